@@ -105,11 +105,11 @@ def _lot_speed(docs: Path) -> None:
     write_speed(docs)
 
 
-def _lot_strangers(docs: Path) -> None:
+def _lot_unrelated(docs: Path) -> None:
     """What a run of 2.5 h can show of a foreign unit in a lot."""
-    from .lot_learning import write_strangers
+    from .lot_learning import write_unrelated
 
-    write_strangers(docs)
+    write_unrelated(docs)
 
 
 def _growth(docs: Path) -> None:
@@ -129,7 +129,7 @@ _ALONE = {
     "fleet": _fleet,
     "lot": _lot,
     "lot-speed": _lot_speed,
-    "lot-strangers": _lot_strangers,
+    "lot-unrelated": _lot_unrelated,
 }
 
 

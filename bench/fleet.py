@@ -161,7 +161,7 @@ def planted_lots(draws: int, seed: int) -> dict[str, Any]:
             lot.write(folder / "data")
             (folder / "data" / "fleet.toml").write_text(_MANIFEST)
             entries = run_fleet(load_manifest(folder / "data" / "fleet.toml"), folder / "out", jobs=_LOT_JOBS)
-            found = {reason.name: reason for reason in summary_of(entries).apart}
+            found = {reason.name: reason for reason in summary_of(entries).reasons}
         concerned = set().union(*lot.planted.values())
         for fault, names in lot.planted.items():
             missed = {

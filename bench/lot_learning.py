@@ -3,7 +3,7 @@
 Strangers: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
 lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
-knows from what distribution strangers are drawn (the likelihood ratio of that against the lot's; the distribution is
+knows from what distribution unrelated are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the foreign units of all other draws), and one that knows each such unit's map.
 
 Cost: the units are simulated from physics, each for itself: copies of a few with noise of their own would be as many
@@ -34,13 +34,13 @@ from numpy.typing import NDArray
 from .lot_peers import best_power, seen
 from .lot_prior import CASES, learnt, ordered, programmes, recordings_of, write_page
 
-__all__ = ["ratio_test", "write_speed", "write_strangers"]
+__all__ = ["ratio_test", "write_speed", "write_unrelated"]
 
 Floats = NDArray[np.float64]
 
 _DRAWS = 4
 _TAUGHT = 60
-_TOLD = 8  # directions of which 2.5 h tell anything; in the next one signal is 1 % of noise
+_REPORTED = 8  # directions of which 2.5 h tell anything; in the next one signal is 1 % of noise
 _SIMULATED = 200_000  # units of the lot, for the quantile of 1 %
 
 
@@ -58,8 +58,8 @@ def drawn(seed: int) -> Draw:
     """One lot."""
     case = CASES[0]
     units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
-    own = [u for u in units if u.lot and not u.lot.stranger]
-    strange = [u for u in units if u.lot and u.lot.stranger]
+    own = [u for u in units if u.lot and not u.lot.unrelated]
+    strange = [u for u in units if u.lot and u.lot.unrelated]
     taught = [
         unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(own[:_TAUGHT], exam=False)
     ]
@@ -75,7 +75,7 @@ def _held(units: list[SimulatedGyro]) -> list[tuple[UnitMeans, UnitMeans]]:
 def ratio_test(
     prior: LotPrior, own: list[UnitMeans], strange: list[UnitMeans], known: list[UnitMeans]
 ) -> Any:
-    """Shares of own units and of strangers refused by the likelihood ratio of the strangers' distribution to the lot's.
+    """Shares of own units and of unrelated refused by the likelihood ratio of the unrelated' distribution to the lot's.
 
     Args:
         prior: The lot; of clusters the first.
@@ -86,14 +86,14 @@ def ratio_test(
     short = [_sums(prior, units) for units in (own, strange)]
     factor = np.linalg.cholesky(covariance)
     ratio, vectors = np.linalg.eigh(factor.T @ short[1].precision.mean(axis=0) @ factor)
-    ratio, vectors = ratio[-_TOLD:], vectors[:, -_TOLD:]
+    ratio, vectors = ratio[-_REPORTED:], vectors[:, -_REPORTED:]
     scored = [_scores(sums, mean, vectors.T @ factor.T) / np.sqrt(ratio * (1.0 + ratio)) for sums in short]
     rng = np.random.default_rng(1)
     maps = np.linalg.solve(factor, (_maps(prior, known) - mean).T).T @ vectors
     noise = rng.standard_normal(maps.shape)
     others = maps * np.sqrt(ratio / (1.0 + ratio)) + noise / np.sqrt(1.0 + ratio)
     center, inverse = others.mean(axis=0), np.linalg.inv(np.cov(others.T))
-    of_lot = _ratio(rng.standard_normal((_SIMULATED, _TOLD)), center, inverse)
+    of_lot = _ratio(rng.standard_normal((_SIMULATED, _REPORTED)), center, inverse)
     limit = np.quantile(of_lot, 1.0 - FALSE_ALARM)
     return [float(np.mean(_ratio(scores, center, inverse) > limit)) for scores in scored]
 
@@ -127,24 +127,24 @@ def figures(draw: Draw, others: list[Draw]) -> dict[str, Any]:
         for units in (draw.own, draw.strange)
     ]
     known = [whole for other in others if other.seed != draw.seed for _, whole in other.strange]
-    told = ratio_test(draw.prior, [s for s, _ in draw.own], [s for s, _ in draw.strange], known)
+    reported = ratio_test(draw.prior, [s for s, _ in draw.own], [s for s, _ in draw.strange], known)
     powers = [best_power(draw.prior, short, whole) for short, whole in draw.strange]
     return {
         "seed": draw.seed,
         "accused": refused[0],
         "refused": refused[1],
-        "ratio_accused": told[0],
-        "ratio_refused": told[1],
+        "ratio_accused": reported[0],
+        "ratio_refused": reported[1],
         "map_refused": float(np.mean(powers)),
     }
 
 
-def write_strangers(docs: Path) -> None:
+def write_unrelated(docs: Path) -> None:
     """Of lots that are drawn now."""
     seeds = [secrets.randbelow(9000) + 1000 for _ in range(_DRAWS)]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         draws = pool.map(drawn, seeds, chunksize=1)
-    write_page(docs, {"strangers": [figures(draw, draws) for draw in draws]})
+    write_page(docs, {"unrelated": [figures(draw, draws) for draw in draws]})
 
 
 _UNITS = (50, 100, 200, 400)

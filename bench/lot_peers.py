@@ -162,8 +162,8 @@ def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:
     powers = []
     for mean, covariance in zip(prior.means, prior.covariances, strict=True):
         away = known.mean - mean
-        told = precision - precision @ np.linalg.inv(np.linalg.inv(covariance) + precision) @ precision
-        distance = float(np.sqrt(max(away @ told @ away, 0.0)))
+        reported = precision - precision @ np.linalg.inv(np.linalg.inv(covariance) + precision) @ precision
+        distance = float(np.sqrt(max(away @ reported @ away, 0.0)))
         powers.append(float(norm.sf(norm.isf(FALSE_ALARM) - distance)))
     return min(powers)
 
@@ -191,12 +191,12 @@ def recalibrated(units: Sequence[tuple[TrainingData, TrainingData]]) -> dict[str
             moved = UnitMeans(
                 run.temperature_c, run.slope_c_per_min, run.bias_dph + change, run.count, run.sigma_dph
             )
-            told = held(prior, moved).change
-            right = told is not None and told.kind == kind
+            reported = held(prior, moved).change
+            right = reported is not None and reported.kind == kind
             if right and kind == "local":
-                right = told.temperature_c[0] - 10.0 <= 20.0 <= told.temperature_c[1] + 10.0
+                right = reported.temperature_c[0] - 10.0 <= 20.0 <= reported.temperature_c[1] + 10.0
             row = found["named"].setdefault(kind, {"seen": [], "right": []})
-            row["seen"].append(told is not None)
+            row["seen"].append(reported is not None)
             row["right"].append(right)
     return found
 

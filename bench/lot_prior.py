@@ -67,11 +67,11 @@ class Case:
     name: str
     family: float
     clusters: int = 1
-    strangers: int = 0
+    unrelated: int = 0
 
 
 CASES = (
-    Case("units differ by 25 %", 0.93, strangers=_UNSEEN),
+    Case("units differ by 25 %", 0.93, unrelated=_UNSEEN),
     Case("units differ by 50 %", 0.73),
     Case("nothing shared", 0.0),
     Case("two clusters", 0.93, clusters=2),
@@ -109,8 +109,8 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     """All figures of one case."""
     started = time.process_time()
     units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
-    own = [u for u in units if u.lot and not u.lot.stranger]
-    strange = [u for u in units if u.lot and u.lot.stranger]
+    own = [u for u in units if u.lot and not u.lot.unrelated]
+    strange = [u for u in units if u.lot and u.lot.unrelated]
     taught = [
         unit_means(cleaned(data), scaling_of(data), None)[0]
         for data, _ in recordings_of(own[:_UNITS], exam=False)
@@ -140,19 +140,19 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     return {
         "case": case.name,
         "family": case.family,
-        "told": lot.told,
+        "text": lot.text,
         "learnt_s": learnt_s,
         "units": rows,
-        "strangers_refused": {name: float(np.mean(r)) for name, r in refused.items() if r},
+        "unrelated_refused": {name: float(np.mean(r)) for name, r in refused.items() if r},
         "best_power": float(np.mean(powers)) if powers else None,
-        "recalibration": recalibrated(checks) if case.strangers else None,
+        "recalibration": recalibrated(checks) if case.unrelated else None,
         "cpu_s": time.process_time() - started,
     }
 
 
 def ordered(case: Case) -> LotOrder:
     """The lot of a case."""
-    return LotOrder(_UNITS + _UNSEEN + case.strangers, case.family, case.clusters, case.strangers)
+    return LotOrder(_UNITS + _UNSEEN + case.unrelated, case.family, case.clusters, case.unrelated)
 
 
 def learnt(units: list[UnitMeans]) -> LotPrior:
@@ -268,11 +268,11 @@ _HEAD = " ".join(
 )
 _STRANGERS = " ".join(
     (
-        "60 units teach a lot (family 0.93); 40 others of it and 40 strangers, gyros whose physical parameters share nothing",
+        "60 units teach a lot (family 0.93); 40 others of it and 40 unrelated, gyros whose physical parameters share nothing",
         "with the lot but the scenario, are held against it by one run of 2.5 h, 1 % false alarms. Beside the test that is",
-        "built stand two that cannot be: the likelihood ratio of the distribution that strangers are drawn from (known from",
+        "built stand two that cannot be: the likelihood ratio of the distribution that unrelated are drawn from (known from",
         "the whole calibrations of those of all other draws) to the lot's, and the most powerful test of a map that is known",
-        "beforehand. What these miss, the run does not show: the stranger's map lies within the lot's spread where the",
+        "beforehand. What these miss, the run does not show: the unrelated unit's map lies within the lot's spread where the",
         "run has been.",
     )
 )
@@ -283,8 +283,8 @@ def quoted(case: dict[str, Any]) -> dict[str, Any]:
     units = case["units"]
     short = [u["2.5 h"] for u in units]
     longer = [name for name in ("8 h", "six runs") if any(name in u for u in units)]
-    told = {name: case[name] for name in ("case", "family", "told", "learnt_s", "strangers_refused")}
-    return told | {
+    reported = {name: case[name] for name in ("case", "family", "text", "learnt_s", "unrelated_refused")}
+    return reported | {
         "best_power": case.get("best_power"),
         "ways": {
             way: found for way in _WAYS if (found := _spread([row[way] for row in short if way in row]))
@@ -313,7 +313,7 @@ def _checked(checked: dict[str, Any]) -> dict[str, Any]:
     p = np.array(checked["unchanged"])
     return {
         "units": len(p),
-        "told": [float(np.mean(p < level)) for level in (0.01, 0.05)],
+        "reported": [float(np.mean(p < level)) for level in (0.01, 0.05)],
         "named": {
             kind: [float(np.mean(row[key])) for key in ("seen", "right")]
             for kind, row in checked["named"].items()
@@ -335,7 +335,7 @@ def _case(case: dict[str, Any]) -> str:
     lines = [
         f"#### {case['case'][0].upper()}{case['case'][1:]} (family {case['family']:g})",
         "",
-        f"`gyrotc lot`: {case['told']}. {case['learnt_s']:.1f} s of processor time.",
+        f"`gyrotc lot`: {case['reported']}. {case['learnt_s']:.1f} s of processor time.",
         "",
         "| way | RMS ÷ floor | error |",
         "| --- | --- | --- |",
@@ -346,11 +346,11 @@ def _case(case: dict[str, Any]) -> str:
         f"{case['refused']:.1%}.",
         f"Longer programmes, {units} units, medians of RMS ÷ floor (error): {'; '.join(longer)}.",
     ]
-    if refused := case["strangers_refused"]:
-        told = ", ".join(f"{share:.1%} from {name}" for name, share in refused.items())
+    if refused := case["unrelated_refused"]:
+        reported = ", ".join(f"{share:.1%} from {name}" for name, share in refused.items())
         most = case["best_power"]
-        beside = f" A test that knew each stranger's map would refuse {most:.1%} from 2.5 h." if most else ""
-        lines.append(f"Strangers (another lot's units) refused: {told}.{beside}")
+        beside = f" A test that knew each unrelated unit's map would refuse {most:.1%} from 2.5 h." if most else ""
+        lines.append(f"Unrelated units (another lot's) refused: {reported}.{beside}")
     if case["recalibration"]:
         lines += ["", _recalibration(case["recalibration"])]
     return "\n".join(lines)
@@ -362,7 +362,7 @@ def _recalibration(checked: dict[str, Any]) -> str:
     )
     return (
         f"Recalibration: a check run of 2.5 h against the model of the five runs before it, {checked['units']} units. "
-        f"Not changed: {checked['told'][0]:.1%} told to have changed at 1 %, {checked['told'][1]:.1%} at 5 %. Planted "
+        f"Not changed: {checked['reported'][0]:.1%} reported to have changed at 1 %, {checked['reported'][1]:.1%} at 5 %. Planted "
         f"changes (offset of one sigma of 50-s means, slope of two over 100 C, a bump of three with 6 C): {named}."
     )
 
@@ -392,11 +392,11 @@ def _speed(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _strangers(rows: Sequence[dict[str, Any]]) -> str:
+def _unrelated(rows: Sequence[dict[str, Any]]) -> str:
     """Of each draw, and over all: a unit is a trial, draws differ in how many of them agree with the lot."""
     names = ("refused", "ratio_refused", "map_refused", "accused", "ratio_accused")
     lines = [
-        "### What a run of 2.5 h can show of a stranger (`python -m bench docs --only lot-strangers`)",
+        "### What a run of 2.5 h can show of an unrelated unit (`python -m bench docs --only lot-unrelated`)",
         "",
         _STRANGERS,
         "",
@@ -408,8 +408,8 @@ def _strangers(rows: Sequence[dict[str, Any]]) -> str:
     lines += [f"| {row['seed']} | " + " | ".join(f"{row[n]:.1%}" for n in names) + " |" for row in rows]
     values = np.array([[row[n] for n in names] for row in rows])
     error = values.std(axis=0, ddof=1) / np.sqrt(len(rows))
-    told = [f"{mean:.1%} ± {off:.1%}" for mean, off in zip(values.mean(axis=0), error, strict=True)]
-    return "\n".join([*lines, "| mean ± one standard error | " + " | ".join(told) + " |"]) + "\n\n"
+    reported = [f"{mean:.1%} ± {off:.1%}" for mean, off in zip(values.mean(axis=0), error, strict=True)]
+    return "\n".join([*lines, "| mean ± one standard error | " + " | ".join(reported) + " |"]) + "\n\n"
 
 
 def section(record: dict[str, Any]) -> str:
@@ -418,8 +418,8 @@ def section(record: dict[str, Any]) -> str:
     parts = [_HEAD, _coverage(draws)]
     for seed, cases in draws.items():
         parts.append(f"### Seed {seed}\n\n" + "\n\n".join(_case(case) for case in cases) + "\n")
-    strangers, speed = record.get("strangers"), record.get("speed")
-    return "\n".join(parts) + (_strangers(strangers) if strangers else "") + (_speed(speed) if speed else "")
+    unrelated, speed = record.get("unrelated"), record.get("speed")
+    return "\n".join(parts) + (_unrelated(unrelated) if unrelated else "") + (_speed(speed) if speed else "")
 
 
 def write_page(docs: Path, part: dict[str, Any]) -> None:

@@ -154,10 +154,10 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
     sources = ["program.c", *(("gtc.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
     command = [*_COMPILER, *CORES[core], level, *fitted, *sources, *_LINKED, "-o", "program.elf"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    told = subprocess.run(
+    reported = subprocess.run(
         ["arm-none-eabi-size", "program.elf"], cwd=folder, check=True, capture_output=True, text=True
     ).stdout.splitlines()[1]
-    text_bytes, data_bytes, zero_bytes = (int(word) for word in told.split()[:3])
+    text_bytes, data_bytes, zero_bytes = (int(word) for word in reported.split()[:3])
     return text_bytes + data_bytes, data_bytes + zero_bytes
 
 

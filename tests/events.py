@@ -30,8 +30,8 @@ from .blind.noise import Noise, draw
 FLOOR_DPH = 7e-4  # of 100-s means
 RUNS, HOURS, STILL_C_PER_MIN = 4, 5.0, 0.1
 ROWS_S, RESOLUTIONS_C = (1, 10, 60), (0.001, 0.0625, 0.1)
-NEAR_S = 900.0  # of an event that is told, from the planted one
-DOUBTS = ("sign_reversed", "axes_exchanged", "runs_contradict", "thermometer_changed", "rate_outliers")
+NEAR_S = 900.0  # of an event that is reported, from the planted one
+WARNINGS = ("sign_reversed", "axes_exchanged", "runs_contradict", "thermometer_changed", "rate_outliers")
 
 
 @dataclass
@@ -246,7 +246,7 @@ def write(runs: list[Recording], row_s: int, averaged: bool, folder: Path) -> No
 
 @dataclass(frozen=True)
 class Score:
-    """Of one set: whether something was told at the event, by the right name, with true limits; what else was told."""
+    """Of one set: what was reported at the event: any, the right name, true limits; what else."""
 
     found: bool
     named: bool
@@ -254,7 +254,7 @@ class Score:
     other: tuple[str, ...]
 
 
-def judge(folder: Path, planted: Planted, doubts: bool) -> Score:
+def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
     """What gyrotc tells of a folder, beside what was planted."""
     near, other = [], []
     for event in found_events(load(folder, trust_units=True)):
@@ -264,10 +264,10 @@ def judge(folder: Path, planted: Planted, doubts: bool) -> Score:
             here = low - NEAR_S <= planted.at_s <= high + NEAR_S
         (near if here else other).append((event.id, event.time_s))
     ids = [id for id, _ in near]
-    if doubts:
+    if warnings:
         result = check(folder)
         ids += ["unit" for p in result.problems if f"{planted.run}.parquet" in p.where]
-        ids += [d.id for d in result.doubts if d.id in DOUBTS and f"{planted.run}.parquet" in d.where]
+        ids += [d.id for d in result.warnings if d.id in WARNINGS and f"{planted.run}.parquet" in d.where]
     right = [time for id, time in near if id in planted.names]
     at = planted.at_s
     holds = at is not None and any(low <= at <= high for _, low, high in right)
@@ -283,18 +283,20 @@ def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
         runs, planted = draw_set(kind, resolution, rng)
         with tempfile.TemporaryDirectory(prefix="events-") as name:
             write(runs, row_s, bool(rng.integers(2)), Path(name))
-            yield judge(Path(name), planted, doubts=planted.at_s is None or kind in ("burst", "lost contact"))
+            yield judge(
+                Path(name), planted, warnings=planted.at_s is None or kind in ("burst", "lost contact")
+            )
 
 
 def line(job: tuple[str, int, int]) -> str:
     """A row of the table, for a kind, a seed and so many sets."""
     kind, of = job[0], list(scores(*job))
-    told = sorted({id for s in of for id in s.other})
+    reported = sorted({id for s in of for id in s.other})
     false = sum(bool(s.other) for s in of)
     by_row = "/".join(str(sum(s.named for s in of[k::3])) for k in range(3))
     return (
         f"{kind:22} {len(of):4} {sum(s.found for s in of):6} {sum(s.named for s in of):6}  {by_row:10}"
-        f"{sum(s.holds for s in of):6} {false:6}  {', '.join(told)}"
+        f"{sum(s.holds for s in of):6} {false:6}  {', '.join(reported)}"
     )
 
 

@@ -14,7 +14,7 @@ from browser import browser  # noqa: E402
 from lot import Lot  # noqa: E402
 
 _PHONE = 390  # points: the narrowest phones that are common
-_PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_apart", "outliers")
+_PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_offset", "outliers")
 
 
 def main(work: Path, docs: Path = ROOT / "docs") -> None:

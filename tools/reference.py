@@ -20,7 +20,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Results whose objects are reported in the tables of another result on the page.
-TOLD_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
+REPORTED_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
 #: Where FORMAT.md has the table of a result's fields.
 PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
 #: Modules that may be imported by users' programs; what stands in their `__all__`.
@@ -143,7 +143,7 @@ def format_page() -> str:
     from gyrotc.cli.schemas import KINDS, tables
 
     def table(place: re.Match[str]) -> str:
-        other = TOLD_BY.get(place[1])
+        other = REPORTED_BY.get(place[1])
         return tables(KINDS[place[1]], [KINDS[other]] if other else []).rstrip()
 
     return PLACE.sub(table, (ROOT / "docs" / "FORMAT.md").read_text("utf-8"))

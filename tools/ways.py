@@ -93,9 +93,9 @@ def weights(work: Path, wheel: Path) -> Iterator[dict[str, Any]]:
     for extra in ("", *EXTRAS):
         folder = work / f"weight-{extra}"
         what = f"{wheel}[{extra}]" if extra else str(wheel)
-        told = _ran([sys.executable, "-m", "pip", "install", "-q", "--target", str(folder), what], work)
-        if told:
-            yield {"extra": extra or "plain", "mb": 0.0, "packages": 0, "result": told}
+        reported = _ran([sys.executable, "-m", "pip", "install", "-q", "--target", str(folder), what], work)
+        if reported:
+            yield {"extra": extra or "plain", "mb": 0.0, "packages": 0, "result": reported}
             continue
         have = {path.name: path for path in folder.glob("*.dist-info")}
         new = {name: path for name, path in have.items() if name not in plain}

@@ -30,15 +30,15 @@ that was started stands here, with what was done of it. Limits: 95 %, binomial (
 
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
     """Writes the run's file and the section of the page; everything else on the page stays."""
-    told = {"table": table(rows), "named": _confusion(rows)}
-    write_section(docs, "blind", head | {"done": len(rows)}, told, section)
+    reported = {"table": table(rows), "named": _confusion(rows)}
+    write_section(docs, "blind", head | {"done": len(rows)}, reported, section)
 
 
 def write_section(
     docs: Path,
     name: str,
     head: dict[str, Any],
-    told: dict[str, Any],
+    reported: dict[str, Any],
     section: Callable[[dict[str, Any]], str],
 ) -> None:
     """Keeps the run, and makes the section of docs/results.md of all runs of that name.
@@ -47,10 +47,10 @@ def write_section(
         docs: The folder docs.
         name: Of the record, and of the marks that hold the section on the page.
         head: Seed, records, how many of them are done, code, commit, start of the run.
-        told: What is told of it.
+        reported: What is reported of it.
         section: Its text, from all runs, the newest first.
     """
-    result = {**head, "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()), **told}
+    result = {**head, "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()), **reported}
     before = (recorded(docs, name) or {"runs": []})["runs"]
     runs = [result, *(run for run in before if run["seed"] != head["seed"])]
     runs.sort(key=lambda run: str(run["started"]), reverse=True)
@@ -81,10 +81,10 @@ def run_lines(run: dict[str, Any], world: str = "") -> list[str]:
     ]
 
 
-def answer_lines(answers: dict[str, dict[str, int]], told: str) -> list[str]:
+def answer_lines(answers: dict[str, dict[str, int]], reported: str) -> list[str]:
     """The table of what was answered how often, for everything that was hidden."""
     return [
-        f"| hidden | recordings | {told} |",
+        f"| hidden | recordings | {reported} |",
         "| --- | --- | --- |",
         *(
             f"| {name} | {sum(found.values())} | {', '.join(f'{k} {v}' for k, v in found.items())} |"

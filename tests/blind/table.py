@@ -22,7 +22,7 @@ def _k(row: Row) -> float:
 
 
 def _one(low: float, high: float = 1e9, *, offset: bool = False) -> Callable[[Row], bool]:
-    """Recordings with one hidden cause and k in a range, run offsets apart."""
+    """Recordings with one hidden cause and k in a range, run offsets excepted."""
     return lambda r: (
         r["stratum"] == "one" and low <= _k(r) < high and (r["truth"] == ["turn_on_offset"]) == offset
     )
@@ -204,10 +204,10 @@ def _sets(rows: Sequence[Row]) -> list[dict[str, Any]]:
     named = [r for r in rows if r["stratum"] == "one" and r["named"]]
     sizes = [1 + max(len(e) for e in r["equivalent"]) for r in named if _k(r) >= 1.7]
     mean = float(np.mean(sizes)) if sizes else 0.0
-    told = [r["truth"][0] == r["named"][0] for r in named if r["design"] == "separating" and _told(r)]
+    reported = [r["truth"][0] == r["named"][0] for r in named if r["design"] == "separating" and _reported(r)]
     return [
         *(_value("mean size of the set, k ≥ 1.7", "≤ 2", mean, mean <= 2, len(sizes)) if sizes else []),
-        *proportion("member right where printed d_sep ≤ d (separating)", "≥ 90 %", told, 0.9, "min"),
+        *proportion("member right where printed d_sep ≤ d (separating)", "≥ 90 %", reported, 0.9, "min"),
     ]
 
 
@@ -237,7 +237,7 @@ def reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return out
 
 
-def _told(row: Row) -> bool:
+def _reported(row: Row) -> bool:
     d = 6.0 * _k(row)
     return all(v <= d for s in row["separable"] for v in s.values())
 

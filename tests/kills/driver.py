@@ -62,11 +62,11 @@ class Blow:
 
 @dataclass(frozen=True)
 class End:
-    """How a job ended: its exit status (-n: by signal n), its calls that change files, what it told."""
+    """How a job ended: its exit status (-n: by signal n), its calls that change files, what it reported."""
 
     status: int
     calls: int
-    told: str
+    reported: str
 
 
 def adopt_orphans() -> None:
@@ -90,11 +90,11 @@ def run(job: Job, below: Path, blow: Blow = Blow()) -> End:
         timer.cancel()
         timer.join()
     _wait_for_orphans()
-    told = os.pread(errors, 2**20, 0).decode(errors="replace")
+    reported = os.pread(errors, 2**20, 0).decode(errors="replace")
     calls = int.from_bytes(os.pread(counter, 8, 0), "little")
     os.close(errors)
     os.close(counter)
-    return End(os.waitstatus_to_exitcode(status), calls, told)
+    return End(os.waitstatus_to_exitcode(status), calls, reported)
 
 
 def _end(pid: int, number: int) -> None:
@@ -158,5 +158,5 @@ def seconds(job: Job, below: Path) -> float:
     begun = time.monotonic()
     end = run(job, below)
     if end.status != 0:
-        raise RuntimeError(f"the job failed by itself: {end.told}")
+        raise RuntimeError(f"the job failed by itself: {end.reported}")
     return time.monotonic() - begun

@@ -63,7 +63,7 @@ def _calls_of_a_unit(root: Path, manifest: Path) -> int:
     end = run(lambda: _refuse_failed(do_unit(task)), root)
     shutil.rmtree(root / "alone")
     if end.status != 0:
-        raise SystemExit(f"a unit fails by itself: {end.told}")
+        raise SystemExit(f"a unit fails by itself: {end.reported}")
     return end.calls
 
 
@@ -96,8 +96,10 @@ def _untrue(unit: Path, status: str, figures: Mapping[str, str]) -> list[str]:
     if faults(unit):
         return [f"{unit.name} is {status}, and {faults(unit)}"]
     entry = json.loads((unit / "entry.json").read_text())
-    told = {name: f"{entry[name]:.4g}" if name.endswith("_dph") else str(entry[name]) for name in figures}
-    return [] if told == figures and figures else [f"{unit.name}: {figures}, and its result says {told}"]
+    reported = {name: f"{entry[name]:.4g}" if name.endswith("_dph") else str(entry[name]) for name in figures}
+    return (
+        [] if reported == figures and figures else [f"{unit.name}: {figures}, and its result says {reported}"]
+    )
 
 
 def _of_json(path: Path) -> Iterator[tuple[str, Row]]:

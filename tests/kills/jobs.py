@@ -140,7 +140,7 @@ profiles = ["ramp", "ramp"]
 
 def commands(root: Path) -> list[Case]:
     """Commands on small recordings; `root` gets what they need."""
-    scenario, data, out, apart = root / "short.toml", root / "data", root / "out", root / "apart"
+    scenario, data, out, other = root / "short.toml", root / "data", root / "out", root / "other"
     scenario.write_text(SCENARIO, encoding="utf-8")
     keys = [_key(root / f"key-{k}.pem") for k in range(2)]
     subprocess.run(
@@ -156,10 +156,10 @@ def commands(root: Path) -> list[Case]:
         case("build", lambda v: [data, "--out", out, "--numeric", "f32", "--seed", v], out),
         case("fit", lambda v: [data, "--out", root / "fitted", "--seed", v, "--json", root / "fit.json"],
              root / "fitted", root / "fit.json"),
-        case("emit", lambda v: [out / "model.json", "--out", apart, "--numeric", numerics[v % 2]], apart),
-        case("verify", lambda v: [apart, "--target", targets[v % 2]], apart),
-        case("evaluate", lambda v: [apart, data, "--trace", apart / "trace", "--average-s", 100 + v], apart),
-        case("sign", lambda v: [apart, "--key", keys[v % 2]], apart),
+        case("emit", lambda v: [out / "model.json", "--out", other, "--numeric", numerics[v % 2]], other),
+        case("verify", lambda v: [other, "--target", targets[v % 2]], other),
+        case("evaluate", lambda v: [other, data, "--trace", other / "trace", "--average-s", 100 + v], other),
+        case("sign", lambda v: [other, "--key", keys[v % 2]], other),
         case("report", lambda _: [out], out),
         case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
         case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v, "--fresh"], root / "diagnosed"),

@@ -49,19 +49,21 @@ class Campaign:
         self.counts[blow.action] += 1
         self._look(case, where)
         found = case.contents()
-        if "Traceback" in end.told:
-            self._tell(where, f"a traceback: {end.told[-600:]}")
+        if "Traceback" in end.reported:
+            self._tell(where, f"a traceback: {end.reported[-600:]}")
         if blow.action in ("TERM", "INT") and not blow.workers:
-            if end.status not in (0, -ACTIONS[blow.action]) or (end.status and end.told):
-                self._tell(where, f"ends with {end.status}: {end.told[-300:]}")
+            if end.status not in (0, -ACTIONS[blow.action]) or (end.status and end.reported):
+                self._tell(where, f"ends with {end.status}: {end.reported[-300:]}")
             if self._left():
                 self._tell(where, f"left {self._left()} itself")
         again = run(case.job(version), self.root)
         if again.status != 0:
-            self._tell(where, f"the next job ends with {again.status}: {again.told}")
+            self._tell(where, f"the next job ends with {again.status}: {again.reported}")
         self._look(case, f"{where}, then again")
-        told = (1, 2) if case.name == "check" else (1,)  # a file that cannot be read is a result of its own
-        if end.status not in told:
+        reported = (
+            (1, 2) if case.name == "check" else (1,)
+        )  # a file that cannot be read is a result of its own
+        if end.status not in reported:
             for result, *contents in zip(case.results, before, found, case.contents(), strict=True):
                 self._compare(where, result, *contents)
         if left := self._left() | {
@@ -102,7 +104,7 @@ class Campaign:
             case.prepare(version)
             end = run(case.job(version), self.root)
             if end.status != 0:
-                raise SystemExit(f"{case.name} fails by itself: {end.told}")
+                raise SystemExit(f"{case.name} fails by itself: {end.reported}")
             seen.append(case.contents())
         for result, one, other in zip(case.results, *seen, strict=True):
             self._changing.setdefault(result, set()).update(n for n in one if one[n] != other.get(n))

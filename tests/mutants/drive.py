@@ -2,7 +2,7 @@
 
     python drive.py MODEL OUT CHECK_TABLE
 
-One line of JSON: `seen_by` (`generator`, `check_table`, `verify` or null) and `told`, the first words of it.
+One line of JSON: `seen_by` (`generator`, `check_table`, `verify` or null) and `reported`, the first words of it.
 """
 
 from __future__ import annotations
@@ -54,5 +54,5 @@ def objection(model_path: Path, out: Path, check_table: Path) -> tuple[str | Non
 
 
 if __name__ == "__main__":
-    seen_by, told = objection(*(Path(word) for word in sys.argv[1:4]))
-    print(json.dumps({"seen_by": seen_by, "told": told}))
+    seen_by, reported = objection(*(Path(word) for word in sys.argv[1:4]))
+    print(json.dumps({"seen_by": seen_by, "reported": reported}))

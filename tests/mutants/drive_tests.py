@@ -2,7 +2,7 @@
 
     python drive_tests.py TEST...
 
-One line of JSON at the end: `seen_by` (`test` or null), `told`: the test and the last line of what it says.
+One line of JSON at the end: `seen_by` (`test` or null), `reported`: the test and the last line of what it says.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ class _First:
     """Which test failed first, or did not even begin."""
 
     def __init__(self) -> None:
-        self.told = ""
+        self.reported = ""
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.failed and not self.told:
-            self.told = f"{report.nodeid.rpartition('/')[2]}"
+        if report.failed and not self.reported:
+            self.reported = f"{report.nodeid.rpartition('/')[2]}"
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        if report.failed and not self.told:
-            self.told = f"{report.nodeid.rpartition('/')[2]} cannot be collected"
+        if report.failed and not self.reported:
+            self.reported = f"{report.nodeid.rpartition('/')[2]} cannot be collected"
 
 
 if __name__ == "__main__":
@@ -46,6 +46,6 @@ if __name__ == "__main__":
     status = pytest.main(
         ["-q", "-x", "-p", "no:cacheprovider", "--rootdir", str(FOLDER.parents[1]), *tests], [first]
     )
-    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) and not first.told:
+    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) and not first.reported:
         raise RuntimeError(f"pytest ended with {status}")
-    print(json.dumps({"seen_by": "test" if first.told else None, "told": first.told}))
+    print(json.dumps({"seen_by": "test" if first.reported else None, "reported": first.reported}))

@@ -40,7 +40,7 @@ def section(result: dict[str, Any]) -> str:
             f"`{m['file']}`",
             m["model"],
             m["seen_by"] or "**nobody**",
-            _cell(m["told"]),
+            _cell(m["reported"]),
         ]
         for m in mutants
     ]
@@ -48,7 +48,7 @@ def section(result: dict[str, Any]) -> str:
         [
             _HEAD,
             table(["package", "faults ", *(f"{who} " for who in _WHO), "nobody ", "seen "], counts),
-            table(["fault", "in", "model", "seen by", "told"], rows),
+            table(["fault", "in", "model", "seen by", "reported"], rows),
         ]
     )
 
@@ -86,7 +86,7 @@ def quoted(result: dict[str, Any]) -> dict[str, Any]:
     return {
         "mutants": [
             {name: m[name] for name in names if name in m}
-            | {"told": _short(m["told"] or m.get("survives", ""))}
+            | {"reported": _short(m["reported"] or m.get("survives", ""))}
             for m in result["mutants"]
         ]
     }

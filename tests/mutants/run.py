@@ -113,7 +113,7 @@ class House:
             timeout=600,
         )
         if done.returncode != 0:
-            return {"seen_by": "generator", "told": done.stderr.strip().splitlines()[-1]}
+            return {"seen_by": "generator", "reported": done.stderr.strip().splitlines()[-1]}
         found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
         return found
 
@@ -132,14 +132,14 @@ def tried(names: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
             if found["seen_by"] is not None:
                 what = model or ", ".join(tests)
                 raise ValueError(
-                    f"{found['seen_by']} objects to the sound generator's {what}: {found['told']}"
+                    f"{found['seen_by']} objects to the sound generator's {what}: {found['reported']}"
                 )
         for fault in chosen:
             yield asdict(fault) | house.objection(fault.model, fault, fault.tests)
 
 
 def main() -> int:
-    """Tries all faults, or those that are named, and writes the page if told where."""
+    """Tries all faults, or those that are named, and writes the page if reported where."""
     parser = argparse.ArgumentParser(prog="tests.mutants.run", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--docs", type=Path, help="folder whose results.md gets the table")
@@ -147,7 +147,7 @@ def main() -> int:
     results = []
     for result in tried(arguments.names):
         results.append(result)
-        print(f"{result['seen_by'] or 'NOBODY':<12} {result['name']}: {result['told'][:100]}", flush=True)
+        print(f"{result['seen_by'] or 'NOBODY':<12} {result['name']}: {result['reported'][:100]}", flush=True)
     unseen = [result["name"] for result in results if result["seen_by"] is None and not result["survives"]]
     if arguments.docs:
         write_page(arguments.docs, results, [fault.name for fault in faults()])

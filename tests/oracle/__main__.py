@@ -116,9 +116,9 @@ def _compared(name: str, earlier: Parts, found: Parts, differ: Callable[[Any, An
             if part not in one or part not in other:
                 lines.append(f"{part}: only in {'the reference' if part in one else 'this run'}")
                 continue
-            told = list(differ(one[part], other[part]))
-            lines += [f"{part}  {line}" for line in told[:_EACH]]
-            lines += [f"{part}  and {len(told) - _EACH} more"] * (len(told) > _EACH)
+            reported = list(differ(one[part], other[part]))
+            lines += [f"{part}  {line}" for line in reported[:_EACH]]
+            lines += [f"{part}  and {len(reported) - _EACH} more"] * (len(reported) > _EACH)
         if lines:
             wrong += 1
             print(f"DIFFERS  {name}/{step}", *lines, sep="\n    ")

@@ -23,7 +23,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "py"))
 
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, truth
-from logger_strangers import STRANGERS
+from logger_foreign import FOREIGN
 from recordings import ACCEPTED, REFUSED, Columns, columns, write_csv
 
 __all__ = ["SETS", "RecordingSet", "run_set"]
@@ -245,7 +245,7 @@ def _lot(s: Steps) -> None:
     runs = {"whole": '"slow", "fast", "slow"', "short": '"fast"'}
     s.write(lambda f: [_text(f"{n}.toml", f"{_CYCLES}profiles = [{p}]\n")(f) for n, p in runs.items()])
     made = ("simulate", "lot", "--seed", 5, "--family", 0.95, "--format", "parquet")
-    s.run(*made, "--units", 9, "--strangers", 1, "--base", "whole.toml", "--out", "whole")
+    s.run(*made, "--units", 9, "--unrelated", 1, "--base", "whole.toml", "--out", "whole")
     s.run(*made, "--units", 10, "--base", "short.toml", "--out", "short", name="simulate a new unit")
     s.write(_reversed_unit, name="a unit with its sign reversed")
     s.run("fleet", "whole", "--out", "fleet", "--jobs", 1, "--json", "fleet.json")
@@ -418,7 +418,7 @@ def _axes(s: Steps) -> None:
 def _imported(s: Steps) -> None:
     """A file of each format that needs no further library."""
     seen = truth()
-    for case in (case for case in (*CSV_CASES, *STRANGERS, *BINARY_CASES) if not case.needs):
+    for case in (case for case in (*CSV_CASES, *FOREIGN, *BINARY_CASES) if not case.needs):
         file = Path(_place(case.id)) / case.file
 
         def make(folder: Path, case: Any = case, file: Path = file) -> None:

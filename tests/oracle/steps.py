@@ -51,11 +51,11 @@ class Steps:
         self._note(name or words[0], status=status, out=_lines(out), err=_lines(err))
 
     def write(self, what: Callable[[Path], object], *, name: str = "recordings") -> None:
-        """Files that no command makes; they are compared as well, so that a changed input is told as such."""
+        """Files that no command makes; they are compared as well, so that a changed input is reported as such."""
         what(self.folder)
         self._note(name)
 
-    def _note(self, name: str, **told: Any) -> None:
+    def _note(self, name: str, **reported: Any) -> None:
         if name in self.outcomes:
             raise ValueError(f"two steps are called {name}")
         before, self._seen = self._seen, {}
@@ -66,7 +66,7 @@ class Steps:
             if before.get(where) != self._seen[where]:
                 changed[where] = content_of(path)
         changed |= dict.fromkeys(before.keys() - self._seen.keys(), "removed")
-        self.outcomes[name] = ({"printed": told} if told else {}) | changed
+        self.outcomes[name] = ({"printed": reported} if reported else {}) | changed
 
 
 @contextlib.contextmanager

@@ -16,7 +16,7 @@ Every pair of positions of a fixed-point table: the emitted C against integers t
 against the model in float64, in deg/h. Worst departure: over all inputs that a pair stands for; arithmetic: without
 the rounding of the inputs (most of it is the rounding of the parameters).
 """
-_PRIMITIVES = """Primitives over their arguments, against formulas written apart. The error of a Gaussian times Σ|w| is
+_PRIMITIVES = """Primitives over their arguments, against independent formulas. The error of a Gaussian times Σ|w| is
 what the arithmetic adds to the surface that the rounded parameters make:
 """
 _EVA = """Frama-C Eva over the emitted C (map, mean, slope, every step function, every term): any input, any state that

@@ -66,13 +66,13 @@ class Browser:
             assert byte, "the browser has ended"
             data += byte
         message: dict[str, Any] = json.loads(data)
-        method, told = message.get("method"), message.get("params", {})
+        method, reported = message.get("method"), message.get("params", {})
         if method == "Runtime.exceptionThrown":
-            self.console.append(str(told["exceptionDetails"]))
-        elif method == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-            self.console.append(told["entry"]["text"])
-        elif method == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning", "assert"):
-            self.console.append(str(told["args"]))
+            self.console.append(str(reported["exceptionDetails"]))
+        elif method == "Log.entryAdded" and reported["entry"]["level"] in ("error", "warning"):
+            self.console.append(reported["entry"]["text"])
+        elif method == "Runtime.consoleAPICalled" and reported["type"] in ("error", "warning", "assert"):
+            self.console.append(str(reported["args"]))
         elif method:
             self._events.append(message)
         return message

@@ -173,7 +173,7 @@ def ardupilot(path: Path, t: Truth) -> None:
     _dataflash(path, [(129, "IMU", "QBffffffIIfBBHH", labels)], data)
 
 
-def _bag(writer: Any, store: Any, t: Truth, imu_type: str, apart: bool) -> None:
+def _bag(writer: Any, store: Any, t: Truth, imu_type: str, ros1: bool) -> None:
     imu = writer.add_connection("/imu/data_raw", imu_type, typestore=store)
     kinds = store.types
     warm = writer.add_connection("/imu/temperature", "sensor_msgs/msg/Temperature", typestore=store)
@@ -184,7 +184,7 @@ def _bag(writer: Any, store: Any, t: Truth, imu_type: str, apart: bool) -> None:
         return kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **extra)
 
     vector, quaternion = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Quaternion"]
-    encode = store.serialize_ros1 if apart else store.serialize_cdr
+    encode = store.serialize_ros1 if ros1 else store.serialize_cdr
     for s, r, c in zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True):
         ns = _EPOCH_NS + round(s * 1e9)
         warmth = kinds["sensor_msgs/msg/Temperature"](header=header(ns), temperature=float(c), variance=0.0)

@@ -300,7 +300,7 @@ CSV_CASES = [
         "local stamps with a zone", "local.csv", local_stamps, ("--time-zone", "Europe/Berlin"), started=True
     ),
     Case(
-        "date and time apart, AM/PM, fahrenheit",
+        "date and time in two columns, AM/PM, fahrenheit",
         "us.csv",
         american,
         ("--time-format", "%m/%d/%Y %I:%M:%S %p"),

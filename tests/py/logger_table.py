@@ -8,7 +8,7 @@ from pathlib import Path
 
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, Case
-from logger_strangers import STRANGERS
+from logger_foreign import FOREIGN
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "import.md"
 _MARKS = re.compile(r"(<!-- files -->\n).*?(<!-- /files -->)", re.DOTALL)
@@ -24,7 +24,7 @@ def table() -> str:
 
 def cases() -> list[Case]:
     """Every file, in the order of the table."""
-    return [*CSV_CASES, *STRANGERS, *BINARY_CASES]
+    return [*CSV_CASES, *FOREIGN, *BINARY_CASES]
 
 
 def filled(page: str) -> str:

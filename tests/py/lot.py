@@ -19,7 +19,7 @@ FAULTS = (
     "sign_reversed",
     "axes_exchanged",
     "step",
-    "thermometer_apart",
+    "thermometer_offset",
     "noise",
     "scale",
     "outliers",
@@ -58,8 +58,8 @@ class Lot:
     def plant(self, fault: str, unit: str) -> None:
         """A fault into a unit, which is noted with the results that it concerns."""
         axis = str(self.draw.choice(AXES))
-        told = getattr(self, f"_{fault}")(unit, axis) or {f"{unit}-{axis}"}
-        self.planted.setdefault(fault, set()).update(told)
+        reported = getattr(self, f"_{fault}")(unit, axis) or {f"{unit}-{axis}"}
+        self.planted.setdefault(fault, set()).update(reported)
 
     def _all(self, unit: str, column: str, change: Callable[[Array], Array]) -> None:
         for run in self.runs[unit]:
@@ -88,7 +88,7 @@ class Lot:
         run[f"rate_{axis}_dph"] = run[f"rate_{axis}_dph"] + size * (self.time_s > 3600.0 * hours)
         self.step = (f"run-{number + 1:02d}.csv", 3600.0 * hours)
 
-    def _thermometer_apart(self, unit: str, _: str) -> set[str]:
+    def _thermometer_offset(self, unit: str, _: str) -> set[str]:
         shift = self.draw.choice([-1.0, 1.0]) * self.draw.uniform(2.0, 8.0)
         self._all(unit, "temperature_c", lambda temperature: temperature + shift)
         return {f"{unit}-{a}" for a in AXES}

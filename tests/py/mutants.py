@@ -34,7 +34,7 @@ from mutation import mutated
 from readers import READERS, Reader, make_seeds, seeds_in
 
 SECONDS = 10
-TOLD_EVERY = 500
+REPORTED_EVERY = 500
 WAITING = 60  # on a busy machine; SIGALRM ends the worker
 SHOW = bool(os.environ.get("SHOW"))  # every refusal, too
 MOST_BYTES = 2 * 2**30
@@ -89,7 +89,7 @@ def work(seeds: Path, seed: int, first: int, last: int) -> None:
 
 
 def run(seed: int, count: int, jobs: int, first: int = 0) -> int:
-    """All numbers over `jobs` processes; the number of failures, each told."""
+    """All numbers over `jobs` processes; the number of failures, each reported."""
     with tempfile.TemporaryDirectory(prefix="gyrotc-seeds-") as folder:
         os.environ["XDG_CACHE_HOME"] = folder
         make_seeds(Path(folder))
@@ -139,7 +139,7 @@ def _collected(process: subprocess.Popen[str], counts: Counter[str]) -> int | No
             counts[f"{name} {word}"] += 1
             if word == "failed":
                 print(f"mutant {at} of {name} failed:", flush=True)
-            elif at % TOLD_EVERY == 0:
+            elif at % REPORTED_EVERY == 0:
                 print(f"  {at} ...", file=sys.stderr, flush=True)
     status = process.wait()
     if status == 0:

@@ -14,7 +14,7 @@ _MOST = 4000
 
 
 def odd_samples(seed: int) -> TrainingData:
-    """Samples of 1 to 7 runs: profile, rate of rows, resolution, scale, noise and faults drawn apart."""
+    """Samples of 1 to 7 runs: profile, rate of rows, resolution, scale, noise and faults drawn independently."""
     rng = np.random.default_rng([17, seed])
     runs = int(rng.choice([1, 1, 1, 2, 3, 4, 7]))
     block_s = float(rng.choice([0.001, 0.1, 1.0, 10.0, 10.0, 50.0, 300.0]))

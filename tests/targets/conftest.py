@@ -40,8 +40,8 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         return
     lists = dict(_FOUND.lists)
     if builds := lists.pop("self_test", None):
-        told = {"schema": "gyrotc.self-test/1", "machine": machine(), "tables": TABLES, "builds": builds}
-        write(docs, "self-test", told, self_test_page.section)
+        reported = {"schema": "gyrotc.self-test/1", "machine": machine(), "tables": TABLES, "builds": builds}
+        write(docs, "self-test", reported, self_test_page.section)
     if lists:
         result = {
             "schema": "gyrotc.targets/1",

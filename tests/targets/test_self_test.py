@@ -43,7 +43,7 @@ def right(sources: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Verd
     return verdict
 
 
-def _told(
+def _reported(
     results: Results, build: str, flags: tuple[str, ...], right: Verdict, verdict: Verdict | None
 ) -> None:
     """A row of docs/results.md; None: it does not compile."""
@@ -70,7 +70,7 @@ def test_builds_of_this_machine(
 ) -> None:
     verdict = native(compiler, flags, sources, tmp_path / "build")
     assert verdict is not None
-    _told(results, f"{platform.machine()}, {compiler}", flags, right, verdict)
+    _reported(results, f"{platform.machine()}, {compiler}", flags, right, verdict)
     assert verdict.missed(right) == []
 
 
@@ -85,7 +85,7 @@ def test_fast_math_by_name_does_not_compile(
     results: Results,
 ) -> None:
     verdict = native(compiler, flags, sources, tmp_path / "build")
-    _told(results, f"{platform.machine()}, {compiler}", flags, right, verdict)
+    _reported(results, f"{platform.machine()}, {compiler}", flags, right, verdict)
     assert verdict is None
 
 
@@ -97,7 +97,7 @@ def test_builds_of_targets(
     verdict = on_target(
         with_flags(name), ("-std=c99", "-ffp-contract=off", *flags), sources, tmp_path / "build"
     )
-    _told(results, name, flags, right, verdict)
+    _reported(results, name, flags, right, verdict)
     assert verdict.differing(right), "the control changes no result"
     assert verdict.missed(right) == []
 

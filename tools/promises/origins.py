@@ -26,15 +26,15 @@ def unexplained_numbers(root: Path) -> Iterator[str]:
     """
     found = 0
     for path in sorted((root / "gen" / "gyrotc").rglob("*.py")):
-        for name, number, told in _python(path.read_text(encoding="utf-8")):
+        for name, number, reported in _python(path.read_text(encoding="utf-8")):
             found += 1
-            if not told:
+            if not reported:
                 yield f"{path.relative_to(root)}:{number}: {name} does not say where it comes from"
     for folder in ("include", "libc", "gen/core"):
         for path in sorted(p for p in (root / folder).rglob("*") if p.suffix in _C_FILES):
-            for name, number, told in _c(path.read_text(encoding="utf-8").splitlines()):
+            for name, number, reported in _c(path.read_text(encoding="utf-8").splitlines()):
                 found += 1
-                if not told:
+                if not reported:
                     yield f"{path.relative_to(root)}:{number}: {name} does not say where it comes from"
     if not found:
         yield f"{root}: no constant found"
@@ -54,9 +54,9 @@ def _python(text: str) -> Iterator[tuple[str, int, bool]]:
         name = _name(node.targets[0] if isinstance(node, ast.Assign) else node.target)
         if name:
             at = node.lineno - 1
-            told = any("#" in line for line in lines[at : node.end_lineno])
-            told = told or lines[at - 1].startswith("#") or _is_text(after)
-            yield name, node.lineno, told or _headed(lines, at)
+            reported = any("#" in line for line in lines[at : node.end_lineno])
+            reported = reported or lines[at - 1].startswith("#") or _is_text(after)
+            yield name, node.lineno, reported or _headed(lines, at)
 
 
 def _name(target: ast.expr) -> str:
@@ -107,8 +107,8 @@ def _c(lines: list[str]) -> Iterator[tuple[str, int, bool]]:
         above = at
         while above > 0 and lines[above - 1].strip() and not _is_c_comment(lines[above - 1]):
             above -= 1
-        told = "/*" in line or "//" in line or (above > 0 and _is_c_comment(lines[above - 1]))
-        yield found["macro"] or found["name"], at + 1, told
+        reported = "/*" in line or "//" in line or (above > 0 and _is_c_comment(lines[above - 1]))
+        yield found["macro"] or found["name"], at + 1, reported
 
 
 def _is_c_comment(line: str) -> bool:

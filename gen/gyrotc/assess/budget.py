@@ -139,9 +139,9 @@ def _gradient(model: Model) -> float:
     step = _STEP * (t1 - t0)
     if step <= 0.0:
         return 0.0
-    apart = model.map_dph(np.minimum(t + step, t1), r) - model.map_dph(np.maximum(t - step, t0), r)
+    difference = model.map_dph(np.minimum(t + step, t1), r) - model.map_dph(np.maximum(t - step, t0), r)
     across = np.minimum(t + step, t1) - np.maximum(t - step, t0)
-    return float(np.sqrt(np.mean((apart / across) ** 2)))
+    return float(np.sqrt(np.mean((difference / across) ** 2)))
 
 
 def arithmetic(verification: Verification | None) -> Contribution | str:

@@ -18,7 +18,6 @@ from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
 from ..results.evaluation import (
-    Apart,
     AsFound,
     At,
     Calibration,
@@ -27,6 +26,7 @@ from ..results.evaluation import (
     Evaluation,
     FigureChange,
     FileChanges,
+    MapDifference,
     NameChanges,
     TextChange,
 )
@@ -78,7 +78,7 @@ def history_of(
     model: Model,
     evaluation: Evaluation,
     found: AsFound | None,
-    moved: Apart | None,
+    moved: MapDifference | None,
     date: str | None,
 ) -> tuple[Calibration, ...]:
     """The earlier result's calibrations, and this one."""
@@ -87,7 +87,11 @@ def history_of(
 
 
 def _calibration(
-    model: Model, evaluation: Evaluation | None, found: AsFound | None, moved: Apart | None, date: str | None
+    model: Model,
+    evaluation: Evaluation | None,
+    found: AsFound | None,
+    moved: MapDifference | None,
+    date: str | None,
 ) -> Calibration:
     judged = evaluation.judged() if evaluation else None
     return Calibration(
@@ -215,7 +219,7 @@ def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:
     return tuple(sorted(names - others))
 
 
-def _hashes_apart(before: dict[str, str], after: dict[str, str]) -> FileChanges:
+def _changed_hashes(before: dict[str, str], after: dict[str, str]) -> FileChanges:
     """Of files by name, with their hashes: which came, went, or have other bytes."""
     other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
     return FileChanges(
@@ -227,7 +231,7 @@ def _hashes_apart(before: dict[str, str], after: dict[str, str]) -> FileChanges:
 
 def _recordings(old: Model, new: Model) -> FileChanges:
     before, after = ({d.file: d.sha256 for d in m.data} for m in (old, new))
-    return _hashes_apart(before, after)
+    return _changed_hashes(before, after)
 
 
 def _of_means(*evaluations: Evaluation | None) -> float | None:
@@ -241,7 +245,7 @@ def _of_means(*evaluations: Evaluation | None) -> float | None:
     return float(np.sqrt(variance))
 
 
-def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
+def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None:
     """How far the maps differ where both were calibrated, deg/h; None where nothing is common.
 
     Args:
@@ -254,16 +258,16 @@ def _map(old: Model, new: Model, of_means: float | None) -> Apart | None:
     if any(low > high for low, high in limits):
         return None
     t, slope = np.meshgrid(*(np.linspace(*span, n) for span, n in zip(limits, _GRID, strict=True)))
-    apart = new.map_dph(t, slope) - old.map_dph(t, slope)
-    worst = np.unravel_index(int(np.argmax(np.abs(apart))), apart.shape)
+    difference = new.map_dph(t, slope) - old.map_dph(t, slope)
+    worst = np.unravel_index(int(np.argmax(np.abs(difference))), difference.shape)
     floor = new.noise_floor_dph
-    rms = float(np.sqrt(np.mean(apart**2)))
+    rms = float(np.sqrt(np.mean(difference**2)))
     expected = _expected_rms(old, new, t, slope)
     expected = of_means if expected is None else expected
-    return Apart(
+    return MapDifference(
         rms_dph=rms,
-        mean_dph=float(np.mean(apart)),
-        max_abs_dph=float(np.abs(apart[worst])),
+        mean_dph=float(np.mean(difference)),
+        max_abs_dph=float(np.abs(difference[worst])),
         at=At(temperature_c=float(t[worst]), slope_c_per_min=float(slope[worst])),
         rms_over_floor=rms / floor if floor else None,
         expanded_uncertainty_dph=None if expected is None else 2.0 * expected,
@@ -330,4 +334,4 @@ def _files(old: Manifest | None, new: Manifest) -> FileChanges:
     before, after = (
         {k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new)
     )
-    return _hashes_apart(before, after)
+    return _changed_hashes(before, after)

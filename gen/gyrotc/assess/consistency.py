@@ -39,14 +39,14 @@ def check_figures(evaluation: Evaluation, where: str) -> None:
         if (pooled.samples if pooled else 0) != n:
             raise InputError(f"{where}, field {role}.samples", "is not that of the runs", _EXPECTED)
         for side in ("before", "after") if pooled and n else ():
-            told = getattr(pooled, side)
+            stated = getattr(pooled, side)
             parts = [(run.samples, getattr(run, side)) for run in runs if run.samples]
             mean = math.fsum(k * (s.mean_dph or 0.0) for k, s in parts) / n
             square = math.fsum(k * (s.rms_dph or 0.0) ** 2 for k, s in parts) / n
             largest = max(s.max_abs_dph or 0.0 for _, s in parts)
-            _same(told.mean_dph, mean, f"{where}, field {role}.{side}.mean_dph", math.sqrt(square))
-            _same(told.rms_dph, math.sqrt(square), f"{where}, field {role}.{side}.rms_dph")
-            _same(told.max_abs_dph, largest, f"{where}, field {role}.{side}.max_abs_dph")
+            _same(stated.mean_dph, mean, f"{where}, field {role}.{side}.mean_dph", math.sqrt(square))
+            _same(stated.rms_dph, math.sqrt(square), f"{where}, field {role}.{side}.rms_dph")
+            _same(stated.max_abs_dph, largest, f"{where}, field {role}.{side}.max_abs_dph")
     for role, pooled in (
         ("train", evaluation.train),
         ("exam", evaluation.exam),
@@ -65,13 +65,13 @@ def _check_pooled(pooled: Pooled, where: str) -> None:
     _same(pooled.improvement, was / remains if was is not None and remains else None, f"{where}.improvement")
 
 
-def _same(told: float | None, found: float | None, where: str, scale: float = 0.0) -> None:
-    if told is None or found is None:
-        equal = told == found
+def _same(stated: float | None, found: float | None, where: str, scale: float = 0.0) -> None:
+    if stated is None or found is None:
+        equal = stated == found
     else:
-        equal = math.isclose(told, found, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale)
+        equal = math.isclose(stated, found, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale)
     if not equal:
-        raise InputError(where, f"is {told}, and the other figures give {found}", _EXPECTED)
+        raise InputError(where, f"is {stated}, and the other figures give {found}", _EXPECTED)
 
 
 def check_limits(
@@ -140,17 +140,17 @@ def _limits(content: dict[str, Any], where: str) -> Limits:
         raise InputError(where, "says what no limits file can", _EXPECTED) from error
 
 
-def _refuse_departure(told: Any, found: Any, where: str) -> None:
+def _refuse_departure(stated: Any, found: Any, where: str) -> None:
     """Refuses two JSON values that differ by more than rounding, by the first field that does."""
-    if isinstance(told, dict) and isinstance(found, dict) and told.keys() == found.keys():
-        for name in told:
-            _refuse_departure(told[name], found[name], f"{where}.{name}")
-    elif isinstance(told, list) and isinstance(found, list) and len(told) == len(found):
-        for number, (one, other) in enumerate(zip(told, found, strict=True)):
+    if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
+        for name in stated:
+            _refuse_departure(stated[name], found[name], f"{where}.{name}")
+    elif isinstance(stated, list) and isinstance(found, list) and len(stated) == len(found):
+        for number, (one, other) in enumerate(zip(stated, found, strict=True)):
             _refuse_departure(one, other, f"{where}.{number}")
-    elif isinstance(told, float) and isinstance(found, float):
-        _same(told, found, where)
-    elif told != found or type(told) is not type(found):
+    elif isinstance(stated, float) and isinstance(found, float):
+        _same(stated, found, where)
+    elif stated != found or type(stated) is not type(found):
         raise InputError(
-            where, f"is {str(told)[:60]}, and the other results give {str(found)[:60]}", _EXPECTED
+            where, f"is {str(stated)[:60]}, and the other results give {str(found)[:60]}", _EXPECTED
         )

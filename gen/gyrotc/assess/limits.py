@@ -289,7 +289,7 @@ class Limits(_Part):
     instrument: Annotated[tuple[StatedInstrument, ...], BeforeValidator(_as_tuple)] = ()
     # Unit of fixed point for all tables of the product: 2^-this deg/h
     q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
-    guards: dict[str, ProductGuard] = {}  # by channel: what the runtime believes of it
+    guards: dict[str, ProductGuard] = {}  # by channel: what the runtime accepts of it
     sha256: str = ""  # of the file ...
     file: str = ""  # ... and its name
 

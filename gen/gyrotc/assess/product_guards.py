@@ -1,6 +1,6 @@
 """Guards of a product: what its sensors can show, where a maker knows it better than the recordings do.
 
-A product file may say for each channel what the runtime believes of it. What it does not say stays as training showed
+A product file may say for each channel what the runtime accepts of it. What it does not say stays as training showed
 it. The recordings themselves are judged by what training showed, so that no product file changes a map.
 """
 
@@ -112,8 +112,8 @@ def _fields(guard: Guard, block_s: float) -> dict[str, Any]:
 
 def _merged(base: Guard, guard: ProductGuard, where: str) -> Guard:
     names = {"step": "max_step", "rate_per_min": "max_rate_per_min"}
-    told = guard.model_dump(exclude_none=True, exclude={"range"})
-    values = base.model_dump() | {names.get(name, name): value for name, value in told.items()}
+    stated = guard.model_dump(exclude_none=True, exclude={"range"})
+    values = base.model_dump() | {names.get(name, name): value for name, value in stated.items()}
     if guard.range:
         values["low"], values["high"] = guard.range
     if not values["low"] <= values["fallback"] <= values["high"]:

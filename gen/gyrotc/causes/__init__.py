@@ -48,7 +48,7 @@ for _module in pkgutil.iter_modules(__path__):
 
 
 def separate_by(one: str, other: str) -> str:
-    """The experiment that tells two causes apart: one for this pair, else that of the more telling cause."""
+    """The experiment that distinguishes two causes: one for this pair, else that of the more telling cause."""
     a, b = CATALOGUE[one].words, CATALOGUE[other].words
     pair = a.beside.get(other) or b.beside.get(one)
     return pair or max((a, b), key=lambda words: words.telling).experiment

@@ -49,7 +49,7 @@ CAUSE = Cause(
         short="tilt",
         signature="none on one axis: the static map holds it",
         remedy="a stiffer fixture, or Earth rate computed from its measured angles",
-        experiment="the same profile with the gyro turned by 180 degrees on its fixture",
+        experiment="the same profile with the gyro rotated by 180 degrees on its fixture",
         telling=Telling.STATIC,
     ),
     bias=_bias,

@@ -79,7 +79,7 @@ CAUSE = Cause(
         remedy="one first-order state and a linear term",
         experiment=RATES,
         advice="A fixture that tilts with a temperature of its own shows the same through Earth's rate (5e-5 deg/h for "
-        "each arcsec at 45 degrees): repeat a run with the gyro turned by 180 degrees; what then changes its sign is "
+        "each arcsec at 45 degrees): repeat a run with the gyro rotated by 180 degrees; what then changes its sign is "
         "the fixture's.",
     ),
     search=SearchRule(

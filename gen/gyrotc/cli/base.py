@@ -90,14 +90,14 @@ class StageLine:
 
     def __init__(self, stages: Stages = ()) -> None:
         self._stages, self._begun = stages, time.monotonic()
-        self._text, self._share, self._left_s, self._told = "", 0.0, 0.0, self._begun
+        self._text, self._share, self._left_s, self._reported = "", 0.0, 0.0, self._begun
 
     def say(self, text: str) -> None:
         """Another stage, or another count within one."""
-        self._text, self._told = text, time.monotonic()
+        self._text, self._reported = text, time.monotonic()
         self._share = max(self._share, self.share_of(text))
         if self._share:
-            self._left_s = (self._told - self._begun) / self._share * (1.0 - self._share)
+            self._left_s = (self._reported - self._begun) / self._share * (1.0 - self._share)
 
     def share_of(self, text: str) -> float:
         """Which part of the work lies before what a text says, 0 ... 1; 0 where it says nothing of it."""
@@ -123,7 +123,7 @@ class StageLine:
             return self._text
         if not self._share:
             return f"{self._text}, {now - self._begun:.0f} s"
-        left = max(self._left_s - (now - self._told), 0.0)
+        left = max(self._left_s - (now - self._reported), 0.0)
         return f"{self._text}, {int(100 * self._share)} %, about {_words(left)} left"
 
 

@@ -80,8 +80,8 @@ def export(
     options = Exporting(axis_as.value, device, points_of(points), address_of(address))
     with progress() as say:
         say(f"writing {format.value}")
-        told = run(folder, format.value, out, options)
-    for line in told:
+        lines = run(folder, format.value, out, options)
+    for line in lines:
         tell(line)
     tell(str(out))
 

@@ -87,14 +87,14 @@ def fleet(
     wanted = replace(wanted, options=replace(wanted.options, prior=lot_in(lot)))
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
     with progress() as say:
-        told = _Told(len(wanted.units), say)
+        done = _Done(len(wanted.units), say)
         if share:
-            entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, told=told)
+            entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, done=done)
         elif gathered:
-            entries = gather(wanted, out, full=full, tag=tag, releases=releases, told=told)
+            entries = gather(wanted, out, full=full, tag=tag, releases=releases, done=done)
         else:
             entries = run_fleet(
-                wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, releases=releases, told=told
+                wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, releases=releases, done=done
             )
     if share:
         _tell_share(shard or "", entries)
@@ -181,9 +181,9 @@ def _tell_comparison(summary: FleetSummary) -> None:
     """A line for what each gyro was found by, when it was compared with the others."""
     from ..pages.words import words
 
-    for reason in summary.apart:
+    for reason in summary.reasons:
         tell(f"outlier: {reason.name}: {reason.text}")
-    named = {reason.name for reason in summary.apart}
+    named = {reason.name for reason in summary.reasons}
     for outlier in (outlier for outlier in summary.outliers if outlier.name not in named):
         tell(
             f"outlier: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
@@ -196,7 +196,7 @@ def _tell_comparison(summary: FleetSummary) -> None:
         )
 
 
-class _Told:
+class _Done:
     """Tells each gyro as it comes, and how many are left."""
 
     def __init__(self, total: int, say: Callable[[str], None]) -> None:
@@ -224,8 +224,8 @@ def _tell_entry(entry: FleetEntry) -> None:
         )
     if entry.status != "done":
         text += f"; {entry.reason}"
-    if entry.aside:
-        text += f"; its earlier result had been changed and is now {entry.aside}"
+    if entry.moved_to:
+        text += f"; its earlier result had been changed and is now {entry.moved_to}"
     tell(text)
 
 
@@ -252,7 +252,7 @@ def lot(
         found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
     checked = found.cross_validation
-    tell(f"{out}: {found.told}")
+    tell(f"{out}: {found.text}")
     tell(
         f"a new unit, before any run: {checked.left_rms_dph:.3g} deg/h about the lot's map, "
         f"{checked.constant_rms_dph:.3g} about its own mean"

@@ -82,13 +82,13 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
 
 def _places(found: Sequence[ThermometerPlace]) -> Table:
     title = "Where a further thermometer would add most"
-    table = _table(title, "node", "apart, C", "not seen so far, C", "shows from, deg/h/C")
+    table = _table(title, "node", "difference, C", "not seen so far, C", "shows from, deg/h/C")
     for place in found:
         limit = "never" if place.limit_dph_per_c is None else f"{place.limit_dph_per_c:.2g}"
         name = f"{place.node} (there is one)" if place.there else place.node
-        table.add_row(name, f"{place.apart_c:.3g}", f"{place.unseen_c:.2g}", limit)
+        table.add_row(name, f"{place.difference_c:.3g}", f"{place.unseen_c:.2g}", limit)
     table.caption = (
-        "apart: RMS difference to the gyro's own thermometer; not seen: by map and those that are there"
+        "difference: RMS difference to the gyro's own thermometer; not seen: by map and those that are there"
     )
     table.caption_justify = "left"
     return table

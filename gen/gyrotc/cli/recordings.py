@@ -186,8 +186,8 @@ def simulate(
     clusters: Annotated[
         int | None, typer.Option("--clusters", help="Of a lot: groups with a center each; default 1.")
     ] = None,
-    strangers: Annotated[
-        int | None, typer.Option("--strangers", help="Of a lot: units that belong to none; default 0.")
+    unrelated: Annotated[
+        int | None, typer.Option("--unrelated", help="Of a lot: units that belong to none; default 0.")
     ] = None,
     base: Annotated[
         str | None, typer.Option("--base", help="Of a lot: the scenario that its units run; default paper.")
@@ -200,7 +200,7 @@ def simulate(
     """
     from ..simulate.campaign import simulate as run
 
-    of_lot = {"units": units, "family": family, "clusters": clusters, "strangers": strangers}
+    of_lot = {"units": units, "family": family, "clusters": clusters, "unrelated": unrelated}
     given = {name: value for name, value in of_lot.items() if value is not None}
     if scenario == "lot":
         _simulate_lot(given, base or "paper", seed, out, (row_s, raw_hz, pulses, format), noise)
@@ -292,10 +292,10 @@ def check(
         )
         if plots is not None:
             from ..pages.check import write_check_page
-            from ..quality.pictures import pictured
+            from ..quality.pictures import pictures_of
 
             say("drawing")
-            write_check_page(plots, result.result(), pictured(dataset, result), str(dataset))
+            write_check_page(plots, result.result(), pictures_of(dataset, result), str(dataset))
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

@@ -275,14 +275,14 @@ def change_lines(changes: Changes) -> Iterator[str]:
     elif changes.map is None:
         yield "against the earlier result: no temperatures and rates in common"
     else:
-        apart, at = changes.map, changes.map.at
-        share = f" = {apart.rms_over_floor:.2g} x noise floor" if apart.rms_over_floor else ""
-        if apart.expanded_uncertainty_dph is not None:
-            more = "more than" if apart.significant else "no more than"
-            share += f", {more} the uncertainty of both maps gives (U = {apart.expanded_uncertainty_dph:.2g})"
+        moved, at = changes.map, changes.map.at
+        share = f" = {moved.rms_over_floor:.2g} x noise floor" if moved.rms_over_floor else ""
+        if moved.expanded_uncertainty_dph is not None:
+            more = "more than" if moved.significant else "no more than"
+            share += f", {more} the uncertainty of both maps gives (U = {moved.expanded_uncertainty_dph:.2g})"
         yield (
-            f"against the earlier result: maps {apart.rms_dph:.3e} deg/h RMS apart{share}, at most "
-            f"{apart.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
+            f"against the earlier result: maps {moved.rms_dph:.3e} deg/h RMS difference{share}, at most "
+            f"{moved.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
     yield from _as_found_lines(changes)
     for name, figure in changes.figures.items():

@@ -63,14 +63,14 @@ def schema_text(kind: type[BaseModel]) -> str:
     return json.dumps(kind.model_json_schema(by_alias=True), indent=1, ensure_ascii=True) + "\n"
 
 
-def tables(kind: type[BaseModel], told: Collection[type[BaseModel]] = ()) -> str:
+def tables(kind: type[BaseModel], shown: Collection[type[BaseModel]] = ()) -> str:
     """A table of fields for a result, and one for each object inside it, in Markdown.
 
     Args:
-        told: Results whose tables stand on the same page: their objects are not reported again.
+        shown: Results whose tables stand on the same page: their objects are not reported again.
     """
     seen: dict[type[BaseModel], None] = {kind: None}
-    above = {inner for one in told for inner in _in_order({one: None})}
+    above = {inner for one in shown for inner in _in_order({one: None})}
     parts = []
     for one in (one for one in _in_order(seen) if one not in above):
         text = (one.__doc__ or "").strip().splitlines()[0]

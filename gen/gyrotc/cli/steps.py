@@ -150,13 +150,16 @@ def emit(
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
-    apart = target.resolve() != source.resolve()
-    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")[: 1 + apart]) as stage:
+    elsewhere = target.resolve() != source.resolve()
+    with (
+        progress(EMIT) as say,
+        result_folder(out, "emit", entries=("c", "model.json")[: 1 + elsewhere]) as stage,
+    ):
         stage.of(loaded.serial, loaded.axis)
-        if apart and target.is_file() and target.read_text("utf-8") != loaded.to_json():
+        if elsewhere and target.is_file() and target.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
         emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at, progress=say)
-        if apart:
+        if elsewhere:
             loaded.save(stage.folder / "model.json")
     result = Emitted(
         gyrotc_version=__version__,

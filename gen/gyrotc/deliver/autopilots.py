@@ -110,11 +110,11 @@ def parameters(
     ]
     if autopilot == "px4":
         lines.append("# TC_G0_ID has to be CAL_GYRO0_ID of the vehicle (--device)" if not device else "#")
-        told = (f"1\t1\t{name}\t{text}\t{kind}" for name, text, kind in rows)
+        body = (f"1\t1\t{name}\t{text}\t{kind}" for name, text, kind in rows)
     else:
         lines.append("# set INS_GYR_CAL to 0: a calibration at start would replace INS_GYROFFS")
-        told = (f"{name},{text}" for name, text, _ in rows)
-    return "\n".join([*(toml_comment(line, 300) for line in lines), *told]) + "\n"
+        body = (f"{name},{text}" for name, text, _ in rows)
+    return "\n".join([*(toml_comment(line, 300) for line in lines), *body]) + "\n"
 
 
 def _text(value: np.float32) -> str:

@@ -290,11 +290,11 @@ def certificate(
         _as_built(place, unit)
     with result_folder(out, "certificate", inputs=[folder]) as stage:
         stage.of(first.model.serial)
-        told = stated.model_copy(update={"issued": stated.issued or date.today().isoformat()})
-        page = certificate_page(units, told, missing, why)
+        issued = stated.model_copy(update={"issued": stated.issued or date.today().isoformat()})
+        page = certificate_page(units, issued, missing, why)
         write_atomically(stage.folder / "certificate.html", page)
         if not missing:
-            write_atomically(stage.folder / "dcc.xml", dcc_text(units, told, why))
+            write_atomically(stage.folder / "dcc.xml", dcc_text(units, issued, why))
         printed = print_to_pdf(stage.folder / "certificate.html", stage.folder / "certificate.pdf")
     written = {"certificate.html": True, "dcc.xml": not missing, "certificate.pdf": printed}
     return Certified(tuple(out / name for name, there in written.items() if there), printed)

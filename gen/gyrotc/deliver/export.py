@@ -55,16 +55,16 @@ def export(folder: Path, format: Format, out: Path, options: Exporting = Exporti
         check_intact(part, ("model.json", "c"), needed=False)
     models = [load_model(part / "model.json") for part in parts]
     if format == "fmu":
-        data, told = fmu(folder, models)
+        data, lines = fmu(folder, models)
         write_atomically(out, data)
-        return told
+        return lines
     shifted = [_as_emitted(part, model) for part, model in zip(parts, models, strict=True)]
     if format in get_args(Autopilot):
-        text, told = _cubics(shifted, cast(Autopilot, format), options)
+        text, lines = _cubics(shifted, cast(Autopilot, format), options)
     else:
-        text, told = _tables(shifted, format, options)
+        text, lines = _tables(shifted, format, options)
     write_atomically(out, text)
-    return told
+    return lines
 
 
 def _as_emitted(part: Path, model: Model) -> Model:

@@ -53,12 +53,12 @@ def fmu(folder: Path, models: Sequence[Model]) -> tuple[bytes, list[str]]:
     sources["fmu.c"] = _wrapper(models, inputs, token)
     name = f"gtc_{models[0].id if len(models) == 1 else table_id(models[0].serial, None)}"
     files = {"modelDescription.xml": _description(models, name, inputs, token)}
-    binary, told = _binary(sources)
+    binary, platform = _binary(sources)
     if binary:
         files[f"binaries/{_here()}/{name}.so"] = binary
     files |= {f"sources/{file}": data for file, data in sources.items()}
     files["sources/buildDescription.xml"] = _build_description(name, sources)
-    return _zipped(files), [f"inputs {', '.join(inputs)}; {told}"]
+    return _zipped(files), [f"inputs {', '.join(inputs)}; {platform}"]
 
 
 def _sources(c: Path, models: Sequence[Model]) -> dict[str, bytes]:
@@ -163,7 +163,7 @@ def _outputs(models: Sequence[Model], n_inputs: int) -> Iterator[tuple[str, dict
     given = {"causality": "output", "variability": "discrete"}
     for k, model in enumerate(models):
         of = f"_{model.axis}" if len(models) > 1 else ""
-        told = [
+        rows = [
             (
                 "Float32",
                 f"bias{of}_dph",
@@ -173,7 +173,7 @@ def _outputs(models: Sequence[Model], n_inputs: int) -> Iterator[tuple[str, dict
             ("Int32", f"status{of}", "Bits of gtc.h: 0 is done", {}),
             ("Float32", f"sigma{of}_dph", "1 sigma of the compensated bias", {"unit": "deg/h"}),
         ]
-        for n, (kind, name, text, unit) in enumerate(told[: 3 if sigma_cells(model)[0] else 2]):
+        for n, (kind, name, text, unit) in enumerate(rows[: 3 if sigma_cells(model)[0] else 2]):
             reference = str(_FIRST_INPUT + n_inputs + _OUTPUTS * k + n)
             yield kind, {"name": name, "valueReference": reference, "description": text} | given | unit
 

@@ -249,8 +249,8 @@ def cdf_text(grids: Sequence[MapGrid], notes: Sequence[str]) -> str:
     for grid in grids:
         _instances(tree, grid)
     indent(root, " ")
-    told = [f"gyrotc: gyro {model.serial}", *notes]
-    comment = "\n".join(toml_comment(note, 300).replace("--", "- -") for note in told)
+    remarks = [f"gyrotc: gyro {model.serial}", *notes]
+    comment = "\n".join(toml_comment(note, 300).replace("--", "- -") for note in remarks)
     head = f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {comment} -->\n{_DOCTYPE}\n'
     return head + tostring(root, "unicode") + "\n"
 

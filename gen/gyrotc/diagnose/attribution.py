@@ -283,7 +283,7 @@ def _p_value(found: list[Found], cause: Candidate) -> float:
 
 
 _TELLING = 10.0  # d² of the part that the rival cannot mimic: odds of about e^5 for the right one (docs/diagnosis.md)
-_LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
+_LEAST = 1e-3  # 1 − R² below which nothing distinguishes the two
 
 
 def overlap(gains: Gains, cause: Refined, rivals: list[str]) -> dict[str, float]:

@@ -81,9 +81,9 @@ def diagnose(
     found = _diagnosed(
         accepted(whole, events) if accept_events else whole, options or _options_of(model), say
     )
-    told = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
+    reported = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
-    return replace(found, result=found.result.model_copy(update=told | {"next": steps}))
+    return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
 
 
 def _about(events: Sequence[Event], accept: bool) -> list[str]:
@@ -157,9 +157,9 @@ def _extended_model(
     low, high = added_range(play_runs(dataset, runs, front), extension.shipped)
     own = [e for e in extension.shipped if e.channel is None]
     lost = added_range(played, own, sum(s.added for s in stand_ins.values()))
-    told = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
+    reported = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
     content = _with_terms(plain, entries, extension.samples, runs, stand_ins)
-    return Model.from_dict({**content, **told}), training
+    return Model.from_dict({**content, **reported}), training
 
 
 def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 With dT/dt as an input of the map, memories contain each other. A gradient is z − T = −τ dz/dt: the map of a lagged
 temperature, free in dz/dt, takes it for nothing. And a lag is f(z) = f(T) + f'(T) (z − T) + ..., of which a gradient
 has all but what f bends. Profile likelihoods with equally many free functions then differ by the noise that twenty
-functions happen to take, with a standard deviation of 2 √20: more than what tells the causes apart.
+functions happen to take, with a standard deviation of 2 √20: more than what distinguishes the causes.
 
 Here the functions of T alone, and those of dT/dt, have weights with a variance of each group, which is estimated with
 the rest (type II maximum likelihood: Rasmussen and Williams 2006, section 5.4.1). What nothing in the data asks for
@@ -79,16 +79,16 @@ class MarginalLikelihood:
         same = [p for p in points if _key(p.members) == own]
         shift = best_of(points, size).criterion(size) - best_of(same, size).criterion(size)
         weighed = self._weighed(near)
-        told = []
+        reported = []
         for rival in ranked:
             place = (rival.id, rival.channel or "")
             found = weighed.get(_sorted([*map(kind_of, chosen[:k]), place, *map(kind_of, chosen[k + 1 :])]))
             if found is None:
-                told.append(replace(rival, distance=rival.distance + shift))
+                reported.append(replace(rival, distance=rival.distance + shift))
                 continue
             behind = replace(rival, distance=max(weighed[own][1] - found[1], 0.0))
-            told.append(replace(behind, odds=odds_of(behind)))
-        return tuple(sorted(told, key=lambda r: r.distance))
+            reported.append(replace(behind, odds=odds_of(behind)))
+        return tuple(sorted(reported, key=lambda r: r.distance))
 
     def criterion(self, members: CauseSet, left_out: NDArray[np.bool_]) -> float:
         """Of a model: over that of the map alone.

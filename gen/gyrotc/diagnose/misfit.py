@@ -206,19 +206,19 @@ def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int =
     changed = _changed(current, causes)
     views = [current.views[k] for k in current.allowed]
     weight = np.exp([view.log_likelihood - current.likeliest.log_likelihood for view in views])
-    p_value, share = _told(current, views, weight / weight.sum(), held, changed, chance)
+    p_value, share = _reported(current, views, weight / weight.sum(), held, changed, chance)
     if current.declared is None:
         return Misfit(p_value, p_value, share)
     view = current.view_of(current.declared)
     declared = replace(view, scale=max(view.scale, 1.0))
-    own_p, own_share = _told(current, [declared], np.ones(1), held, changed, chance)
+    own_p, own_share = _reported(current, [declared], np.ones(1), held, changed, chance)
     worst = min(1.0, 2.0 * min(p_value, own_p))
     if current.contradicts(view):
         return Misfit(p_value, worst, share)
     return Misfit(worst, worst, min(share, own_share))
 
 
-def _told(
+def _reported(
     current: Search, views: Sequence[View], weight: FloatArray, held: Held, changed: FloatArray, chance: int
 ) -> tuple[float, float]:
     """The same where the noise has one of some colours, each as likely as its weight says."""

@@ -1,4 +1,4 @@
-"""Other causes that explain the recordings as well, and whether these recordings can tell them apart.
+"""Other causes that explain the recordings as well, and whether these recordings can distinguish them.
 
 The likelihood of each cause is known, but not how far it can be trusted: a cause with a free time constant follows
 noise more closely than one without, and offsets that are drawn anew in every run may lie on a line by chance. So
@@ -47,7 +47,7 @@ _TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
 equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
 
 _SURE = 0.9  # probability from which one cause is reported as the explanation
-_TOLD = 0.01  # smaller ones are not worth a line
+_REPORTED = 0.01  # smaller ones are not worth a line
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
 
@@ -74,7 +74,7 @@ def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
         if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause
             odds[rival.id] = odds_of(rival)
     total = sum(odds.values())
-    return {id: value / total for id, value in odds.items() if id == chosen or value / total >= _TOLD}
+    return {id: value / total for id, value in odds.items() if id == chosen or value / total >= _REPORTED}
 
 
 def odds_of(rival: Rival) -> float:
@@ -135,7 +135,7 @@ _MOST_RIVALS = 4  # the nearest: whoever comes after them adds little to their s
 _MOST_POINTS, _REACH = 8, 15.0
 """Points of a cause's grid that stand for it: its best ones on these recordings, as far as they explain nearly as much
 (e^-7.5 of the likelihood)."""
-_FINEST = 0.05  # difference of the criterion below which nothing is told: one part in 40 of the likelihood
+_FINEST = 0.05  # difference of the criterion below which nothing is decided: one part in 40 of the likelihood
 _OWN = 1e-4  # share of a column's energy that must be its own beside the model, as in `gains`
 
 
@@ -163,8 +163,8 @@ def calibrated(
     for rival, kind in zip(near, kinds[1:], strict=True):
         if kinds[0] in simulated.models and kind in simulated.models:
             odds[rival] = max(odds_of(rival), simulated.odds(kinds[0], kind))
-    told = [replace(r, odds=odds[r]) if r in odds else r for r in ranked]
-    return tuple(sorted(told, key=lambda r: -odds_of(r)))
+    reported = [replace(r, odds=odds[r]) if r in odds else r for r in ranked]
+    return tuple(sorted(reported, key=lambda r: -odds_of(r)))
 
 
 def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: Kind) -> list[Candidate]:

@@ -29,7 +29,9 @@ _SCALE_ROWS = 241  # odd; 40 minutes at 10 s: the scale of the noise is known to
 _OUTLIER = 4.5  # robust standard deviations
 _ALIKE = 0.01  # of the noise of a row: values that are nearer are the same step of a converter
 _P_OUTLIERS, _MANY = 1e-7, 8  # eight or more, and hardly by chance: single ones are left out in silence
-_P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is told: rarer than the 1 % of causes
+_P_VARIANCE = (
+    1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
+)
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
 _KNOTS = 4  # hats over the temperature: the variance is a slow function of it
 

@@ -32,9 +32,7 @@ __all__ = [
 ]
 
 _MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
-_FEW_LEFT = (
-    30  # degrees of freedom below which noise cannot be told from effects: its level is known to 13 % then
-)
+_FEW_LEFT = 30  # degrees of freedom that noise needs beside effects: its level is known to 13 % then
 _JITTER = 1e-10  # added to the diagonal of inner products of columns of norm 1: dependent columns do not stop Cholesky
 
 

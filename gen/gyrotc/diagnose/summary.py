@@ -369,13 +369,13 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
     channels = tuple(r.channel for r in near if r.channel is not None)
     repair = CATALOGUE[id].repair
     values = {name: interval.value for name, interval in cause.parameters.items()}
-    told: dict[str, str | tuple[str, ...] | dict[str, float] | None] = {
+    reported: dict[str, str | tuple[str, ...] | dict[str, float] | None] = {
         "probabilities": attribution.probabilities[k] if k < len(attribution.probabilities) else None,
         "repair": None if repair is None else repair(cause.candidate.values | values),
         "channel": cause.candidate.channel,
         "equivalent_channels": channels or None,
     }
-    return named.model_copy(update={name: value for name, value in told.items() if value is not None})
+    return named.model_copy(update={name: value for name, value in reported.items() if value is not None})
 
 
 def _estimate(interval: Interval) -> Estimate:

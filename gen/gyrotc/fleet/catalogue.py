@@ -1,4 +1,4 @@
-"""The catalogue of a fleet: every calibration of every gyro in SQLite, tables and models apart under their hashes.
+"""The catalogue of a fleet: every calibration of every gyro in SQLite, tables and models under their hashes.
 
 Calibrations are only ever added; a payload is written once and never changed. `docs/fleet.md` documents the
 tables for other programs.
@@ -38,7 +38,7 @@ _MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.o
 _BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
 _MOST_S = 60.0  # a catalogue of 100,000 gyros is read in seconds
 _STEPS = 100_000  # of SQLite's machine between two looks at the clock: milliseconds
-_TOLD = 100  # calibrations of a whole catalogue: a screen or two
+_MOST_ROWS = 100  # calibrations of a whole catalogue: a screen or two
 
 SCHEMA = """
 CREATE TABLE calibration (
@@ -229,14 +229,14 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
     path = place if place.is_file() else place / CATALOGUE / _FILE
     if not path.is_file():
         raise InputError(str(place), "has no catalogue", "the --out of gyrotc fleet")
-    query = _CARRIED if serial else f"SELECT * FROM calibration ORDER BY id DESC LIMIT {_TOLD}"
+    query = _CARRIED if serial else f"SELECT * FROM calibration ORDER BY id DESC LIMIT {_MOST_ROWS}"
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
             _confine(base)
             _check_schema(base, path)
             base.row_factory = sqlite3.Row
             rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
-            found = tuple(_told(base, row) for row in rows)
+            found = tuple(_entry(base, row) for row in rows)
             for one in found if serial else ():
                 _check_payloads(path.parent / Path(PAYLOADS).name, one)
             total = base.execute("SELECT coalesce(max(id), 0) FROM calibration").fetchone()[0]
@@ -319,7 +319,7 @@ def _copy(folder: Path, out: Path, one: Catalogued) -> None:
             write_own(stage.folder / "c" / name, data)
 
 
-def _told(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:
+def _entry(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:
     names = [name for name in Catalogued.model_fields if name not in ("axis", "recordings")]
     files = base.execute(
         "SELECT file, role, sha256 FROM recording WHERE calibration = ? ORDER BY file", (row["id"],)

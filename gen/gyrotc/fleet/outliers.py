@@ -29,10 +29,10 @@ __all__ = [
     "NOISY_RUN",
     "copies",
     "facts_of",
+    "mirrored_units",
     "outliers",
     "spread",
     "step_in",
-    "turned",
     "with_copies",
 ]
 
@@ -97,13 +97,13 @@ _POINTS = 160  # of the residual that a picture shows
 
 def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
     """Facts of a gyro from the means of its runs, each with its file."""
-    told = [(file, a) for file, a in runs if a.time_s.size]
-    steps = [step_in(a.after_dph) for _, a in told]
-    compared = [_compared(file, a, step) for (file, a), step in zip(told, steps, strict=True)]
+    used = [(file, a) for file, a in runs if a.time_s.size]
+    steps = [step_in(a.after_dph) for _, a in used]
+    compared = [_compared(file, a, step) for (file, a), step in zip(used, steps, strict=True)]
     return Facts(
-        curve=_curve([a for _, a in told]),
+        curve=_curve([a for _, a in used]),
         runs=tuple(compared),
-        series=_series(*told[_shown(compared)]) if told else None,
+        series=_series(*used[_shown(compared)]) if used else None,
     )
 
 
@@ -222,9 +222,9 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
             continue
         values = np.array([value for _, value in known])
         scaled = np.log(values) if by_ratio else values
-        apart = np.abs(scaled - np.median(scaled))
+        distances = np.abs(scaled - np.median(scaled))
         sigma = max(
-            MAD_TO_SIGMA * float(np.median(apart)),
+            MAD_TO_SIGMA * float(np.median(distances)),
             _LEAST_RATIO / _SIGMAS if by_ratio else _LEAST_OF_RMS / _SIGMAS * usual_rms,
         )
         if sigma == 0.0:
@@ -237,7 +237,7 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
                 median=float(np.median(values)),
                 sigmas=float(distance / sigma),
             )
-            for (name, value), distance in zip(known, apart, strict=True)
+            for (name, value), distance in zip(known, distances, strict=True)
             if distance > _SIGMAS * sigma
         ]
     return found
@@ -245,22 +245,22 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
 
 _LEAST_PLACES = 6  # of a shorter curve a correlation of 0.9 may be chance
 _ALIKE = (
-    0.9  # correlation of the usual gyro with the median of the lot, and of a turned one with its negative
+    0.9  # correlation of the usual gyro with the median of the lot, and of a mirrored one with its negative
 )
 _SWING = 3.0  # how much more or less than the median it may swing
 _KNOWN = 0.8  # share of the lot that knows a temperature
 
 
-def turned(entries: Sequence[FleetEntry]) -> list[str]:
-    """Names of gyros whose curve is the lot's turned over, axis by axis; none where the lot has no common one."""
+def mirrored_units(entries: Sequence[FleetEntry]) -> list[str]:
+    """Names of gyros whose curve is the lot's mirrored, axis by axis; none where the lot has no common one."""
     names: list[str] = []
     for axis in dict.fromkeys(entry.axis for entry in entries):
         lot = [(e.name, e.facts.curve) for e in entries if e.axis == axis and e.facts is not None]
-        names += _turned_of(lot) if len(lot) >= _LEAST_SERIALS else []
+        names += _mirrored_of(lot) if len(lot) >= _LEAST_SERIALS else []
     return names
 
 
-def _turned_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]:
+def _mirrored_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]:
     curves = np.array([[np.nan if b is None else b for b in curve] for _, curve in lot], dtype=np.float64)
     known = np.mean(np.isfinite(curves), axis=0) >= _KNOWN
     curves = curves[:, known]

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from .. import __version__
 from ..common.texts import csv_cell
-from ..pages.plots import lot_picture, unit_apart
+from ..pages.plots import lot_picture, outlier_picture
 from ..pages.report import page_environment
 from ..results.fleet import FleetEntry, FleetSummary, FleetUnit
 from ..store.files import json_text, write_atomically
@@ -23,7 +23,7 @@ from .reasons import reasons, with_reasons
 __all__ = ["summary_of", "write_summary"]
 
 _COLUMNS = (
-    "name", "serial", "axis", "status", "verdict", "limits_met", "limits_held", "date", "apart", "judged_on",
+    "name", "serial", "axis", "status", "verdict", "limits_met", "limits_held", "date", "outlier_reason", "judged_on",
     "before_rms_dph", "after_rms_dph", "expanded_uncertainty_dph", "rms_over_floor", "noise_floor_dph", "bias_dph",
     "centers", "table_bytes", "error_bound_dph", "findings", "model_hash", "reason",
 )  # fmt: skip
@@ -49,9 +49,9 @@ def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
         unfinished=counts["unfinished"],
         figures={f: spread(figured, f) for f in (*FIGURES, "sum_abs_weights_dph", "centers", "table_bytes")},
         outliers=tuple(outliers(figured)),
-        apart=tuple(named),
+        reasons=tuple(named),
         copies=tuple(copied),
-        serials=tuple(entry.told() for entry in entries),
+        serials=tuple(entry.unit() for entry in entries),
     )
 
 
@@ -62,11 +62,11 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
         InputError: There are files of these names that gyrotc did not write.
     """
     summary = summary_of(entries)
-    apart = {reason.name for reason in summary.apart} | {outlier.name for outlier in summary.outliers}
+    outliers = {reason.name for reason in summary.reasons} | {outlier.name for outlier in summary.outliers}
     known = {entry.name: entry for entry in entries if entry.facts}
     pictures = {
-        reason.name: unit_apart(known, reason)
-        for reason in summary.apart[:_PICTURES]
+        reason.name: outlier_picture(known, reason)
+        for reason in summary.reasons[:_PICTURES]
         if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
     }
     page = (
@@ -74,8 +74,8 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
         .get_template("fleet.html.j2")
         .render(
             summary=summary,
-            apart=apart,
-            picture=lot_picture([e for e in entries if e.after_rms_dph], apart),
+            outliers=outliers,
+            picture=lot_picture([e for e in entries if e.after_rms_dph], outliers),
             pictures=pictures,
             links={entry.name: _link(out, entry.name) for entry in summary.serials},
             verdicts=Counter(entry.verdict for entry in summary.serials),

@@ -14,7 +14,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
-from .outliers import NOISY_RUN, turned
+from .outliers import NOISY_RUN, mirrored_units
 
 __all__ = ["reasons", "with_reasons"]
 
@@ -79,13 +79,13 @@ def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[
             if name in by_name:
                 found.setdefault(name, _reason(by_name[name], "copy_of_other", text))
     kinds = _kinds(entries)
-    mirrored = set(turned(entries))
+    mirrored = set(mirrored_units(entries))
     for reason in (*_exchanged(kinds), *(r for kind in kinds.values() for r in _of_kind(kind))):
         found.setdefault(reason.name, reason)
     for entry in entries:
         known = found.get(entry.name)
-        if entry.name in mirrored and (known is None or known.id == "bias_apart"):
-            text = "sign reversed: its bias over temperature has the shape of that of its kind turned over"
+        if entry.name in mirrored and (known is None or known.id == "bias_outlier"):
+            text = "sign reversed: its bias over temperature has the shape of that of its kind mirrored"
             found[entry.name] = _reason(entry, "sign_reversed", text)
     return [found[e.name] for e in entries if e.name in found]
 
@@ -98,13 +98,13 @@ def _reason(
 
 def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:
     """The entries with their reasons' words; what is mounting or wiring is a finding too."""
-    told = {reason.name: reason for reason in named}
-    return [_with_reason(entry, told[entry.name]) if entry.name in told else entry for entry in entries]
+    by_name = {reason.name: reason for reason in named}
+    return [_with_reason(entry, by_name[entry.name]) if entry.name in by_name else entry for entry in entries]
 
 
 def _with_reason(entry: FleetEntry, reason: Reason) -> FleetEntry:
     more = _MISMOUNTED & {reason.id} - set(entry.findings)
-    return entry.model_copy(update={"apart": reason.text, "findings": (*entry.findings, *more)})
+    return entry.model_copy(update={"outlier_reason": reason.text, "findings": (*entry.findings, *more)})
 
 
 def _kinds(entries: Sequence[FleetEntry]) -> dict[str | None, _Kind]:
@@ -140,11 +140,11 @@ def _of_kind(kind: _Kind) -> Iterator[Reason]:
     yield from _spikes(kind)
     yield from _steps(kind)
     yield from _noise(kind)
-    yield from _bias_apart(kind)
+    yield from _bias_outlier(kind)
 
 
 def _thermometers(kind: _Kind) -> Iterator[Reason]:
-    """The programme is the same for all: mean temperatures of the runs say which thermometer is apart."""
+    """The programme is the same for all: mean temperatures of the runs say which thermometer is an outlier."""
     temperatures = _run_figures(kind.facts, lambda run: run.mean_c)
     shifts = np.nanmedian(temperatures - np.nanmedian(temperatures, axis=0), axis=1)
     _, scatter = _usual(shifts)
@@ -154,7 +154,7 @@ def _thermometers(kind: _Kind) -> Iterator[Reason]:
             text = (
                 f"thermometer differs: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
             )
-            yield _reason(entry, "thermometer_apart", text)
+            yield _reason(entry, "thermometer_offset", text)
 
 
 def _steps(kind: _Kind) -> Iterator[Reason]:
@@ -213,13 +213,13 @@ def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
             yield _reason(entry, "scale", text)
 
 
-def _bias_apart(kind: _Kind) -> Iterator[Reason]:
+def _bias_outlier(kind: _Kind) -> Iterator[Reason]:
     """What nothing known brings back."""
     for entry, curve in zip(kind.entries, kind.curves, strict=True):
         far = kind.distance(curve)
         if _FAR < far < np.inf:
             text = f"bias over temperature differs from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
-            yield _reason(entry, "bias_apart", text)
+            yield _reason(entry, "bias_outlier", text)
 
 
 def _kin(entry: FleetEntry) -> str:

@@ -27,7 +27,7 @@ from ..store.cache import program_of
 from ..store.files import Lock
 from ..store.folder import result_folder
 from ..store.interrupts import deferred
-from ..store.marker import KINDS, check_apart, check_contents, final_place
+from ..store.marker import KINDS, check_contents, check_separate, final_place
 from .catalogue import enter
 from .manifest import SUMMARY, Fleet, Share, mine, printable
 from .page import write_summary
@@ -235,7 +235,7 @@ def _there(task: Task, entry: FleetEntry) -> FleetEntry:
     return entry
 
 
-Told = Callable[[FleetEntry], None]
+Done = Callable[[FleetEntry], None]
 
 
 def run_fleet(
@@ -247,7 +247,7 @@ def run_fleet(
     full: bool = False,
     tag: str = "",
     releases: Mapping[str, str] | None = None,
-    told: Told | None = None,
+    done: Done | None = None,
 ) -> list[FleetEntry]:
     """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
 
@@ -258,7 +258,7 @@ def run_fleet(
         tag: Goes into the catalogue with what is new in it.
         releases: Reasons, by serial, for which units are released although a finding bars them.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
-        told: Called with each entry as it comes, those of earlier calls first.
+        done: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
         InputError: As `on_dask`, where a cluster is named; `out` is, holds or lies in
@@ -267,7 +267,7 @@ def run_fleet(
     place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        entries = _run(fleet, place, jobs, cluster, full, told or (lambda _: None), releases)
+        entries = _run(fleet, place, jobs, cluster, full, done or (lambda _: None), releases)
         enter(place, entries, tag)
         return entries
     finally:
@@ -286,14 +286,14 @@ def run_share(
     jobs: int = 2,
     cluster: Cluster | None = None,
     full: bool = False,
-    told: Told | None = None,
+    done: Done | None = None,
 ) -> list[FleetEntry]:
     """Does the units of one share that are not done yet, and writes no summary; arguments as of `run_fleet`.
 
     Raises:
         InputError: As `run_fleet`; what the summary would replace is none.
     """
-    place, own, say = _checked_place(fleet, out), mine(fleet, share), told or (lambda _: None)
+    place, own, say = _checked_place(fleet, out), mine(fleet, share), done or (lambda _: None)
     try:
         tasks = tasks_of(own, place, full)
         entries = _done_already(tasks, say)
@@ -324,7 +324,7 @@ def gather(
     full: bool = False,
     tag: str = "",
     releases: Mapping[str, str] | None = None,
-    told: Told | None = None,
+    done: Done | None = None,
 ) -> list[FleetEntry]:
     """The summary and the catalogue of the results that shares have made; arguments as of `run_fleet`.
 
@@ -333,7 +333,7 @@ def gather(
     Raises:
         InputError: As `run_fleet`.
     """
-    place, say = _checked_place(fleet, out), told or (lambda _: None)
+    place, say = _checked_place(fleet, out), done or (lambda _: None)
     lock = Lock(place / "fleet.json", "fleet")
     try:
         entries = []
@@ -353,7 +353,7 @@ def _checked_place(fleet: Fleet, out: Path) -> Path:
     """The folder of a fleet, which is there afterwards; raises as `run_fleet`."""
     place = final_place(out)
     folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
-    check_apart(out, place, folders, whole=True)
+    check_separate(out, place, folders, whole=True)
     check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
     place.mkdir(parents=True, exist_ok=True)
     return place
@@ -381,7 +381,7 @@ def _run(
     jobs: int,
     cluster: Cluster | None,
     full: bool,
-    say: Told,
+    say: Done,
     releases: Mapping[str, str] | None,
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
@@ -393,7 +393,7 @@ def _run(
     return _summed(out, _worked(tasks, entries, jobs, cluster, say), releases)
 
 
-def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
+def _done_already(tasks: list[Task], say: Done) -> dict[int, FleetEntry]:
     """Entries of earlier calls that still hold, by the number of their task. Every task gets its key."""
     entries = {}
     for number, task in enumerate(tasks):
@@ -405,7 +405,7 @@ def _done_already(tasks: list[Task], say: Told) -> dict[int, FleetEntry]:
 
 
 def _worked(
-    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, cluster: Cluster | None, say: Told
+    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, cluster: Cluster | None, say: Done
 ) -> list[FleetEntry]:
     """Does what has no entry yet; all entries in the order of the tasks."""
     waiting = [number for number in range(len(tasks)) if number not in entries]

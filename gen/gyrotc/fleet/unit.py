@@ -37,12 +37,12 @@ __all__ = [
     "do_unit",
     "failed",
     "made_before",
-    "set_aside",
+    "move_away",
     "write_entry",
 ]
 
 
-def set_aside(place: Path) -> str:
+def move_away(place: Path) -> str:
     """A result in which somebody changed a file makes room for a new one, under a name of its own.
 
     Returns:
@@ -200,7 +200,7 @@ def _built(task: Task) -> FleetEntry:
             f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere"
         )
     dataset = load(task.unit.dataset, axis=task.unit.axis)
-    aside = set_aside(task.out)
+    moved_to = move_away(task.out)
     runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
@@ -221,7 +221,7 @@ def _built(task: Task) -> FleetEntry:
         for name in _OF_ALL:
             share_by_hash(task.out.parent / PAYLOADS, stage.folder / name)
         stage.leave_out(f"c/vectors_{built.model.id}.txt")  # nine tenths of what is this gyro's alone
-    return entry.model_copy(update={"aside": aside}) if aside else entry
+    return entry.model_copy(update={"moved_to": moved_to}) if moved_to else entry
 
 
 def _entry_of(

@@ -158,8 +158,8 @@ def build(
             stage.of(dataset.serial, any_serial=any_serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
-                told = _of_axis(f"{name} ({k} of {len(axes)})", say)
-                built.append(_build_axis(dataset, part.folder, options, order, told))
+                say_axis = _of_axis(f"{name} ({k} of {len(axes)})", say)
+                built.append(_build_axis(dataset, part.folder, options, order, say_axis))
         join_axes(stage.folder, axes)
         return built
 

@@ -225,7 +225,7 @@ def _name(
         if description.is_file()
         else None,
         "recordings": [[run.file, run.sha256, run.role] for run in dataset.runs],
-        "told": [dataset.serial, dataset.axis, dataset.applied_table, dataset.trusted, dataset.warnings],
+        "stated": [dataset.serial, dataset.axis, dataset.applied_table, dataset.trusted, dataset.warnings],
         "model": None if model is None else digest_of(model.to_dict()),
         "options": None if options is None else asdict(replace(options, prior=None)),
         "prior": None if prior is None else prior.key,

@@ -49,8 +49,8 @@ def prior_from(
         if run.role == "train" and run.sha256 in seen:
             raise InputError(run.file, f"the model in {folder} was made from it", "recordings of its own")
     posterior = posterior_in(earlier.folder, earlier.model)
-    aged, told = _ageing(earlier, dataset, ageing_dph, limits)
-    return widened(posterior, aged, told, earlier.model.hash, earlier.date)
+    aged, stated = _ageing(earlier, dataset, ageing_dph, limits)
+    return widened(posterior, aged, stated, earlier.model.hash, earlier.date)
 
 
 def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float | None) -> None:

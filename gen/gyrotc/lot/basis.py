@@ -82,7 +82,7 @@ class LotBasis:
         kept = np.array(functions.kept, dtype=np.int64)
         return LotBasis(functions.center_c, functions.half_range_c, functions.half_range_c_per_min, kept)
 
-    def told(self) -> LotFunctions:
+    def result(self) -> LotFunctions:
         """The functions as a file tells them."""
         return LotFunctions(
             center_c=self.center_c,

@@ -21,7 +21,7 @@ from ..store.marker import check_intact
 from ..train.evidence import MEAN_S
 from ..train.means import UnitMeans, means_of
 from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, learn
-from .prior import process_told, rounded
+from .prior import process_result, rounded
 from .use import prior_of
 
 __all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
@@ -157,17 +157,17 @@ def lot_from(
         gyrotc_version=__version__,
         axis=axis,
         units=_named(names, found),
-        told=_told(names, found),
+        text=_in_words(names, found),
         temperature_c=envelope[0],
         slope_c_per_min=envelope[1],
         occupancy=tuple(rounded(row) for row in _occupancy(inside, envelope)),
         center_dph=found.center_dph,
         unit_dph=found.unit_dph,
-        functions=state.basis.told(),
+        functions=state.basis.result(),
         clusters=_clusters(state),
         directions=tuple(rounded(d) for d in state.directions.T),
-        rest=process_told(state.rest),
-        of_mean=process_told(state.of_mean),
+        rest=process_result(state.rest),
+        of_mean=process_result(state.of_mean),
         noise_dph=float(np.median([u.sigma_dph for u in inside])),
         mean_s=mean_s,
         between_dph=between_dph,
@@ -236,7 +236,7 @@ def _at_rest(lot: Lot) -> AtRest:
     )
 
 
-def _told(names: Sequence[tuple[str, str]], found: Learned) -> str:
+def _in_words(names: Sequence[tuple[str, str]], found: Learned) -> str:
     """What was found, in words."""
     left, alone = found.left_out_dph
     size = np.bincount(found.state.cluster)
@@ -247,5 +247,5 @@ def _told(names: Sequence[tuple[str, str]], found: Learned) -> str:
     text = f"{int(found.inside.sum())} units, {found.state.rank} directions; {shared}"
     if len(size) > 1:
         text += f"; {len(size)} clusters of {', '.join(map(str, size))} units"
-    apart = [name for (name, _), kept in zip(names, found.inside, strict=True) if not kept]
-    return text + (f"; excluded as outliers: {', '.join(apart)}" if apart else "")
+    outliers = [name for (name, _), kept in zip(names, found.inside, strict=True) if not kept]
+    return text + (f"; excluded as outliers: {', '.join(outliers)}" if outliers else "")

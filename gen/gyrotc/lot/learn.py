@@ -49,7 +49,7 @@ __all__ = [
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
 _STRANGE = (
-    16.0  # a stranger's variance over the lot's, for which the test has most power: four times as far away
+    16.0  # an unrelated unit's variance over the lot's, where the test has most power: four times as far away
 )
 _LEAST_FREEDOM = 3  # below it Student's t has no variance, and a prior must have one
 _TELLING = 1.0  # variance by the lot over variance by noise, from which on a score says how wide the lot is
@@ -76,9 +76,9 @@ def scores(
     """
     factor = np.linalg.cholesky(covariance)
     ratio, vectors = np.linalg.eigh(factor.T @ precision @ factor)
-    told = ratio > 1e-9 * ratio[-1]
+    known = ratio > 1e-9 * ratio[-1]
     moved = vectors.T @ (factor.T @ (moment - precision @ mean))
-    ratio, moved = ratio[told], moved[told]
+    ratio, moved = ratio[known], moved[known]
     return ratio, np.asarray(moved**2 / (ratio * (1.0 + ratio)))
 
 
@@ -330,7 +330,7 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
     Args:
         units: At least `LEAST_UNITS`.
         envelope: Ranges of T (C) and dT/dt (C/min) of the lot.
-        say: Told what is being done.
+        say: Called with what is being done.
     """
     bias = np.concatenate([u.bias_dph for u in units])
     count = np.concatenate([u.count for u in units])
@@ -346,9 +346,9 @@ def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Lear
     inside = np.ones(len(units), dtype=bool)
     state = _chosen(sums, basis, say)
     say("every unit left out")
-    p, scale, apart = _left_out(sums, state)
-    if apart.any() and (~apart).sum() >= LEAST_UNITS:
-        inside = ~apart
+    p, scale, outside = _left_out(sums, state)
+    if outside.any() and (~outside).sum() >= LEAST_UNITS:
+        inside = ~outside
         say("without the outliers")
         state = _chosen(sums.select(inside), basis, say)
         again, scale, _ = _left_out(sums.select(inside), state)
@@ -439,7 +439,7 @@ def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
 
 def _worth(state: LotState) -> float:
     """Log evidence of a partition, what it costs to say it taken off."""
-    return state.evidence - _told(state.cluster)
+    return state.evidence - _labels_cost(state.cluster)
 
 
 def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np.int64]]:
@@ -469,7 +469,7 @@ def _smallest(cluster: NDArray[np.int64], number: int) -> int:
     return int(np.bincount(cluster, minlength=number).min())
 
 
-def _told(cluster: NDArray[np.int64]) -> float:
+def _labels_cost(cluster: NDArray[np.int64]) -> float:
     """What it costs to say who is in which cluster, nats."""
     share = np.bincount(cluster) / len(cluster)
     return -float(np.sum(np.log(share[cluster])))

@@ -18,7 +18,7 @@ __all__ = [
     "MapPosterior",
     "MapPrior",
     "check_positive",
-    "process_told",
+    "process_result",
     "processed",
     "rounded",
     "triangle",
@@ -122,7 +122,7 @@ def processed(process: LotProcess) -> FloatArray:
     return np.asarray(np.log([getattr(process, name) for name in PARAMETERS]))
 
 
-def process_told(log_parameters: FloatArray) -> LotProcess:
+def process_result(log_parameters: FloatArray) -> LotProcess:
     """The same the other way round."""
     return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
 

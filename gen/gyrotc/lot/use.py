@@ -23,7 +23,7 @@ from ..train.prior import Given
 from ..train.result import Outcome
 from .basis import LotBasis
 from .learn import FALSE_ALARM, freedom_of, of_few
-from .prior import MapPosterior, MapPrior, check_positive, process_told, processed, rounded, triangle
+from .prior import MapPosterior, MapPrior, check_positive, process_result, processed, rounded, triangle
 
 __all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
 
@@ -104,7 +104,7 @@ class LotPrior(MapPrior):
         posterior = self.with_runs(unit)
         if posterior.p_value < FALSE_ALARM:
             use = _use(self, posterior, serial, accepted=False, scaling=own)
-            return Given(None, [_stranger(use)], lot=use)
+            return Given(None, [_unrelated(use)], lot=use)
         found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
         if isinstance(found, str):
             use = _use(self, posterior, serial, accepted=False, scaling=own)
@@ -319,7 +319,7 @@ def curve_of(alone: MapPosterior, posterior: MapPosterior, scaling: Scaling) -> 
     )
 
 
-def _stranger(use: LotUse) -> dict[str, Any]:
+def _unrelated(use: LotUse) -> dict[str, Any]:
     return {
         "id": "not_of_its_lot",
         "text": f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
@@ -338,10 +338,10 @@ def known_map(posterior: MapPosterior) -> KnownMap:
         slope_c_per_min=prior.slope_c_per_min,
         center_dph=prior.center_dph,
         unit_dph=prior.unit_dph,
-        functions=basis.told(),
+        functions=basis.result(),
         mean=rounded(posterior.mean),
         covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
-        rest=process_told(prior.rest),
+        rest=process_result(prior.rest),
         asked_temperature_c=rounded(asked.temperature_c),
         asked_slope_c_per_min=rounded(asked.slope_c_per_min),
         asked_share=rounded(asked.share),

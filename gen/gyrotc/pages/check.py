@@ -87,13 +87,13 @@ def _columned(shown: Columned) -> Figure:
 
 
 def _compared(shown: Compared) -> Figure:
-    every = (*shown.told, *shown.others)
+    every = (*shown.named, *shown.others)
     panels = max((max(len(c.axes), 1) for c in every), default=1)
     figure = Figure(figsize=(_WIDE, 2.6), layout="constrained")
     axes = figure.subplots(1, panels, squeeze=False)[0]
     for curve in shown.others[:_MOST_OTHERS]:
         _curve(axes, curve, COVERED, "the other runs" if curve is shown.others[0] else None)
-    for curve in shown.told[:_MOST_OTHERS]:
+    for curve in shown.named[:_MOST_OTHERS]:
         _curve(axes, curve, BEFORE, picture_text(curve.file))
     for ax in axes:
         ax.set_xlabel("temperature, C")
@@ -146,8 +146,9 @@ def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Pi
         drawn.append([picture(one) for one in shown[: max(left, 0)]])
         left -= len(shown)
     problems = list(zip(result.problems, drawn, strict=False))
-    doubts = list(zip(result.doubts, drawn[len(problems) :], strict=True))
+    warnings = list(zip(result.warnings, drawn[len(problems) :], strict=True))
     page = page_environment().get_template("check.html.j2")
     write_result(
-        path, page.render(result=result, problems=problems, doubts=doubts, title=title, more=max(-left, 0))
+        path,
+        page.render(result=result, problems=problems, warnings=warnings, title=title, more=max(-left, 0)),
     )

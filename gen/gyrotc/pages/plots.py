@@ -40,9 +40,9 @@ __all__ = [
     "curve_by_size",
     "lot_picture",
     "map_with_centers",
+    "outlier_picture",
     "prior_and_posterior",
     "svg",
-    "unit_apart",
 ]
 
 BEFORE, AFTER, COVERED, ACCENT = "#b4552d", "#1f6f8b", "#7a7a7a", "#222222"
@@ -163,7 +163,7 @@ def _draw_centers(ax: Axes, model: Model, t_span: tuple[float, float], r_span: t
 
 
 def _shown(limits: tuple[float, float]) -> tuple[float, float]:
-    """Limits of an axis: those of the envelope, a little apart where they are one value."""
+    """Limits of an axis: those of the envelope, widened a little where they are one value."""
     low, high = limits
     return limits if high > low else (low - 0.5, high + 0.5)
 
@@ -322,13 +322,13 @@ _IN_TIME = ("step", "outliers", "noise")  # reasons that show over time, not ove
 _FIRST_C, _BIN_C = -90.0, 5.0  # of the curves of entries
 
 
-def lot_picture(entries: Sequence[FleetEntry], apart: set[str]) -> str | None:
+def lot_picture(entries: Sequence[FleetEntry], outliers: set[str]) -> str | None:
     """RMS of every gyro before and after, those that are outliers ringed; None for fewer than two."""
     if len(entries) < 2:
         return None
     ordered = sorted(entries, key=lambda e: e.after_rms_dph or 0.0)
     place = np.arange(1, len(ordered) + 1)
-    ringed = [k for k, entry in enumerate(ordered) if entry.name in apart]
+    ringed = [k for k, entry in enumerate(ordered) if entry.name in outliers]
     size = 4.0 if len(ordered) < 200 else 2.0
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 3.2), layout="constrained")
@@ -345,7 +345,7 @@ def lot_picture(entries: Sequence[FleetEntry], apart: set[str]) -> str | None:
         return svg(figure)
 
 
-def unit_apart(known: Mapping[str, FleetEntry], reason: Reason) -> str:
+def outlier_picture(known: Mapping[str, FleetEntry], reason: Reason) -> str:
     """What shows why a gyro is an outlier.
 
     Args:

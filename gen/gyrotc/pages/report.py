@@ -40,7 +40,7 @@ from .words import (
     sci,
     with_uncertainty,
     words,
-    words_of_rung,
+    words_of_candidate,
 )
 
 __all__ = ["axes_page", "page_environment", "page_from", "write_page", "write_report"]
@@ -72,12 +72,12 @@ def axes_page(folder: Path, axes: Sequence[str]) -> str:
     """
     units = [unit_in(folder / axis) for axis in axes]
     with page_from(folder):
-        told = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
+        ordered = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
         pictures = {u.model.axis: _bias_picture(folder / str(u.model.axis), u) for u in units}
-        worst = told[0].verdict
+        worst = ordered[0].verdict
         template = page_environment().get_template("axes.html.j2")
         trends = {unit.model.axis: _trend(unit) for unit in units}
-        return template.render(units=told, pictures=pictures, trends=trends, verdict=worst)
+        return template.render(units=ordered, pictures=pictures, trends=trends, verdict=worst)
 
 
 def write_page(folder: Path, text: str) -> Path:
@@ -99,7 +99,7 @@ def page_environment() -> jinja2.Environment:
     """
     environment = html_environment(
         sci=sci, number=_number, times=_times, chance=_chance, known=with_uncertainty, plain=plain, rounded=rounded,
-        words=words, rung=words_of_rung, limit_words=limit_words, bound_words=bound_words,
+        words=words, candidate=words_of_candidate, limit_words=limit_words, bound_words=bound_words,
         measured_words=measured_words,
     )  # fmt: skip
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"

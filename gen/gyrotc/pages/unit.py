@@ -11,7 +11,7 @@ from ..results.base import read_optional, read_result
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation, Pooled
 from ..results.release import Budget, HeldLimits, Limit, Verdict
-from ..results.training import Manifest, Rung, Training
+from ..results.training import CandidateModel, Manifest, Training
 from ..results.verification import Verification
 from .words import limit_words, plain, words
 
@@ -28,7 +28,7 @@ _RULES = {
     "guard_band_binary": "a guard band of w = U; PASS up to the limit less w, else FAIL (ILAC-G8:09/2019, binary)",
     "simple_acceptance": "simple acceptance, w = 0 (ILAC-G8:09/2019, binary)",
 }
-_TOLD_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # entries of `[meta]`
+_SHOWN_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # entries of `[meta]`
 _GRAVEST = ("FAIL", "CONDITIONAL PASS", "PASS")
 _COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
 
@@ -133,16 +133,16 @@ class UnitResults:
         floor, rms = self.evaluation.noise_floor_dph, self.judged.after.rms_dph if self.judged else None
         return rms / floor if floor and rms is not None else None
 
-    def against_constant(self, rung: Rung) -> float | None:
+    def against_constant(self, candidate: CandidateModel) -> float | None:
         """How many times what this correction leaves a constant leaves."""
         ladder = self.training.ladder if self.training else ()
         constant = next((r.left_out_rms_dph for r in ladder if r.id == "constant"), None)
-        return constant / rung.left_out_rms_dph if constant and rung.left_out_rms_dph else None
+        return constant / candidate.left_out_rms_dph if constant and candidate.left_out_rms_dph else None
 
     @property
     def who(self) -> list[tuple[str, str]]:
         """Who, what and when, of what is known."""
-        meta = {k: v for k, v in self.model.meta.items() if k not in _TOLD_ELSEWHERE}
+        meta = {k: v for k, v in self.model.meta.items() if k not in _SHOWN_ELSEWHERE}
         product = self.limits.product if self.limits else ""
         date = meta.pop("calibrated_on", None)
         train = sum(run.role == "train" for run in self.evaluation.runs)

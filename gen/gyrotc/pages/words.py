@@ -9,7 +9,7 @@ from ..results.release import Limit
 
 __all__ = [
     "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",
-    "with_uncertainty", "words", "words_of_rung",
+    "with_uncertainty", "words", "words_of_candidate",
 ]  # fmt: skip
 
 _UNITS = (
@@ -66,7 +66,7 @@ _LIMITS = {
     "needs.no_findings": "findings that must not be there",
 }
 
-_RUNGS = {
+_CANDIDATES = {
     "nothing": "no correction",
     "constant": "a constant",
     "linear": "a plane in T and dT/dt",
@@ -91,9 +91,9 @@ def limit_words(limit: str) -> str:
     return _LIMITS.get(limit) or words(limit.partition(".")[2])
 
 
-def words_of_rung(id: str) -> str:
+def words_of_candidate(id: str) -> str:
     """A correction of model selection."""
-    return _RUNGS.get(id, id.replace("_", " "))
+    return _CANDIDATES.get(id, id.replace("_", " "))
 
 
 def sci(value: float | None, digits: int = 2) -> str:

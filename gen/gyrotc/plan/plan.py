@@ -119,16 +119,16 @@ def places(
     if len(found.runs[0]) < 2:
         raise InputError(f"{scenario}, gyro.node", "one node", "further nodes, where a thermometer could be")
     records = sensitivity.programme.records
-    apart = {
+    differences = {
         node: records.average([run[node] - run[found.sensor] for run in found.runs])
         for node in found.runs[0]
         if node != found.sensor
     }
     gains = Gains(sensitivity.search)
-    there = [node for node in apart if node in found.there]
+    there = [node for node in differences if node in found.there]
     ranked = []
-    for node, column in apart.items():
-        others = [apart[o] for o in there if o != node]
+    for node, column in differences.items():
+        others = [differences[o] for o in there if o != node]
         white, plain = gains.whiten(column), column - column.mean()
         q = orthonormal(gains.map, *([gains.whiten(np.column_stack(others))] if others else []))
         own = white - q @ (q.T @ white)
@@ -141,7 +141,7 @@ def places(
             ThermometerPlace(
                 node=node,
                 there=node in there,
-                apart_c=float(np.sqrt(np.mean(plain**2))),
+                difference_c=float(np.sqrt(np.mean(plain**2))),
                 unseen_c=unseen,
                 limit_dph_per_c=limit,
             )

@@ -264,7 +264,7 @@ def _columns(search: Search) -> tuple[list[Candidate], FloatArray, list[slice]]:
 
 
 _D_LIMIT = 6.0  # about where most causes are found (`causes.base.SearchRule.needed_d`)
-_LEAST = 1e-3  # 1 − R² below which nothing tells the two apart
+_LEAST = 1e-3  # 1 − R² below which nothing distinguishes the two
 
 
 @dataclass(frozen=True)

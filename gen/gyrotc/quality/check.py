@@ -18,9 +18,9 @@ from ..model import Model
 from ..recordings.description import Problems
 from ..recordings.load import axes_of, survey
 from ..recordings.records import Applied, Dataset, Mark
-from ..results.recordings import Checked, CheckedRun, Doubted, MarkedRows, Problem
+from ..results.recordings import Checked, CheckedRun, MarkedRows, Problem, Suspected
 from .facts import RunFacts
-from .findings import Doubt, Envelope, doubts_of_data_set, looked_at, where_of
+from .findings import Doubt, Envelope, looked_at, warnings_of_data_set, where_of
 
 __all__ = [
     "CheckResult",
@@ -39,7 +39,7 @@ class CheckResult:
         serial: The stated one; None if that could not be read.
         axis: The one that was asked for.
         problems: What `fit` refuses.
-        doubts: What a person should look at.
+        warnings: What a person should look at.
         facts: Axis and facts of every run that could be read.
         marks: Rows that a problem is about, by its text.
         datasets: Axis and data set of the runs that could be read.
@@ -48,7 +48,7 @@ class CheckResult:
     serial: str | None
     axis: str | None
     problems: tuple[InputError, ...]
-    doubts: tuple[Doubt, ...]
+    warnings: tuple[Doubt, ...]
     facts: tuple[tuple[str | None, RunFacts], ...]
     marks: Mapping[str, tuple[Mark, ...]]
     datasets: tuple[tuple[str | None, Dataset], ...]
@@ -57,14 +57,14 @@ class CheckResult:
         """For a person: a line for each problem, warning (and what to do next) and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
-        for doubt in self.doubts:
+        for doubt in self.warnings:
             yield f"doubt: {doubt}"
             if doubt.advice:
                 yield f"  next: {doubt.advice}"
         for axis, f in self.facts:
             yield _run_line(axis, f)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
-        yield f"{_counted(self.problems, 'problem')}, {_counted(self.doubts, 'doubt')}: {verdict}"
+        yield f"{_counted(self.problems, 'problem')}, {_counted(self.warnings, 'warning')}: {verdict}"
 
     def result(self) -> Checked:
         """What `gyrotc check --json` writes."""
@@ -78,9 +78,9 @@ class CheckResult:
                 )
                 for p in self.problems
             ),
-            doubts=tuple(
-                Doubted(id=d.id, where=d.where, text=d.text, next=d.advice, rows=_rows(d.marks))
-                for d in self.doubts
+            warnings=tuple(
+                Suspected(id=d.id, where=d.where, text=d.text, next=d.advice, rows=_rows(d.marks))
+                for d in self.warnings
             ),
             runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
         )
@@ -126,16 +126,16 @@ def check(
     """
     problems: dict[str, InputError] = {}
     marks: dict[str, tuple[Mark, ...]] = {}
-    doubts: dict[Doubt, list[str | None]] = {}
+    warnings: dict[Doubt, list[str | None]] = {}
     facts: list[tuple[str | None, RunFacts]] = []
     datasets: list[tuple[str | None, Dataset]] = []
     axes = _axes(folder, axis)
     for one in axes:
-        told = Problems(collect=True)
+        reported = Problems(collect=True)
         progress("reading")
-        dataset = survey(folder, told, axis=one, applied=applied, trust_units=trust_units)
-        problems |= {str(problem): problem for problem in told.found}
-        marks |= told.marks
+        dataset = survey(folder, reported, axis=one, applied=applied, trust_units=trust_units)
+        problems |= {str(problem): problem for problem in reported.found}
+        marks |= reported.marks
         if dataset is not None:
             _refuse_another(earlier or {}, dataset)
             datasets.append((one, dataset))
@@ -144,11 +144,11 @@ def check(
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")
                 looked.append(looked_at(run))
             of_axis = [f for f, _ in looked]
-            together = doubts_of_data_set(dataset, of_axis, envelope, earlier)
+            together = warnings_of_data_set(dataset, of_axis, envelope, earlier)
             for doubt in (*together, *(doubt for _, of_run in looked for doubt in of_run)):
-                doubts.setdefault(doubt, []).append(one)
+                warnings.setdefault(doubt, []).append(one)
             facts += [(one, f) for f in of_axis]
-    named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in doubts.items())
+    named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in warnings.items())
     serial = datasets[-1][1].serial if datasets else None
     return CheckResult(
         serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets)

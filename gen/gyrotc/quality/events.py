@@ -87,7 +87,7 @@ def events_of(dataset: Dataset) -> list[Event]:
         found += of_run
         departing.append(wild)
     judged = _Judged(runs, departing)
-    steps, drifts = _told_once(steps_of(judged), drifts_of(judged))
+    steps, drifts = _reported_once(steps_of(judged), drifts_of(judged))
     for number, run in enumerate(runs):
         found += [_drift(run, drift, float(judged[number][0][-1])) for drift in drifts if drift.run == number]
         its_steps = [step for step in steps if step.run == number]
@@ -148,7 +148,7 @@ def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:
     return replace(dataset, runs=tuple(map(without, kept)))
 
 
-def _told_once(steps: Sequence[Step], drifts: Sequence[Drift]) -> tuple[list[Step], list[Drift]]:
+def _reported_once(steps: Sequence[Step], drifts: Sequence[Drift]) -> tuple[list[Step], list[Drift]]:
     """Of a step and a drift that are found at about one place, the clearer one."""
 
     def near(one: Step | Drift, other: Step | Drift) -> bool:

@@ -31,7 +31,7 @@ from .recorded import (
 from .thermometers import thermometer_findings
 from .timing import time_findings
 
-__all__ = ["Doubt", "Envelope", "advice_of", "doubts_of_data_set", "looked_at", "where_of"]
+__all__ = ["Doubt", "Envelope", "advice_of", "looked_at", "warnings_of_data_set", "where_of"]
 
 _ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
@@ -121,7 +121,7 @@ def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
         *copied_channel_findings(run, rows),
         *stuck_temperature_findings(run, rows),
     ]
-    doubts = [
+    warnings = [
         *_of_temperature(f, where),
         *_of_rate(f, rows, where, coarse=any(one["id"] == "coarse_rate" for one in found)),
         *_of_time(f, where),
@@ -129,7 +129,7 @@ def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
         *_of_counter(f, rows, where),
         *_of_outliers(run, rows, f, where),
     ]
-    return f, doubts
+    return f, warnings
 
 
 def _of_counter(f: RunFacts, rows: Rows, where: str) -> Iterator[Doubt]:
@@ -173,7 +173,7 @@ def _mark(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
     return Mark(file, (int(first) + 1, int(max(end, first + 1))), (from_s, to_s))
 
 
-def doubts_of_data_set(
+def warnings_of_data_set(
     dataset: Dataset,
     facts: Sequence[RunFacts],
     envelope: Envelope | None,

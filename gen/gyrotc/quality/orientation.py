@@ -1,7 +1,7 @@
 """Axes that were exchanged and signs that were reversed: against Earth's rate, the other runs, an earlier calibration.
 
-Every way in which the columns of a file can stand for its axes is tried (exchanged, reversed, both): a run is told of
-where another way than the stated one makes it agree, and the stated one does not.
+Every way in which the columns of a file can stand for its axes is tried (exchanged, reversed, both). A run is
+reported where another way than the stated one makes it agree, and the stated one does not.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from .check import CheckResult
 from .facts import RunFacts
 from .findings import Doubt
 
-__all__ = ["Columned", "Compared", "Covered", "Picture", "Seen", "Strip", "pictured"]
+__all__ = ["Columned", "Compared", "Covered", "Picture", "Seen", "Strip", "pictures_of"]
 
 Span = tuple[float, float]
 
@@ -64,7 +64,7 @@ class Columned:
 class Compared:
     """Mean rates over temperature: of the runs that are reported, and of the others."""
 
-    told: tuple[Curve, ...]
+    named: tuple[Curve, ...]
     others: tuple[Curve, ...]
 
 
@@ -79,21 +79,21 @@ class Covered:
 Picture = Seen | Columned | Compared | Covered
 
 
-def pictured(folder: Path, result: CheckResult) -> list[list[Picture]]:
+def pictures_of(folder: Path, result: CheckResult) -> list[list[Picture]]:
     """Pictures of every problem, then of every warning, of a check of `folder`.
 
     Raises:
         InputError: A recording changed meanwhile.
     """
     of_problems = (_of_problem(folder, result, _marks(result, problem)) for problem in result.problems)
-    return [list(one) for one in (*of_problems, *(_of_doubt(result, doubt) for doubt in result.doubts))]
+    return [list(one) for one in (*of_problems, *(_of_doubt(result, doubt) for doubt in result.warnings))]
 
 
 def _marks(result: CheckResult, problem: InputError) -> Sequence[Mark]:
     """Rows that a problem is about, or all of the run whose file it names."""
-    told = result.marks.get(str(problem), ())
+    named = result.marks.get(str(problem), ())
     files = [run.file for _, dataset in result.datasets[:1] for run in dataset.runs]
-    return told or [Mark(file) for file in dict.fromkeys(files) if problem.where.startswith(f"{file},")]
+    return named or [Mark(file) for file in dict.fromkeys(files) if problem.where.startswith(f"{file},")]
 
 
 def _of_problem(folder: Path, result: CheckResult, marks: Sequence[Mark]) -> Iterator[Picture]:
@@ -131,8 +131,8 @@ def _of_doubt(result: CheckResult, doubt: Doubt) -> Iterator[Picture]:
     if doubt.id in _COVERED:
         yield _covered(facts)
     elif doubt.id in _COMPARED:
-        told = tuple(c for c in dataset.curves if c.file in files)
-        yield Compared(told, tuple(c for c in dataset.curves if c.file not in files))
+        named = tuple(c for c in dataset.curves if c.file in files)
+        yield Compared(named, tuple(c for c in dataset.curves if c.file not in files))
     else:
         for file in files[:_MOST_FILES]:
             yield from _file_rows(dataset, [m for m in doubt.marks if m.file == file] or [Mark(file)])

@@ -2,7 +2,7 @@
 
 At every place of a run a step is fitted in a window around it beside a constant, a drift, the temperature and its rate,
 for windows of several lengths. What such a fit makes of noise is read off the run itself, robustly, over all places,
-whatever the colour of its noise; a step is told where the fit is so far beyond it that chance makes one in two hundred
+whatever the colour of its noise; a step is reported where the fit is so far beyond it that chance makes one in 200
 records, over all places and lengths of all runs together (Bonferroni). See Basseville and Nikiforov, Detection of
 Abrupt Changes, 1993, 2.2. A narrow feature of the static map that is passed quickly looks the same within one run: a
 step that the other passages over the same temperatures show as well is none.

@@ -71,7 +71,7 @@ class _Followed:
     run: Run
     own_c: FloatArray
     rate: FloatArray  # C/s
-    apart_c: FloatArray
+    difference_c: FloatArray
     lag_s: float | None
 
 
@@ -125,27 +125,27 @@ def _odd_ones(name: str, runs: list[_Followed]) -> Iterator[dict[str, Any]]:
     for k, one in enumerate(runs):
         others = [other for j, other in enumerate(runs) if j != k]
         own, rate, apart = (
-            np.concatenate([getattr(o, part) for o in others]) for part in ("own_c", "rate", "apart_c")
+            np.concatenate([getattr(o, part) for o in others]) for part in ("own_c", "rate", "difference_c")
         )
         center = float(own.mean())
         found = np.linalg.lstsq(_columns(own, rate, center), apart, rcond=None)[0]
 
         def mean_left(o: _Followed, found: FloatArray = found, center: float = center) -> float:
-            return float(np.mean(o.apart_c - _columns(o.own_c, o.rate, center) @ found))
+            return float(np.mean(o.difference_c - _columns(o.own_c, o.rate, center) @ found))
 
         shift = mean_left(one)
         usual = float(np.sqrt(np.mean([mean_left(o) ** 2 for o in others])))
-        told = []
+        reported = []
         if abs(shift) > max(_SIGMAS * usual, _LEAST_C):
-            told.append(f"shows {abs(shift):.2g} C {'more' if shift > 0.0 else 'less'}")
+            reported.append(f"shows {abs(shift):.2g} C {'more' if shift > 0.0 else 'less'}")
         rest = np.delete(lags, k)
         rest = rest[np.isfinite(rest)]
         if np.isfinite(lags[k]) and len(rest) >= _LEAST_RUNS - 1:
             late = float(lags[k] - np.median(rest))
             if abs(late) > max(_SIGMAS * float(rest.std()), _LEAST_S):
-                told.append(f"answers {abs(late):.0f} s {'later' if late > 0.0 else 'sooner'}")
-        if told:
-            yield _finding(name, one, " and ".join(told), shift, usual)
+                reported.append(f"answers {abs(late):.0f} s {'later' if late > 0.0 else 'sooner'}")
+        if reported:
+            yield _finding(name, one, " and ".join(reported), shift, usual)
 
 
 def _finding(name: str, one: _Followed, what: str, shift: float, usual: float) -> dict[str, Any]:

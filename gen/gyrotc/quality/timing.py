@@ -27,7 +27,7 @@ _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
 # Of a row period, and of the rows: a clock of coarser ticks than the rows
 _COARSE, _COARSE_SHARE = 0.4, 0.05
 _EVEN_ROWS, _EVEN, _EVEN_SHARE = 400, 1.25, 0.8  # parts in which even rows stay so near a line, in units
-_TOLD = 20  # that are reported: enough to see a pattern
+_REPORTED = 20  # that are reported: enough to see a pattern
 _HOUR_S = 3600.0  # a change of summer time
 
 
@@ -61,7 +61,7 @@ def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
 def _marks(run: Run, time: FloatArray, at: Sequence[int], places: list[int]) -> tuple[Mark, ...]:
     return tuple(
         Mark(run.file, (int(at[k]) + 1, int(at[k + 1]) + 1), (float(time[k]), float(time[k + 1])))
-        for k in places[:_TOLD]
+        for k in places[:_REPORTED]
     )
 
 
@@ -69,7 +69,7 @@ def _gaps(run: Run, time: FloatArray, at: Sequence[int], gaps: NDArray[np.int64]
     step = np.diff(time)[gaps]
     missing = int(np.sum(np.round(step / run.row_period_s) - 1.0))
     longest = int(gaps[np.argmax(step)])
-    places = sorted(gaps.tolist(), key=lambda k: time[k] - time[k + 1])[:_TOLD]
+    places = sorted(gaps.tolist(), key=lambda k: time[k] - time[k + 1])[:_REPORTED]
     return {
         "id": "gaps",
         "text": (

@@ -125,7 +125,7 @@ def common_channels(recordings: Mapping[str, Recording]) -> tuple[tuple[str, ...
     return common, warnings
 
 
-Doubted = tuple[str, Suspicion]
+Suspected = tuple[str, Suspicion]
 """Name of a file and what contradicts its units."""
 
 
@@ -142,7 +142,7 @@ def check_channel_units(
             problems.add(InputError(f"{FILE}, field units.{name}", "no such column", expected))
 
 
-def suspected(description: Description, recordings: Mapping[str, Recording]) -> Iterator[Doubted]:
+def suspected(description: Description, recordings: Mapping[str, Recording]) -> Iterator[Suspected]:
     """What contradicts the units of each file."""
     noise = description.noise.arw_deg_per_sqrt_h if description.noise else None
     for name, recording in recordings.items():
@@ -158,7 +158,7 @@ def suspected(description: Description, recordings: Mapping[str, Recording]) -> 
 
 def suspected_of_earth(
     axis: str | None, runs: Sequence[Run], recordings: Mapping[str, Recording]
-) -> Iterator[Doubted]:
+) -> Iterator[Suspected]:
     """Runs whose mean is Earth's component along the axis in another unit, where that is computed."""
     for run in runs:
         recording = recordings[run.file]
@@ -175,11 +175,11 @@ def suspected_of_earth(
             yield run.file, one
 
 
-def judge(doubted: Sequence[Doubted], trust: bool, problems: Problems) -> list[tuple[str, str]]:
+def judge(suspicions: Sequence[Suspected], trust: bool, problems: Problems) -> list[tuple[str, str]]:
     """Refuses what contradicts its unit; where the user's word is taken, the file and what it was taken against."""
     trusted: list[tuple[str, str]] = []
     seen = set()
-    for name, one in doubted:
+    for name, one in suspicions:
         if (name, one.kind) in seen:
             continue
         seen.add((name, one.kind))
@@ -289,8 +289,8 @@ def survey(
         if r.file.torn
     ]
     check_channel_units(description, recordings, problems)
-    doubted = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
-    trusted = judge(doubted, trust_units or description.trust_units, problems)
+    suspicions = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
+    trusted = judge(suspicions, trust_units or description.trust_units, problems)
     warnings += [f"{name}: units are trusted: {text}" for name, text in trusted]
     trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
     if description.temperature_late_s:

@@ -47,12 +47,12 @@ def shared_rows(
             if runs[i].role == runs[j].role:
                 found.append(shared)
             else:
-                of_exam = shared if runs[j].role == "exam" else _turned(shared)
+                of_exam = shared if runs[j].role == "exam" else _reversed_roles(shared)
                 problems.add(_refused(of_exam), *of_exam.marks)
     return tuple(found)
 
 
-def _turned(shared: SharedRows) -> SharedRows:
+def _reversed_roles(shared: SharedRows) -> SharedRows:
     return replace(
         shared,
         file=shared.other_file,

@@ -191,8 +191,8 @@ def known_rows(
     known = np.ones(len(columns[layout.time]), dtype=bool)
     for name in (layout.temperature, *channels):
         with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
-            doubtful = np.isnan(np.sum(columns[name]))
-        if doubtful:
+            not_finite = np.isnan(np.sum(columns[name]))
+        if not_finite:
             known &= ~np.isnan(columns[name])
     return columns if known.all() else {name: values[known] for name, values in columns.items()}
 

@@ -99,11 +99,11 @@ def windows_in_common(prints: Sequence[Fingerprints]) -> dict[tuple[int, int], N
     order = np.argsort(hashes, kind="stable")  # those that are alike by run
     hashes, run, place = hashes[order], run[order], np.concatenate([np.zeros(0, np.int64), *at])[order]
     pairs = []
-    for apart in range(1, len(prints)):
-        alike = np.flatnonzero(hashes[apart:] == hashes[:-apart])
+    for lag in range(1, len(prints)):
+        alike = np.flatnonzero(hashes[lag:] == hashes[:-lag])
         if len(alike) == 0:
             break
-        pairs.append(np.column_stack([run[alike + apart], run[alike], place[alike + apart], place[alike]]))
+        pairs.append(np.column_stack([run[alike + lag], run[alike], place[alike + lag], place[alike]]))
     each = np.concatenate(pairs) if pairs else np.zeros((0, 4), dtype=np.int64)
     for j, i in np.unique(each[:, :2], axis=0).tolist():
         mine, its = each[(each[:, 0] == j) & (each[:, 1] == i), 2:].T

@@ -14,7 +14,6 @@ from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .release import HeldLimits
 
 __all__ = [
-    "Apart",
     "AsFound",
     "At",
     "Calibration",
@@ -28,6 +27,7 @@ __all__ = [
     "FileChanges",
     "FoundIn",
     "Group",
+    "MapDifference",
     "Method",
     "ModelSizes",
     "NameChanges",
@@ -282,7 +282,7 @@ class At(Part):
     slope_c_per_min: float = Field(description="C/min")
 
 
-class Apart(Part):
+class MapDifference(Part):
     """How far the maps differ where both were calibrated."""
 
     rms_dph: float = Field(description="deg/h")
@@ -331,7 +331,7 @@ class Changes(UnitResult):
     same_model: bool = Field(description="whether the models have one hash")
     model_hash: TextChange = Field(description="hashes of the models")
     recordings: FileChanges = Field(description="recordings that the models were fitted to")
-    map: Apart | None = Field(description="null where the envelopes have nothing in common")
+    map: MapDifference | None = Field(description="null where the envelopes have nothing in common")
     envelope: Envelopes = Field(description="calibrated ranges")
     figures: dict[str, FigureChange | str] = Field(
         description="figures of both results; `judged_on` says on what those of recordings were measured, which are "

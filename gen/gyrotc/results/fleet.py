@@ -120,11 +120,13 @@ class FleetUnit(Part):
         default=None, description="`calibrated_on` of the data set, else the day of its last run"
     )
     rows_left_out: Count | None = Field(default=None, description="rows of training that were outliers")
-    aside: str | None = Field(
+    moved_to: str | None = Field(
         default=None, description="folder of an earlier result of the gyro that somebody had changed"
     )
     copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows")
-    apart: str | None = Field(default=None, description="why it is an outlier, as in `apart` of the fleet")
+    outlier_reason: str | None = Field(
+        default=None, description="why it is an outlier, as in `reasons` of the fleet"
+    )
 
     released: str | None = Field(
         default=None,
@@ -195,7 +197,7 @@ class FleetEntry(FleetUnit):
         found._kept = True
         return found
 
-    def told(self) -> FleetUnit:
+    def unit(self) -> FleetUnit:
         """What a summary says of it."""
         known = self.model_fields_set & set(FleetUnit.model_fields)
         return FleetUnit(**{name: getattr(self, name) for name in FleetUnit.model_fields if name in known})
@@ -224,8 +226,8 @@ class Reason(Part):
 
     name: str = Field(description="of the gyro")
     id: str = Field(
-        description="`copy_of_other`, `axes_exchanged`, `thermometer_apart`, `sign_reversed`, `scale`, `outliers`, "
-        "`step`, `noise`, or `bias_apart` where nothing known explains it"
+        description="`copy_of_other`, `axes_exchanged`, `thermometer_offset`, `sign_reversed`, `scale`, `outliers`, "
+        "`step`, `noise`, or `bias_outlier` where nothing known explains it"
     )
     text: str = Field(description="the reason in words")
     file: str | None = Field(default=None, description="run in which it shows; null: in all")
@@ -260,7 +262,7 @@ class FleetSummary(Result):
         description="figures over the fleet by their names; null where no gyro has it"
     )
     outliers: tuple[FleetOutlier, ...] = Field(description="figures that are outliers, the farthest first")
-    apart: tuple[Reason, ...] = Field(description="gyros that are outliers, in the order of the manifest")
+    reasons: tuple[Reason, ...] = Field(description="gyros that are outliers, in the order of the manifest")
     copies: tuple[Copy, ...] = Field(
         description="pairs of gyros of different serials with the same rows, in the order of the manifest"
     )

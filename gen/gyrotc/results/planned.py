@@ -187,7 +187,7 @@ class ThermometerPlace(Part):
 
     node: str = Field(description="name of the node")
     there: bool = Field(description="whether a thermometer is there")
-    apart_c: float = Field(description="RMS of its temperature less the sensor's, about the mean, C")
+    difference_c: float = Field(description="RMS of its temperature less the sensor's, about the mean, C")
     unseen_c: float = Field(
         description="RMS of what map and thermometers that are there do not hold of it, C"
     )

@@ -11,13 +11,13 @@ from .base import Axis, Count, Figure, Numbered, Part, Result, Share
 __all__ = [
     "Checked",
     "CheckedRun",
-    "Doubted",
     "ImportedFile",
     "ImportedFiles",
     "MarkedRows",
     "OriginalFile",
     "Problem",
     "SimulatedTruth",
+    "Suspected",
     "TrueLot",
     "TrueRun",
 ]
@@ -40,7 +40,7 @@ class Problem(Part):
     rows: tuple[MarkedRows, ...] = Field(description="rows that it is about")
 
 
-class Doubted(Part):
+class Suspected(Part):
     """What a person should look at."""
 
     id: str = Field(description="stable name of the warning")
@@ -79,7 +79,7 @@ class Checked(Result):
     serial: str | None = Field(description="null where it could not be read")
     axis: str | None = Field(description="as asked for: `x`, `y`, `z`, `all`, or null")
     problems: tuple[Problem, ...] = Field(description="what `fit` refuses")
-    doubts: tuple[Doubted, ...] = Field(description="what it takes, and a person should look at")
+    warnings: tuple[Suspected, ...] = Field(description="what it takes, and a person should look at")
     runs: tuple[CheckedRun, ...] = Field(description="every run that could be read")
 
 
@@ -137,7 +137,7 @@ class TrueLot(Part):
     family: Share = Field(description="correlation of each parameter between two units of one cluster")
     clusters: int = Field(description="groups with a center of their own")
     cluster: int = Field(description="number of the group, from 0; of a foreign unit that of none: -1")
-    stranger: bool = Field(description="whether it shares nothing with the lot but the scenario")
+    unrelated: bool = Field(description="whether it shares nothing with the lot but the scenario")
     scores: dict[str, float] = Field(description="every parameter that was drawn, in standard deviations")
 
 

@@ -98,7 +98,7 @@ Value = bool | int | float | str | tuple[float, ...] | tuple[str, ...] | None
 """A bound, or what was measured of it; null: not measured."""
 
 
-def _told(value: Value) -> str:
+def _in_words(value: Value) -> str:
     """A bound or a figure on one line."""
     if isinstance(value, tuple):
         return ", ".join(str(v) for v in value) or "none"
@@ -153,7 +153,7 @@ class Limit(Part):
 
     def failure(self) -> str:
         """What is reported of a limit that is not met."""
-        bound, measured = (_told(v) for v in (self.bound, self.measured))
+        bound, measured = (_in_words(v) for v in (self.bound, self.measured))
         if self.verdict == "CONDITIONAL PASS":
             return f"{self.limit} = {bound} is met by less than the guard band: {measured}"
         return f"{self.limit} = {bound} is not met: {measured}"

@@ -13,6 +13,7 @@ from .lot import KnownMap, LotUse, UnitCurve
 __all__ = [
     "AllanPoint",
     "BiasPlane",
+    "CandidateModel",
     "ChannelTried",
     "CheckedCell",
     "DeclaredUnits",
@@ -23,7 +24,6 @@ __all__ = [
     "MapMeans",
     "NoiseTerms",
     "Outliers",
-    "Rung",
     "SpanLeftOut",
     "Training",
 ]
@@ -136,7 +136,7 @@ class BiasPlane(Part):
     residual_rms_dph: Figure = Field(description="what the plane leaves, deg/h")
 
 
-class Rung(Part):
+class CandidateModel(Part):
     """A correction that was tried."""
 
     id: str = Field(description="method")
@@ -221,7 +221,7 @@ class Training(UnitResult):
     left_out_spans: tuple[Pooled, ...] = Field(description="each of them")
     noise: NoiseTerms = Field(description="of the compensated training runs")
     sensitivity: BiasPlane = Field(description="of the bias before compensation")
-    ladder: tuple[Rung, ...] = Field(
+    ladder: tuple[CandidateModel, ...] = Field(
         description="what was tried, the simplest first; empty of a named method"
     )
     reason: str = Field(description="why this one was chosen, in words")

@@ -59,7 +59,7 @@ class LotOrder:
         units: Number of gyros, foreign units among them.
         family: Correlation of each parameter between two units of a cluster, 0 ... 1.
         clusters: Groups with a center of their own; units go to them at random.
-        strangers: Units that share nothing with the others but the scenario.
+        unrelated: Units that share nothing with the others but the scenario.
 
     Raises:
         InputError: A number that cannot be.
@@ -68,7 +68,7 @@ class LotOrder:
     units: int
     family: float = 0.9
     clusters: int = 1
-    strangers: int = 0
+    unrelated: int = 0
 
     def __post_init__(self) -> None:
         if not 1 <= self.units <= _MOST_UNITS:
@@ -77,8 +77,8 @@ class LotOrder:
             raise InputError("--family", f"{self.family:g}", "0 (nothing shared) ... 1 (all the same)")
         if not 1 <= self.clusters <= self.units:
             raise InputError("--clusters", str(self.clusters), "1 ... the number of units")
-        if not 0 <= self.strangers < self.units:
-            raise InputError("--strangers", str(self.strangers), "0 or more, and fewer than units")
+        if not 0 <= self.unrelated < self.units:
+            raise InputError("--unrelated", str(self.unrelated), "0 or more, and fewer than units")
 
 
 def simulate_lot(
@@ -132,7 +132,7 @@ def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list
     mix = _mixing()
     centers = np.random.default_rng(of_lot).standard_normal((order.clusters, len(SCORES))) @ mix.T
     places = np.random.default_rng(of_places)
-    strange = set(places.permutation(order.units)[: order.strangers].tolist())
+    strange = set(places.permutation(order.units)[: order.unrelated].tolist())
     cluster = places.integers(order.clusters, size=order.units)
     units = []
     for k, child in enumerate(of_units.spawn(order.units)):
@@ -147,7 +147,7 @@ def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list
             family=order.family,
             clusters=order.clusters,
             cluster=group,
-            stranger=group < 0,
+            unrelated=group < 0,
             scores={key: float(value) for key, value in zip(SCORES, score, strict=True)},
         )
         bias_map = _map(plan.gyro, truth.scores, center, order.family)

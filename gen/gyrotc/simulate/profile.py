@@ -1,6 +1,6 @@
 """Chamber programmes: holds, ramps, steps, staircases, triangles, nested loops and repeats.
 
-A profile's steps are turned into the corners of a piecewise linear programme (time in s, temperature in C).
+A profile's steps become the corners of a piecewise linear programme (time in s, temperature in C).
 """
 
 from __future__ import annotations

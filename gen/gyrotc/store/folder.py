@@ -17,8 +17,8 @@ from .marker import (
     KINDS,
     MARKER,
     OWN,
-    check_apart,
     check_contents,
+    check_separate,
     check_serial,
     faults,
     final_place,
@@ -36,7 +36,7 @@ from .update import Update, can_exchange, exchange, write_marker
 __all__ = ["Stage", "clean", "kept_by_hash", "leftovers", "result_folder", "share_by_hash", "write_result"]
 
 _open: list[_Job] = []
-_ASIDE = ".old"
+_EARLIER = ".old"
 
 
 class Stage:
@@ -102,7 +102,7 @@ def result_folder(
         command: The command that writes it.
         kind: What kind of folder it becomes; default: the kind of the command. "" takes any kind that is there.
         entries: Names in `out` that are written; all else in it stays. None: the folder is replaced as a whole.
-        inputs: What the job reads: `out` must be apart from it.
+        inputs: What the job reads: `out` must lie outside of it.
 
     Raises:
         InputError: `out` holds what gyrotc did not write, or another kind of result; it is the same as, above or
@@ -194,7 +194,7 @@ class _Job:
         self.place = final_place(out)
         self._prefix = prefix_of(self.place)
         self._entries = entries
-        check_apart(out, self.place, inputs, whole=entries is None)
+        check_separate(out, self.place, inputs, whole=entries is None)
         self.place.parent.mkdir(parents=True, exist_ok=True)
         self._lock = Lock(self.place, command)
         try:
@@ -276,11 +276,11 @@ class _Job:
         link = self.work.with_name(f"{self.work.name}.link")
         link.symlink_to(self.work.name)
         old = self.place.readlink() if self.place.is_symlink() else None
-        aside = self.work.with_name(f"{self.work.name}{_ASIDE}")
+        earlier = self.work.with_name(f"{self.work.name}{_EARLIER}")
         if old is None and self.place.exists():
-            self.place.rename(aside)
+            self.place.rename(earlier)
         link.replace(self.place)
-        self.work = aside if old is None else self.place.parent / old
+        self.work = earlier if old is None else self.place.parent / old
 
     def end(self) -> None:
         """Removes what is left of the work, or of the earlier result, and releases the place."""
@@ -295,7 +295,7 @@ class _Job:
         """A job that died between two renames (where names cannot be exchanged) left the place empty."""
         if not self.place.exists() and not self.place.is_symlink():
             for path in sorted(self.place.parent.iterdir()):
-                if path.name.startswith(self._prefix) and path.name.endswith(_ASIDE) and not faults(path):
+                if path.name.startswith(self._prefix) and path.name.endswith(_EARLIER) and not faults(path):
                     path.rename(self.place)
                     return
 

@@ -26,9 +26,9 @@ __all__ = [
     "NEW",
     "OWN",
     "SCHEMA",
-    "check_apart",
     "check_contents",
     "check_intact",
+    "check_separate",
     "check_serial",
     "faults",
     "final_place",
@@ -291,7 +291,7 @@ def remove_listed(folder: Path) -> list[str]:
 
 
 def _remove_empty(folder: Path) -> None:
-    """The folders inside, then the marker, then the folder: a kill between leaves what can be told to be gyrotc's."""
+    """The folders inside, then the marker, then the folder: a kill between leaves what is recognisably gyrotc's."""
     for place, _, _ in os.walk(folder, topdown=False):
         if Path(place) != folder:
             Path(place).rmdir()
@@ -317,7 +317,7 @@ def prefix_of(place: Path) -> str:
     return f".{place.name}.gyrotc-part-"
 
 
-def check_apart(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) -> None:
+def check_separate(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) -> None:
     """Refuses an `out` that is a file, or is, holds or lies in what the job reads or gyrotc's own sources.
 
     Args:

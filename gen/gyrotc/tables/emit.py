@@ -313,10 +313,10 @@ def _time_macros(model: Model) -> Iterator[dict[str, str]]:
     yield _macro("PERIOD_MIN_US", c_code(f"{shortest}UL"), "shortest sample period, microseconds")
     yield _macro("PERIOD_MAX_US", c_code(f"{longest}UL"), "longest sample period")
     stuck = f"{round(model.stuck_s * 1e6)}UL"
-    told = (
+    comment = (
         "a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck"
     )
-    yield _macro("STUCK_US", c_code(stuck), told)
+    yield _macro("STUCK_US", c_code(stuck), comment)
 
 
 def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
@@ -325,8 +325,8 @@ def _authority_macros(emission: Emission) -> Iterator[dict[str, str]]:
     values = {"MIN": min(low for low, _ in ends), "MAX": max(high for _, high in ends)}
     for name, value in values.items():
         text = CText(f"({c_code(f'{value:#.9g}F')})")
-        told = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of the range"
-        yield _macro(f"AUTHORITY_{name}_DPH", text, told)
+        comment = f"no correction lies {'below' if name == 'MIN' else 'above'} it, deg/h: margin {MARGIN:.0%} of range"
+        yield _macro(f"AUTHORITY_{name}_DPH", text, comment)
 
 
 def image_of(table: Table) -> bytes:

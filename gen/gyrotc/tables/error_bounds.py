@@ -12,8 +12,8 @@ The bank is f = Σ s_k n_k / Σ s_k. With shares s_k that are off by at most ε_
 
     f' − f = Σ (s'_k − s_k) (n_k − f) / Σ s'_k,   so   |f' − f| ≤ (Σ ε_k − min ε_k) · D / (Σ s_k − Σ ε_k)
 
-where D is how far apart the networks are that count there; |n_k − f| ≤ (1 − s_k/Σ s) D. A narrow overlap has a small
-Σ s_k: this is why it is dear. Shares are ramps, so on a cell of a grid that has every edge of a region among its lines
+where D is the largest difference of the networks that count there; |n_k − f| ≤ (1 − s_k/Σ s) D. A narrow overlap has
+a small Σ s_k and a large bound. Shares are ramps. On a cell of a grid with every edge of a region among its lines
 each is concave, and Σ s_k is least at a corner. All in the coordinates in which the table compares inputs with edges.
 """
 
@@ -344,9 +344,9 @@ def handover_error_dph(
             f"{numeric}: networks hand over within less than this arithmetic can separate; let their regions "
             f"overlap by more than {float(np.max(moved)):.1g} of their width"
         )
-    apart = _apart(model, axes, lines, counts)
+    spread = _spread(model, axes, lines, counts)
     part = np.where(blended, np.minimum((moved - smallest) / np.where(blended, room, 1.0), 1.0), 0.0)
-    return float(np.max(apart * (part + 2.0 * share_error)))
+    return float(np.max(spread * (part + 2.0 * share_error)))
 
 
 def _ramps(axis: Axis, pairs: list[tuple[float, float]], limits: tuple[float, float], numeric: str) -> _Ramps:
@@ -393,7 +393,7 @@ def _over_cells(values: FloatArray, least: np.ufunc) -> FloatArray:
     return values
 
 
-def _apart(
+def _spread(
     model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]
 ) -> FloatArray:
     """Bound of how far from one another the networks are that count in a cell, deg/h."""

@@ -238,15 +238,15 @@ def _telling(table: Table, inputs: Words, n: int) -> list[int]:
     """Numbers of the inputs that show most builds to be wrong, those first that no chosen one shows yet."""
     _, right = evaluate_map(table, inputs)
     tells = np.stack([evaluate_map(table, inputs, fused)[1] != right for fused in _BUILDS])
-    told = np.zeros(len(_BUILDS))
+    known = np.zeros(len(_BUILDS))
     free = np.ones(len(inputs), dtype=np.bool_)
     chosen: list[int] = []
     for _ in range(n):
-        worth = np.where(free, 2.0 ** (-8.0 * told) @ tells, -1.0)  # exact: sums of powers of two
+        worth = np.where(free, 2.0 ** (-8.0 * known) @ tells, -1.0)  # exact: sums of powers of two
         best = int(np.argmax(worth))
         chosen.append(best)
         free[best] = False
-        told += tells[:, best]
+        known += tells[:, best]
     return chosen
 
 

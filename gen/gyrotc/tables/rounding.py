@@ -78,8 +78,8 @@ def sigma_values(model: Model, frac_bits: int | None = None) -> NDArray[np.float
 def _grids(known: Uncertainty, rules: Rules) -> list[float]:
     """Covered cells, uncovered ones, without the constant from power-on to power-on."""
     both = np.array([known.rows, known.uncovered or known.rows])
-    apart = np.sqrt(np.maximum(both**2 - rules.between_dph**2, 0.0))
-    return [float(sigma) for sigma in apart.reshape(-1)]
+    separate = np.sqrt(np.maximum(both**2 - rules.between_dph**2, 0.0))
+    return [float(sigma) for sigma in separate.reshape(-1)]
 
 
 def _rules(rules: Rules, block_s: float) -> list[float]:

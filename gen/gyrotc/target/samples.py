@@ -28,7 +28,7 @@ class Guarded:
 
     Attributes:
         low, high: Range of the readings.
-        max_step: Believable change between two of them, besides ...
+        max_step: Largest accepted change between two of them, besides ...
         max_rate: ... this much for each microsecond since the last accepted one (fixed point: 2^-40).
         agree_us: How long readings must agree that do not follow the last one.
         stuck_us: How long a reading may stay the same; 0: for ever.
@@ -134,7 +134,7 @@ class _Judge:
         self._suspects = 0
 
     def _limit(self, gap: int) -> Any:
-        """Believable change after so many samples."""
+        """Largest accepted change after so many samples."""
         us = min(gap * self._period_us, _LONGEST_US)
         return self._arithmetic.limit(self._guard.max_step, self._guard.max_rate, us)
 

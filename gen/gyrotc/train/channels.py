@@ -108,7 +108,7 @@ class ChannelShape:
         line = self.columns[:, 0] - self.columns[:, 0].mean()
         return float(line @ added / (line @ line))
 
-    def doubt_dph(self, weights: FloatArray) -> float:
+    def sigma_dph(self, weights: FloatArray) -> float:
         """RMS over training of what the correction lacks when the channel is lost."""
         return float(np.sqrt(np.mean(((self.columns - self.lost) @ weights) ** 2)))
 
@@ -462,7 +462,7 @@ def with_channels(
         terms.append({"id": shape.cause.id, "parameters": shape.parameters(weights), "channel": name})
         stand_in = stand_in_of(model, samples, choice.effects[name])
         if stand_in is None:
-            sigmas.append(shape.doubt_dph(weights))
+            sigmas.append(shape.sigma_dph(weights))
             continue
         terms[-1]["stand_in"] = stand_in.network
         sigmas.append(stand_in.sigma_dph)

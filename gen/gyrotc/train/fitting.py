@@ -23,7 +23,7 @@ from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.evaluation import FoundIn, Pooled
-from ..results.training import DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Rung, Training
+from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
 from .cross_validation import Span, training_spans
 from .data import TrainingData, cleaned, joined, scaling_of
@@ -176,17 +176,17 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     front = replace(front, stuck_s=stuck_after_s(read.longest_same_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
-    told: dict[str, Any] = {
+    content: dict[str, Any] = {
         "outliers": outliers_of(read.left_out, float(data.weight.sum())),
         "means": _means(data, fitted),
     }
-    told |= {"lot": fitted.lot} if fitted.lot else {}
-    told |= {"prior": fitted.prior} if fitted.prior else {}
-    told |= {"known": fitted.known} if fitted.known else {}
+    content |= {"lot": fitted.lot} if fitted.lot else {}
+    content |= {"prior": fitted.prior} if fitted.prior else {}
+    content |= {"known": fitted.known} if fitted.known else {}
     if choice:
-        told["channels"] = choice.rows
+        content["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
-    return Fitted(model, training.model_copy(update=told))
+    return Fitted(model, training.model_copy(update=content))
 
 
 @dataclass(frozen=True, slots=True)
@@ -441,7 +441,7 @@ def training_of(
         left_out_spans=tuple(Pooled.of([a]) for a in left_out or []),
         noise=_noise(data, fitted, front.block_s),
         sensitivity=sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
-        ladder=tuple(Rung(**row) for row in fitted.ladder),
+        ladder=tuple(CandidateModel(**row) for row in fitted.ladder),
         reason=fitted.reason,
         generalises=_generalises(fitted),
         findings=tuple(FoundIn(**f) for f in fitted.findings),

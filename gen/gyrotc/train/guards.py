@@ -42,10 +42,12 @@ def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average
         z = scaling.normalise(t, r)
         noise = process.noise_dph**2 * min(process.seconds / average_s, 1.0)
         sigma = np.sqrt(process.variance_dph2(*z) + noise)
-        apart = np.abs(values - process.mean_dph(*z)) / sigma
-        if apart.max() > _SIGMAS:
-            k = int(np.argmax(apart))
-            return f"it leaves the process that it stands for by {apart[k]:.3g} sigma at {_place(t[k], r[k])}"
+        distance = np.abs(values - process.mean_dph(*z)) / sigma
+        if distance.max() > _SIGMAS:
+            k = int(np.argmax(distance))
+            return (
+                f"it leaves the process that it stands for by {distance[k]:.3g} sigma at {_place(t[k], r[k])}"
+            )
         if process.asked is not None:  # a lot knows what lies beyond the unit's own means
             return ""
     means = average(samples, average_s).bias_dph

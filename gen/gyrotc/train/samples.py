@@ -108,7 +108,7 @@ def run_blocks(
         run: Gives row period and span.
         block_s: Length of a block, s.
         slope_blocks: Window of dT/dt, blocks.
-        max_step_c: Believable change between two samples, C, besides ...
+        max_step_c: Largest accepted change between two samples, C, besides ...
         max_rate_c_per_min: ... this rate times the time since the last accepted one.
         agree_s: How long readings must agree that do not follow the last one, s.
         stuck_s: Time after which a reading that stays the same is none, s; 0: never.

@@ -113,13 +113,13 @@ def start_sigma(
         width = parameters["width_c"]
         return amplitude * _played(samples, width) / (2.0 * width)
     if id in ("thermal_gradient", "cavity_lag"):
-        apart = _apart(samples, parameters["tau_s"])
+        left = _warm_up_left(samples, parameters["tau_s"])
         if id == "cavity_lag":
             per_min = 60.0 / parameters["tau_s"]
             amplitude = float(
                 np.hypot(rules["beyond_dph_per_c"], rules["beyond_dph_per_c_per_min"] * per_min)
             )
-        return amplitude * apart
+        return amplitude * left
     if channel is not None and np.isfinite(channel).any():
         departure = channel[np.isfinite(channel)] - parameters["reference"]
         return abs(parameters["slope_dph_per_unit"]) * float(np.sqrt(np.mean(departure**2)))
@@ -136,7 +136,7 @@ def _played(samples: TrainingData, width_c: float) -> float:
     return found if found > 0.0 else width_c
 
 
-def _apart(samples: TrainingData, tau_s: float) -> float:
+def _warm_up_left(samples: TrainingData, tau_s: float) -> float:
     """RMS of a first-order memory of the temperature less the temperature over the training runs, C."""
     squares, count = 0.0, 0
     for own in _runs(samples):
@@ -225,10 +225,10 @@ def _correlation_s(known: Known, block_s: float) -> float:
         same = s.run[now] == s.run[then]
         if not same.any():
             break
-        apart = ((z_t[then] - z_t[now]) ** 2 + (z_r[then] - z_r[now]) ** 2)[same]
+        distance = ((z_t[then] - z_t[now]) ** 2 + (z_r[then] - z_r[now]) ** 2)[same]
         both = (known.sigma[now] * known.sigma[then])[same]
         size = np.sqrt(np.mean(variance[now][same]) * np.mean(variance[then][same]))
-        last = float((np.mean(both * np.exp(-0.5 * apart)) + constant) / (size + constant))
+        last = float((np.mean(both * np.exp(-0.5 * distance)) + constant) / (size + constant))
         if last <= np.exp(-1.0) or lag >= longest:
             break
         lag = min(2 * lag if lag < 16 else lag + lag // 8, longest)

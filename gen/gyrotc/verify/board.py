@@ -317,11 +317,11 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             flags=" ".join(target.all_flags),
             table_bytes=job.tables[numeric].table_bytes,
         )
-        told: dict[str, Any] = {"functions": functions[numeric]} if numeric in functions else {}
+        extra: dict[str, Any] = {"functions": functions[numeric]} if numeric in functions else {}
         try:
             if isinstance(shared, CheckFailed):
                 raise shared
-            yield entry(**_ran(job, target, numeric, shared, work, c), **told)
+            yield entry(**_ran(job, target, numeric, shared, work, c), **extra)
         except CheckFailed as error:
             yield entry(status="fail", error=str(error))
 
@@ -411,7 +411,7 @@ def check_identity(output: BoardOutput, job: Job) -> None:
 
 
 def _costs(target: Target, output: BoardOutput) -> dict[str, Any]:
-    """Counts and stack of a call of the map and, apart, of a sample (one in a block evaluates the map)."""
+    """Counts and stack of a call of the map and, separately, of a sample (one in a block evaluates the map)."""
     if target.counts is None:
         return {}
     found: dict[str, Any] = {}

@@ -140,8 +140,8 @@ def _content(path: Path, length: int) -> bytes | None:
 def _differing(name: str, found: bytes | None, data: bytes, *, allowed: bool) -> VerifiedFile:
     """How much differs, and the first place: a line, or a word of an image."""
     if found is None:
-        told = "no regular file that can be read"
-        return VerifiedFile(file=name, verdict="differs", status="fail", mismatches=1, found=told)
+        what = "no regular file that can be read"
+        return VerifiedFile(file=name, verdict="differs", status="fail", mismatches=1, found=what)
     image = name.endswith(".bin")
     parts = _words if image else _lines
     got, want = parts(found), parts(data)

@@ -59,7 +59,7 @@ from .toolchain import Target, all_targets, compile_objects, confined, end_all, 
 
 __all__ = ["Visited", "chosen_targets", "file_entries", "verify", "visit_all"]
 
-_SLICES = 128  # of exhaustive.c, which is written apart from libc/ but for the code under test
+_SLICES = 128  # of exhaustive.c, which is written independently of libc/ but for the code under test
 _BAR = 32  # characters
 _LIMIT_S = 4 * 3600  # of processor time for one of the processes; all 2^32 inputs take minutes
 _KEPT_LINES = 1000  # exhaustive.c prints fewer than ten

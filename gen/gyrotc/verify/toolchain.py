@@ -284,8 +284,8 @@ _made: dict[str, Object] = {}  # by name, of this process
 
 def runtime_object(target: Target, c_folder: Path, work: Path, *, fresh: bool = False) -> Object:
     """The runtime, with lines of its text and its graph of calls where the compiler gives them; as `shared_object`."""
-    told = target.compiler.endswith("-gcc") and target.counts == "instructions"
-    flags = (*target.flags, *_GRAPH) if told else target.flags
+    counted = target.compiler.endswith("-gcc") and target.counts == "instructions"
+    flags = (*target.flags, *_GRAPH) if counted else target.flags
     return shared_object(
         target.model_copy(update={"flags": flags}), c_folder / "gtc.c", work, include=c_folder, fresh=fresh
     )
@@ -323,16 +323,16 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
 def _content(found: Object) -> bytes:
     """A line of JSON, then the file."""
     rows = [[s.name, s.kind, s.size, s.address] for s in found.symbols]
-    told = {"symbols": rows, "writable_bytes": found.writable_bytes, "graph": found.graph}
-    return canonical_json(told) + b"\n" + found.code
+    measured = {"symbols": rows, "writable_bytes": found.writable_bytes, "graph": found.graph}
+    return canonical_json(measured) + b"\n" + found.code
 
 
 def _object(name: str, content: bytes) -> Object | None:
     line, _, code = content.partition(b"\n")
-    told = json.loads(line)
-    rows = tuple(Symbol(*row) for row in told["symbols"])
-    sound = code and type(told["writable_bytes"]) is int and type(told["graph"]) is str
-    return Object(name, code, rows, told["writable_bytes"], told["graph"]) if sound else None
+    measured = json.loads(line)
+    rows = tuple(Symbol(*row) for row in measured["symbols"])
+    sound = code and type(measured["writable_bytes"]) is int and type(measured["graph"]) is str
+    return Object(name, code, rows, measured["writable_bytes"], measured["graph"]) if sound else None
 
 
 def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
@@ -371,10 +371,10 @@ def _processor() -> str:
     """What tells the code that `-march=native` makes here from that of another machine; empty: not known."""
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
-        told = re.findall(
+        lines = re.findall(
             r"^(?:model name|vendor_id|cpu family|model|flags|Features|CPU \w+)\s*:.*$", text, re.M
         )
-        return digest_of([platform.machine(), *told]) if told else ""
+        return digest_of([platform.machine(), *lines]) if lines else ""
     return ""
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from ..effects import FAMILY
 from ..grade import Row, alarmed, family_right, in_set, shipped_worse, wrong_family
 from ..table import proportion, reliability, worse_on_the_exam
-from .record import Recording, told
+from .record import Recording, reported
 
 __all__ = ["answers", "graded", "table"]
 
@@ -19,7 +19,7 @@ def graded(recording: Recording, result: dict[str, Any]) -> Row:
     truth = recording.truth
     names = [truth.name] if truth.name else ["foreign"] if truth.stratum == "foreign" else []
     row: Row = {
-        **told(truth),
+        **reported(truth),
         "truth": names,
         "verdict": result["verdict"],
         "named": [c["id"] for c in physical],
@@ -56,11 +56,11 @@ def _sure(row: Row) -> bool:
     return bool(row["named"]) and row["verdict"] == "explained"
 
 
-def _level_told(row: Row) -> bool:
+def _level_reported(row: Row) -> bool:
     return bool(row["noise"])
 
 
-def _event_told(row: Row) -> bool:
+def _event_reported(row: Row) -> bool:
     return bool(row.get("events"))
 
 
@@ -70,10 +70,10 @@ _CHECKS: list[tuple[str, str, Chosen, Callable[[Row], bool], float, str]] = [
     ("... noise declared right", "≤ 2 %", _of("clean", declared="right"), _named, 0.02, "max"),
     ("... not declared", "≤ 2 %", _of("clean", declared="none"), _named, 0.02, "max"),
     ("a cause or structure claimed, clean", "≤ 2 %", _of("clean"), alarmed, 0.02, "max"),
-    ("an event told, clean", "≤ 2 %", _of("clean"), _event_told, 0.02, "max"),
-    ("an event told, a catalogue effect hidden", "≤ 2 %", _of("one"), _event_told, 0.02, "max"),
-    ("wrong declaration told, clean", "-", _of("clean", declared="wrong"), _level_told, 0.0, "min"),
-    ("right declaration doubted, clean", "-", _of("clean", declared="right"), _level_told, 1.0, "max"),
+    ("an event reported, clean", "≤ 2 %", _of("clean"), _event_reported, 0.02, "max"),
+    ("an event reported, a catalogue effect hidden", "≤ 2 %", _of("one"), _event_reported, 0.02, "max"),
+    ("wrong declaration reported, clean", "-", _of("clean", declared="wrong"), _level_reported, 0.0, "min"),
+    ("right declaration doubted, clean", "-", _of("clean", declared="right"), _level_reported, 1.0, "max"),
     ("foreign given a name", "≤ 10 %", _of("foreign"), _named, 0.10, "max"),
     ("... without saying that another does as well", "≤ 10 %", _of("foreign"), _sure, 0.10, "max"),
     ("foreign given a name, k ≥ 2.5", "≤ 10 %", _of("foreign", 2.5), _named, 0.10, "max"),

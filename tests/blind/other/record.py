@@ -193,6 +193,6 @@ def write(recording: Recording, folder: Path, serial: str) -> None:
     (folder / "dataset.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def told(truth: Truth) -> dict[str, Any]:
+def reported(truth: Truth) -> dict[str, Any]:
     """The truth for a row of results."""
     return {**vars(truth)}

@@ -1,4 +1,4 @@
-"""Blind runs in the other world: each recording has its own temperatures; who diagnoses is not told.
+"""Blind runs in the other world: each recording has its own temperatures; who diagnoses is not reported.
 
     python -m tests.blind.other.run [--records 200] [--seed N] [--docs docs]
 
@@ -25,7 +25,7 @@ from ..run import ROOT, Tool, code_version, commit, rows_of
 from ..table import markdown
 from .grade import answers, graded, table
 from .mechanisms import CATALOGUE
-from .record import draw_recording, told, write
+from .record import draw_recording, reported, write
 
 __all__ = ["orders", "run", "write_page"]
 
@@ -118,8 +118,8 @@ def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
     kept = ("kind", "k", "named")
     mistaken = [row for row in rows if row["stratum"] == "foreign" and row["named"]]
     foreign = [{name: row[name] for name in kept} for row in mistaken]
-    told = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
-    write_section(docs, "blind-other", head | {"done": len(rows)}, told, section)
+    reported = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
+    write_section(docs, "blind-other", head | {"done": len(rows)}, reported, section)
 
 
 def section(record: dict[str, Any]) -> str:
@@ -155,7 +155,7 @@ def main() -> None:
         stratum, name = orders(arguments.records)[arguments.only]
         recording = draw_recording(seed, arguments.only, stratum, name)
         write(recording, arguments.folder / f"{seed}-{arguments.only:04d}", f"V-{arguments.only:04d}")
-        print(arguments.folder / f"{seed}-{arguments.only:04d}", told(recording.truth))
+        print(arguments.folder / f"{seed}-{arguments.only:04d}", reported(recording.truth))
         return
     print(f"blind run in the other world, seed {seed} (go on or repeat with --seed {seed})", flush=True)
     head = {

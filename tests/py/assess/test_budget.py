@@ -114,13 +114,13 @@ def test_noise_fit_and_power_on_are_what_the_table_states(built: Path) -> None:
 
 
 def test_an_instrument_that_is_not_well_stated_is_refused() -> None:
-    for wrong, told in (
+    for wrong, reported in (
         ({"name": "T", "uncertainty": 1.0}, "meta.instrument.0, field uncertainty"),
         ({"certificate": "1"}, "meta.instrument.0, field name"),
         ("T", "meta.instrument.0"),
         ({"name": "T", "expanded_uncertainty": -1.0}, "expanded_uncertainty"),
     ):
-        with pytest.raises(InputError, match=told):
+        with pytest.raises(InputError, match=reported):
             instruments_in({"instrument": [wrong]})
     with pytest.raises(InputError, match="list of tables"):
         instruments_in({"instrument": "T"})
@@ -250,10 +250,10 @@ def test_stated_uncertainties_cover_the_truth(correlation_s: float) -> None:
 
 
 def uncertainties(runs: list[Averages]) -> dict[str, FigureUncertainty]:
-    return figure_uncertainties(runs, told_of(runs), 100.0, floor=(1.0, 1728))
+    return figure_uncertainties(runs, reported_of(runs), 100.0, floor=(1.0, 1728))
 
 
-def told_of(runs: list[Averages]) -> list[EvaluatedRun]:
+def reported_of(runs: list[Averages]) -> list[EvaluatedRun]:
     return [
         EvaluatedRun(
             file="a.csv", role="exam", environment=None, samples=a.after_dph.size,
@@ -277,7 +277,9 @@ def test_every_noise_figure_has_an_uncertainty_and_a_short_exam_says_less() -> N
     shorter = uncertainties(exam(draw, 1, 1.0)[:1])
     assert shorter["rms_dph"].standard > 2.0 * known["rms_dph"].standard
     one_sample = Averages(np.zeros(1), np.ones(1), np.ones(1), np.zeros(1))
-    assert figure_uncertainties([one_sample], told_of([one_sample]), 100.0).keys() <= {"first_10min_rms_dph"}
+    assert figure_uncertainties([one_sample], reported_of([one_sample]), 100.0).keys() <= {
+        "first_10min_rms_dph"
+    }
 
 
 def test_the_largest_of_many_scatters_as_stated() -> None:

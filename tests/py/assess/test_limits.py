@@ -163,11 +163,11 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_wrong_limits_file_is_refused(case: str, tmp_path: Path) -> None:
-    text, told = REFUSED[case]
+    text, reported = REFUSED[case]
     (tmp_path / "product.toml").write_text(text)
     with pytest.raises(InputError) as caught:
         load_limits(tmp_path / "product.toml")
-    assert told in str(caught.value) and "\n" not in str(caught.value)
+    assert reported in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("shown", "met"), [(True, True), (False, False), (None, False)])
@@ -219,7 +219,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
         "c/gtc_rlg_1.c" in changes["files"]["other_bytes"]
         and "c/gtc.c" not in changes["files"]["other_bytes"]
     )
-    assert "maps 1.000e-02 deg/h RMS apart" in done.stdout
+    assert "maps 1.000e-02 deg/h RMS difference" in done.stdout
     assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     assert json.loads((tmp_path / "two" / "model.json").read_text())["q31_bias_frac_bits"] == 30
     found = changes["as_found"]

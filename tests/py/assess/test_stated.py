@@ -1,4 +1,4 @@
-"""What a command states of a result is what was found: a file or a figure that was changed is refused, not told."""
+"""What a command states of a result is what was found: a file or a figure that was changed is refused, not reported."""
 
 from __future__ import annotations
 
@@ -141,8 +141,10 @@ def test_a_fail_that_was_edited_into_a_pass_is_refused(
         ("sign", folder, "--key", key),
     ):
         assert _status(*command) == 2
-        told = capsys.readouterr().err
-        assert len(told.splitlines()) == 1 and ("limits.json" in told or "budget.json" in told), told
+        reported = capsys.readouterr().err
+        assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), (
+            reported
+        )
     assert not (tmp_path / "C").exists() and not (folder / "c" / "release.json").exists()
 
 
@@ -171,8 +173,12 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
     """Before: `sign` signed a result that said FAIL, and no verdict was among what it signed."""
     folder, reason = shutil.copytree(failing, tmp_path / "out"), "bench unit, not for flight"
     assert _status("sign", folder, "--key", key) == 2
-    told = capsys.readouterr().err
-    assert "its verdict is FAIL (" in told and "--accept-fail REASON" in told and len(told.splitlines()) == 1
+    reported = capsys.readouterr().err
+    assert (
+        "its verdict is FAIL (" in reported
+        and "--accept-fail REASON" in reported
+        and len(reported.splitlines()) == 1
+    )
     with pytest.raises(InputError, match="its verdict is FAIL"):
         certificate(folder, tmp_path / "C", draft=True)
     with pytest.raises(InputError, match="a reason"):
@@ -352,8 +358,8 @@ def test_verifying_a_signature_refuses_what_the_marker_does_not_know(
     _passed(folder)
     capsys.readouterr()
     assert _status("verify", folder, "--signature", public) == 2
-    told = capsys.readouterr().err
-    assert "budget.json: is not as gyrotc wrote it" in told and len(told.splitlines()) == 1
+    reported = capsys.readouterr().err
+    assert "budget.json: is not as gyrotc wrote it" in reported and len(reported.splitlines()) == 1
     for name in (MARKER, "verify.json"):  # as an archive may come: the signature alone says it
         (folder / name).unlink()
     assert _status("verify", folder, "--target", "host-gcc-O2", "--signature", public) == 1

@@ -46,19 +46,19 @@ def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path
         assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     wrong = gyrotc("check", tmp_path / "none", "-q")
     assert wrong.returncode == 2 and "none" in wrong.stdout
-    told = gyrotc("fit", tmp_path / "R", "--out", tmp_path / "out", "-v")
-    assert told.returncode == 0 and told.stdout
-    lines = told.stderr.splitlines()
+    reported = gyrotc("fit", tmp_path / "R", "--out", tmp_path / "out", "-v")
+    assert reported.returncode == 0 and reported.stdout
+    lines = reported.stderr.splitlines()
     assert lines and all(line.split()[1] == "s" and float(line.split()[0]) >= 0.0 for line in lines)
     course = StageLine(FIT)
     assert all(course.share_of(line.partition(" s  ")[2]) > 0.0 for line in lines[1:]), "a stage has no place"
 
 
 def test_every_stage_of_emit_has_a_place(model_dict: dict[str, Any], tmp_path: Path) -> None:
-    told: list[str] = []
-    emit(Model.from_dict(model_dict), tmp_path, progress=told.append)
-    shares = [StageLine(EMIT).share_of(text) for text in told]
-    assert shares == sorted(shares) and len(set(shares)) == len(told) == len(EMIT)
+    reported: list[str] = []
+    emit(Model.from_dict(model_dict), tmp_path, progress=reported.append)
+    shares = [StageLine(EMIT).share_of(text) for text in reported]
+    assert shares == sorted(shares) and len(set(shares)) == len(reported) == len(EMIT)
 
 
 def test_the_time_left() -> None:
@@ -70,7 +70,7 @@ def test_the_time_left() -> None:
 
 def test_what_a_text_tells_of_the_work_that_is_done() -> None:
     course = StageLine((("reading", 0.2), ("verifying", 0.6), ("drawing", 0.2)))
-    told = {
+    reported = {
         "reading": 0.0,
         "reading a.csv, 2 of 4": 0.05,
         "verifying host-gcc-O2, target 3 of 4": 0.5,
@@ -79,7 +79,7 @@ def test_what_a_text_tells_of_the_work_that_is_done() -> None:
         "something else": 0.0,
         "verifying 7 of 3": 0.2,
     }
-    for text, share in told.items():
+    for text, share in reported.items():
         assert course.share_of(text) == pytest.approx(share), text
     assert (
         StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
@@ -150,13 +150,13 @@ def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
         time.sleep(0.005)
     time.sleep(random.Random(seed).uniform(0.0, 1.5))
     job.send_signal(signal.SIGINT)
-    _, told = job.communicate()
+    _, reported = job.communicate()
     if job.returncode == -signal.SIGINT:  # a shell reports 130
-        assert told == "gyrotc: interrupted (SIGINT)\n"
+        assert reported == "gyrotc: interrupted (SIGINT)\n"
         whole = name == "fleet" or sorted(p for p in desk.iterdir() if p.suffix != ".lock") == before
         assert whole, "something half-written stayed"
     else:
-        assert job.returncode == 0, f"it had ended: {told}"
+        assert job.returncode == 0, f"it had ended: {reported}"
     shutil.rmtree(desk / "out", ignore_errors=True)
     (desk / "out").unlink(missing_ok=True)
 
@@ -185,10 +185,10 @@ def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
     wide = []
     for words in ([], *([name] for name in ("build", "export", "fleet", "diagnose", "import"))):
         command = [PROGRAM, *words, "--help"]
-        told = subprocess.run(
+        reported = subprocess.run(
             command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"}
         )
-        wide += [line for line in told.stdout.splitlines() if len(line) > 80]
+        wide += [line for line in reported.stdout.splitlines() if len(line) > 80]
     assert wide == []
 
 
@@ -216,13 +216,13 @@ def test_a_terminal_of_80_columns_gets_lines_of_80_columns(tmp_path: Path) -> No
     reader, writer = os.openpty()
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writer, env=environment) as process:
         os.close(writer)
-        told = b""
+        reported = b""
         with contextlib.suppress(OSError):  # Linux says so when the other side has gone
             while part := os.read(reader, 4096):
-                told += part
+                reported += part
         os.close(reader)
     assert process.returncode == 0
-    lines = told.decode().splitlines()
+    lines = reported.decode().splitlines()
     assert all(len(line) <= 80 for line in lines if len(line.split()) > 1)
     assert "".join("".join(lines).split()) == "".join(whole.split())
 
@@ -298,7 +298,7 @@ def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
         assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command
 
 
-def test_the_cache_is_told_cleared_and_kept_to_a_limit(
+def test_the_cache_is_reported_cleared_and_kept_to_a_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -309,10 +309,10 @@ def test_the_cache_is_told_cleared_and_kept_to_a_limit(
     cache.set_limit(2500)
     assert sorted(p.name for p in cache.folder().glob("*.bank")) == ["2.bank", "3.bank"], "the oldest go"
     assert cache.held() == (2, 2000) and cache.limit() == 2500
-    told = subprocess.run([PROGRAM, "cache", "--clear"], capture_output=True, text=True, check=True)
+    reported = subprocess.run([PROGRAM, "cache", "--clear"], capture_output=True, text=True, check=True)
     assert (
         "0 banks of signatures, 0 diagnoses, 0 objects of compilers, 0.000 GB of at most 2.5e-06 GB"
-        in told.stdout
+        in reported.stdout
         and cache.held() == (0, 0)
     )
     (cache.folder() / "limit_bytes").write_text("much")

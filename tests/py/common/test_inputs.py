@@ -67,8 +67,8 @@ def test_a_pipe_a_device_and_the_kernels_files_are_not_waited_for(name: str, tmp
         assert "is a device" in refused(lambda: READERS[name](path))
     path.unlink()
     path.symlink_to("/proc/kmsg")
-    told = refused(lambda: READERS[name](path))
-    assert "is empty" in told or "cannot be read" in told
+    reported = refused(lambda: READERS[name](path))
+    assert "is empty" in reported or "cannot be read" in reported
 
 
 def test_a_link_to_a_regular_file_is_read(tmp_path: Path) -> None:
@@ -101,19 +101,19 @@ JSON = {
 
 @pytest.mark.parametrize("case", TOML)
 def test_hostile_toml(case: str) -> None:
-    text, told = TOML[case]
+    text, reported = TOML[case]
     data = text.encode("utf-8", "surrogateescape")
-    assert told in refused(lambda: parse_toml(data, "a.toml", "a file"))
+    assert reported in refused(lambda: parse_toml(data, "a.toml", "a file"))
 
 
 @pytest.mark.parametrize("case", JSON)
 def test_hostile_json(case: str) -> None:
-    text, told = JSON[case]
-    assert told in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
+    text, reported = JSON[case]
+    assert reported in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
 
 
 def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
-    """150 million rows lie in a file of 1 MB; here a twentieth of that, which is told from its metadata alone."""
+    """150 million rows lie in a file of 1 MB; here a twentieth of that, as its metadata alone say."""
     folder = tmp_path / "RLG-1"
     folder.mkdir()
     table = pa.table({name: np.zeros(2**23) for name in ("time_s", "temperature_c", "rate_dph")})
@@ -126,7 +126,7 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
         "try: load(Path(sys.argv[1]))\nexcept Exception as error: print(error)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used, 'KiB')\n"
     )
-    for limits, told in (
+    for limits, reported in (
         ("", "bytes that unpack to 201326592 or more; expected at most 250 times"),
         ("rows=1000000", "8388608 rows; expected at most 1000000 (--max rows=...)"),
         (
@@ -139,7 +139,7 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
             env=os.environ | {"GYROTC_MAX": limits},
         )  # fmt: skip
         message, taken = done.stdout.splitlines()
-        assert told in message and int(taken.split()[0]) < 2**16, done.stdout
+        assert reported in message and int(taken.split()[0]) < 2**16, done.stdout
 
 
 def test_times_on_a_wrong_scale(tmp_path: Path) -> None:
@@ -163,8 +163,8 @@ def test_gaps_that_make_more_samples_than_memory_is_granted_for(tmp_path: Path) 
     write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": np.round(time, 6)})
     [run] = load(tmp_path / "RLG-1", trust_units=True).runs
     settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
-    told = refused(lambda: run_blocks(run.rows(), run, block_s=10.0, **settings))
-    assert told.startswith("a.csv: ") and "GiB of memory" in told
+    reported = refused(lambda: run_blocks(run.rows(), run, block_s=10.0, **settings))
+    assert reported.startswith("a.csv: ") and "GiB of memory" in reported
 
 
 def test_ceilings_move_by_option_and_environment(tmp_path: Path, gyrotc: Command) -> None:
@@ -190,7 +190,7 @@ TRUTH = {
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         ({"runs": [{}]}, "field runs.0.file: is missing"),
         ({"runs": [TRUTH["runs"][0] | {"file": "b.csv"}]}, "no run a.csv"),  # type: ignore[index,operator]
@@ -201,9 +201,9 @@ TRUTH = {
         ({}, "a.npy: does not exist"),
     ],
 )
-def test_a_truth_that_is_not_as_it_was_written(change: dict[str, Any], told: str, tmp_path: Path) -> None:
+def test_a_truth_that_is_not_as_it_was_written(change: dict[str, Any], reported: str, tmp_path: Path) -> None:
     (tmp_path / "truth.json").write_text(json.dumps(TRUTH | change))
-    assert told in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
+    assert reported in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
 
 
 def test_the_noise_of_a_truth(tmp_path: Path) -> None:
@@ -232,14 +232,14 @@ def test_results_of_other_types_are_refused_by_field() -> None:
     content |= {"model_hash": "00", "c_hash": "00", "error_bound_dph": 0.0}
     content |= {"worst_error_dph": {"value": 0.0, "inputs_visited": 0}}
     assert checked_result(content, Verification, "v.json").content() == content
-    for change, told in (
+    for change, reported in (
         ({"passed": "1"}, "v.json, field passed: '1'"),
         ({"targets": [3]}, "v.json, field targets.0: 3"),
         ({"targets": {}}, "v.json, field targets: {}"),
         ({"failed": -1}, "v.json, field failed: -1"),
         ({"schema": None}, "v.json, field schema: None"),
     ):
-        assert told in refused(lambda: checked_result(content | change, Verification, "v.json"))  # noqa: B023
+        assert reported in refused(lambda: checked_result(content | change, Verification, "v.json"))  # noqa: B023
     assert "is not a JSON object" in refused(lambda: checked_result([], Verification, "v.json"))
 
 
@@ -346,7 +346,7 @@ def test_mutants_of_every_reader() -> None:
 
 
 @pytest.mark.parametrize(
-    ("steps", "minutes", "told"),
+    ("steps", "minutes", "reported"),
     [
         ("[{staircase_to_c = 60.0, tread_c = 1e-9, hold_min = 1.0, c_per_min = 1.0}]", "60", "corners"),
         ("[{repeat = [{hold_min = 1e-9}]}]", "60", "corners"),
@@ -354,12 +354,12 @@ def test_mutants_of_every_reader() -> None:
         ("[{hold_min = 1.0}]", "1e300", "record_min"),
     ],
 )
-def test_a_programme_that_never_ends(steps: str, minutes: str, told: str, tmp_path: Path) -> None:
+def test_a_programme_that_never_ends(steps: str, minutes: str, reported: str, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(
         f'title = "a"\n[profile.a]\nstart_c = 20.0\nrecord_min = {minutes}\nsteps = {steps}\n'
         '[[set]]\nstarted = 2026-03-02T08:00:00Z\nprofiles = ["a"]\n'
     )
-    assert told in refused(lambda: simulate(tmp_path / "a.toml", seed=1, out=tmp_path / "out"))
+    assert reported in refused(lambda: simulate(tmp_path / "a.toml", seed=1, out=tmp_path / "out"))
 
 
 @pytest.mark.parametrize(

@@ -621,7 +621,7 @@ def test_a_description_is_read_or_refused_in_words(tmp_path: Path) -> None:
                 assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f]", terminal_text(str(problem)))
 
 
-def test_columns_of_a_recording_are_told_as_they_are(tmp_path: Path, model_dict: dict[str, Any]) -> None:
+def test_columns_of_a_recording_are_reported_as_they_are(tmp_path: Path, model_dict: dict[str, Any]) -> None:
     """Names of columns that one run of several has."""
     names = [text for text in map(str.strip, HOSTILE) if text.isprintable() and '"' not in text]
     names = [name for name in dict.fromkeys(names) if 1 <= len(name) <= 64]
@@ -694,7 +694,7 @@ def test_terminals_show_every_text_and_obey_none(
     monkeypatch.setattr(base, "OUT", console)
     for text in HOSTILE:
         base.tell(text)
-    assert stream.getvalue().count("\n") == len(HOSTILE), "each is told in one line"
+    assert stream.getvalue().count("\n") == len(HOSTILE), "each is reported in one line"
     evaluation = result["evaluation"]
     runs = tuple(evaluation.runs[0].model_copy(update={"environment": t, "file": t}) for t in HOSTILE[:400])
     console.print(

@@ -1,4 +1,4 @@
-"""A certificate: what is missing is told first, and page and DCC say the same digits."""
+"""A certificate: what is missing is reported first, and page and DCC say the same digits."""
 
 from __future__ import annotations
 
@@ -91,10 +91,10 @@ def results(made: Path) -> list[ElementTree.Element]:
 
 
 def test_what_is_missing_is_listed_and_nothing_is_written(built: Path, tmp_path: Path, paper: None) -> None:
-    with pytest.raises(InputError) as told:
+    with pytest.raises(InputError) as reported:
         certificate(built, tmp_path / "cert", accept_fail=REASON)
     for name in ("number", "laboratory", "operator", "customer_country", "calibrated_on"):
-        assert f"{name} (" in str(told.value)
+        assert f"{name} (" in str(reported.value)
     assert not (tmp_path / "cert").exists()
     certificate(built, tmp_path / "cert", draft=True, accept_fail=REASON)
     assert "Draft, not a certificate" in (tmp_path / "cert" / "certificate.html").read_text("utf-8")
@@ -123,9 +123,9 @@ def test_conformity_numbers_and_hashes_are_in_both(made: Path, built: Path) -> N
     assert "fail" in stated and "pass" in stated and "FAIL" in page
     manifest = read_result(built / "manifest.json", Manifest)
     assert re.fullmatch("[0-9a-f]{64}", manifest.program)
-    for told in (REASON, "2026-0042", "K-4711", "North &lt;&amp; Sons&gt;", "A. &lt;U+0007&gt;Berg", manifest.program,
+    for fact in (REASON, "2026-0042", "K-4711", "North &lt;&amp; Sons&gt;", "A. &lt;U+0007&gt;Berg", manifest.program,
                  manifest.model_hash):  # fmt: skip
-        assert told in page and told in text, told
+        assert fact in page and fact in text, fact
 
 
 def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Path, paper: None) -> None:
@@ -140,7 +140,7 @@ def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         ("schema = 1\nlabratory = 'x'", "labratory"),
         ("schema = 1\ncountry = 'Germany'", "country"),
@@ -150,9 +150,9 @@ def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Pa
         ("schema = 1\nissued = [2026-03-02, 10:00:00]", "issued"),
     ],
 )
-def test_wrong_facts_are_refused(tmp_path: Path, text: str, told: str) -> None:
+def test_wrong_facts_are_refused(tmp_path: Path, text: str, reported: str) -> None:
     (tmp_path / "facts.toml").write_text(text)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         facts_of({}, tmp_path / "facts.toml", None)
 
 

@@ -78,7 +78,7 @@ def test_an_envelope_without_width_has_one_point(model: Model) -> None:
     assert grid.bias_dph.shape == (61, 1) and np.isfinite(grid.largest_dph)
 
 
-def test_what_is_lost_between_the_points_is_what_is_told(model: Model) -> None:
+def test_what_is_lost_between_the_points_is_what_is_reported(model: Model) -> None:
     from scipy.interpolate import RegularGridInterpolator
 
     losses = []
@@ -101,10 +101,10 @@ def test_what_is_lost_between_the_points_is_what_is_told(model: Model) -> None:
 
 
 def test_json_is_the_map_with_its_units(three: Path, tmp_path: Path) -> None:
-    told = json.loads(text_of(three, "json", tmp_path, Exporting(points=(9, 5))))
-    assert told["schema"] == "gyrotc.map/1" and told["units"]["bias_dph"] == "deg/h"
-    assert [part["axis"] for part in told["maps"]] == ["x", "y", "z"]
-    for part in told["maps"]:
+    reported = json.loads(text_of(three, "json", tmp_path, Exporting(points=(9, 5))))
+    assert reported["schema"] == "gyrotc.map/1" and reported["units"]["bias_dph"] == "deg/h"
+    assert [part["axis"] for part in reported["maps"]] == ["x", "y", "z"]
+    for part in reported["maps"]:
         model = load_model(three / part["axis"] / "model.json")
         t, r = np.meshgrid(part["temperature_c"], part["slope_c_per_min"], indexing="ij")
         assert np.array_equal(np.array(part["bias_dph"]), model.map_dph(t, r))
@@ -307,8 +307,8 @@ def test_cdf_holds_the_values_of_what_the_a2l_names(three: Path, tmp_path: Path)
 def test_a_table_is_replaced_and_what_is_not_ours_stays(one: Path, tmp_path: Path) -> None:
     for format in TABLES:
         for _ in range(2):
-            told = export(one, format, tmp_path / f"map.{format}", SMALL)
-        assert told[0].startswith("7 x 5 points; linear between them it is ")
+            reported = export(one, format, tmp_path / f"map.{format}", SMALL)
+        assert reported[0].startswith("7 x 5 points; linear between them it is ")
         (tmp_path / f"notes.{format}").write_text("mine")
         with pytest.raises(InputError, match="not written by gyrotc"):
             export(one, format, tmp_path / f"notes.{format}", SMALL)
@@ -410,7 +410,7 @@ def test_the_file_gives_the_firmwares_bits(
 ) -> None:
     model.save(tmp_path / "model.json")
     export(tmp_path, autopilot, tmp_path / "gyro.params", Exporting(axis_as="z"))
-    told = export(
+    reported = export(
         tmp_path, autopilot, tmp_path / "gyro.params", Exporting(axis_as="y")
     )  # an earlier export is replaced
     values = read(tmp_path / "gyro.params")
@@ -419,7 +419,7 @@ def test_the_file_gives_the_firmwares_bits(
     done = subprocess.run([firmware, autopilot], input=stream, capture_output=True, check=True)
     answers = np.frombuffer(done.stdout, dtype=np.float32)
     assert np.array_equal(answers, best_cubic(model, autopilot).offset(TEMPERATURES))
-    assert told[0] in (tmp_path / "gyro.params").read_text()
+    assert reported[0] in (tmp_path / "gyro.params").read_text()
     assert all(values[name.replace("_1", "_0").replace("_Y", "_X")] == 0 for name in NAMES[autopilot][1:4])
 
 
@@ -430,7 +430,7 @@ def lost(cubic: Cubic, model: Model) -> float:
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_no_other_cubic_is_closer_and_the_loss_is_told(autopilot: Autopilot, model: Model) -> None:
+def test_no_other_cubic_is_closer_and_the_loss_is_reported(autopilot: Autopilot, model: Model) -> None:
     found = best_cubic(model, autopilot)
     assert lost(found, model) <= 2.0 * found.rms_dph + 1e-9
     assert found.rms_dph < found.flat_dph

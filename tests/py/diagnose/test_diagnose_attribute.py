@@ -220,7 +220,7 @@ def test_a_shape_without_a_name_beats_causes_where_it_was_planted(case: Case) ->
     assert contest(gains, causes, [[] for _ in causes]).lead > 0.0
 
 
-def test_what_a_cause_mimics_itself_cannot_be_told_apart(case: Case) -> None:
+def test_what_a_cause_mimics_itself_cannot_be_reported_apart(case: Case) -> None:
     [cause] = case.found.causes
     d = overlap(case.gains, cause, ["thermal_gradient", "ageing", "hysteresis"])
     assert d["hysteresis"] > 15.0
@@ -592,7 +592,7 @@ def test_structure_without_a_name_is_described() -> None:
     assert "40%" in text and "it looks more like a switch" in text
 
 
-def test_causes_without_an_extension_are_told_so() -> None:
+def test_causes_without_an_extension_are_reported_so() -> None:
     assert "no extension is shipped" in "\n".join(diagnosis_lines(result("explained")))
 
 

@@ -1,4 +1,4 @@
-"""A diagnosis through the installed command: named, extended, emitted, verified, shown, told in words, cached."""
+"""A diagnosis through the installed command: named, extended, emitted, verified, shown, reported in words, cached."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_a_build_is_not_overwritten(built: Path, gyrotc: Command) -> None:
     assert "holds the result of gyrotc build" in done.stderr
 
 
-def test_a_broken_result_is_told(tmp_path: Path, gyrotc: Command) -> None:
+def test_a_broken_result_is_reported(tmp_path: Path, gyrotc: Command) -> None:
     (tmp_path / "diagnose.json").write_text('{"schema": "gyrotc.diagnose/1"}')
     done = gyrotc("report", tmp_path)
     assert done.returncode == 2 and "diagnose.json" in done.stderr
@@ -277,7 +277,7 @@ def test_whatever_a_diagnosis_depends_on_makes_another_one(
     def asked_anew(what: str, call: Callable[[], None]) -> None:
         before = counted.count
         call()
-        assert counted.count == before + 1, f"{what} is not told apart"
+        assert counted.count == before + 1, f"{what} is not distinguished"
         call()
         assert counted.count == before + 1, f"{what} is not kept"
 
@@ -505,7 +505,7 @@ def test_a_cause_that_the_fixture_can_imitate_says_so_and_what_tells(id: str) ->
         signature=words.signature,
         remedy=words.remedy,
     )
-    told = [step for step in next_steps("explained", [cause], [], shipped=True) if "Earth's rate" in step]
-    assert len(told) == 1 and (
-        "turned by 180 degrees" in told[0] or "without touching the fixture" in told[0]
+    reported = [step for step in next_steps("explained", [cause], [], shipped=True) if "Earth's rate" in step]
+    assert len(reported) == 1 and (
+        "rotated by 180 degrees" in reported[0] or "without touching the fixture" in reported[0]
     )

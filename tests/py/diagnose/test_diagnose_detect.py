@@ -301,7 +301,7 @@ def test_normal_noise_has_no_finding(records: Records) -> None:
 
 @pytest.mark.parametrize("share", [0.2, 0.4, 0.55, 0.7, 0.8, 1.0, 1.3, 2.0])
 def test_steps_of_a_converter_are_no_outliers_and_hide_none(records: Records, share: float) -> None:
-    """A lattice's median is short of the noise by up to half a step: 40 rows of 10,000 were told as outliers."""
+    """A lattice's median is short of the noise by up to half a step: 40 rows of 10,000 were reported as outliers."""
     step = share * 1e-3
     runs = []
     for run in records.runs:
@@ -328,7 +328,7 @@ def test_noise_that_grows_with_the_rate_becomes_weights(records: Records) -> Non
     assert ratio == pytest.approx(np.median(1.0 + slope[slope > 1.5]), rel=0.25)
 
 
-def test_a_coarse_thermometer_is_told_with_its_step(records: Records) -> None:
+def test_a_coarse_thermometer_is_reported_with_its_step(records: Records) -> None:
     runs = [
         replace(r, history=replace(r.history, temperature_c=np.round(2.0 * r.history.temperature_c) / 2.0))
         for r in records.runs

@@ -1,7 +1,7 @@
 """What must not change a diagnosis, and what must: units, sign, order of runs, blocks, cuts, truth beside the data.
 
 Simulated recordings come from the independent generator of tests/blind with a fixed seed; every claim holds for any.
-Tests on measured recordings are skipped, and told, where these are absent.
+Tests on measured recordings are skipped, and reported, where these are absent.
 """
 
 from __future__ import annotations
@@ -247,7 +247,7 @@ def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
 
 
 @pytest.mark.slow
-def test_noise_declared_twice_too_high_or_low_is_told(made: Callable[[str], Case]) -> None:
+def test_noise_declared_twice_too_high_or_low_is_reported(made: Callable[[str], Case]) -> None:
     case = made("")
     for factor in (0.5, 2.0):
         found = answer(case.records, scaled(case.declared, factor))

@@ -96,7 +96,7 @@ def _with(quiet: Gains, campaign: Campaign, name: str, rng: np.random.Generator)
     return other
 
 
-def _told(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, float]]:
+def _reported(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, float]]:
     """The named one of the memories, and the probability of each; by the evidence, or by likelihoods alone."""
     singles = [p for p in gains.single() if p.members[0].id in MEMORIES]
     evidence = MarginalLikelihood(gains)
@@ -108,7 +108,7 @@ def _told(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, float]]
 
 
 @pytest.mark.slow
-def test_gradients_and_lags_that_the_catalogue_does_not_have_are_told_apart(
+def test_gradients_and_lags_that_the_catalogue_does_not_have_are_reported_apart(
     quiet: Gains, campaign: Campaign
 ) -> None:
     """By the evidence, and surer of what is true than likelihoods of equally many functions are."""
@@ -116,11 +116,13 @@ def test_gradients_and_lags_that_the_catalogue_does_not_have_are_told_apart(
     rng = np.random.default_rng(SEED)
     hidden = ["thermal_gradient", "cavity_lag"] * 8
     drawn = [_with(quiet, campaign, name, rng) for name in hidden]
-    found = [_told(one) for one in drawn]
-    wrong = [told for name, told in zip(hidden, found, strict=True) if told[0] != name]
+    found = [_reported(one) for one in drawn]
+    wrong = [reported for name, reported in zip(hidden, found, strict=True) if reported[0] != name]
     assert len(wrong) <= 2, wrong
-    of_truth = [told[1].get(name, 0.0) for name, told in zip(hidden, found, strict=True)]
-    before = [_told(one, weighed=False)[1].get(name, 0.0) for name, one in zip(hidden, drawn, strict=True)]
+    of_truth = [reported[1].get(name, 0.0) for name, reported in zip(hidden, found, strict=True)]
+    before = [
+        _reported(one, weighed=False)[1].get(name, 0.0) for name, one in zip(hidden, drawn, strict=True)
+    ]
     assert np.mean(of_truth) > 0.85 and np.mean(of_truth) > np.mean(before) + 0.1, (of_truth, before)
 
 
@@ -131,7 +133,7 @@ def test_a_late_clock_is_held_against_memories_on_the_blocks_that_it_knows(
     """Where the true temperature was not recorded a clock gains nothing, and a memory that stands for it does."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 1)
-    found = [_told(_with(quiet, campaign, clock, rng)) for _ in range(6)]
+    found = [_reported(_with(quiet, campaign, clock, rng)) for _ in range(6)]
     assert [name for name, _ in found].count("time_misalignment") >= 5, found
 
 
@@ -180,12 +182,14 @@ def test_rivals_keep_their_order_and_who_is_far_behind_stays_there(quiet: Gains,
     evidence = MarginalLikelihood(gains)
     chosen = evidence.preferred(singles).members
     [ranked] = ranked_rivals(singles, [], chosen, gains.size)
-    told = evidence.judged(singles, chosen, 0, ranked)
-    assert {r.id for r in told} == {r.id for r in ranked}
-    assert [r.distance for r in told] == sorted(r.distance for r in told) and told[0].distance >= 0.0
-    asked = [r for r in told if r.odds is not None]
+    reported = evidence.judged(singles, chosen, 0, ranked)
+    assert {r.id for r in reported} == {r.id for r in ranked}
+    assert [r.distance for r in reported] == sorted(r.distance for r in reported) and reported[
+        0
+    ].distance >= 0.0
+    asked = [r for r in reported if r.odds is not None]
     assert asked and all(r.odds == odds_of(Rival(r.id, r.distance)) for r in asked)
-    assert all(r.distance > LOOKED_AT for r in told if r.odds is None)
+    assert all(r.distance > LOOKED_AT for r in reported if r.odds is None)
 
 
 SEED_OF_ODDS = 20261122
@@ -281,8 +285,8 @@ def _said(gains: Gains, pool: Sequence[Point], simulated: bool) -> tuple[str, fl
     """The named cause and its probability."""
     chosen = best_of(list(pool), gains.size).members
     [ranked] = ranked_rivals(list(pool), [], chosen, gains.size)
-    told = calibrated(gains, pool, chosen, 0, ranked) if simulated else ranked
-    return chosen[0].id, probabilities_of(chosen[0].id, told)[chosen[0].id]
+    reported = calibrated(gains, pool, chosen, 0, ranked) if simulated else ranked
+    return chosen[0].id, probabilities_of(chosen[0].id, reported)[chosen[0].id]
 
 
 def test_what_is_said_is_true_at_least_as_often(campaign: Campaign) -> None:
@@ -302,7 +306,7 @@ def test_what_is_said_is_true_at_least_as_often(campaign: Campaign) -> None:
         true.append(found == name)
     spread = float(np.sqrt(np.sum(np.array(said) * (1.0 - np.array(said)))))
     assert sum(said) - sum(true) < 2.5 * spread
-    assert 0.05 < np.mean(np.array(said) < 0.9) < 0.95, "some are told as ambiguous, some are not"
+    assert 0.05 < np.mean(np.array(said) < 0.9) < 0.95, "some are reported as ambiguous, some are not"
 
 
 SEED_OF_DISCREPANCY = 20260404
@@ -323,7 +327,7 @@ def test_noise_as_declared_has_no_finding_and_no_discrepancy(campaign: Campaign)
 
 
 @pytest.mark.parametrize("ratio", [0.7, 1.4])
-def test_another_level_is_told_with_its_ratio(campaign: Campaign, ratio: float) -> None:
+def test_another_level_is_reported_with_its_ratio(campaign: Campaign, ratio: float) -> None:
     found = noise_findings(campaign.search(ratio * noise(campaign)), DECLARED, causes=True)
     level = next(f for f in found if f.id == "noise_level")
     assert level.parameters["ratio"] == pytest.approx(ratio, rel=0.12) and level.id in NOISE_WORDS

@@ -309,7 +309,7 @@ def named(found: Attribution) -> list[str]:
 
 @pytest.mark.parametrize("seed", quick_and_slow([0], [1, 2, 3]))
 def test_relays_are_hysteresis(campaign: Campaign, seed: int) -> None:
-    """One play leaves what one finds with certainty, and is not four fifths of it: it was told as unexplained."""
+    """One play leaves what one finds with certainty, and is not four fifths of it: it was reported as unexplained."""
     found = attribute(measured(campaign, relays(campaign.records, seed), 40.0, seed))
     assert named(found) == ["hysteresis"] and found.wide is not None
     assert found.left.share > 0.8 and verdict_of(found, ()) in ("explained", "partial")
@@ -332,7 +332,7 @@ def test_a_wave_beside_a_play_stays_a_cause_of_its_own(campaign: Campaign) -> No
 
 
 @pytest.mark.parametrize("seed", quick_and_slow([0], [1]))
-def test_a_strength_that_goes_with_temperature_is_told(campaign: Campaign, seed: int) -> None:
+def test_a_strength_that_goes_with_temperature_is_reported(campaign: Campaign, seed: int) -> None:
     found = attribute(measured(campaign, campaign.records.columns(local_loop)[:, 0], 25.0, seed))
     assert named(found) == ["hysteresis"] and found.wide is not None
     assert found.wide.varies and "goes with temperature" in found.wide.text
@@ -350,7 +350,7 @@ def test_a_loop_about_one_temperature_is_no_lag(campaign: Campaign, seed: int) -
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_play_of_one_strength_is_not_told_to_change(campaign: Campaign, seed: int) -> None:
+def test_a_play_of_one_strength_is_not_reported_to_change(campaign: Campaign, seed: int) -> None:
     wide = rate_independent(Gains(measured(campaign, campaign.records.columns(loop)[:, 0], 40.0, seed)), ())
     assert wide is not None and not wide.varies and "goes with" not in wide.text
 

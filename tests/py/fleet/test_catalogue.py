@@ -143,8 +143,12 @@ def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, 
 
 
 def test_the_command(fleet: Path, gyrotc: Command) -> None:
-    told = gyrotc("catalogue", fleet, "RLG-1", "--on", "2026-08-31")
-    assert told.returncode == 0 and "2026-03-01 to 2027-03-01" in told.stdout and "run-01.csv" in told.stdout
+    reported = gyrotc("catalogue", fleet, "RLG-1", "--on", "2026-08-31")
+    assert (
+        reported.returncode == 0
+        and "2026-03-01 to 2027-03-01" in reported.stdout
+        and "run-01.csv" in reported.stdout
+    )
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "2030-01-01").returncode == 1
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "soon").returncode == 2
 
@@ -229,7 +233,7 @@ def test_an_exported_result_is_complete(two: Path, tmp_path: Path, gyrotc: Comma
             assert (out / path.relative_to(kept)).read_bytes() == path.read_bytes()
     assert sha256(out / ANSWERS) == read_marker(kept).left_out[ANSWERS]  # type: ignore[union-attr]
     assert {file.verdict for file in verify(out, compiled=False).emitted} == {"equal"}
-    assert all(path.stat().st_nlink == 1 for path in out.rglob("*") if path.is_file()), "apart from the fleet"
+    assert all(path.stat().st_nlink == 1 for path in out.rglob("*") if path.is_file()), "a copy, not a link"
     manifest = read_result(out / "manifest.json", Manifest)
     assert all(sha256(out / name) == known for name, known in manifest.files.items())
     none = gyrotc("catalogue", two, "--export", "RLG-9", "--out", tmp_path / "RLG-9")

@@ -123,11 +123,11 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_wrong_manifest_is_refused(case: str, tmp_path: Path) -> None:
     gyro(tmp_path / "d" / "RLG-1", "RLG-1")
-    text, told = REFUSED[case]
+    text, reported = REFUSED[case]
     (tmp_path / "fleet.toml").write_text(text)
     with pytest.raises(InputError) as caught:
         load_manifest(tmp_path / "fleet.toml")
-    assert told in str(caught.value) and "\n" not in str(caught.value)
+    assert reported in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:

@@ -85,8 +85,8 @@ def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_pat
         assert done_before(replace(task, fleet=replace(task.fleet, **{name: value}))) is None, name
     assert done_before(replace(task, full=True)) is None
     assert done_before(replace(task, program="0" * 64)) is None
-    stranger = do_unit(replace(task, program="0" * 64))
-    assert stranger.status == "failed" and "where the fleet was started" in (stranger.reason or "")
+    other = do_unit(replace(task, program="0" * 64))
+    assert other.status == "failed" and "where the fleet was started" in (other.reason or "")
     assert done_before(task) is not None
 
 
@@ -137,9 +137,9 @@ def test_a_tampered_result_is_not_done(case: str, task: Task) -> None:
         return
     assert again.status == "done"
     assert _stable(task.out) == before
-    if again.aside:  # nobody's file is lost
-        aside = task.out.with_name(again.aside)
-        assert {path.relative_to(aside): path.read_bytes() for path in aside.rglob("*.*")} == damaged
+    if again.moved_to:  # nobody's file is lost
+        moved = task.out.with_name(again.moved_to)
+        assert {path.relative_to(moved): path.read_bytes() for path in moved.rglob("*.*")} == damaged
     else:
         assert case in ("half the files", "the evaluation")
     assert {p.name for p in task.out.parent.iterdir()} <= {"RLG-1", "RLG-1.changed-1", "catalogue"}
@@ -159,17 +159,17 @@ def test_a_foreign_file_in_a_result_stays_and_stops_its_gyro_alone(task: Task) -
 def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gyro(tmp_path / "d" / "RLG-1", "RLG-1")
     fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
-    told = []
+    reported = []
 
     def meanwhile(_jobs: int, tasks: list[Task]) -> Any:
         with pytest.raises(InputError, match="another job writes there: gyrotc fleet, process") as caught:
             run_fleet(fleet, out)
-        told.append(caught.value)
+        reported.append(caught.value)
         yield 0, do_unit(tasks[0])
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
     assert run_fleet(fleet, out)[0].status == "done"
-    assert told and {path.name for path in out.iterdir()} == {"RLG-1", "catalogue", MARKER, *SUMMARY}
+    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", "catalogue", MARKER, *SUMMARY}
 
 
 @pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])

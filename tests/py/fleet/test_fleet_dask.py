@@ -168,7 +168,7 @@ def test_a_worker_that_finds_other_recordings_refuses_them(
     assert not (tmp_path / "out" / "RLG-1").exists()
 
 
-def test_without_a_worker_it_is_told_what_is_waited_for(
+def test_without_a_worker_it_is_reported_what_is_waited_for(
     world: Path, alone: Dask, tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fleet = ("fleet", world / "lab" / "few", "--out", tmp_path / "out")

@@ -24,7 +24,7 @@ def entries(lot: Lot) -> Iterator[FleetEntry]:
             t = np.concatenate([run["temperature_c"] for run in means])
             rate = np.concatenate([run[f"rate_{axis}_dph"] for run in means])
             fit = np.polynomial.Polynomial.fit(t, rate, 3)
-            told = [
+            reported = [
                 Averages(
                     run["time_s"],
                     r := run[f"rate_{axis}_dph"],
@@ -33,7 +33,7 @@ def entries(lot: Lot) -> Iterator[FleetEntry]:
                 )
                 for run in means
             ]
-            facts = facts_of([(f"run-{k:02d}.csv", a) for k, a in enumerate(told, 1)])
+            facts = facts_of([(f"run-{k:02d}.csv", a) for k, a in enumerate(reported, 1)])
             spikes = sum(int((np.abs(np.diff(run[f"rate_{axis}_dph"])) > 0.04).sum()) // 2 for run in runs)
             yield FleetEntry(
                 name=f"{name}-{axis}",
@@ -73,15 +73,17 @@ def test_each_planted_fault_is_named_and_no_healthy_gyro() -> None:
 
 def test_words_with_run_and_time() -> None:
     lot, found = planted(5, FAULTS)
-    told = {fault: found[sorted(names)[0]] for fault, names in lot.planted.items()}
+    reported = {fault: found[sorted(names)[0]] for fault, names in lot.planted.items()}
     file, time_s = lot.step
-    assert told["step"].file == file
-    assert told["step"].time_s == pytest.approx(time_s, abs=600.0)
-    assert f"step in {file} at " in told["step"].text
-    assert "mirror image of that of the other" in told["sign_reversed"].text
-    assert "shows what" in told["axes_exchanged"].text
-    assert "copy of another unit" in told["copy_of_other"].text
-    assert told["copy_of_other"].text.endswith(told["copy_of_other"].name[-2:]), "the other's same axis"
+    assert reported["step"].file == file
+    assert reported["step"].time_s == pytest.approx(time_s, abs=600.0)
+    assert f"step in {file} at " in reported["step"].text
+    assert "mirror image of that of the other" in reported["sign_reversed"].text
+    assert "shows what" in reported["axes_exchanged"].text
+    assert "copy of another unit" in reported["copy_of_other"].text
+    assert reported["copy_of_other"].text.endswith(reported["copy_of_other"].name[-2:]), (
+        "the other's same axis"
+    )
 
 
 def test_the_picture_of_a_noisy_gyro_shows_the_run_that_is_named() -> None:
@@ -106,13 +108,13 @@ def test_exchanged_axes_stand_apart_in_what_the_fleet_says() -> None:
     figured = [e.model_copy(update={"serial": e.dataset, "model_hash": "0"}) for e in entries(lot)]
     summary = summary_of(figured)
     (wrong,) = lot.planted.values()
-    assert {reason.name: reason.id for reason in summary.apart} == dict.fromkeys(wrong, "axes_exchanged")
+    assert {reason.name: reason.id for reason in summary.reasons} == dict.fromkeys(wrong, "axes_exchanged")
     for unit in summary.serials:
         assert ("axes_exchanged" in unit.findings) == (unit.name in wrong)
-        assert (unit.apart is None) == (unit.name not in wrong)
+        assert (unit.outlier_reason is None) == (unit.name not in wrong)
     one, other = sorted(name[-1] for name in wrong)
-    told = next(reason.text for reason in summary.apart if reason.name.endswith(f"-{one}"))
-    assert told == f"axes exchanged: {one} shows what {other} axes show, and {other} what {one} axes show"
+    reported = next(reason.text for reason in summary.reasons if reason.name.endswith(f"-{one}"))
+    assert reported == f"axes exchanged: {one} shows what {other} axes show, and {other} what {one} axes show"
 
 
 def test_a_handful_of_gyros_accuses_nobody() -> None:
@@ -122,7 +124,7 @@ def test_a_handful_of_gyros_accuses_nobody() -> None:
 
 
 def test_axes_are_compared_with_their_own_kind() -> None:
-    """Before: with x, y and z in one heap nine healthy axes stood apart."""
+    """Before: with x, y and z in one heap nine healthy axes were named outliers."""
     assert reasons(list(entries(Lot(4, 10)))) == []
 
 

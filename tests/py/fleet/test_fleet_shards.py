@@ -61,15 +61,15 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     fleet, out = load_manifest(lot / "d"), lot / "shares"
-    told = gyrotc("fleet", lot / "d", "--out", out, "--shard", f"1/{N}")
-    assert f"share 1/{N}" in told.stdout and not (out / "fleet.json").exists()
+    reported = gyrotc("fleet", lot / "d", "--out", out, "--shard", f"1/{N}")
+    assert f"share 1/{N}" in reported.stdout and not (out / "fleet.json").exists()
     early = gather(fleet, out)
-    assert {e.status for e in early if e.name not in told.stdout} <= {"unfinished"}
+    assert {e.status for e in early if e.name not in reported.stdout} <= {"unfinished"}
     failed = [
         e for k in range(2, N + 1) for e in run_share(fleet, out, Share(k, N), jobs=1) if e.status != "done"
     ]
     assert not (out / "fleet.json").exists(), "a summary outlasts what it says"
-    assert ("RLG-3: failed" in told.stdout) != ([entry.name for entry in failed] == ["RLG-3"])
+    assert ("RLG-3: failed" in reported.stdout) != ([entry.name for entry in failed] == ["RLG-3"])
     done = gyrotc("fleet", lot / "d", "--out", out, "--gather")
     assert done.returncode == 1 and "RLG-3: unfinished; no share has made it" in done.stdout
     assert "3 of 4 done, 0 failed" in done.stdout

@@ -196,8 +196,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     block = ("--block-s", "50")
     run_here("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old", *block)
     dataset(place / "check", 12, "2026-01-01", check=True)
-    told = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
-    assert "earlier model: the model " in told and "is confirmed" in told
+    reported = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
+    assert "earlier model: the model " in reported and "is confirmed" in reported
     return place
 
 
@@ -207,12 +207,12 @@ def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path
     assert "is confirmed" in json.loads((world / "new" / "model.json").read_text())["meta"]["prior"]
     bumped = dataset(tmp_path / "bumped", 13, "2026-06-01", check=True, change=CHANGES["local"])
     block = ("--block-s", "50")
-    told = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
-    assert "no longer holds" in told and "finding prior_does_not_hold" in told
-    told = run_here(
+    reported = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
+    assert "no longer holds" in reported and "finding prior_does_not_hold" in reported
+    reported = run_here(
         "fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged", *block
     )
-    assert "ageing of 0.005 deg/h" in told
+    assert "ageing of 0.005 deg/h" in reported
 
 
 def sigma_dph(result: Path) -> float:
@@ -266,7 +266,7 @@ def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path
     assert "no longer holds" in str(model.meta["prior"]) and model.hash in page
 
 
-def test_what_cannot_be_a_prior_is_told(world: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_a_prior_is_reported(world: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="was made from it"):
         run_here("fit", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
     with pytest.raises(InputError, match="--ageing"):

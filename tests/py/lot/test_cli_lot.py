@@ -53,8 +53,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run_here(*made, "--units", "5", "--base", place / "whole.toml", "--out", place / "whole")
     run_here(*made, "--units", "6", "--base", place / "short.toml", "--out", place / "short")
     run_here("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
-    told = run_here("lot", place / "fleet", "--out", place / "lot.json")
-    assert "5 units" in told and "before any run" in told
+    reported = run_here("lot", place / "fleet", "--out", place / "lot.json")
+    assert "5 units" in reported and "before any run" in reported
     return place
 
 
@@ -68,14 +68,14 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
 
 
 def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
-    told = run_here(
+    reported = run_here(
         "fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with"
     )
     run_here("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
     lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
     use = json.loads((world / "with" / "training.json").read_text())["lot"]
     assert use["checksum"] == lot.checksum and use["accepted"] and not use["member"]
-    assert "lot: a lot of 5 units leaves" in told and str(model.meta["lot"]).endswith(use["text"])
+    assert "lot: a lot of 5 units leaves" in reported and str(model.meta["lot"]).endswith(use["text"])
     assert model.envelope.temperature_c[0] <= lot.temperature_c[0]
     assert model.envelope.temperature_c[1] >= alone.envelope.temperature_c[1]
     assert model.coverage is not None and alone.coverage is not None
@@ -108,8 +108,8 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
     lot = load_lot(world / "lot.json")
     before = prior_of(lot).alone().rms_sigma_dph()
     asked = ("--lot", world / "lot.json", "--require", f"accuracy={0.5 * before:.3g}")
-    told = run_here("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
-    assert "with the lot: " in told and "without: " in told
+    reported = run_here("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
+    assert "with the lot: " in reported and "without: " in reported
     found = LotPlan.model_validate_json((tmp_path / "plan" / "plan.json").read_text())
     assert found.with_lot.reached and found.with_lot.sigma_dph <= found.accuracy_dph < found.before_dph
     assert 0.0 < found.with_lot.hours < found.without.hours
@@ -129,9 +129,9 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
 def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Path) -> None:
     unit, scenario = world / "fleet" / "LOT-0005-001", world / "whole.toml"
     price = ("--hours", "0.5", "--price-per-hour", "90", "--price-per-run", "150")
-    told = run_here("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
+    reported = run_here("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
     found = NextRun.model_validate_json((tmp_path / "next" / "plan.json").read_text())
-    assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in told
+    assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in reported
     assert all(p.programme.hours <= 0.5 and 0.0 <= p.removed_share < 1.0 for p in found.proposals)
     assert (tmp_path / "next" / "programme.csv").read_text().startswith("time_min,set_point_c")
     run_here(
@@ -162,12 +162,12 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
         left.append(float(np.mean(away**2)))
         assert (fitted.lot is not None and fitted.lot.accepted) == (options.prior is not None)
     assert left[0] < left[1]
-    told = run_here(
+    reported = run_here(
         *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),
         *("--json", tmp_path / "found.json"),
     )
     assert (
-        "lot: not used: " in told
+        "lot: not used: " in reported
         and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
     )
     with pytest.raises(InputError, match="--lot"):
@@ -182,7 +182,7 @@ def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:
         load_lot(tmp_path / "lot.json")
 
 
-def test_what_is_no_lot_of_units_is_told(world: Path, tmp_path: Path) -> None:
+def test_what_is_no_lot_of_units_is_reported(world: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="0 calibrated units"):
         run_here("lot", tmp_path, "--out", tmp_path / "lot.json")
     with pytest.raises(InputError, match="no folder"):

@@ -171,7 +171,7 @@ def test_scores_of_the_lots_own_units_are_as_expected() -> None:
     assert kstest(found, "uniform").pvalue > 1e-3
 
 
-def test_a_stranger_is_told_and_calibrated_without_the_lot() -> None:
+def test_a_stranger_is_reported_and_calibrated_without_the_lot() -> None:
     _, prior, _ = family(11)
     rng = np.random.default_rng(22)
     data = short_run(rng, [2e-3, -2e-3, 1e-3, 0.0, 1e-3])
@@ -191,7 +191,7 @@ def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
         u = calibrated(rng, own)
         units.append(replace(u, bias_dph=u.bias_dph - shared(u.temperature_c, u.slope_c_per_min) + 7e-3))
     lot, found = lot_of(units)
-    assert "no family" in lot.told
+    assert "no family" in lot.text
     assert prior_of(lot).alone().rms_sigma_dph() > 5e-4
     assert len(found.state.means) == 1
 
@@ -201,7 +201,7 @@ def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     rng = np.random.default_rng(71)
     side = np.arange(20) % 2
     lot, found = lot_of([calibrated(rng, unit_map(rng, 1e-4, 3e-3 * (s - 0.5))) for s in side])
-    assert len(lot.clusters) == 2 and "2 clusters" in lot.told
+    assert len(lot.clusters) == 2 and "2 clusters" in lot.text
     assert abs(np.corrcoef(found.state.cluster, side[found.inside])[0, 1]) > 0.99
     prior = prior_of(lot)
     own = unit_map(rng, 1e-4, 1.5e-3)
@@ -217,7 +217,7 @@ def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     units[4] = calibrated(rng, [3e-3, 2e-3, -2e-3, 0.0, 0.0])
     lot, found = lot_of(units)
     assert not found.inside[4] and found.inside.sum() >= 13
-    assert lot.units[4].cluster is None and "U4" in lot.told
+    assert lot.units[4].cluster is None and "U4" in lot.text
 
 
 @pytest.mark.slow
@@ -386,7 +386,7 @@ def test_what_is_promised_is_what_the_posterior_has_after_the_run() -> None:
         (Price(1.0, 1.0, float("nan")), "--hours"),
     ],
 )
-def test_what_is_no_price_is_told(price: Price, option: str) -> None:
+def test_what_is_no_price_is_reported(price: Price, option: str) -> None:
     known = known_of(np.random.default_rng(6), np.zeros(5))
     with pytest.raises(InputError, match=option):
         next_run(random_model(1), known, NOISE_OF_RUNS, MEAN_S, "paper", price)

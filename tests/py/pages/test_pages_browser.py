@@ -123,8 +123,8 @@ def test_landmarks_headings_and_names(name: str, pages: dict[str, Path], tab: Br
 @pytest.mark.parametrize("name", PAGES)
 def test_no_key_stands_where_words_should(name: str, pages: dict[str, Path], tab: Browser) -> None:
     tab.open(pages[name])
-    told = "[...document.querySelectorAll('th, td, .label, .note, h2, h3, dt')]"
-    text = tab.value(told + ".filter(e => !e.matches('.mono, .name')).map(e => e.innerText).join('\\n')")
+    reported = "[...document.querySelectorAll('th, td, .label, .note, h2, h3, dt')]"
+    text = tab.value(reported + ".filter(e => !e.matches('.mono, .name')).map(e => e.innerText).join('\\n')")
     assert not re.findall(r"\b[a-z]+_(?:[a-z]+_)*(?:dph|s|c|arcsec|bytes)\b|\brms dph\b|\['", text)
 
 

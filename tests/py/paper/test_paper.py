@@ -54,7 +54,7 @@ def test_page_and_figures_are_made_from_the_record() -> None:
     assert list(stale(DOCS)) == []
 
 
-def test_a_figure_that_moves_is_told_with_its_place(now: dict[str, Any]) -> None:
+def test_a_figure_that_moves_is_reported_with_its_place(now: dict[str, Any]) -> None:
     """By ten times what is allowed, here and where libraries or compiler are others."""
     for made, share in ((made_with(), 1e-5), ({**made_with(), "compiler": "another"}, 0.01)):
         other = copy.deepcopy(RECORD) | {"made_with": made}
@@ -66,7 +66,7 @@ def test_a_figure_that_moves_is_told_with_its_place(now: dict[str, Any]) -> None
     assert sum("None recorded" in line for line in departures(other, now)) > 100
 
 
-def test_a_page_or_a_figure_of_another_record_is_told(tmp_path: Path) -> None:
+def test_a_page_or_a_figure_of_another_record_is_reported(tmp_path: Path) -> None:
     docs = tmp_path / "docs"
     (docs / "results").mkdir(parents=True)
     for name in ("paper.md", "results/summary.json"):

@@ -73,7 +73,7 @@ def test_the_shortest_profile_reaches_what_is_required(planned: dict[str, Any]) 
     assert set(found["runs"]) <= {"loops", "slow", "steps"}
 
 
-def test_what_no_number_of_runs_reaches_is_told(sensitivity: Sensitivity) -> None:
+def test_what_no_number_of_runs_reaches_is_reported(sensitivity: Sensitivity) -> None:
     assert shortest(sensitivity, {"hysteresis": 1e-9}).runs is None
 
 
@@ -82,7 +82,7 @@ def test_accuracy_comes_near_the_noise_floor(planned: dict[str, Any]) -> None:
     assert ratios == sorted(ratios, reverse=True) and 1.0 < ratios[-1] < 1.1
 
 
-def test_two_ways_of_saying_the_same_cannot_be_told_apart(planned: dict[str, Any]) -> None:
+def test_two_ways_of_saying_the_same_cannot_be_reported_apart(planned: dict[str, Any]) -> None:
     d = {r["id"]: r["d"] for r in planned["separability"]}
     assert d["ageing"]["turn_on_offset"] > 30.0, "offsets of their own hold every trend between runs"
     assert d["path_length_periodicity"]["warm_up"] < 4.0
@@ -107,7 +107,7 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "reported"),
     [
         (("--require", "hysteresis"), "cause=limit"),
         (("--require", "hysteresis=-1"), "above 0"),
@@ -116,10 +116,10 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
         (("--separate", "hysteresis,sensor_lag"), "thermal_gradient"),
     ],
 )
-def test_bad_options_are_told(folder: Path, options: tuple[str, str], told: str) -> None:
+def test_bad_options_are_reported(folder: Path, options: tuple[str, str], reported: str) -> None:
     """In this process: what is refused costs less than a start of the program."""
     done = invoked("plan", scenario(folder), *options)
-    assert isinstance(done.exception, InputError) and told in str(done.exception)
+    assert isinstance(done.exception, InputError) and reported in str(done.exception)
 
 
 def test_options_are_read() -> None:

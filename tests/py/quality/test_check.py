@@ -1,6 +1,6 @@
-"""`check` tells all problems and doubts; each doubt follows from a property of the data and from nothing else.
+"""`check` tells all problems and warnings; each warning follows from a property of the data and from nothing else.
 
-Each faulty case is made from good runs by one change, and the same good runs raise no doubt.
+Each faulty case is made from good runs by one change, and the same good runs raise no warning.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def checked(folder: Path, table: Mapping[str, np.ndarray] | None = None) -> Chec
 
 
 def ids(result: CheckResult) -> set[str]:
-    return {doubt.id for doubt in result.doubts}
+    return {warning.id for warning in result.warnings}
 
 
 def long(n: int = 600) -> Columns:
@@ -41,7 +41,7 @@ def long(n: int = 600) -> Columns:
 def test_a_plain_recording_is_without_doubt(tmp_path: Path) -> None:
     result = checked(tmp_path / "RLG-1", long())
     assert result.problems == ()
-    assert result.doubts == ()
+    assert result.warnings == ()
 
 
 def _jump(c: Columns) -> Columns:
@@ -89,7 +89,7 @@ def _holds(c: Columns) -> Columns:
     return c | {"temperature_c": 20.0 + np.clip(np.arange(len(c["time_s"])), 0, 60) + noise}
 
 
-DOUBTS: dict[str, Callable[[Columns], Mapping[str, np.ndarray]]] = {
+WARNINGS: dict[str, Callable[[Columns], Mapping[str, np.ndarray]]] = {
     "coarse_temperature": lambda c: c | {"temperature_c": np.round(c["temperature_c"])},
     "jump_in_temperature": _jump,
     "constant_channel": lambda c: c | {"supply_v": np.full(len(c["time_s"]), 5.0)},
@@ -107,21 +107,21 @@ DOUBTS: dict[str, Callable[[Columns], Mapping[str, np.ndarray]]] = {
 }
 
 
-@pytest.mark.parametrize("doubt", DOUBTS)
-def test_each_doubt_has_its_cause(doubt: str, tmp_path: Path) -> None:
-    result = checked(tmp_path / "RLG-1", DOUBTS[doubt](long()))
+@pytest.mark.parametrize("warning", WARNINGS)
+def test_each_warning_has_its_cause(warning: str, tmp_path: Path) -> None:
+    result = checked(tmp_path / "RLG-1", WARNINGS[warning](long()))
     assert result.problems == ()
-    assert ids(result) == {doubt}
+    assert ids(result) == {warning}
 
 
 def test_whole_degrees_are_called_so(tmp_path: Path) -> None:
-    result = checked(tmp_path / "RLG-1", DOUBTS["coarse_temperature"](long()))
-    assert "whole degrees" in result.doubts[0].text
+    result = checked(tmp_path / "RLG-1", WARNINGS["coarse_temperature"](long()))
+    assert "whole degrees" in result.warnings[0].text
 
 
 def test_gaps_are_counted_with_their_rows(tmp_path: Path) -> None:
     result = checked(tmp_path / "RLG-1", _gap(long()))
-    assert "1 gaps; 20 rows of 10 s are missing" in result.doubts[0].text
+    assert "1 gaps; 20 rows of 10 s are missing" in result.warnings[0].text
 
 
 def test_earth_rate_that_is_not_stated(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_coverage_of_a_requested_envelope(tmp_path: Path) -> None:
     checked(folder, long())
     wide = check(folder, envelope=((-40.0, 60.0), (-5.0, 5.0)))
     assert {"envelope_not_reached", "envelope_coverage"} == ids(wide)
-    texts = [d.text for d in wide.doubts]
+    texts = [d.text for d in wide.warnings]
     assert any(t.startswith("temperature covers 20.") and "-40 ... 60 C" in t for t in texts)
     assert any(t.startswith("temperature rate covers") and "-5 ... 5 C/min" in t for t in texts)
     near = check(folder, envelope=((20.5, 49.5), (-0.55, 0.55)))
@@ -182,12 +182,12 @@ def test_a_recording_that_still_grows(tmp_path: Path) -> None:
     result = check(folder)
     assert result.problems == ()
     assert ids(result) == {"left_out"}
-    assert "unfinished" in str(result.doubts[0])
+    assert "unfinished" in str(result.warnings[0])
 
 
 def test_problems_and_doubts_come_together(tmp_path: Path) -> None:
     folder = tmp_path / "RLG-1"
-    write_csv(folder / "good.csv", DOUBTS["coarse_temperature"](long()))
+    write_csv(folder / "good.csv", WARNINGS["coarse_temperature"](long()))
     write_csv(folder / "kelvin.csv", long() | {"temperature_c": long()["temperature_c"] + 273.15})
     write_csv(folder / "short.csv", columns(5))
     result = check(folder)
@@ -195,15 +195,15 @@ def test_problems_and_doubts_come_together(tmp_path: Path) -> None:
     assert "coarse_temperature" in ids(result)
 
 
-def test_all_axes_tell_a_common_doubt_once(tmp_path: Path) -> None:
+def test_all_axes_tell_a_common_warning_once(tmp_path: Path) -> None:
     base = long()
     table = {"time_s": base["time_s"], "temperature_c": np.round(base["temperature_c"])}
     table |= {f"rate_{axis}_dph": base["rate_dph"] + k for k, axis in enumerate("xyz")}
     table["rate_y_dph"] = _spike(base | {"rate_dph": table["rate_y_dph"]})["rate_dph"]
     write_csv(tmp_path / "IMU" / "a.csv", table)
-    told = [str(d) for d in check(tmp_path / "IMU", axis="all").doubts]
-    assert sum("whole degrees" in t for t in told) == 1
-    [outlier] = [t for t in told if "those around them" in t]
+    reported = [str(d) for d in check(tmp_path / "IMU", axis="all").warnings]
+    assert sum("whole degrees" in t for t in reported) == 1
+    [outlier] = [t for t in reported if "those around them" in t]
     assert outlier.startswith("a.csv, axis y: 1 rows of a.csv depart from those around them, most at ")
 
 
@@ -249,7 +249,7 @@ def three(seed: int, *, bias: tuple[float, float, float] = (2.0, -1.0, 0.5), ear
     return table
 
 
-def turned(table: Columns, columns_of: str) -> Columns:
+def swapped(table: Columns, columns_of: str) -> Columns:
     """A run whose columns x, y, z hold what `columns_of` says, as "y x -z"."""
     rates = {a: table[f"rate_{a}_dph"] for a in AXES}
     held = [(-1.0 if one[0] == "-" else 1.0) * rates[one[-1]] for one in columns_of.split()]
@@ -257,7 +257,7 @@ def turned(table: Columns, columns_of: str) -> Columns:
 
 
 def oriented(result: CheckResult) -> list[Doubt]:
-    return [d for d in result.doubts if d.id in ORIENTED]
+    return [d for d in result.warnings if d.id in ORIENTED]
 
 
 @pytest.mark.parametrize(
@@ -272,13 +272,13 @@ def oriented(result: CheckResult) -> list[Doubt]:
 def test_against_the_other_runs(held: str, id: str, words: str, tmp_path: Path) -> None:
     for k in range(4):
         table = three(k)
-        write_csv(tmp_path / "R" / f"{k}.csv", turned(table, held) if k == 2 else table)
-    told = oriented(check(tmp_path / "R", axis="all"))
-    assert [d.id for d in told] == ([id] if id else [])
-    for doubt in told:
-        assert doubt.where == "2.csv"
-        assert words in doubt.text
-        assert "mounting and wiring" in doubt.advice + doubt.text
+        write_csv(tmp_path / "R" / f"{k}.csv", swapped(table, held) if k == 2 else table)
+    reported = oriented(check(tmp_path / "R", axis="all"))
+    assert [d.id for d in reported] == ([id] if id else [])
+    for warning in reported:
+        assert warning.where == "2.csv"
+        assert words in warning.text
+        assert "mounting and wiring" in warning.advice + warning.text
 
 
 @pytest.mark.parametrize(
@@ -288,11 +288,11 @@ def test_against_earths_rate(held: str, id: str, tmp_path: Path) -> None:
     """One run is enough where the geometry is stated: a good gyro shows Earth's rate itself."""
     small = (0.02, -0.01, 0.03)
     folder = tmp_path / "R"
-    write_csv(folder / "a.csv", turned(three(1, bias=small, earth=True), held))
+    write_csv(folder / "a.csv", swapped(three(1, bias=small, earth=True), held))
     (folder / "dataset.toml").write_text(toml(f'file = "a.csv"\n{GEOMETRY}', head=COMPUTED), "utf-8")
-    told = oriented(check(folder, axis="all"))
-    assert [d.id for d in told] == ([id] if id else [])
-    assert all("against Earth's rate" in d.text for d in told)
+    reported = oriented(check(folder, axis="all"))
+    assert [d.id for d in reported] == ([id] if id else [])
+    assert all("against Earth's rate" in d.text for d in reported)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -326,12 +326,12 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("held", "id"), [("x y z", ""), ("y x z", "axes_exchanged"), ("x -y z", "sign_reversed")]
 )
 def test_against_an_earlier_calibration(held: str, id: str, calibrated: Path, tmp_path: Path) -> None:
-    write_csv(tmp_path / "RLG-0042" / "a.csv", turned(three(5), held))
+    write_csv(tmp_path / "RLG-0042" / "a.csv", swapped(three(5), held))
     earlier = earlier_models(calibrated)
     assert set(earlier) == set(AXES)
-    told = oriented(check(tmp_path / "RLG-0042", axis="all", earlier=earlier))
-    assert [d.id for d in told] == ([id] if id else [])
-    assert all("against the earlier calibration" in d.text for d in told)
+    reported = oriented(check(tmp_path / "RLG-0042", axis="all", earlier=earlier))
+    assert [d.id for d in reported] == ([id] if id else [])
+    assert all("against the earlier calibration" in d.text for d in reported)
 
 
 CHANGES: dict[str, Callable[[Columns], Columns]] = {
@@ -342,14 +342,14 @@ CHANGES: dict[str, Callable[[Columns], Columns]] = {
 
 
 @pytest.mark.parametrize("id", CHANGES)
-def test_time_stamps_are_told_with_their_rows(id: str, tmp_path: Path) -> None:
+def test_time_stamps_are_reported_with_their_rows(id: str, tmp_path: Path) -> None:
     write_csv(tmp_path / "R" / "a.csv", CHANGES[id](columns(600)))
-    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == id]
-    [mark, *_] = doubt.marks
+    [warning] = [d for d in check(tmp_path / "R").warnings if d.id == id]
+    [mark, *_] = warning.marks
     assert mark.rows == ((50, 51) if id != "time_drifts" else mark.rows)
     if id == "time_jumps":
-        assert "jumps by 3600 s between rows 50 and 51" in doubt.text
-        assert "1 h: a clock that was set" in doubt.text
+        assert "jumps by 3600 s between rows 50 and 51" in warning.text
+        assert "1 h: a clock that was set" in warning.text
     if id == "time_drifts":
         assert mark.rows is not None
         assert mark.rows[0] > 290 or mark.rows[1] < 310
@@ -362,7 +362,7 @@ def test_what_is_excluded_is_no_gap(tmp_path: Path) -> None:
     run = 'file = "a.csv"\nexclude = [{from_s = 500.0, to_s = 700.0, reason = "door opened"}]'
     (folder / "dataset.toml").write_text(toml(run), "utf-8")
     result = check(folder)
-    assert result.doubts == ()
+    assert result.warnings == ()
     assert result.facts[0][1].gaps == 0
 
 
@@ -372,15 +372,15 @@ def test_stamps_of_a_computer_that_tremble_are_in_order(scatter: float, tmp_path
     table = columns(2000)
     table["time_s"] = np.arange(2000) * 10.0 + g.uniform(-scatter, scatter, 2000) * 10.0
     write_csv(tmp_path / "R" / "a.csv", table)
-    assert not {d.id for d in check(tmp_path / "R").doubts} & {
+    assert not {d.id for d in check(tmp_path / "R").warnings} & {
         "time_jumps", "time_drifts", "coarse_time", "gaps",
     }  # fmt: skip
 
 
-def test_every_doubt_says_what_to_do_next() -> None:
+def test_every_warning_says_what_to_do_next() -> None:
     """By `advice`, or, with the line to paste or the place to look, in its own text."""
-    told_in_text = {"shared_rows", "sign_reversed", "axes_exchanged", "stuck_temperature", "channel_copy"}
-    told_in_text |= {"thermometer_changed"}
+    reported_in_text = {"shared_rows", "sign_reversed", "axes_exchanged", "stuck_temperature", "channel_copy"}
+    reported_in_text |= {"thermometer_changed"}
     judge = Path(doubts_file).parent
     texts = "".join(
         (judge / f"{name}.py").read_text("utf-8")
@@ -388,7 +388,7 @@ def test_every_doubt_says_what_to_do_next() -> None:
     )
     ids = set(re.findall(r'(?:Doubt\(|"id": )"(\w+)"', texts)) | {"axes_exchanged", "jump_in_temperature"}
     assert len(ids) > 20
-    assert {id for id in ids if not advice_of(id)} <= told_in_text
+    assert {id for id in ids if not advice_of(id)} <= reported_in_text
 
 
 def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
@@ -403,34 +403,34 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
     lines[7] = lines[6]
     (folder / "b.csv").write_text("\n".join(lines))
     from gyrotc.pages.check import write_check_page
-    from gyrotc.quality.pictures import pictured
+    from gyrotc.quality.pictures import pictures_of
 
     result = check(folder)
     assert len(result.problems) == 1
-    assert {d.id for d in result.doubts} == {
+    assert {d.id for d in result.warnings} == {
         "time_jumps",
         "sign_reversed",
         "runs_contradict",
         "earth_rate_not_stated",
     }
-    write_check_page(page, result.result(), pictured(folder, result), folder.name)
+    write_check_page(page, result.result(), pictures_of(folder, result), folder.name)
     text = page.read_text("utf-8")
-    assert text.count("<svg") == 1 + len(result.doubts)
+    assert text.count("<svg") == 1 + len(result.warnings)
     assert text.count("<b>Next:</b>") >= 2
     assert "b.csv: row 7" in text
     write_check_page(
-        page, result.result(), pictured(folder, result), folder.name
+        page, result.result(), pictures_of(folder, result), folder.name
     )  # its own page is replaced ...
     page.write_text("mine")
     with pytest.raises(Exception, match="was not written by gyrotc"):  # ... and nobody else's
-        write_check_page(page, result.result(), pictured(folder, result), folder.name)
+        write_check_page(page, result.result(), pictures_of(folder, result), folder.name)
 
 
 def test_rows_and_what_to_do_next_stand_in_the_json(tmp_path: Path) -> None:
     write_csv(tmp_path / "R" / "a.csv", CHANGES["gaps"](columns(600)))
-    [doubt] = json.loads(json.dumps(check(tmp_path / "R").result().content()))["doubts"]
-    assert doubt["rows"] == [{"file": "a.csv", "rows": [50, 51], "span_s": [490.0, 700.0]}]
-    assert "Look at the logger" in doubt["next"]
+    [warning] = json.loads(json.dumps(check(tmp_path / "R").result().content()))["warnings"]
+    assert warning["rows"] == [{"file": "a.csv", "rows": [50, 51], "span_s": [490.0, 700.0]}]
+    assert "Look at the logger" in warning["next"]
 
 
 def _entry(name: str, curve: list[float | None]) -> FleetEntry:
@@ -440,7 +440,7 @@ def _entry(name: str, curve: list[float | None]) -> FleetEntry:
 
 @pytest.mark.parametrize("reversed_unit", [None, 3])
 def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
-    from gyrotc.fleet.outliers import turned
+    from gyrotc.fleet.outliers import mirrored_units
 
     g = np.random.default_rng(1)
     t = np.arange(-60.0, 126.0, 5.0)
@@ -453,16 +453,16 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
         inside = (t >= -40.0) & (t <= 60.0)
         held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
         entries.append(_entry(f"u{k}", held))
-    assert turned(entries) == ([] if reversed_unit is None else ["u3"])
+    assert mirrored_units(entries) == ([] if reversed_unit is None else ["u3"])
 
 
 def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
-    from gyrotc.fleet.outliers import turned
+    from gyrotc.fleet.outliers import mirrored_units
 
     g = np.random.default_rng(2)
     for _ in range(200):
         entries = [_entry(f"u{k}", g.normal(0.0, 1.0, 38).cumsum().tolist()) for k in range(12)]
-        assert turned(entries) == []
+        assert mirrored_units(entries) == []
 
 
 @pytest.mark.parametrize("lost", [0.06, 0.2])
@@ -470,13 +470,13 @@ def test_rows_that_are_really_missing_are_gaps_and_no_coarse_stamps(lost: float,
     table = columns(3000)
     kept = np.random.default_rng(4).random(3000) > lost
     write_csv(tmp_path / "R" / "a.csv", {name: values[kept] for name, values in table.items()})
-    assert {d.id for d in check(tmp_path / "R").doubts} == {"gaps"}
+    assert {d.id for d in check(tmp_path / "R").warnings} == {"gaps"}
 
 
 def test_the_command_draws_and_holds_against_an_earlier_result(
     calibrated: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
-    write_csv(tmp_path / "RLG-0042" / "a.csv", turned(three(5), "x -y z"))
+    write_csv(tmp_path / "RLG-0042" / "a.csv", swapped(three(5), "x -y z"))
     page = tmp_path / "check.html"
     command = ("check", tmp_path / "RLG-0042", "--axis", "all", "--previous", calibrated, "--plots", page)
     done = gyrotc(*command)
@@ -506,35 +506,37 @@ def run(seed: int, sign: float = 1.0) -> Columns:
 def test_the_run_with_its_sign_reversed_is_named(reversed_run: int | None, tmp_path: Path) -> None:
     for k in range(4):
         write_csv(tmp_path / "R" / f"{k}.csv", run(k, -1.0 if k == reversed_run else 1.0))
-    told = [d for d in check(tmp_path / "R").doubts if d.id == "sign_reversed"]
-    assert [d.where for d in told] == ([] if reversed_run is None else [f"{reversed_run}.csv"])
-    assert all("Look at mounting and wiring" in d.text for d in told)
+    reported = [d for d in check(tmp_path / "R").warnings if d.id == "sign_reversed"]
+    assert [d.where for d in reported] == ([] if reversed_run is None else [f"{reversed_run}.csv"])
+    assert all("Look at mounting and wiring" in d.text for d in reported)
 
 
 def test_runs_of_noise_alone_are_not_accused(tmp_path: Path) -> None:
     for k in range(4):
         write_csv(tmp_path / "R" / f"{k}.csv", columns(600, seed=k))
-    assert "sign_reversed" not in {d.id for d in check(tmp_path / "R").doubts}
+    assert "sign_reversed" not in {d.id for d in check(tmp_path / "R").warnings}
 
 
-def test_a_channel_that_is_a_copy_is_told(tmp_path: Path) -> None:
+def test_a_channel_that_is_a_copy_is_reported(tmp_path: Path) -> None:
     table = run(1)
     own = table["temperature_c"] + 1.0
     write_csv(
         tmp_path / "R" / "a.csv", table | {"case_temperature_c": table["temperature_c"], "inner_c": own}
     )
-    told = [d.text for d in check(tmp_path / "R").doubts if d.id == "channel_copy"]
-    assert len(told) == 1
-    assert told[0].startswith("channel case_temperature_c of a.csv is a copy of the temperature, row by row")
+    reported = [d.text for d in check(tmp_path / "R").warnings if d.id == "channel_copy"]
+    assert len(reported) == 1
+    assert reported[0].startswith(
+        "channel case_temperature_c of a.csv is a copy of the temperature, row by row"
+    )
 
 
-def test_a_stuck_thermometer_is_told_and_the_line_mends_it(tmp_path: Path) -> None:
+def test_a_stuck_thermometer_is_reported_and_the_line_mends_it(tmp_path: Path) -> None:
     table = run(1)
     table["temperature_c"][200:280] = table["temperature_c"][200]
     write_csv(tmp_path / "R" / "a.csv", table)
-    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "stuck_temperature"]
-    assert "from 2000 to 2790 s (80 rows)" in doubt.text
-    assert 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "thermometer stuck"}]' in doubt.text
+    [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "stuck_temperature"]
+    assert "from 2000 to 2790 s (80 rows)" in warning.text
+    assert 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "thermometer stuck"}]' in warning.text
 
 
 @pytest.mark.parametrize("step", [0.25, 1.0])
@@ -542,4 +544,4 @@ def test_a_coarse_thermometer_that_holds_is_not_stuck(step: float, tmp_path: Pat
     table = run(1)
     held = np.where(np.arange(600) < 300, table["temperature_c"], table["temperature_c"][300])
     write_csv(tmp_path / "R" / "a.csv", table | {"temperature_c": np.round(held / step) * step})
-    assert "stuck_temperature" not in {d.id for d in check(tmp_path / "R").doubts}
+    assert "stuck_temperature" not in {d.id for d in check(tmp_path / "R").warnings}

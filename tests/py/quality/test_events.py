@@ -95,7 +95,7 @@ def test_one_record_in_as_many_as_is_said_has_a_step_by_chance(
 
 
 def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None:
-    """Six passages over 2 C in half a minute. A step in the same place of one passage alone is told."""
+    """Six passages over 2 C in half a minute. A step in the same place of one passage alone is reported."""
     rng = np.random.default_rng(SEED + 3)
     time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
     temperature = np.interp(time / 3600.0, [0, 1, 1.25, 3, 3.25, 6, 6.25, 8], [0, 0, 60, 60, 0, 0, 60, 60])
@@ -111,7 +111,7 @@ def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None
 
 @pytest.mark.slow
 def test_limits_of_time_and_size_hold_in_as_many_cases_as_they_say() -> None:
-    """Sixty steps of 9 to 20 noise floors, on ramps and holds. A step within a cell had been told too small."""
+    """Sixty steps of 9 to 20 noise floors, on ramps and holds. A step within a cell had been reported too small."""
     rng = np.random.default_rng(SEED + 4)
     found, times, sizes = 0, 0, 0
     for _ in range(60):
@@ -214,8 +214,8 @@ def test_a_step_that_comes_back_is_one_event_and_what_is_accepted_is_left_out(tm
     assert events_of(rest) == []
 
 
-def test_a_burst_a_gap_and_a_lost_thermometer_are_told(tmp_path: Path) -> None:
-    """An hour of rows of a second: bursts are told where a block has several rows."""
+def test_a_burst_a_gap_and_a_lost_thermometer_are_reported(tmp_path: Path) -> None:
+    """An hour of rows of a second: bursts are reported where a block has several rows."""
     rng = np.random.default_rng(SEED)
     time = np.arange(3600.0)
     temperature = 20.0 + time / 600.0 + 0.01 * rng.standard_normal(time.size)
@@ -248,7 +248,7 @@ def ramps(folder: Path, change: Callable[[EventColumns], None] | None = None) ->
     return folder
 
 
-def test_a_run_with_another_gain_is_told_with_its_factor(tmp_path: Path) -> None:
+def test_a_run_with_another_gain_is_reported_with_its_factor(tmp_path: Path) -> None:
     def louder(columns: EventColumns) -> None:
         columns["rate_dph"] = 1.3 * columns["rate_dph"]
 
@@ -287,15 +287,15 @@ def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path
     assert gain_changes(load(ramps(tmp_path / "level", higher))) == []
 
 
-def test_a_run_with_its_sign_reversed_is_told(tmp_path: Path) -> None:
-    def turned(columns: EventColumns) -> None:
+def test_a_run_with_its_sign_reversed_is_reported(tmp_path: Path) -> None:
+    def mirrored(columns: EventColumns) -> None:
         columns["rate_dph"] = -columns["rate_dph"]
 
-    (event,) = turned_runs(load(ramps(tmp_path, turned)))
+    (event,) = turned_runs(load(ramps(tmp_path, mirrored)))
     assert (event.id, event.file) == ("sign_reversed", "2.csv")
 
 
-def test_runs_that_agree_are_told_nothing_of(tmp_path: Path) -> None:
+def test_runs_that_agree_are_reported_nothing_of(tmp_path: Path) -> None:
     def shifted(columns: EventColumns) -> None:
         columns["rate_dph"] = columns["rate_dph"] + 0.01
 
@@ -349,14 +349,14 @@ def test_ten_spikes_cost_less_than_a_hundredth_of_the_floor(tmp_path: Path, clea
     assert departure(spiked, clean) < 0.01 * floor
     assert abs(spiked.training.noise_floor_dph / floor - 1.0) < 0.01
     assert spiked.training.centers == clean.training.centers
-    told = spiked.training.content()["outliers"]
-    assert told["rows"] == 10
-    assert [s["from_s"] for s in told["stretches"]] == at.tolist()
-    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "rate_outliers"]
-    line = doubt.text[doubt.text.index("exclude = ") :]
+    reported = spiked.training.content()["outliers"]
+    assert reported["rows"] == 10
+    assert [s["from_s"] for s in reported["stretches"]] == at.tolist()
+    [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "rate_outliers"]
+    line = warning.text[warning.text.index("exclude = ") :]
     again = fitted(tmp_path / "R", table, f"{RUN}\n{line}")  # pasted as it is offered
     assert again.training.content()["outliers"]["rows"] == 0
-    assert "rate_outliers" not in {d.id for d in check(tmp_path / "R").doubts}
+    assert "rate_outliers" not in {d.id for d in check(tmp_path / "R").warnings}
 
 
 def test_a_burst_is_left_out_whole(tmp_path: Path, clean: Fitted) -> None:
@@ -499,7 +499,7 @@ def test_two_runs_say_nothing(sound: Dataset) -> None:
 @pytest.mark.parametrize("averaged", [False, True])
 @pytest.mark.parametrize("wavering", [0.0, 0.2, 0.5])
 def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged: bool) -> None:
-    """A converter of 1/16 C in holds of half an hour and an hour; stuck on a ramp it is told with its rows."""
+    """A converter of 1/16 C in holds of half an hour and an hour; stuck on a ramp it is reported with its rows."""
     rng = np.random.default_rng(SEED + 5)
     time = np.arange(5 * 3600.0)
     true = np.interp(time / 3600.0, [0, 1, 1.5, 2, 2.5, 3.5, 5], [20, 20, 50, 50, 0, 0, 1])

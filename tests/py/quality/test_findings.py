@@ -80,25 +80,25 @@ def test_names_play_no_part(plain: Dataset, model_dict: dict[str, Any]) -> None:
 
 
 def test_constant_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    def told(swing: float) -> set[str]:
+    def reported(swing: float) -> set[str]:
         table = columns(600)
         table["temperature_c"] = 25.0 + swing * np.linspace(-0.5, 0.5, 600)
         return ids(dataset_of(tmp_path / "R", table), model_dict, result_of(exam=0.5))
 
-    assert told(1.9) == {"no_temperature_information"}, "and nothing about a map that is not there"
-    assert told(2.1) == {"fails_on_unseen_span"}
+    assert reported(1.9) == {"no_temperature_information"}, "and nothing about a map that is not there"
+    assert reported(2.1) == {"fails_on_unseen_span"}
 
 
 def test_what_a_map_has_not_seen(plain: Dataset, model_dict: dict[str, Any]) -> None:
-    def told(exam: float | None, left_out: float | None = None, train: float = 0.001) -> set[str]:
+    def reported(exam: float | None, left_out: float | None = None, train: float = 0.001) -> set[str]:
         training = None if left_out is None else _left_out(left_out)
         return ids(plain, model_dict, result_of(exam=exam, train=train), training)
 
-    assert told(0.0011) == set()
-    assert told(0.004) == {"fails_on_unseen_span"}
-    assert told(None, 0.004) == {"fails_on_unseen_span"}
-    assert told(None, 0.0029) == set(), "within three times the noise floor"
-    assert told(None, 0.0050, train=0.003) == set(), "no worse than what it has seen"
+    assert reported(0.0011) == set()
+    assert reported(0.004) == {"fails_on_unseen_span"}
+    assert reported(None, 0.004) == {"fails_on_unseen_span"}
+    assert reported(None, 0.0029) == set(), "within three times the noise floor"
+    assert reported(None, 0.0050, train=0.003) == set(), "no worse than what it has seen"
 
 
 @pytest.mark.parametrize(("factor", "found"), [(1.0, True), (0.2, True), (2.0, False), (1e4, False)])
@@ -107,8 +107,8 @@ def test_earth_rate_follows_the_rate(
 ) -> None:
     table = columns(600)
     table["rate_dph"] = factor * (table["rate_dph"] - 10.0)
-    told = ids(dataset_of(tmp_path / "R", table), model_dict, result_of())
-    assert told == ({"earth_rate_not_stated"} if found else set())
+    reported = ids(dataset_of(tmp_path / "R", table), model_dict, result_of())
+    assert reported == ({"earth_rate_not_stated"} if found else set())
     for stated in ("removed", "none"):
         head = f'schema = 1\nserial = "A"\nearth_rate = "{stated}"'
         assert ids(dataset_of(tmp_path / "R", table, head=head), model_dict, result_of()) == set()
@@ -120,8 +120,8 @@ def _jump(table: Columns, size: float) -> Columns:
 
 def test_jumps_of_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> None:
     for size, found in ((0.0, False), (0.5, False), (-3.0, True), (10.0, True)):
-        told = ids(dataset_of(tmp_path / "R", _jump(columns(600), size)), model_dict, result_of())
-        assert told == ({"jump_in_temperature"} if found else set())
+        reported = ids(dataset_of(tmp_path / "R", _jump(columns(600), size)), model_dict, result_of())
+        assert reported == ({"jump_in_temperature"} if found else set())
 
 
 def test_a_noisy_thermometer_does_not_jump(tmp_path: Path, model_dict: dict[str, Any]) -> None:
@@ -185,7 +185,7 @@ def test_findings_are_json(tmp_path: Path, model_dict: dict[str, Any]) -> None:
 
 
 def test_outliers_that_no_noise_makes(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    def told(*rows: int, size: float = 7e6) -> list[dict[str, Any]]:
+    def reported(*rows: int, size: float = 7e6) -> list[dict[str, Any]]:
         table = columns(600)
         table["rate_dph"][list(rows)] += size
         dataset = dataset_of(tmp_path / "R", table)
@@ -193,14 +193,14 @@ def test_outliers_that_no_noise_makes(tmp_path: Path, model_dict: dict[str, Any]
         found = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
         return [f for f in found if f["id"] != "earth_rate_not_stated"]
 
-    assert told() == []
+    assert reported() == []
     for rows in ((300,), (0,), (599,), (300, 301), (300, 301, 302), tuple(range(300, 310)), (100, 300, 500)):
         for size in (7e6, -7e6, 1.0):
-            [finding] = told(*rows, size=size)
+            [finding] = reported(*rows, size=size)
             assert (finding["id"], finding["evidence"]["rows"]) == ("rate_outliers", len(rows))
             assert finding["evidence"]["time_s"] in [10.0 * k for k in rows]
-    assert told(*range(300, 400)) == [], "a hundred rows are a piece of record"
-    assert told(300, size=0.02) == [], "a doubt of check, no finding"
+    assert reported(*range(300, 400)) == [], "a hundred rows are a piece of record"
+    assert reported(300, size=0.02) == [], "a warning of check, no finding"
 
 
 def test_an_outlier_among_rates_that_repeat(tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_counter_that_wraps(bits: int, kind: str, tmp_path: Path, model_dict: 
 
 
 def test_training_runs_that_contradict_one_another(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    def told(*shifts: float) -> list[str]:
+    def reported(*shifts: float) -> list[str]:
         tables = [columns(1800, seed=k) for k in range(len(shifts))]
         for table, shift in zip(tables, shifts, strict=True):
             table["rate_dph"] = table["rate_dph"] + shift
@@ -248,6 +248,6 @@ def test_training_runs_that_contradict_one_another(tmp_path: Path, model_dict: d
         return [f["evidence"]["file"] for f in found if f["id"] == "runs_contradict"]
 
     floor = 0.001 / np.sqrt(10.0)  # of 100 s
-    assert told(0.0) == told(0.0, 0.0) == told(0.0, 2.0 * floor) == []
-    assert told(0.0, 24.0 * floor) == ["0.csv", "1.csv"], "two runs: nobody knows which"
-    assert told(0.0, 0.0, 24.0 * floor, 0.0) == ["2.csv"]
+    assert reported(0.0) == reported(0.0, 0.0) == reported(0.0, 2.0 * floor) == []
+    assert reported(0.0, 24.0 * floor) == ["0.csv", "1.csv"], "two runs: nobody knows which"
+    assert reported(0.0, 0.0, 24.0 * floor, 0.0) == ["2.csv"]

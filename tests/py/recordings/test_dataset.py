@@ -140,7 +140,7 @@ def test_hash_is_of_the_file(tmp_path: Path) -> None:
     assert run.sha256 == hashlib.sha256(run.path.read_bytes()).hexdigest()
 
 
-def test_unfinished_last_line_is_left_out_and_told(tmp_path: Path) -> None:
+def test_unfinished_last_line_is_left_out_and_reported(tmp_path: Path) -> None:
     for torn in ("1200.0,20.0", "1200.0,20.0,", "1200.0,20.0,-", "1200.0,20.0,1e", "12"):
         write_csv(tmp_path / "RLG-1" / "a.csv")
         with (tmp_path / "RLG-1" / "a.csv").open("a") as file:
@@ -268,7 +268,7 @@ def test_survey_tells_everything_that_is_wrong(tmp_path: Path) -> None:
     (folder / "dataset.toml").write_text(text)
     problems = Problems(collect=True)
     dataset = survey(folder, problems)
-    told = [str(problem) for problem in problems.found]
+    reported = [str(problem) for problem in problems.found]
     expected = [
         "field serial: 'A/B'",
         "field serail: is not known",
@@ -284,8 +284,8 @@ def test_survey_tells_everything_that_is_wrong(tmp_path: Path) -> None:
         "d.csv: does not exist",
     ]
     for part in expected:
-        assert any(part in text for text in told), (part, told)
-    assert len(told) == len(expected)
+        assert any(part in text for text in reported), (part, reported)
+    assert len(reported) == len(expected)
     assert dataset is not None
     assert [run.file for run in dataset.runs] == ["a.csv"]
 
@@ -421,7 +421,7 @@ def test_the_correction_that_was_applied_is_added_back(tmp_path: Path) -> None:
         load(folder_of(tmp_path / "plain"), applied=applied)
 
 
-def test_a_channel_that_not_every_run_has_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_channel_that_not_every_run_has_is_left_out_and_reported(tmp_path: Path) -> None:
     folder = tmp_path / "RLG-1"
     extra = {"supply_v": np.linspace(5.0, 5.1, ROWS), "pressure_hpa": np.linspace(990.0, 991.0, ROWS)}
     write_csv(folder / "a.csv", columns() | extra)

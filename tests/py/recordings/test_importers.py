@@ -30,7 +30,7 @@ from gyrotc.results.base import read_result
 from gyrotc.results.recordings import ImportedFiles
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
-from logger_strangers import STRANGERS, milliseconds
+from logger_foreign import FOREIGN, milliseconds
 from logger_table import PAGE, cases, filled
 
 
@@ -40,15 +40,15 @@ def run_alone(*arguments: str | Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("case", [*CSV_CASES, *STRANGERS, *BINARY_CASES], ids=lambda c: c.id)
+@pytest.mark.parametrize("case", [*CSV_CASES, *FOREIGN, *BINARY_CASES], ids=lambda c: c.id)
 def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
     if case.needs and importlib.util.find_spec(case.needs) is None:
         pytest.skip(f"{case.needs} is not installed")
     seen = truth()
     case.write(tmp_path / case.file, seen)
     out = tmp_path / "RLG-1"
-    status, told, error = run_alone("import", tmp_path / case.file, "--out", out, *case.options)
-    assert status == 0, error + told
+    status, reported, error = run_alone("import", tmp_path / case.file, "--out", out, *case.options)
+    assert status == 0, error + reported
     for k, axis in enumerate("xyz") if case.axes else [(0, None)]:
         rows = (dataset := load(out, axis=axis)).runs[0].rows()
         assert len(rows) == case.rows
@@ -95,7 +95,7 @@ def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(tmp_path: Path
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1200.0
 
 
-@pytest.mark.parametrize("case", STRANGERS, ids=lambda c: c.id)
+@pytest.mark.parametrize("case", FOREIGN, ids=lambda c: c.id)
 def test_the_kept_map_reads_the_next_file(case: Case, tmp_path: Path) -> None:
     """Without any option, and to the same rows."""
     case.write(tmp_path / case.file, truth())
@@ -110,9 +110,9 @@ def test_the_kept_map_reads_the_next_file(case: Case, tmp_path: Path) -> None:
 def test_milliseconds_beside_a_stamp_are_read(tmp_path: Path) -> None:
     milliseconds(tmp_path / "gl.csv", truth())
     command = ("import", tmp_path / "gl.csv", "--out", tmp_path / "R", "--trust-units")
-    status, told, error = run_alone(*command)
+    status, reported, error = run_alone(*command)
     assert status == 0, error
-    assert "Date&Time + ms" in told
+    assert "Date&Time + ms" in reported
     np.testing.assert_allclose(load(tmp_path / "R").runs[0].rows().time_s, truth().time_s / 20.0, atol=1e-9)
 
 
@@ -622,7 +622,7 @@ def test_units_in_cells_are_taken_out_by_the_command_that_the_refusal_gives(tmp_
     assert load(tmp_path / "R").runs[0].n_rows == 600
 
 
-def test_digits_that_may_be_hexadecimal_are_told(tmp_path: Path, run: Run) -> None:
+def test_digits_that_may_be_hexadecimal_are_reported(tmp_path: Path, run: Run) -> None:
     text = lines("tick [ms],temp_c,rate_dph", lambda k, t, r: f"{10000 * k:06X}h,{t},{r}")
     (tmp_path / "a.csv").write_text(text)
     _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
@@ -641,7 +641,7 @@ def test_a_short_file_is_read(rows: int, above: int, tmp_path: Path, run: Run) -
     assert load(tmp_path / "R").runs[0].n_rows == rows
 
 
-def test_commas_between_columns_and_in_decimals_are_told(tmp_path: Path, run: Run) -> None:
+def test_commas_between_columns_and_in_decimals_are_reported(tmp_path: Path, run: Run) -> None:
     text = "\n".join(["time_s,temp_c,rate_dph", *(f"{k},0,20,{k},4,{k % 7}" for k in range(60))])
     (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
     status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")

@@ -33,7 +33,7 @@ def two_runs(folder: Path, *, role: str = "exam", extra: str = "") -> tuple[Colu
 
 
 def test_an_exam_on_training_data_is_refused_with_the_rows_and_the_line_that_mends_it(tmp_path: Path) -> None:
-    """Before: 0 problems, 0 doubts."""
+    """Before: 0 problems, 0 warnings."""
     two_runs(tmp_path / "R")
     [problem] = check(tmp_path / "R").problems
     assert problem.where == "b.csv, rows 3501 to 5500"
@@ -47,23 +47,24 @@ def test_an_exam_on_training_data_is_refused_with_the_rows_and_the_line_that_men
     load(tmp_path / "R")
 
 
-def test_rows_of_two_training_runs_are_told(tmp_path: Path) -> None:
+def test_rows_of_two_training_runs_are_reported(tmp_path: Path) -> None:
     two_runs(tmp_path / "R", role="train")
     result = check(tmp_path / "R")
     assert result.problems == ()
-    [doubt] = [d for d in result.doubts if d.id == "shared_rows"]
+    [warning] = [d for d in result.warnings if d.id == "shared_rows"]
     assert (
-        "Rows 3501 to 5500 of b.csv are also rows 1001 to 3000 of a.csv: 2000 rows count twice" in doubt.text
+        "Rows 3501 to 5500 of b.csv are also rows 1001 to 3000 of a.csv: 2000 rows count twice"
+        in warning.text
     )
 
 
-def test_a_stretch_that_a_logger_wrote_twice_is_told(tmp_path: Path) -> None:
+def test_a_stretch_that_a_logger_wrote_twice_is_reported(tmp_path: Path) -> None:
     table = columns(9000)
     for name in ("temperature_c", "rate_dph"):
         table[name][5000:8000] = table[name][1000:4000]
     write_csv(tmp_path / "R" / "a.csv", table)
-    [doubt] = [d for d in check(tmp_path / "R").doubts if d.id == "shared_rows"]
-    assert "Rows 5001 to 8000 of a.csv are also rows 1001 to 4000 of the same file" in doubt.text
+    [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "shared_rows"]
+    assert "Rows 5001 to 8000 of a.csv are also rows 1001 to 4000 of the same file" in warning.text
 
 
 def alike(rate: Callable[[np.random.Generator], Floats], n: int = 60_000) -> int:

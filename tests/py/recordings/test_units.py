@@ -148,8 +148,8 @@ def test_values_that_contradict_their_unit_are_refused_unless_trusted(
     assert "--trust-units" in str(refused.value)
     dataset = load(folder, trust_units=True)
     assert any(words[0] in text for text in dataset.trusted)
-    told = check(folder, trust_units=True)
-    assert not told.problems and any("units are trusted" in str(doubt) for doubt in told.doubts)
+    reported = check(folder, trust_units=True)
+    assert not reported.problems and any("units are trusted" in str(warning) for warning in reported.warnings)
 
 
 def test_kelvin_is_refused_with_its_unit(tmp_path: Path) -> None:
@@ -218,7 +218,9 @@ def test_units_of_channels(tmp_path: Path) -> None:
         ('suply_v = "mV"', ("field units.suply_v", "no such column")),
     ],
 )
-def test_a_wrong_declaration_is_told_by_its_field(units: str, words: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_wrong_declaration_is_reported_by_its_field(
+    units: str, words: tuple[str, ...], tmp_path: Path
+) -> None:
     with pytest.raises(InputError) as refused:
         load(made(tmp_path / "R", columns(600), units))
     assert all(word in str(refused.value) for word in words), refused.value

@@ -1,4 +1,4 @@
-"""Hidden effects: fresh recordings of an independent generator, diagnosed by a process that is not told.
+"""Hidden effects: fresh recordings of an independent generator, diagnosed by a process that is not reported.
 
 The seed of the draws is new in every run and printed; `python -m tests.blind.run --seed N --records 40
 --per-campaign 21 --weakest 1.7` makes the same recordings again. `make blind` measures the figures; here only
@@ -42,8 +42,8 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
 
 def judged(rows: list[dict], bad: list[dict], rate: float) -> None:
     """`bad` of `rows` are no more than the rate allows."""
-    told = [(r["number"], r["truth"], r["k"], r["stress"], r["verdict"], r["named"]) for r in bad]
-    assert len(bad) <= most(len(rows), rate), told
+    reported = [(r["number"], r["truth"], r["k"], r["stress"], r["verdict"], r["named"]) for r in bad]
+    assert len(bad) <= most(len(rows), rate), reported
 
 
 def test_no_diagnosis_breaks_down(rows: list[dict]) -> None:

@@ -104,8 +104,8 @@ def test_the_path_of_a_change_is_named(path: str, tmp_path: Path) -> None:
     reference = Reference(tmp_path / "reference.json")
     part = reference.steps("set")["step"]["x.json"]
     assert not [*reference.differences(part, before)] and not [*differences(before, before)]
-    told = [line.split(": ")[0] for line in reference.differences(part, after)]
-    assert set(told) == {"sha256", path}
+    reported = [line.split(": ")[0] for line in reference.differences(part, after)]
+    assert set(reported) == {"sha256", path}
     assert len([*differences(before, after)]) >= 2
 
 
@@ -137,7 +137,7 @@ def test_a_slice_of_the_kills(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_the_tests_of_a_file_its_lines_are_told(tmp_path: Path) -> None:
+def test_without_the_tests_of_a_file_its_lines_are_reported(tmp_path: Path) -> None:
     for folder in ("include", "libc", "tests/c"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     for test in (tmp_path / "tests/c").glob("test_*.c"):

@@ -157,8 +157,8 @@ def clone(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_from_tag_to_archives(clone: Path) -> None:
     """Prepared where nothing is set up yet; archives of the tag, packages by the tag's own generator."""
-    told = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
-    assert "git tag -a v0.2.0" in told
+    reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
+    assert "git tag -a v0.2.0" in reported
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
     emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
     emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
@@ -208,8 +208,8 @@ def test_what_is_no_release_is_refused(clone: Path, words: tuple[str, ...], why:
 @pytest.mark.slow
 def test_archives_need_what_make_setup_makes_and_say_so(clone: Path) -> None:
     _run("git", "tag", "v9.9.9", cwd=clone)
-    told = _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2, python="")
-    assert "there is no .venv here: make setup" in told
+    reported = _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2, python="")
+    assert "there is no .venv here: make setup" in reported
 
 
 @pytest.mark.slow

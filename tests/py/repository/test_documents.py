@@ -42,10 +42,10 @@ def test_a_dead_link_and_a_dead_heading_are_seen(tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize("page", RUNNING, ids=_name)
 @pytest.mark.slow
 def test_what_a_page_shows_is_what_happens(page: Path) -> None:
-    told = list(documents.run(page))
-    assert [text for text in told if not text.startswith("skipped")] == []
-    if told:
-        pytest.skip("; ".join(told))
+    reported = list(documents.run(page))
+    assert [text for text in reported if not text.startswith("skipped")] == []
+    if reported:
+        pytest.skip("; ".join(reported))
 
 
 def test_the_readme_shows_what_make_demo_prints(demo: Path) -> None:

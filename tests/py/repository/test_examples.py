@@ -57,13 +57,13 @@ def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
     folder = tmp_path / "examples" / "triad"
     shutil.copytree(EXAMPLES / "triad", folder)
     _run("make", f"GYROTC={Path(sys.executable).with_name('gyrotc')}", cwd=folder)
-    told = re.findall(r"-?\d+\.\d+", _run(folder / "build" / "triad"))
-    for axis, temperature, rate in zip("xyz", (20.0, 21.5, None), told, strict=True):
+    reported = re.findall(r"-?\d+\.\d+", _run(folder / "build" / "triad"))
+    for axis, temperature, rate in zip("xyz", (20.0, 21.5, None), reported, strict=True):
         if temperature is not None:  # the third one's temperature moves
             assert float(rate) == pytest.approx(
                 -_at(load_model(folder / f"model_{axis}.json"), temperature), abs=1e-6
             )
-    assert len({abs(float(rate)) for rate in told}) == 3
+    assert len({abs(float(rate)) for rate in reported}) == 3
 
 
 @pytest.fixture(scope="module")
@@ -97,13 +97,13 @@ def test_one_firmware_takes_the_image_of_its_serial(
     )
     flash.write_bytes(flash.read_bytes() + b"\xff" * 64)  # erased behind the last one
     for serial, folder in gyros.items():
-        told = _run(firmware, flash, serial)
-        assert told.startswith(f"{serial}: ")
-        assert float(told.split()[-2]) == pytest.approx(
+        reported = _run(firmware, flash, serial)
+        assert reported.startswith(f"{serial}: ")
+        assert float(reported.split()[-2]) == pytest.approx(
             _at(load_model(folder / "model.json"), 20.0), abs=2e-7
         )
-    for stranger in ("RLG-0003", "RLG-001", "RLG-00100", ""):
-        assert "-5" in _run(firmware, flash, stranger, status=1), "GTC_E_ID"
+    for other in ("RLG-0003", "RLG-001", "RLG-00100", ""):
+        assert "-5" in _run(firmware, flash, other, status=1), "GTC_E_ID"
 
 
 def test_a_damaged_image_is_not_used_nor_passed_over(
@@ -122,16 +122,16 @@ def test_a_damaged_image_is_not_used_nor_passed_over(
 
 
 def test_interrupt_and_task_on_the_host(tmp_path: Path) -> None:
-    told = _run("make", "-s", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
-    assert re.search(r"\d+ increments, 5 readings, 0\.\d+ arcsec taken away", told)
+    reported = _run("make", "-s", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
+    assert re.search(r"\d+ increments, 5 readings, 0\.\d+ arcsec taken away", reported)
 
 
 def test_interrupt_and_task_with_freertos(tmp_path: Path) -> None:
     kernel = os.environ.get("FREERTOS")
     if kernel is None:
         pytest.skip("FREERTOS names no folder of the FreeRTOS kernel")
-    told = _run("make", "-s", f"FREERTOS={kernel}", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
-    assert "320 increments, 5 readings" in told
+    reported = _run("make", "-s", f"FREERTOS={kernel}", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
+    assert "320 increments, 5 readings" in reported
 
 
 @pytest.mark.slow

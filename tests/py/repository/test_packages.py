@@ -128,11 +128,11 @@ def copies(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", version.PLACES)
-def test_a_file_with_another_version_is_told_and_mended(name: str, copies: Path) -> None:
+def test_a_file_with_another_version_is_reported_and_mended(name: str, copies: Path) -> None:
     path = copies / name
     path.write_text(path.read_text().replace(version.header_version(ROOT), "9.8.7"))
-    (told,) = version.differing(copies)
-    assert told.startswith(f"{name}: 9.8.7")
+    (reported,) = version.differing(copies)
+    assert reported.startswith(f"{name}: 9.8.7")
     version.write(copies)
     assert path.read_text() == (ROOT / name).read_text()
 

@@ -1,4 +1,4 @@
-"""Measured recordings: every axis, built from end to end; skipped, and told, where they are absent."""
+"""Measured recordings: every axis, built from end to end; skipped, and reported, where they are absent."""
 
 from __future__ import annotations
 

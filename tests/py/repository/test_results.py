@@ -123,14 +123,14 @@ def test_every_aim_has_its_figure() -> None:
         assert figure(recorded(DOCS, "bench")) > 0.0, what
 
 
-@pytest.mark.parametrize(("worst", "told"), [(1.2, "**1.2000** (missed)"), (1.01, "1.0100")])
-def test_a_missed_aim_of_training_is_told(worst: float, told: str) -> None:
+@pytest.mark.parametrize(("worst", "reported"), [(1.2, "**1.2000** (missed)"), (1.01, "1.0100")])
+def test_a_missed_aim_of_training_is_reported(worst: float, reported: str) -> None:
     changed = recorded(DOCS, "bench")
     changed["accuracy"]["default"][0]["ratio"]["worst"] = worst
-    assert f"| RMS ÷ floor, smooth maps: worst | 1.015 | {told} |" in bench_page.section(changed)
+    assert f"| RMS ÷ floor, smooth maps: worst | 1.015 | {reported} |" in bench_page.section(changed)
 
 
-def test_a_missed_aim_of_the_runtime_is_told() -> None:
+def test_a_missed_aim_of_the_runtime_is_reported() -> None:
     changed = recorded(DOCS, "runtime")
     for cost in changed["costs"]:
         cost["map"]["mean"] += 1000.0
@@ -249,19 +249,19 @@ def _row(named: list[str], before2: float, after2: float) -> dict[str, object]:
 
 def test_what_is_gained_is_counted_over_all_that_was_hidden() -> None:
     """Over what was named rightly alone a cause that is never named gains nothing, and costs nothing."""
-    told = {t["name"]: t for t in _gains([_row(["hysteresis"], 3.0, 1.0), _row([], 3.0, 3.0)])}
-    assert told["held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"]["value"] == pytest.approx(1.0)
-    of_all = told["... of all that hide hysteresis, named or not"]
+    reported = {t["name"]: t for t in _gains([_row(["hysteresis"], 3.0, 1.0), _row([], 3.0, 3.0)])}
+    assert reported["held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"]["value"] == pytest.approx(1.0)
+    of_all = reported["... of all that hide hysteresis, named or not"]
     assert of_all["value"] == pytest.approx(0.5) and of_all["of"] == 2 and not of_all["met"]
 
 
 @pytest.mark.parametrize(
     ("after", "high", "worse", "surely"), [(0.9, 0.2, 0, 0), (1.1, 0.1, 1, 0), (1.1, -0.05, 1, 1)]
 )
-def test_what_is_worse_than_before_is_told_apart_from_what_is_worse_by_more_than_noise(
+def test_what_is_worse_than_before_is_reported_apart_from_what_is_worse_by_more_than_noise(
     after: float, high: float, worse: int, surely: int
 ) -> None:
     gain = {"exam_rms_before_dph": 1.0, "exam_rms_after_dph": after, "rms_removed_dph": {"high": high}}
-    told = shipped_worse({"extended": {"gain": gain}})
-    assert told == {"shipped": 1.0, "worse": worse, "surely_worse": surely}
+    reported = shipped_worse({"extended": {"gain": gain}})
+    assert reported == {"shipped": 1.0, "worse": worse, "surely_worse": surely}
     assert shipped_worse({"extended": None})["shipped"] == 0.0

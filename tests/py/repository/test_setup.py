@@ -38,7 +38,7 @@ def house(tmp_path: Path) -> Path:
 
 
 def setup(house: Path, level: str, unknown: str = "") -> tuple[int, list[str], str]:
-    """Exit status, the packages asked for, and what was told."""
+    """Exit status, the packages asked for, and what was reported."""
     calls = house / "calls"
     calls.unlink(missing_ok=True)
     environment = os.environ | {
@@ -56,18 +56,18 @@ def setup(house: Path, level: str, unknown: str = "") -> tuple[int, list[str], s
 
 
 def test_packages_of_a_compiler_have_its_version(house: Path) -> None:
-    status, asked, told = setup(house, "targets")
-    assert (status, told) == (0, "")
+    status, asked, reported = setup(house, "targets")
+    assert (status, reported) == (0, "")
     assert {"libclang-rt-19-dev", "lib32gcc-14-dev"} <= set(asked)
     assert asked.index("libclang-rt-19-dev") > asked.index("clang")
     assert not [name for name in setup(house, "demo")[1] if re.search("clang|lib32|qemu-user", name)]
 
 
-def test_a_package_that_a_release_lacks_is_told_and_left_out(house: Path) -> None:
-    status, asked, told = setup(house, "prove", "frama-c-base libclang-rt-19-dev")
+def test_a_package_that_a_release_lacks_is_reported_and_left_out(house: Path) -> None:
+    status, asked, reported = setup(house, "prove", "frama-c-base libclang-rt-19-dev")
     assert status == 0 and {"gappa", "z3", "cmake"} <= set(asked)
     assert "frama-c-base" not in asked and "libclang-rt-19-dev" not in asked
-    assert told.splitlines() == [
+    assert reported.splitlines() == [
         f"setup: this release has no package {name}: what needs it is skipped"
         for name in ("frama-c-base", "libclang-rt-19-dev")
     ]

@@ -148,7 +148,7 @@ def test_check_fit_and_compare(tmp_path: Path, gyrotc: Command) -> None:
         done = gyrotc(command[0], tmp_path / "RLG-1", *command[1:], "--json", tmp_path / "result.json")
         assert done.returncode == 0, done.stderr
         results[command[0]] = read(tmp_path / "result.json")
-    assert absent(HEAD | {"problems": [], "doubts": [], "runs": []}, results["check"]) == []
+    assert absent(HEAD | {"problems": [], "warnings": [], "runs": []}, results["check"]) == []
     assert absent(HEAD, results["fit"]) == []
     assert absent(COMPARE, results["compare"]) == []
     assert absent({"findings": [FINDING]}, results["fit"]) == []
@@ -219,7 +219,7 @@ def test_a_result_is_read_back_as_it_was_written() -> None:
 def test_unknown_fields_are_let_through_and_wrong_ones_refused_by_name() -> None:
     content = json.loads(json.dumps(LIMITS.content()))
     assert checked_result(content | {"later": 1}, HeldLimits, "limits.json") == LIMITS
-    for change, told in (
+    for change, reported in (
         ({"met": "yes"}, "limits.json, field met: 'yes'"),
         ({"axis": "w"}, "limits.json, field axis: 'w'"),
         ({"limits": [{}]}, "limits.json, field limits.0.limit: is missing"),
@@ -227,7 +227,7 @@ def test_unknown_fields_are_let_through_and_wrong_ones_refused_by_name() -> None
     ):
         with pytest.raises(InputError) as caught:
             checked_result(content | change, HeldLimits, "limits.json")
-        assert told in str(caught.value)
+        assert reported in str(caught.value)
 
 
 def test_an_entry_of_a_fleet_tells_the_summary_what_it_may_know() -> None:
@@ -235,7 +235,7 @@ def test_an_entry_of_a_fleet_tells_the_summary_what_it_may_know() -> None:
         name="A", dataset="d", axis=None, status="done", serial="1", bias_dph=None, findings=("large_weights",),
         key="0" * 64, sketch="0" * 16,
     )  # fmt: skip
-    assert entry.told().content() == {
+    assert entry.unit().content() == {
         "name": "A", "dataset": "d", "axis": None, "status": "done", "serial": "1", "bias_dph": None,
         "findings": ["large_weights"],
     }  # fmt: skip

@@ -215,8 +215,8 @@ def test_the_snippet_of_the_readme_compiles_links_and_corrects(tmp_path: Path) -
         "    const int started = (correction_start() == 0);\n"
         f"    for (k = 0; k < {held}; k++) {{\n        held += (correct({middle:.3f}F, &rate) == GTC_HELD);\n    }}\n"
         f"    if (!started || (held != {held}) || (rate != 1.0F) || (correct({middle:.3f}F, &rate) != GTC_WARMING)"
-        " || (rate == 1.0F)) {\n        return 1; /* believed once readings agree for the guard's time */\n    }\n"
-        "    /* a wild reading is told with the sample that brought it, though the correction in force is sound */\n"
+        " || (rate == 1.0F)) {\n        return 1; /* accepted once readings agree for the guard's time */\n    }\n"
+        "    /* a wild reading is stated with the sample that brought it, though the correction in force is sound */\n"
         "    return (correct(150.0F, &rate) == (GTC_WARMING | GTC_HELD)) ? 0 : 2;\n}\n"
     )
     (tmp_path / "c" / "user.c").write_text(main)

@@ -40,7 +40,7 @@ def test_a_restored_state_goes_on_bit_for_bit_in_any_history(build: Runtime, num
         model = variant(seed + trial)
         try:
             table = quantise(model, numeric)
-        except CheckFailed:  # a model whose regions this arithmetic cannot tell apart
+        except CheckFailed:  # a model whose regions this arithmetic cannot distinguish
             continue
         device = Device(build, table)
         samples_per_block = int(rng.choice([1, 2, 3, 7, 10, 50]))

@@ -398,7 +398,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("content", BROKEN)
-def test_a_wrong_scenario_is_told_with_its_place(content: str, tmp_path: Path) -> None:
+def test_a_wrong_scenario_is_reported_with_its_place(content: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
     path.write_text(content, "utf-8")
     with pytest.raises(InputError, match=BROKEN[content]):

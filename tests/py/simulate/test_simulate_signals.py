@@ -34,7 +34,7 @@ def planned(**changes: object) -> Scenario:
 
 
 def test_thermometers_show_their_own_nodes_with_their_own_faults() -> None:
-    """Offset, lag and steps are told from the true temperature of the node alone."""
+    """Offset, lag and steps are distinguished from the true temperature of the node alone."""
     made = next(campaign(planned(), 3))
     for name, node, lag_s, offset_c, step_c in (
         ("mirror_c", "mirror", 15.0, 0.3, 0.02),
@@ -208,9 +208,9 @@ def test_units_of_a_stronger_family_differ_less() -> None:
 
 
 def test_a_stranger_is_no_unit_of_its_lot() -> None:
-    order = LotOrder(20, 0.96, strangers=3)
+    order = LotOrder(20, 0.96, unrelated=3)
     units = draw_lot(read("paper")[1], order, 8)
-    strange = np.array([bool(u.lot and u.lot.stranger) for u in units])
+    strange = np.array([bool(u.lot and u.lot.unrelated) for u in units])
     assert strange.sum() == 3
     found = maps(order, 8)
     away = np.std(found - found[~strange].mean(axis=0), axis=1)
@@ -222,9 +222,9 @@ def test_clusters_have_centers_of_their_own() -> None:
     cluster = np.array([u.lot.cluster for u in draw_lot(read("paper")[1], order, 5) if u.lot])
     assert set(cluster) == {0, 1}
     found = maps(order, 5)
-    apart = np.std(found[cluster == 0].mean(axis=0) - found[cluster == 1].mean(axis=0))
+    between = np.std(found[cluster == 0].mean(axis=0) - found[cluster == 1].mean(axis=0))
     within = np.std(found[cluster == 0] - found[cluster == 0].mean(axis=0))
-    assert apart > 2.0 * within
+    assert between > 2.0 * within
 
 
 def test_a_unit_keeps_its_parameters_where_the_lot_grows() -> None:
@@ -237,7 +237,7 @@ def test_a_unit_keeps_its_parameters_where_the_lot_grows() -> None:
 
 
 def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp_path: Path) -> None:
-    order = LotOrder(3, 0.9, strangers=1)
+    order = LotOrder(3, 0.9, unrelated=1)
     first, again = ([*simulate_lot(order, seed=4, out=tmp_path / n, scenario=short)] for n in "ab")
     assert first == again == ["LOT-0004-001", "LOT-0004-002", "LOT-0004-003"]
     for serial in first:
@@ -250,13 +250,15 @@ def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp
         truth = read_truth(tmp_path / "a" / serial)
         assert truth is not None and truth.content.lot is not None
         assert set(truth.content.lot.scores) == set(SCORES)
-    told = [json.loads((tmp_path / "a" / s / "truth.json").read_text())["lot"]["stranger"] for s in first]
-    assert sum(told) == 1
+    reported = [
+        json.loads((tmp_path / "a" / s / "truth.json").read_text())["lot"]["unrelated"] for s in first
+    ]
+    assert sum(reported) == 1
 
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "strangers": 3}],
+    [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "unrelated": 3}],
 )
 def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match=f"--{[*wrong][-1]}"):

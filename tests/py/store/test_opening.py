@@ -157,14 +157,14 @@ def _refused_or_replaced(
     plant(place, thesis)
     capfd.readouterr()
     found = status(*command)
-    told = capfd.readouterr().err
+    reported = capfd.readouterr().err
     assert thesis.read_bytes() == YEARS, what
     if plant is folder:
         assert (place / "thesis.tex").read_bytes() == YEARS, what
     elif plant is file:
         assert place.read_bytes() == YEARS, what
-    assert found in (0, 2), f"{what}: {told}"
-    assert found == 0 or len(told.strip().splitlines()) == 1, f"{what}: {told}"
+    assert found in (0, 2), f"{what}: {reported}"
+    assert found == 0 or len(reported.strip().splitlines()) == 1, f"{what}: {reported}"
     if place.name.endswith(".lock") or plant in (file, pipe):
         assert found == 2, what
 

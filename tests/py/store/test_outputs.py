@@ -25,7 +25,7 @@ from gyrotc.store import update as exchanging
 from gyrotc.store import update as updating
 from gyrotc.store.files import Lock, json_text, write_atomically
 from gyrotc.store.folder import result_folder, write_result
-from gyrotc.store.marker import MARKER, check_apart, faults, read_marker
+from gyrotc.store.marker import MARKER, check_separate, faults, read_marker
 from recordings import columns, toml, write_csv
 
 
@@ -172,7 +172,7 @@ def test_inputs_and_sources_are_out_of_reach(tmp_path: Path) -> None:
             pytest.fail("began")
     with pytest.raises(InputError), result_folder(package, "emit", entries=["c"]):
         pytest.fail("began")
-    check_apart(tmp_path, tmp_path, [data], whole=False)  # a job that only adds may stand above a .venv
+    check_separate(tmp_path, tmp_path, [data], whole=False)  # a job that only adds may stand above a .venv
     assert list(data.iterdir()) == []
     write(tmp_path / "lab" / "out", "beside", inputs=[data])
 
@@ -198,7 +198,7 @@ def test_parts_have_markers_of_their_own(out: Path) -> None:
         pytest.fail("began")
 
 
-def test_a_second_job_is_told_who_holds_the_place(out: Path) -> None:
+def test_a_second_job_is_reported_who_holds_the_place(out: Path) -> None:
     with result_folder(out, "build"), pytest.raises(InputError) as caught:
         write(out, "two", "fit")
     assert f"gyrotc build, process {os.getpid()} on " in str(caught.value) and ", since 2" in str(
@@ -375,11 +375,11 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def refused(command: Command, folder: Path, *arguments: object, told: str) -> None:
+def refused(command: Command, folder: Path, *arguments: object, reported: str) -> None:
     """The command ends with 2 and one line, and nothing in the folder has changed."""
     before = tree(folder)
     done = command(*arguments)
-    assert done.returncode == 2 and told in done.stderr, done.stdout + done.stderr
+    assert done.returncode == 2 and reported in done.stderr, done.stdout + done.stderr
     assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
     assert tree(folder) == before
 
@@ -394,24 +394,24 @@ def test_a_firmware_project_is_not_taken_for_a_result(
     (project / decoy).mkdir() if decoy == "c" else (project / decoy).write_text("{}")
     (project / "thesis.tex").write_text("years of work")
     for command in ("build", "fit", "compare", "diagnose") if decoy == "c" else ("build",):
-        refused(gyrotc, tmp_path, command, made / "A", "--out", project, told="was not written by gyrotc")
+        refused(gyrotc, tmp_path, command, made / "A", "--out", project, reported="was not written by gyrotc")
     if decoy != "c":
         return
-    refused(gyrotc, tmp_path, "simulate", "paper", "--out", project, told="was not written by gyrotc")
-    refused(gyrotc, tmp_path, "plan", "paper", "--out", project, told="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "simulate", "paper", "--out", project, reported="was not written by gyrotc")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", project, reported="was not written by gyrotc")
 
 
 def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> None:
     data = made / "A"
     for command in ("build", "fit", "compare", "diagnose"):
-        refused(gyrotc, made, command, data, "--out", data, told="is the data set")
-        refused(gyrotc, made, command, data, "--out", data / "x", told="inside the data set")
-        refused(gyrotc, made, command, data, "--out", made, told="above the data set")
+        refused(gyrotc, made, command, data, "--out", data, reported="is the data set")
+        refused(gyrotc, made, command, data, "--out", data / "x", reported="inside the data set")
+        refused(gyrotc, made, command, data, "--out", made, reported="above the data set")
     refused(
-        gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", told="run-01.csv"
+        gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", reported="run-01.csv"
     )
     refused(
-        gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", told="is a file"
+        gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", reported="is a file"
     )
 
 
@@ -423,17 +423,17 @@ def test_emit_puts_code_beside_the_users_own_and_deletes_none(
         assert gyrotc("emit", made / "result", "--out", tmp_path, "--numeric", "f32").returncode == 0
     assert (tmp_path / "src.c").read_text() == "mine" and (tmp_path / "c" / "gtc.c").is_file()
     (tmp_path / "c" / "main.c").write_text("edited")
-    refused(gyrotc, tmp_path, "emit", made / "result", "--out", tmp_path, told="c/main.c")
+    refused(gyrotc, tmp_path, "emit", made / "result", "--out", tmp_path, reported="c/main.c")
 
 
 def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     out = tmp_path / "result"
     assert gyrotc("fit", made / "A", "--out", out).returncode == 0
-    refused(gyrotc, tmp_path, "fit", made / "B", "--out", out, told="holds the result of serial A")
-    refused(gyrotc, tmp_path, "plan", "paper", "--out", out, told="holds the result of gyrotc fit")
-    refused(gyrotc, tmp_path, "compare", made / "A", "--out", out, told="holds the result of gyrotc fit")
+    refused(gyrotc, tmp_path, "fit", made / "B", "--out", out, reported="holds the result of serial A")
+    refused(gyrotc, tmp_path, "plan", "paper", "--out", out, reported="holds the result of gyrotc fit")
+    refused(gyrotc, tmp_path, "compare", made / "A", "--out", out, reported="holds the result of gyrotc fit")
     (out / MARKER).unlink()
-    refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, told=MARKER)
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, reported=MARKER)
 
 
 def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
@@ -455,11 +455,11 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
         MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "more.json", "verify.json",
     }  # fmt: skip
     (out / "trace" / "notes.txt").write_text("mine")
-    refused(gyrotc, tmp_path, *steps[2], told="trace/notes.txt")
+    refused(gyrotc, tmp_path, *steps[2], reported="trace/notes.txt")
     (out / "trace" / "notes.txt").unlink()
     for trace in (out, out / "c"):
-        refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", trace, told="--trace")
-    refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", made / "A", told="is the data set")
+        refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", trace, reported="--trace")
+    refused(gyrotc, tmp_path, "evaluate", out, made / "A", "--trace", made / "A", reported="is the data set")
     assert gyrotc(*steps[0]).returncode == 0
     assert {p.name for p in out.iterdir()} == {MARKER, "model.json", "training.json"}
     assert json.loads((out / MARKER).read_text())["serial"] == "A"
@@ -469,7 +469,13 @@ def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) ->
     lock = Lock(tmp_path / "out", "build")
     try:
         refused(
-            gyrotc, tmp_path, "fit", made / "A", "--out", tmp_path / "out", told=f"process {os.getpid()} on"
+            gyrotc,
+            tmp_path,
+            "fit",
+            made / "A",
+            "--out",
+            tmp_path / "out",
+            reported=f"process {os.getpid()} on",
         )
     finally:
         lock.release()
@@ -477,9 +483,11 @@ def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) ->
 
 
 def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Path, gyrotc: Command) -> None:
-    refused(gyrotc, tmp_path, "check", made / "A", "--json", "/dev/full", told="No space left")
-    refused(gyrotc, tmp_path, "fit", made / "A", "--out", "/proc/out", told="/proc")
-    refused(gyrotc, tmp_path, "fit", made / "A", "--out", made / "A" / "run-01.csv" / "x", told="run-01.csv")
+    refused(gyrotc, tmp_path, "check", made / "A", "--json", "/dev/full", reported="No space left")
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", "/proc/out", reported="/proc")
+    refused(
+        gyrotc, tmp_path, "fit", made / "A", "--out", made / "A" / "run-01.csv" / "x", reported="run-01.csv"
+    )
     program = Path(sys.executable).with_name("gyrotc")
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -488,7 +496,7 @@ def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Pa
     assert (done.returncode, done.stderr) == (2, "gyrotc: standard output: No space left on device\n")
 
 
-def test_output_that_cannot_be_written_is_told_once(
+def test_output_that_cannot_be_written_is_reported_once(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Some releases of Python keep what they could not write, and try again at the end."""
@@ -502,7 +510,7 @@ def test_output_that_cannot_be_written_is_told_once(
     assert capsys.readouterr().err == "gyrotc: standard output: No space left on device\n"
 
 
-def test_a_closed_pipe_is_told_as_shells_expect(made: Path) -> None:
+def test_a_closed_pipe_is_reported_as_shells_expect(made: Path) -> None:
     program = Path(sys.executable).with_name("gyrotc")
     reader, writer = os.pipe()
     os.close(reader)
@@ -535,7 +543,7 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(
     select.select([waiting, job.stderr], [], [])  # it ends or complains where no compiler is called
     writing = list(place.glob(".out.gyrotc-part-*"))
     job.send_signal(number)
-    _, told = job.communicate()
+    _, says = job.communicate()
     os.close(waiting)
-    assert (job.returncode, told) == (-number, f"gyrotc: interrupted ({number.name})\n")
+    assert (job.returncode, says) == (-number, f"gyrotc: interrupted ({number.name})\n")
     assert writing and list(place.iterdir()) == []

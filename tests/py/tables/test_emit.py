@@ -1,4 +1,4 @@
-"""Emission is a pure function of the model; what the rounding costs is bounded, told and refused."""
+"""Emission is a pure function of the model; what the rounding costs is bounded, reported and refused."""
 
 from __future__ import annotations
 

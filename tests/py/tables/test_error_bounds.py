@@ -142,8 +142,8 @@ def _added(recursion: Recursion, mean: NDArray[Any], t: NDArray[Any]) -> Array:
     return np.asarray(outcome.added, dtype=np.float64)
 
 
-def _two(overlap: float, *, first: float = 0.0, last: float = 1.0, apart: float = 1.0) -> Model:
-    """Two constants `apart` deg/h, whose regions overlap by a part of the envelope; edges as parts of it."""
+def _two(overlap: float, *, first: float = 0.0, last: float = 1.0, step: float = 1.0) -> Model:
+    """Two constants `step` deg/h, whose regions overlap by a part of the envelope; edges as parts of it."""
     model = random_model(3, coverage=None)
     t0, t1 = model.envelope.temperature_c
 
@@ -154,7 +154,7 @@ def _two(overlap: float, *, first: float = 0.0, last: float = 1.0, apart: float 
         )
         return Network(w0=w0, linear=(0.0, 0.0), centers=(), widths=(), weights=(), region=region)
 
-    halves = part(first, 0.5 + overlap / 2, 100.0), part(0.5 - overlap / 2, last, 100.0 + apart)
+    halves = part(first, 0.5 + overlap / 2, 100.0), part(0.5 - overlap / 2, last, 100.0 + step)
     return model.model_copy(update={"networks": halves})
 
 
@@ -177,7 +177,7 @@ def test_a_narrow_hand_over_is_priced_or_refused(numeric: str, overlap: float) -
 @pytest.mark.parametrize("numeric", NUMERICS)
 def test_two_networks_that_are_alike_cost_nothing_to_blend(numeric: str) -> None:
     """But for the roundings of the blend itself, which grow with the bias and not with the difference."""
-    model = _two(1e-2, apart=0.0)
+    model = _two(1e-2, step=0.0)
     table = quantise(model, numeric)
     assert table.bound_parts_dph["hand-over"] == 0.0
     assert worst_error_dph(model, table, 1) <= table.error_bound_dph

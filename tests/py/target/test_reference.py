@@ -116,7 +116,7 @@ def test_every_status_bit_was_seen_in_the_histories() -> None:
 
 @pytest.mark.parametrize("numeric", NUMERICS)
 @pytest.mark.parametrize("seed", range(6))
-def test_before_the_first_correction_the_bias_is_nothing_and_told(numeric: str, seed: int) -> None:
+def test_before_the_first_correction_the_bias_is_nothing_and_reported(numeric: str, seed: int) -> None:
     """`evaluate` scores no such row: a gyro of 16,000 deg/h had 349 deg/h of two rows without a correction."""
     model = random_model(seed)
     table = quantise(model, numeric)

@@ -184,7 +184,9 @@ def test_what_must_not_be_an_input_is_refused_with_the_reason(rng: np.random.Gen
     assert "does not change" in found["still_v"][1]
 
 
-def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_told(rng: np.random.Generator) -> None:
+def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_reported(
+    rng: np.random.Generator,
+) -> None:
     samples = history(rng)
     supply = wander(rng)
     made = replace(samples, bias_dph=samples.bias_dph + 8e-4 * supply)
@@ -363,9 +365,9 @@ def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as
     assert shapes == {"supply_v": "curve", "magnetic_ut": "product"}
     (product,) = (t.parameters for t in model.terms if t.id == "auxiliary_product")
     assert product["slope_dph_per_unit_per_c"] == pytest.approx(1.2e-4, rel=0.2)
-    told = (built / "fit.txt").read_text("utf-8")
-    assert "along a bent line" in told
-    assert "slope that depends on temperature" in told
+    reported = (built / "fit.txt").read_text("utf-8")
+    assert "along a bent line" in reported
+    assert "slope that depends on temperature" in reported
     page = (built / "report.html").read_text("utf-8")
     assert "taken: a bent line, two Gaussians beside a straight one" in page
 

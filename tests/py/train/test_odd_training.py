@@ -47,5 +47,5 @@ def test_a_map_asked_for_by_name_comes_or_says_why_not(seed: int) -> None:
     except TrainingFailed as failure:
         assert "evidence model" in str(failure)
         return
-    told = {finding["id"] for finding in found.findings}
-    assert beyond(found, data) < 1.02 or "map_beyond_data" in told, f"seed {seed}"
+    reported = {finding["id"] for finding in found.findings}
+    assert beyond(found, data) < 1.02 or "map_beyond_data" in reported, f"seed {seed}"

@@ -143,7 +143,7 @@ def test_a_gaussian_of_a_channel_takes_about_25_instructions() -> None:
 def test_a_target_whose_code_has_no_bound_is_verified_without_one(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Bits that agree were told as a fail: code at -O3 has loops that no line of the text bounds."""
+    """Bits that agree were reported as a fail: code at -O3 has loops that no line of the text bounds."""
     cost = FunctionCost(code_bytes=10, stack_bytes=4, helpers=())
 
     def refuse(*_: object) -> dict[str, dict[str, int]]:

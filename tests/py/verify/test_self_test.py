@@ -78,10 +78,10 @@ def test_known_answers_differ_wherever_a_product_is_fused() -> None:
     for model in models():
         table = quantise(model, "f32")
         probes = table.probes.reshape(N_PROBES, 4)
-        told = [int(np.sum(evaluate_map(table, probes[:, :2], b)[1] != probes[:, 2])) for b in builds]
+        reported = [int(np.sum(evaluate_map(table, probes[:, :2], b)[1] != probes[:, 2])) for b in builds]
         assert np.array_equal(evaluate_map(table, probes[:, :2])[1], probes[:, 2])
         if len(model.networks[0].weights) >= 3:
             with_centers += 1
-            assert min(told) >= 1, (model.serial, told)
-            assert told[-1] >= 4, (model.serial, told)
+            assert min(reported) >= 1, (model.serial, reported)
+            assert reported[-1] >= 4, (model.serial, reported)
     assert with_centers >= 25

@@ -196,7 +196,7 @@ def test_another_compiler_of_the_same_name_makes_its_own_objects(
         assert compiled.count == 2 + changed
     monkeypatch.setattr(toolchain, "_identity", lambda _: [])
     _asked(source, tmp_path)
-    assert compiled.count == 6, "a compiler that cannot be told from others compiles each time"
+    assert compiled.count == 6, "a compiler that cannot be distinguished from others compiles each time"
 
 
 def test_what_is_damaged_or_foreign_is_never_linked(

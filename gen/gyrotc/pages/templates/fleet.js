@@ -31,7 +31,7 @@
     for (const row of rows) {
       const text = row.textContent.toLowerCase();
       row.hidden = !(wanted.every(word => text.includes(word)) && (!verdict || row.dataset.verdict === verdict) &&
-        (!axis || row.dataset.axis === axis) && (which !== "apart" || row.classList.contains("apart")) &&
+        (!axis || row.dataset.axis === axis) && (which !== "outliers" || row.classList.contains("outlier")) &&
         (which !== "failed" || row.dataset.state !== "done"));
       shown += !row.hidden;
     }

@@ -105,14 +105,14 @@ def plain_number(cell: str, decimal: str, thousands: str) -> str:
     return plain.replace(",", ".", 1) if decimal == "," else plain
 
 
-def plain_lines(lines: bytes, delimiter: str, thousands: str, *, apart: bool) -> bytes:
+def plain_lines(lines: bytes, delimiter: str, thousands: str, *, spaced_sign: bool) -> bytes:
     """Lines of cells, in UTF-8, likewise; the decimal mark stays.
 
     Args:
-        apart: Signs are separate from the digits.
+        spaced_sign: Signs are separate from the digits.
     """
     edge = re.escape(delimiter.encode())
-    if apart:
+    if spaced_sign:
         lines = re.sub(rb"(?m)(^|" + edge + rb'|")( *[+-]) +(?=[0-9.])', rb"\1\2", lines)
     if thousands:
         mark = thousands.encode()
@@ -268,7 +268,7 @@ class Dialect:
         units: Units by column, empty where none are given.
         missing: What cells without a number hold.
         thousands: The mark between thousands; empty: there is none.
-        apart: Signs are separate from the digits.
+        spaced_sign: Signs are separate from the digits.
         facts: `key: value` lines above the header.
     """
 
@@ -283,7 +283,7 @@ class Dialect:
     units: tuple[str, ...]
     missing: tuple[str, ...] = MISSING
     thousands: str = ""
-    apart: bool = False
+    spaced_sign: bool = False
     facts: dict[str, str] = field(default_factory=dict)
 
     def to_map(self) -> dict[str, Any]:
@@ -372,8 +372,8 @@ def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]]
 
 def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """How numbers are written besides their decimal mark."""
-    apart = any(cell[:2] in ("+ ", "- ") for cell in cells)
-    return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "apart": apart}
+    spaced_sign = any(cell[:2] in ("+ ", "- ") for cell in cells)
+    return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
 
 
 def _encoding(head: bytes) -> str:

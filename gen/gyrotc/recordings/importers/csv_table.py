@@ -131,9 +131,9 @@ class CsvTable(LoggerTable):
         if self.dialect.delimiter == "whitespace":
             lines = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", lines)
             lines = re.sub(rb"[ \t]+", b" ", lines)
-        elif self.dialect.thousands or self.dialect.apart:
+        elif self.dialect.thousands or self.dialect.spaced_sign:
             one = self.dialect
-            lines = plain_lines(lines, one.delimiter, one.thousands, apart=one.apart)
+            lines = plain_lines(lines, one.delimiter, one.thousands, spaced_sign=one.spaced_sign)
         return lines
 
     def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Which importer reads a file: told from its first bytes, and from the ending of its name where these say nothing."""
+"""Which importer reads a file: known from its first bytes, and from the ending of its name where these say nothing."""
 
 from __future__ import annotations
 

@@ -77,13 +77,15 @@ def serial_of(stated: str | None, chosen: Map, file: LoggerFile, out: Path) -> s
     in_file = next(
         (v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None
     )
-    told = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
-    serial = told or out.resolve().name
+    known = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
+    serial = known or out.resolve().name
     try:
         return check_serial(serial)
     except PydanticCustomError as error:
         where = (
-            "--serial" if stated else f"the serial {'in the file' if told else 'from the name of the folder'}"
+            "--serial"
+            if stated
+            else f"the serial {'in the file' if known else 'from the name of the folder'}"
         )
         raise InputError(where, repr(serial), f"{error.message()}; --serial names one") from error
 
@@ -275,8 +277,8 @@ def import_files(
     Args:
         chosen: What is known of the logger; what it leaves open is proposed from the first file.
         ask: Asks a person for a unit that stands nowhere.
-        say: Told the proposal, the preview and what was written, line by line.
-        progress: Told the name of the file and the share of it that is done.
+        say: Called with the proposal, the preview and what was written, line by line.
+        progress: Called with the name of the file and the share of it that is done.
 
     Returns:
         What was written; None after a dry run.

@@ -207,7 +207,7 @@ class Stamps:
         return ns, good
 
     def _ahead(self, local: IntArray, good: NDArray[np.bool_]) -> IntArray:
-        """Nanoseconds that local times are ahead of UTC. The hour that comes twice when summer time ends is told from
+        """Nanoseconds that local times are ahead of UTC. The hour repeated at the end of summer time is recognised by
         the local time going back in it.
         """
         if isinstance(self._zone, int) or self._zone is None:

@@ -204,7 +204,7 @@ def gps(t: Truth) -> list[str]:
 
 @text("ascii", "\r\n")
 def graphtec(t: Truth) -> list[str]:
-    """Signs stand apart from the digits, the milliseconds in a column of their own."""
+    """Signs are separated from the digits, the milliseconds in a column of their own."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{k + 1},{_at(s):%Y/%m/%d %H:%M:%S},000,+ {c:.9f},+ {r[0]:.9f},LLLLLLLLLL,LLLL"
@@ -345,7 +345,7 @@ def pipes(t: Truth) -> list[str]:
     ]
 
 
-STRANGERS = [
+FOREIGN = [
     Case("Campbell Scientific TOA5", "toa5.dat", campbell),
     Case(
         "Keysight 34972A, a voltage",
