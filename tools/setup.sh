@@ -62,7 +62,7 @@ become_root() {
   as=(sudo)
 }
 
-# install_missing PACKAGE...: a package outside `base` that the release does not have is told and left out.
+# install_missing PACKAGE...: a package outside `base` that the release does not have is reported and left out.
 install_missing() {
   local missing=() known=() p
   for p in "$@"; do installed "$p" || missing+=("$p"); done

@@ -22,7 +22,7 @@ TEST(outside_it_gives_the_value_at_the_edge)
     CHECK(same(bias, map_of(C(45.0), C(0.5))));
 }
 
-TEST(cells_without_training_data_are_told)
+TEST(cells_without_training_data_are_reported)
 {
     num_t bias;
 
@@ -91,7 +91,7 @@ int main(void)
 {
     RUN(inside_it_answers_without_remark);
     RUN(outside_it_gives_the_value_at_the_edge);
-    RUN(cells_without_training_data_are_told);
+    RUN(cells_without_training_data_are_reported);
     RUN(without_a_coverage_map_nothing_is_uncovered);
     RUN(an_envelope_without_extent_has_one_cell);
     RUN(far_from_a_center_its_gaussian_is_nothing);

@@ -208,7 +208,7 @@ TEST(foreign_images_are_refused)
 }
 
 /* Other layouts may be shorter than this one. */
-TEST(a_short_image_of_another_layout_is_told_as_one)
+TEST(a_short_image_of_another_layout_is_reported_as_one)
 {
     table_t table;
 
@@ -286,7 +286,7 @@ int main(void)
     RUN(truncated_images_are_refused);
     RUN(the_other_byte_order_is_refused);
     RUN(foreign_images_are_refused);
-    RUN(a_short_image_of_another_layout_is_told_as_one);
+    RUN(a_short_image_of_another_layout_is_reported_as_one);
     RUN(sizes_must_make_up_the_length);
     RUN(what_was_not_compiled_in_is_refused);
     RUN(null_pointers_are_refused);
