@@ -16,7 +16,7 @@ import json
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from datetime import date, datetime, time
 from typing import TYPE_CHECKING, Any, SupportsIndex
 from xml.etree import ElementTree
@@ -38,6 +38,7 @@ __all__ = [
     "file_stem",
     "html_environment",
     "picture_text",
+    "pictures_in_rows",
     "terminal_line",
     "terminal_text",
     "toml_comment",
@@ -177,15 +178,15 @@ def _only_html(value: Any) -> Any:
 
 
 def picture_text(text: str, limit: int = _TITLE) -> str:
-    """Text in a picture of matplotlib: one line, no control characters, `$` is a dollar sign and no mathematics."""
-    return _shown(text, lambda char, _: char.isprintable(), limit).replace("$", r"\$")
+    """Text in a picture: one line, no control characters."""
+    return _shown(text, lambda char, _: char.isprintable(), limit)
 
 
 _SVG = "{http://www.w3.org/2000/svg}"
 _DRAWN = frozenset(
     _SVG + name
     for name in (
-        "svg", "g", "defs", "metadata", "path", "use", "rect", "clipPath", "pattern", "text", "tspan", "image", "style",
+        "svg", "g", "defs", "metadata", "path", "rect", "clipPath", "pattern", "text", "title", "image", "style",
     )
 )  # fmt: skip
 _FACTS = (
@@ -223,6 +224,18 @@ def checked_svg(text: str) -> Markup:
         if element.tag == _SVG + "style" and _REFERENCES.search(element.text or ""):
             raise ValueError("refers to something else in its style")
     return Markup(text)
+
+
+def pictures_in_rows(pictures: Iterable[str], kind: str) -> Markup:
+    """Elements of `checked_svg` beside each other where there is room; `kind`: a class of the style sheet.
+
+    Raises:
+        ValueError: One is anything else.
+    """
+    from markupsafe import Markup
+
+    checked = [checked_svg(str(picture)) for picture in pictures]
+    return Markup('<div class="panels {}">').format(kind) + Markup("").join(checked) + Markup("</div>")
 
 
 # ---- TOML, CSV, file names, terminals ----

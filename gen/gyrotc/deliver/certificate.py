@@ -18,6 +18,7 @@ from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from markupsafe import Markup
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..common.errors import InputError
@@ -25,7 +26,7 @@ from ..common.inputs import checked, read_toml
 from ..common.texts import html_environment
 from ..jobs.axes import axes_in
 from ..jobs.release import accepted, unit_of
-from ..pages.report import page_environment
+from ..pages.report import page_environment, thermal_picture
 from ..pages.unit import UnitResults
 from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
 from ..results.release import Limit
@@ -114,18 +115,25 @@ def _row(limit: Limit) -> CertifiedRow:
 
 
 def certificate_page(
-    units: Sequence[UnitResults], facts: Any, missing: Sequence[str], accepted: str | None = None
+    units: Sequence[UnitResults],
+    pictures: Mapping[str | None, Markup | None],
+    facts: Any,
+    missing: Sequence[str],
+    accepted: str | None = None,
 ) -> str:
     """The page.
 
     Args:
+        pictures: By axis: bias against temperature; None: it has no traces.
         facts: What the laboratory states.
         missing: What is missing makes it a draft.
         accepted: Why the unit is released although a verdict is FAIL or CONDITIONAL PASS.
     """
     template = page_environment().get_template("certificate.html.j2")
     rows = [rows_of(unit) for unit in units]
-    return template.render(units=units, rows=rows, facts=facts, missing=missing, accepted=accepted)
+    return template.render(
+        units=units, rows=rows, pictures=pictures, facts=facts, missing=missing, accepted=accepted
+    )
 
 
 def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
@@ -291,7 +299,10 @@ def certificate(
     with result_folder(out, "certificate", inputs=[folder]) as stage:
         stage.of(first.model.serial)
         issued = stated.model_copy(update={"issued": stated.issued or date.today().isoformat()})
-        page = certificate_page(units, issued, missing, why)
+        pictures: dict[str | None, Markup | None] = {
+            u.model.axis: thermal_picture(place, u) for place, u in zip(places, units, strict=True)
+        }
+        page = certificate_page(units, pictures, issued, missing, why)
         write_atomically(stage.folder / "certificate.html", page)
         if not missing:
             write_atomically(stage.folder / "dcc.xml", dcc_text(units, issued, why))

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from .. import __version__
 from ..common.texts import csv_cell
-from ..pages.plots import lot_picture, outlier_picture
+from ..pages.fleet_plots import curves_of_units, rms_of_units, why_outlier
 from ..pages.report import page_environment
 from ..results.fleet import FleetEntry, FleetSummary, FleetUnit
 from ..store.files import json_text, write_atomically
@@ -65,7 +65,7 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
     outliers = {reason.name for reason in summary.reasons} | {outlier.name for outlier in summary.outliers}
     known = {entry.name: entry for entry in entries if entry.facts}
     pictures = {
-        reason.name: outlier_picture(known, reason)
+        reason.name: why_outlier(known, reason)
         for reason in summary.reasons[:_PICTURES]
         if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
     }
@@ -75,7 +75,8 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
         .render(
             summary=summary,
             outliers=outliers,
-            picture=lot_picture([e for e in entries if e.after_rms_dph], outliers),
+            picture=rms_of_units([e for e in entries if e.after_rms_dph], outliers),
+            curves=curves_of_units(entries, outliers),
             pictures=pictures,
             links={entry.name: _link(out, entry.name) for entry in summary.serials},
             verdicts=Counter(entry.verdict for entry in summary.serials),

@@ -6,16 +6,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from markupsafe import Markup
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ..common.texts import picture_text
 from ..results.evaluation import Comparison, Group, Method, Published
-from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
+from .chart import AFTER, BEFORE, COVERED, Panel, drawing, stacked
+from .scales import power
 
 __all__ = [
     "AFTER_DPH",
@@ -56,6 +54,7 @@ RUNNING_S = {
 
 
 _PANELS = 6  # in a row
+_ROW = 20.0  # height of a method
 _DEFAULT = "mrbf"
 
 
@@ -174,63 +173,62 @@ def _numbers(values: Iterable[float | None], unit: float) -> list[str]:
     return ["" if v is None else f"{v / unit:.2f}" for v in values]
 
 
-def comparison_picture(result: Comparison) -> str:
+def comparison_picture(result: Comparison) -> Markup:
     """One panel for each environment, a row for each method: RMS after, beside the noise; below, all together."""
     exponent, methods = _exponent(result), result.methods
     groups = len(_environments(result))
-    lines, columns = -(-groups // _PANELS), min(groups, _PANELS)
-    height = 0.5 + 0.21 * len(methods)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 0.4 + (lines + 1) * height), layout="constrained")
-        parts: Any = figure.subfigures(2, 1, height_ratios=(lines, 1))
-        above, below = parts
-        axes = above.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-        for ax in axes.flat[groups:]:
-            ax.set_visible(False)
-        for k, ax in enumerate(axes.flat[:groups]):
-            _environment(ax, methods, k, 10.0**exponent)
-        _rows(axes[0][0], methods)
-        above.supxlabel(f"RMS after, 1e{exponent} deg/h", fontsize=9)
-        handles, labels = axes[0][0].get_legend_handles_labels()
-        above.legend(handles, labels, loc="outside upper right", ncols=len(labels))
-        _together(below.subplots(), methods)
-        return svg(figure)
+    columns = min(groups, _PANELS)
+    panels = [_environment(methods, k, exponent) for k in range(groups)]
+    height = 10.0 + _ROW * len(methods)
+    above = drawing(panels, columns=columns, height=height, share_x=True, share_y=True)
+    return stacked(above, drawing([_together(methods)], height=height))
 
 
-def _rows(ax: Axes, methods: Sequence[Method]) -> None:
+def _rows_of(methods: Sequence[Method]) -> dict[str, Any]:
     """Names of the methods, the first one uppermost."""
-    ax.set_yticks(range(len(methods)), [m.id for m in methods])
-    ax.set_ylim(len(methods) - 0.4, -0.6)
+    last = len(methods) - 1
+    return {
+        "y_ticks": [(last - k, m.id) for k, m in enumerate(methods)],
+        "y_range": (-0.6, last + 0.6),
+    }
 
 
-def _color(method: Method) -> str:
-    return AFTER if method.id == _DEFAULT else COVERED
-
-
-def _environment(ax: Axes, methods: Sequence[Method], k: int, unit: float) -> None:
-    place = np.arange(len(methods))
+def _environment(methods: Sequence[Method], k: int, exponent: int) -> Panel:
+    unit = 10.0**exponent
+    panel = Panel(
+        x=f"RMS after, {power(exponent)} deg/h", title=methods[0].groups[k].environment, **_rows_of(methods)
+    )
+    place = np.arange(len(methods))[::-1]
+    before = (methods[0].groups[k].before_std_dph or 0.0) / unit
+    panel.vertical(before, label="σ before: what the mean alone leaves", dash="2 3")
     ours = np.array([m.groups[k].after_rms_dph for m in methods], dtype=np.float64) / unit
-    ax.axvline((methods[0].groups[k].before_std_dph or 0.0) / unit, color=ACCENT, linewidth=0.8, linestyle=":",
-               label="σ before: what the mean alone leaves")  # fmt: skip
-    ax.scatter(ours, place, s=22, color=[_color(m) for m in methods], zorder=3, label="here")
+    default = np.array([m.id == _DEFAULT for m in methods])
+    panel.dots(ours[~default], place[~default], COVERED, "here", size=7.0)
+    panel.dots(ours[default], place[default], AFTER, size=7.0)
     paper = [_of_paper(m, _rms)[k] for m in methods]
     if any(paper):
         values = np.array([np.nan if p is None else p / unit for p in paper])
-        ax.scatter(values, place, s=22, facecolor="none", edgecolor=BEFORE, zorder=2, label="in the paper")
-    ax.set_title(picture_text(methods[0].groups[k].environment), fontsize=8.5, loc="left")
+        known = np.isfinite(values)
+        panel.dots(values[known], place[known], BEFORE, "in the paper", size=7.0, hollow=True)
+    return panel
 
 
-def _together(ax: Axes, methods: Sequence[Method]) -> None:
+def _together(methods: Sequence[Method]) -> Panel:
     """How far every method is from the best one, and what it costs."""
     rms = np.array([m.exam_rms_dph for m in methods], dtype=np.float64)
     excess = 100.0 * (rms / rms.min() - 1.0) if rms.min() > 0.0 else np.zeros(len(rms))
-    ax.barh(np.arange(len(methods)), excess, height=0.6, color=[_color(m) for m in methods])
-    for k, m in enumerate(methods):
-        size = f"{m.centers} centers, " if m.centers else ""
-        text = f"{size}{m.table_bytes} bytes, trained in {m.train_s:.3f} s"
-        ax.annotate(text, (excess[k], k), (4, 0), textcoords="offset points", va="center", fontsize=7.5)
-    _rows(ax, methods)
-    ax.margins(x=0.35)
-    ax.set_xlim(left=0.0)
-    ax.grid(visible=False, axis="y")
-    ax.set(xlabel="RMS over all environments, % above the best")
+    place = np.arange(len(methods))[::-1]
+    room = 1.6 * max(float(excess.max()), 1.0)  # for the words behind the longest bar
+    panel = Panel(x="RMS over all environments, % above the best", x_range=(0.0, room), **_rows_of(methods))
+    default = np.array([m.id == _DEFAULT for m in methods])
+    for of, color in ((~default, COVERED), (default, AFTER)):
+        panel.bars(excess[of], place[of], color)
+    panel.words(
+        excess,
+        place,
+        [
+            f"{f'{m.centers} centers, ' if m.centers else ''}{m.table_bytes} bytes, trained in {m.train_s:.3f} s"
+            for m in methods
+        ],
+    )
+    return panel

@@ -8,15 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, running_mean
-from ..common.texts import picture_text
 from ..results.base import read_optional, read_result
 from ..results.diagnosed import (
     ComparedStatistic,
@@ -31,8 +27,9 @@ from ..results.diagnosed import (
     Statistic,
     Values,
 )
-from .plots import ACCENT, AFTER, BEFORE, COVERED, STYLE, svg
+from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .report import page_environment, page_from, write_page
+from .thermal import sorted_by_rate
 
 __all__ = ["PICTURES", "SERIES", "draw", "is_diagnosis", "write_diagnosis_page"]
 
@@ -83,7 +80,7 @@ def _gains(result: Diagnosed) -> list[tuple[str, GainOnUnseen]]:
 
 
 _SMOOTH_S = 1800.0  # half an hour, as the simulated band of `series.json`
-_MOVING = 0.1  # C/min
+_LEAST_SHOWN = 20  # blocks at a kind of rate: fewer give no mean to speak of
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
 _MOST_PANELS = 6  # runs with events that are drawn
@@ -107,73 +104,56 @@ def draw(result: Diagnosed, series: DiagnosisSeries) -> dict[str, Markup]:
     return {name: picture for name, picture in made.items() if picture is not None}
 
 
+def _panels(count: int, x: str, y: str) -> list[Panel]:
+    """Panels of runs in rows of three, with words at the left ones only."""
+    columns = min(3, count)
+    return [Panel(x=x, y="" if k % columns else y) for k in range(count)]
+
+
+def _drawn(panels: Sequence[Panel]) -> Markup:
+    return drawing(panels, columns=min(3, len(panels)), height=115.0, share_y=True)
+
+
 def _events(runs: Sequence[RunSeries], events: Sequence[FoundEvent]) -> Markup | None:
     """The rate of every run with an event, as block means, and where the events lie."""
     files = {event.file for event in events}
     shown = [run for run in runs if run.file in files][:_MOST_PANELS]
     if not shown:
         return None
-    with mpl.rc_context(STYLE):
-        figure, axes = _grid(len(shown))
-        for ax, run in zip(axes, shown, strict=False):
-            ax.plot(np.array(run.hours) + run.first_s / 3600.0, run.rate_dph, color=BEFORE, linewidth=0.9)
-            for event in (e for e in events if e.file == run.file):
-                ax.axvline(event.time_s.value / 3600.0, color=AFTER, linewidth=1.2)
-            ax.set(title=picture_text(run.name), xlabel="h on the file's clock")
-        axes[0].set_ylabel("rate less its mean, deg/h")
-        return svg(figure)
+    panels = _panels(len(shown), "h on the file's clock", "rate less its mean, deg/h")
+    for panel, run in zip(panels, shown, strict=True):
+        panel.title = run.name
+        panel.line(np.array(run.hours) + run.first_s / 3600.0, np.array(run.rate_dph), BEFORE)
+        for event in (e for e in events if e.file == run.file):
+            panel.vertical(event.time_s.value / 3600.0, AFTER, width=1.2)
+    return _drawn(panels)
 
 
 def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
     """Half-hour means of every run's residual over the band of the simulated ones, and the fitted causes."""
-    with mpl.rc_context(STYLE):
-        figure, axes = _grid(len(runs))
-        for ax, run in zip(axes, runs, strict=False):
-            band = (run.simulated_low_dph, run.simulated_high_dph)
-            ax.fill_between(run.hours, *band, color=COVERED, alpha=0.3, linewidth=0, label="simulated, 95 %")
-            ax.plot(
-                run.hours, _smooth(run.residual_dph, width), color=BEFORE, linewidth=1.2, label="measured"
-            )
-            if run.named_dph is not None:
-                ax.plot(
-                    run.hours, _smooth(run.named_dph, width), color=AFTER, linewidth=1.2, label="named causes"
-                )
-            title = picture_text(" ".join(dict.fromkeys((run.name, run.environment))))
-            ax.set_title(title, fontsize=8, loc="left")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
-        figure.supxlabel("h since the first row", fontsize=9)
-        figure.supylabel("residual of the static map, deg/h", fontsize=9)
-        return svg(figure)
+    panels = _panels(len(runs), "h since the first row", "residual of the static map, deg/h")
+    for panel, run in zip(panels, runs, strict=True):
+        panel.title = " ".join(dict.fromkeys((run.name, run.environment)))
+        panel.band(run.hours, run.simulated_low_dph, run.simulated_high_dph, COVERED, "simulated, 95 %")
+        panel.line(run.hours, _smooth(run.residual_dph, width), BEFORE, "measured")
+        if run.named_dph is not None:
+            panel.line(run.hours, _smooth(run.named_dph, width), AFTER, "named causes")
+    return _drawn(panels)
 
 
 def _cycle_over_time(runs: Sequence[RunSeries]) -> Markup:
     """Block means of what a map of T alone leaves, and the states' part of it; temperature below."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-        at = 0.0
-        for run in runs:
-            minutes = at + 60.0 * np.array(run.hours)
-            upper.plot(minutes, run.residual_dph, color=BEFORE, linewidth=1.2, label="measured")
-            if run.named_dph is not None:
-                upper.plot(minutes, run.named_dph, color=AFTER, linewidth=1.2, label="named causes")
-            lower.plot(minutes, run.temperature_c, color=COVERED, linewidth=1.2)
-            at = float(minutes[-1])
-        upper.set_ylabel("residual of a map of T, deg/h")
-        lower.set(ylabel="T, C", xlabel="min")
-        handles, labels = upper.get_legend_handles_labels()
-        figure.legend(handles[:2], labels[:2], loc="outside upper right", ncols=2, fontsize=8)
-        return svg(figure)
-
-
-def _grid(count: int) -> tuple[Figure, list[Axes]]:
-    columns = min(3, count)
-    rows = -(-count // columns)
-    figure = Figure(figsize=(10.0, 0.6 + 1.9 * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    for ax in axes.flat[count:]:
-        ax.set_visible(False)
-    return figure, list(axes.flat[:count])
+    upper = Panel(y="residual of a map of T, deg/h")
+    lower = Panel(x="time, min", y="temperature, C")
+    at = 0.0
+    for run in runs:
+        minutes = at + 60.0 * np.array(run.hours)
+        upper.line(minutes, run.residual_dph, BEFORE, "measured")
+        if run.named_dph is not None:
+            upper.line(minutes, run.named_dph, AFTER, "named causes")
+        lower.line(minutes, run.temperature_c, COVERED)
+        at = float(minutes[-1])
+    return drawing([upper, lower], heights=(190.0, 95.0), share_x=True)
 
 
 def _smooth(values: Values, width: int) -> FloatArray:
@@ -183,23 +163,19 @@ def _smooth(values: Values, width: int) -> FloatArray:
 def _statistics(discrepancies: Sequence[Statistic]) -> Markup:
     """Every statistic of the residuals against the middle 95 % of the plain and of the extended simulation."""
     found = list(reversed(discrepancies))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 0.8 + 0.34 * len(found)), layout="constrained")
-        ax = figure.subplots()
-        ax.axvspan(-1.0, 1.0, color=COVERED, alpha=0.3, linewidth=0, label="simulated, 95 %")
-        rows = np.arange(len(found))
-        ax.plot([_place(d) for d in found], rows, "o", color=BEFORE, label="measured, plain simulation")
-        after = [(row, _place(d.extended)) for row, d in enumerate(found) if d.extended is not None]
-        if after:
-            at, places = zip(*after, strict=True)
-            ax.plot(places, at, "D", mfc="none", color=AFTER, label="measured, with what was found")
-        labels = [d.statistic.removesuffix("_dph").replace("_", " ") for d in found]
-        ax.set_yticks(rows, labels)
-        ax.set_xlabel("half widths of the simulated 95 % range (beyond 1: square root)")
-        ax.set_ylim(-0.7, len(found) - 0.3)
-        ax.grid(axis="y", visible=False)
-        figure.legend(loc="outside upper right", ncols=3, fontsize=8)
-        return svg(figure)
+    names = [d.statistic.removesuffix("_dph").replace("_", " ") for d in found]
+    panel = Panel(
+        x="half widths of the simulated 95 % range (beyond 1: square root)",
+        y_range=(-0.7, len(found) - 0.3),
+        y_ticks=list(enumerate(names)),
+    )
+    panel.span(-1.0, 1.0, COVERED, "simulated, 95 %")
+    panel.dots([_place(d) for d in found], range(len(found)), BEFORE, "measured, plain simulation", size=7.0)
+    after = [(row, _place(d.extended)) for row, d in enumerate(found) if d.extended is not None]
+    if after:
+        at, places = zip(*after, strict=True)
+        panel.dots(places, at, AFTER, "measured, with what was found", size=9.0, hollow=True)
+    return drawing([panel], height=16.0 + 25.0 * len(found))
 
 
 def _place(d: ComparedStatistic) -> float:
@@ -219,29 +195,25 @@ def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
         np.concatenate([np.array(values) for values in of])
         for of in zip(*((r.temperature_c, r.slope_c_per_min, r.residual_dph) for r in runs), strict=True)
     )
-    named = [np.zeros(len(r.hours)) if r.named_dph is None else np.array(r.named_dph) for r in runs]
-    line = np.concatenate(named)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 5.6), layout="constrained")
-        axes = figure.subplots(2, 2, sharey=True)
-        for mask, colour, label in (
-            (slope > _MOVING, BEFORE, "heating"),
-            (slope < -_MOVING, AFTER, "cooling"),
-            (np.abs(slope) <= _MOVING, COVERED, "held"),
-        ):
-            if mask.sum() > 20:
-                _binned(axes[0, 0], t[mask], residual[mask], line[mask], colour, label)
-        axes[0, 0].set_xlabel("temperature, C")
-        axes[0, 0].legend(fontsize=8)
-        _binned(axes[0, 1], slope, residual, line, BEFORE, "")
-        axes[0, 1].set_xlabel("dT/dt, C/min")
-        _over_power_on(axes[1, 0], runs, width)
-        _over_date(axes[1, 1], runs)
-        figure.supylabel("residual of the static map, deg/h", fontsize=9)
-        return svg(figure)
+    line = np.concatenate(
+        [np.zeros(len(r.hours)) if r.named_dph is None else np.array(r.named_dph) for r in runs]
+    )
+    words = "residual, deg/h"
+    over_t = Panel(x="temperature, C", y=words)
+    for label, color, mask in sorted_by_rate(slope):
+        if mask.sum() > _LEAST_SHOWN:
+            _binned(over_t, t[mask], residual[mask], line[mask], color, label)
+    over_rate = Panel(x="dT/dt, C/min")
+    _binned(over_rate, slope, residual, line, BEFORE, "")
+    over_power_on = Panel(y=words)
+    _over_power_on(over_power_on, runs, width)
+    over_date = Panel()
+    _over_date(over_date, runs)
+    panels = [over_t, over_rate, over_power_on, over_date]
+    return drawing(panels, columns=2, height=190.0, share_y=True)
 
 
-def _binned(ax: Axes, x: FloatArray, y: FloatArray, term: FloatArray, colour: str, label: str) -> None:
+def _binned(panel: Panel, x: FloatArray, y: FloatArray, term: FloatArray, color: str, label: str) -> None:
     """Means of y in 24 cells with their standard errors, and of the fitted causes as a line."""
     edges = np.linspace(x.min(), x.max() + 1e-9, 25)
     cell = np.digitize(x, edges) - 1
@@ -251,88 +223,75 @@ def _binned(ax: Axes, x: FloatArray, y: FloatArray, term: FloatArray, colour: st
         return
     mean, place, line = (np.bincount(cell, weights=v, minlength=24)[use] / count[use] for v in (y, x, term))
     error = np.array([y[cell == c].std() for c in use]) / np.sqrt(count[use])
-    ax.axhline(0.0, color=ACCENT, linewidth=0.6)
-    ax.errorbar(place, mean, yerr=error, color=colour, fmt="o", markersize=3, linewidth=1.0, label=label)
+    panel.horizontal(0.0)
+    panel.errors(place, mean - error, mean + error, color)
+    panel.dots(place, mean, color, label, size=6.0)
     if np.any(term):
-        ax.plot(place, line, color=colour, linewidth=1.3)
+        panel.line(place, line, color, width=1.4)
 
 
-def _over_power_on(ax: Axes, runs: Sequence[RunSeries], width: int) -> None:
+def _over_power_on(panel: Panel, runs: Sequence[RunSeries], width: int) -> None:
     """Half-hour means of every run, and their mean at equal time since power-on."""
-    ax.set_xlabel("h since power-on")
     known = [(np.array(run.on_h), np.array(run.residual_dph)) for run in runs if run.on_h is not None]
+    panel.x = "h since power-on" if known else "power-on is not known"
     for hours, residual in known:
-        ax.plot(hours, running_mean(residual, width), color=COVERED, linewidth=0.7, alpha=0.7)
-    if not known:
-        ax.text(0.5, 0.5, "power-on is not known", transform=ax.transAxes, ha="center", color=COVERED)
-        return
-    at, value = (np.concatenate(parts) for parts in zip(*known, strict=True))
-    _binned(ax, at, value, np.zeros_like(at), BEFORE, "")
+        panel.line(hours, running_mean(residual, width), COVERED, width=0.8)
+    if known:
+        at, value = (np.concatenate(parts) for parts in zip(*known, strict=True))
+        _binned(panel, at, value, np.zeros_like(at), BEFORE, "")
 
 
-def _over_date(ax: Axes, runs: Sequence[RunSeries]) -> None:
+def _over_date(panel: Panel, runs: Sequence[RunSeries]) -> None:
     dated = all(run.day is not None for run in runs)
-    ax.set_xlabel("day" if dated else "number of the run (not all are dated)")
-    for number, run in enumerate(runs):
-        day = run.day if dated and run.day is not None else float(number)
-        part = np.array(run.residual_dph)
-        error = part.std() / np.sqrt(max(part.size, 1))
-        ax.errorbar(day, part.mean(), yerr=error, fmt="o", color=BEFORE, markersize=4)
-    ax.axhline(0.0, color=ACCENT, linewidth=0.6)
+    panel.x = "day" if dated else "number of the run (not all are dated)"
+    panel.whole_x = True
+    parts = [np.array(run.residual_dph) for run in runs]
+    day = [run.day if dated and run.day is not None else float(k) for k, run in enumerate(runs)]
+    mean = np.array([part.mean() for part in parts])
+    error = np.array([part.std() / np.sqrt(max(part.size, 1)) for part in parts])
+    panel.horizontal(0.0)
+    panel.errors(day, mean - error, mean + error, BEFORE)
+    panel.dots(day, mean, BEFORE, size=7.0)
 
 
 def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:
     """Half-hour means on the scored runs: model without the causes, and with them."""
     smooth_s = min(_SMOOTH_S, min(len(run.hours) for run in scored) * average_s / 16.0)
     width = max(round(smooth_s / average_s), 1)
-    with mpl.rc_context(STYLE):
-        figure, axes = _grid(len(scored))
-        for ax, run in zip(axes, scored, strict=False):
-            ax.axhline(0.0, color=ACCENT, linewidth=0.6)
-            ax.plot(run.hours, _smooth(run.before_dph, width), color=BEFORE, linewidth=1.1, label="without")
-            ax.plot(
-                run.hours, _smooth(run.after_dph, width), color=AFTER, linewidth=1.1, label="with the causes"
-            )
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2, fontsize=8)
-        figure.supxlabel("h", fontsize=9)
-        figure.supylabel("compensated rate, deg/h", fontsize=9)
-        return svg(figure)
+    panels = _panels(len(scored), "time, h", "compensated rate, deg/h")
+    for panel, run in zip(panels, scored, strict=True):
+        panel.horizontal(0.0)
+        panel.line(run.hours, _smooth(run.before_dph, width), BEFORE, "without")
+        panel.line(run.hours, _smooth(run.after_dph, width), AFTER, "with the causes")
+    return _drawn(panels)
 
 
 def _likelihood(likelihood: ParameterLikelihood) -> Markup:
     """Profile likelihood of the parameter of a cause where it is near its top, with its 95 % interval."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.0, 2.6), layout="constrained")
-        ax = figure.subplots()
-        if likelihood.low is not None and likelihood.high is not None:
-            ax.axvspan(likelihood.low, likelihood.high, color=AFTER, alpha=0.12, linewidth=0)
-        ax.plot(likelihood.values, likelihood.gain, "o-", color=AFTER, markersize=3, linewidth=1.0)
-        ax.axhline(-CHI2_95_ONE, color=ACCENT, linewidth=0.6, linestyle="--")
-        ax.set_ylim(bottom=max(_SHOWN, 1.05 * min(likelihood.gain)))
-        ax.set_xlabel(likelihood.parameter)
-        ax.set_ylabel("2 Δ log likelihood")
-        ax.set_title(likelihood.cause, fontsize=8, loc="left")
-        return svg(figure)
+    panel = Panel(x=likelihood.parameter, y="2 Δ log likelihood", title=likelihood.cause)
+    panel.y_range = (max(_SHOWN, 1.05 * min(likelihood.gain)), None)
+    if likelihood.low is not None and likelihood.high is not None:
+        panel.span(likelihood.low, likelihood.high, AFTER)
+    panel.line(likelihood.values, likelihood.gain, AFTER)
+    panel.dots(likelihood.values, likelihood.gain, AFTER, size=5.0)
+    panel.horizontal(-CHI2_95_ONE, dash="5 3")
+    return drawing([panel], width=HALF)
 
 
 def _considered(scores: SearchScores) -> Markup:
     """Best score of every cause before any was taken, and what is left after the named ones."""
     ids = list(scores.alone)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 0.9 + 0.34 * len(ids)), layout="constrained")
-        ax = figure.subplots()
-        places = np.arange(len(ids))[::-1]
-        ax.barh(places, list(scores.alone.values()), height=0.62, color=BEFORE, alpha=0.85, label="alone")
-        if scores.beside is not None:
-            left = [scores.beside.get(i, 0.0) for i in ids]
-            ax.barh(places, left, height=0.28, color=AFTER, label="beside the named causes")
-        ax.axvline(
-            scores.limit, color=ACCENT, linewidth=0.8, linestyle="--", label="1 % for the whole search"
+    places = np.arange(len(ids))[::-1]
+    panel = Panel(
+        x="−ln p of the best candidate",
+        x_log=_LINEAR if max(scores.alone.values(), default=0.0) > _LINEAR else False,
+        y_range=(-0.6, len(ids) - 0.4),
+        y_ticks=[(int(place), id.replace("_", " ")) for place, id in zip(places, ids, strict=True)],
+    )
+    panel.bars(list(scores.alone.values()), places, BEFORE, "alone", height=0.62)
+    if scores.beside is not None:
+        panel.bars(
+            [scores.beside.get(i, 0.0) for i in ids], places, AFTER, "beside the named causes", height=0.28
         )
-        ax.set_yticks(places, [i.replace("_", " ") for i in ids])
-        ax.set_xlabel("-ln p of the best candidate")
-        if max(scores.alone.values(), default=0.0) > _LINEAR:
-            ax.set_xscale("symlog", linthresh=_LINEAR)
-        ax.grid(axis="y", visible=False)
-        figure.legend(fontsize=8, loc="outside upper right", ncols=3)
-        return svg(figure)
+    panel.vertical(scores.limit, label="1 % for the whole search", dash="5 3")
+    return drawing([panel], height=16.0 + 25.0 * len(ids))

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
+from markupsafe import Markup
 
-from ..common.texts import picture_text
 from ..results.base import read_result
 from ..results.planned import Plan
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
-from .plots import ACCENT, AFTER, BEFORE, STYLE, svg
+from .chart import AFTER, BEFORE, Panel, drawing
 from .report import page_environment, page_from, write_page
 
 __all__ = [
@@ -26,63 +24,57 @@ __all__ = [
 ]
 
 _FULL = 30.0  # d from which a pair counts as inseparable
+_LEAST = 10.0**0.5  # d below which a pair has no colour: well separated
 
 
-def temperatures(result: Plan) -> str:
+def temperatures(result: Plan) -> Markup:
     """Temperature that the sensor will show in every run."""
-    runs = result.runs
-    columns = min(3, len(runs))
-    rows = -(-len(runs) // columns)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 0.5 + 1.6 * rows), layout="constrained")
-        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        for ax in axes.flat[len(runs) :]:
-            ax.set_visible(False)
-        for ax, run in zip(axes.flat, runs, strict=False):
-            ax.plot(run.temperature.time_h, run.temperature.value_c, color=BEFORE, linewidth=1.1)
-            ax.set_title(picture_text(run.profile), fontsize=8.5, loc="left")
-        figure.supxlabel("h", fontsize=9)
-        figure.supylabel("temperature at the sensor, C", fontsize=9)
-        return svg(figure)
+    columns = min(3, len(result.runs))
+    panels = []
+    for k, run in enumerate(result.runs):
+        panel = Panel(x="time, h", y="" if k % columns else "temperature, C", title=run.profile)
+        panel.line(run.temperature.time_h, run.temperature.value_c, BEFORE)
+        panels.append(panel)
+    return drawing(panels, columns=columns, height=105.0, share_x=True, share_y=True)
 
 
-def separability_matrix(result: Plan) -> str:
+def separability_matrix(result: Plan) -> Markup:
     """d from which the row's cause can be distinguished from the column's, on a logarithmic scale of grey."""
     rows = result.separability
     others = list(dict.fromkeys([*(row.id for row in rows), *(o for row in rows for o in row.d)]))
-    d = np.array([[row.d.get(o, np.nan) for o in others] for row in rows])
-    names = [
-        picture_text(row.id.replace("_", " ")) + ("" if row.value is None else f" {row.value:.4g}")
-        for row in rows
-    ]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 1.4 + 0.33 * len(rows)), layout="constrained")
-        ax = figure.subplots()
-        shade = np.log(np.clip(d, np.sqrt(10.0), _FULL))
-        ax.imshow(shade, cmap="Oranges", aspect="auto", vmin=np.log(np.sqrt(10.0)), vmax=np.log(_FULL))
-        for k, line in enumerate(d):
-            for i, value in enumerate(line):
-                if np.isfinite(value):
-                    text = f">{_FULL:.0f}" if value > _FULL else f"{value:.1f}"
-                    ax.text(i, k, text, ha="center", va="center", fontsize=8, color=ACCENT)
-        ax.set_xticks(range(len(others)), [picture_text(o).replace("_", "\n") for o in others], fontsize=8)
-        ax.set_yticks(range(len(rows)), names, fontsize=8)
-        ax.grid(visible=False)
-        return svg(figure)
+    places, texts, shades = [], [], []
+    for k, row in enumerate(rows):
+        for i, other in enumerate(others):
+            value = row.d.get(other)
+            if value is not None and np.isfinite(value):
+                places.append((i, k))
+                texts.append(f">{_FULL:.0f}" if value > _FULL else f"{value:.1f}")
+                shades.append(np.log(max(value, _LEAST) / _LEAST) / np.log(_FULL / _LEAST))
+    names = [row.id.replace("_", " ") + ("" if row.value is None else f" {row.value:.4g}") for row in rows]
+    panel = Panel(
+        x_range=(-0.5, len(others) - 0.5),
+        y_range=(-0.5, len(rows) - 0.5),
+        x_ticks=[(k, other.replace("_", "\n")) for k, other in enumerate(others)],
+        y_ticks=[(len(rows) - 1 - k, name) for k, name in enumerate(names)],
+    )
+    x, y = np.array(places, dtype=np.float64).reshape(-1, 2).T
+    panel.cells(x, len(rows) - 1 - y, texts, np.clip(shades, 0.0, 1.0))
+    return drawing([panel], height=24.0 * len(rows) + 6.0)
 
 
-def accuracy_by_hours(result: Plan) -> str:
+def accuracy_by_hours(result: Plan) -> Markup:
     """Predicted RMS over the noise floor, and error of the map, over chamber hours."""
     hours = [a.hours for a in result.accuracy]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 2.6), layout="constrained")
-        left, right = figure.subplots(1, 2)
-        left.plot(hours, [a.rms_over_floor for a in result.accuracy], "o-", color=AFTER, markersize=4)
-        left.axhline(1.0, color=ACCENT, linewidth=0.7, linestyle="--")
-        left.set(xlabel="chamber hours", ylabel="RMS of 100 s means / noise floor")
-        right.semilogy(hours, [a.map_error_dph for a in result.accuracy], "o-", color=BEFORE, markersize=4)
-        right.set(xlabel="chamber hours", ylabel="error of the map, deg/h")
-        return svg(figure)
+    left = Panel(x="chamber hours", y="RMS of 100 s means ÷ noise floor")
+    right = Panel(x="chamber hours", y="error of the map, deg/h", y_log=True)
+    left.horizontal(1.0, dash="5 3")
+    for panel, color, values in (
+        (left, AFTER, [a.rms_over_floor for a in result.accuracy]),
+        (right, BEFORE, [a.map_error_dph for a in result.accuracy]),
+    ):
+        panel.line(hours, values, color)
+        panel.dots(hours, values, color, size=6.0)
+    return drawing([left, right], columns=2, height=150.0)
 
 
 def is_plan(folder: Path) -> bool:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
+from markupsafe import Markup
 
 from ..causes import CATALOGUE
 from ..common.errors import InputError
@@ -23,13 +25,13 @@ from ..results.training import LeftOutRows, Training
 from ..store.files import write_atomically
 from ..store.folder import result_folder
 from .plots import (
-    allan_deviation,
     bias_over_time,
     calibrations_over_time,
     curve_by_size,
     map_with_centers,
     prior_and_posterior,
 )
+from .thermal import allan_deviation, bias_against_temperature
 from .unit import UnitResults, unit_in
 from .words import (
     bound_words,
@@ -43,7 +45,7 @@ from .words import (
     words_of_candidate,
 )
 
-__all__ = ["axes_page", "page_environment", "page_from", "write_page", "write_report"]
+__all__ = ["axes_page", "page_environment", "page_from", "thermal_picture", "write_page", "write_report"]
 
 _ORDER = ("FAIL", "CONDITIONAL PASS", "", "PASS")  # of axes on their common page
 _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
@@ -73,7 +75,7 @@ def axes_page(folder: Path, axes: Sequence[str]) -> str:
     units = [unit_in(folder / axis) for axis in axes]
     with page_from(folder):
         ordered = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
-        pictures = {u.model.axis: _bias_picture(folder / str(u.model.axis), u) for u in units}
+        pictures = {u.model.axis: thermal_picture(folder / str(u.model.axis), u) for u in units}
         worst = ordered[0].verdict
         template = page_environment().get_template("axes.html.j2")
         trends = {unit.model.axis: _trend(unit) for unit in units}
@@ -142,9 +144,20 @@ def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], s
     ]
 
 
-def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:
+@dataclass(frozen=True, slots=True)
+class _Traced:
+    """A run of which there is a trace: its means, and times (s) of rows that were left out of training."""
+
+    run: EvaluatedRun
+    means: Averages
+    left_out_s: list[float]
+
+
+def _pictures(folder: Path, unit: UnitResults) -> dict[str, Markup | None]:
+    traced = list(_traced(folder, unit))
     return {
-        "bias": _bias_picture(folder, unit),
+        "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
+        "bias": _over_time(traced),
         "map": map_with_centers(unit.model),
         "curve": curve_by_size(unit.training) if unit.training else None,
         "lot": prior_and_posterior(unit.training) if unit.training else None,
@@ -153,23 +166,32 @@ def _pictures(folder: Path, unit: UnitResults) -> dict[str, str | None]:
     }
 
 
-def _trend(unit: UnitResults) -> str | None:
+def thermal_picture(folder: Path, unit: UnitResults) -> Markup | None:
+    """Bias of one axis against temperature, from the traces of its folder; None where there are none."""
+    return bias_against_temperature(unit.model, [one.means for one in _traced(folder, unit)])
+
+
+def _trend(unit: UnitResults) -> Markup | None:
     return calibrations_over_time(unit.changes.history) if unit.changes else None
 
 
-def _bias_picture(folder: Path, unit: UnitResults) -> str | None:
-    """Bias over time from the traces of a result; None where there are none."""
-    runs, left_out = [], []
+def _traced(folder: Path, unit: UnitResults) -> Iterator[_Traced]:
+    """Runs of a result that have a trace."""
     outliers = unit.training.outliers if unit.training else None
     stretches = outliers.stretches if outliers else ()
     for run in unit.evaluation.runs:
-        averages = _trace(folder / "trace", run, unit.evaluation.average_s)
-        if averages is not None and averages.time_s.size:
-            runs.append((run.environment or run.file, run.role, averages))
+        means = _trace(folder / "trace", run, unit.evaluation.average_s)
+        if means is not None and means.time_s.size:
             mine = [s.from_s for s in stretches if s.file == run.file and run.role == "train"]
-            first, last = averages.time_s[0], averages.time_s[-1]
-            left_out.append([t for t in mine if first <= t <= last])
-    return bias_over_time(runs, left_out) if runs else None
+            first, last = means.time_s[0], means.time_s[-1]
+            yield _Traced(run, means, [t for t in mine if first <= t <= last])
+
+
+def _over_time(traced: Sequence[_Traced]) -> Markup | None:
+    if not traced:
+        return None
+    runs = [(one.run.environment or one.run.file, one.run.role, one.means) for one in traced]
+    return bias_over_time(runs, [one.left_out_s for one in traced])
 
 
 def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:

@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from ..results.release import Limit
+from .scales import power
 
 __all__ = [
     "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",
@@ -105,11 +106,7 @@ def sci(value: float | None, digits: int = 2) -> str:
     if 0.01 <= abs(value) < 1e5:
         return f"{value:.{digits + 1}g}" if abs(value) < 1e3 else f"{value:,.0f}"
     mantissa, exponent = f"{value:.{digits}e}".split("e")
-    return f"{mantissa}·{_power(int(exponent))}"
-
-
-def _power(exponent: int) -> str:
-    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa}·{power(int(exponent))}"
 
 
 class Digits(NamedTuple):
@@ -123,7 +120,7 @@ class Digits(NamedTuple):
     def page(self) -> str:
         """(7.21 ± 0.25)·10⁻⁴."""
         text = f"{self.value} ± {self.spread}"
-        return text if self.exponent == 0 else f"({text})·{_power(self.exponent)}"
+        return text if self.exponent == 0 else f"({text})·{power(self.exponent)}"
 
     def decimal(self, mantissa: str) -> str:
         """The value or the spread as machines read it: 7.21e-4."""
@@ -153,7 +150,7 @@ def rounded(expanded: float) -> str:
     if not expanded:
         return "0"
     found = digits_of(0.0, expanded)
-    return found.spread if found.exponent == 0 else f"{found.spread}·{_power(found.exponent)}"
+    return found.spread if found.exponent == 0 else f"{found.spread}·{power(found.exponent)}"
 
 
 def plain(value: Any) -> str:
@@ -187,5 +184,5 @@ def bound_words(limit: Limit) -> str:
         if 0.0 < abs(limit.bound) < 0.01:
             mantissa, _, exponent = f"{limit.bound:.5e}".partition("e")
             mantissa = mantissa.rstrip("0").rstrip(".")
-        return sign + mantissa + (f"·{_power(int(exponent))}" if exponent else "")
+        return sign + mantissa + (f"·{power(int(exponent))}" if exponent else "")
     return sign + plain(limit.bound).replace("_", " ")

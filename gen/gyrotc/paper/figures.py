@@ -17,14 +17,27 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
+from ..pages.chart import COLOURS
 from ..pages.comparison import ENVIRONMENTS
-from ..pages.plots import AFTER, BEFORE, COVERED, STYLE
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.noise import CELL_S
 from ..store.files import write_atomically
 from .experiment import AVERAGE_S
 
-__all__ = ["FIGURES", "Series", "checksum", "draw", "draw_run", "png"]
+__all__ = ["AFTER", "BEFORE", "FIGURES", "Series", "checksum", "draw", "draw_run", "png"]
+
+BEFORE, AFTER, COVERED = (COLOURS[name][0] for name in ("before", "after", "covered"))
+STYLE: Any = {
+    "font.family": "sans-serif",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+}
 
 _ZOOM = slice(50, 101)
 _DPI = 90  # 900 pixels across, as wide as a page of text

@@ -1,0 +1,182 @@
+"""Marks of charts as SVG: lines, points, areas, bars and words between two scales."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from html import escape
+from itertools import pairwise
+
+import numpy as np
+
+from ..common.arrays import FloatArray
+from ..common.texts import picture_text
+from .scales import Scale
+
+__all__ = ["Box", "Mark", "mark_svg", "sample", "text_svg"]
+
+Box = tuple[float, float, float, float]
+"""Left, top, width and height, points."""
+_MOST = 4000  # points of a line: four for each column of the widest picture, more cannot be seen
+
+
+@dataclass
+class Mark:
+    """Something in a panel: its SVG is made when the scales are known."""
+
+    kind: str
+    x: FloatArray
+    y: FloatArray
+    color: str
+    label: str = ""
+    width: float = 1.2
+    dash: str = ""
+    far: FloatArray | None = None
+    title: str = ""
+    texts: tuple[str, ...] = ()
+
+
+def sample(mark: Mark, x: float, y: float) -> str:
+    if mark.kind in ("band", "span", "bars"):
+        kind = "" if mark.kind == "bars" else ' class="area"'
+        return f'<g{kind}><rect class="f-{mark.color}" x="{x:g}" y="{y - 5:g}" width="20" height="10"/></g>'
+    if mark.kind == "dots":
+        return _dotted(f"M{x + 10:g} {y:g}h0", mark.color, max(mark.width, 5.0))
+    if mark.kind == "rings":
+        return _ring(x + 10.0, y, mark.color, mark.width)
+    return f'<path d="M{x:g} {y:g}h20" class="s-{mark.color}" stroke-width="{max(mark.width, 1.2):g}"{_dash(mark)}/>'
+
+
+def _dash(mark: Mark) -> str:
+    return f' stroke-dasharray="{mark.dash}"' if mark.dash else ""
+
+
+def _dotted(path: str, color: str, size: float) -> str:
+    still = ' vector-effect="non-scaling-stroke"'
+    return f'<path class="dots s-{color}" stroke-width="{size:g}" d="{path}"{still}/>'
+
+
+def _ring(x: float, y: float, color: str, size: float) -> str:
+    half = size / 2
+    return (
+        f'<path class="s-{color}" stroke-width="1.2" d="M{x - half:.1f} {y:.1f}a{half:g} {half:g} 0 1 0 {size:g} 0'
+        f'a{half:g} {half:g} 0 1 0 {-size:g} 0"/>'
+    )
+
+
+def text_svg(x: float, y: float, text: str, *, anchor: str = "start", more: str = "") -> str:
+    where = "" if anchor == "start" else f' text-anchor="{anchor}"'
+    return f'<text x="{x:.1f}" y="{y:.1f}"{where}{more}>{escape(text)}</text>'
+
+
+def mark_svg(mark: Mark, box: Box, xs: Scale, ys: Scale) -> str:
+    x0, y0, w, h = box
+    x = x0 + w * xs.place(mark.x)
+    y = y0 + h * (1.0 - ys.place(mark.y))
+    far = None if mark.far is None or mark.kind == "cells" else y0 + h * (1.0 - ys.place(mark.far))
+    stroke = f'class="s-{mark.color}" stroke-width="{mark.width:g}"{_dash(mark)} vector-effect="non-scaling-stroke"'
+    match mark.kind:
+        case "line":
+            title = f"<title>{escape(picture_text(mark.title))}</title>" if mark.title else ""
+            return f'<path {stroke} d="{_path(*_thinned(x, y))}">{title}</path>'
+        case "dots":
+            return _dotted(_points(x, y), mark.color, mark.width)
+        case "rings":
+            return "".join(_ring(a, b, mark.color, mark.width) for a, b in zip(x, y, strict=True))
+        case "band":
+            assert far is not None
+            return f'<g class="area"><path class="f-{mark.color}" style="fill-opacity:1" d="{_area(x, y, far)}"/></g>'
+        case "errors":
+            assert far is not None
+            d = "".join(
+                f"M{a:.1f} {b:.1f}V{c:.1f}M{a - 3:.1f} {b:.1f}h6M{a - 3:.1f} {c:.1f}h6"
+                for a, b, c in zip(x, y, far, strict=True) if math.isfinite(a + b + c)
+            )  # fmt: skip
+            return f'<path class="s-{mark.color}" stroke-width="1" d="{d}"/>'
+        case "vertical":
+            return f'<path {stroke} d="M{x[0]:.1f} {y0:.1f}v{h:.1f}"/>'
+        case "horizontal":
+            return f'<path {stroke} d="M{x0:.1f} {y[0]:.1f}h{w:.1f}"/>'
+        case "span":
+            a, b = float(x.min()), max(float(x.max()), float(x.min()) + 1.0)
+            return (
+                f'<g class="area"><rect class="f-{mark.color}" x="{a:.1f}" y="{y0:.1f}" '
+                f'width="{b - a:.1f}" height="{h:.1f}"/></g>'
+            )
+        case "tops":
+            d = "".join(f"M{a - 3.5:.1f} {y0 + 1:.1f}h7l-3.5 6z" for a in x)
+            return f'<g class="f-accent"><path class="f-accent" style="fill-opacity:1" d="{d}"/></g>'
+        case _:
+            return _boxes(mark, box, xs, ys, (x, y))
+
+
+def _boxes(
+    mark: Mark,
+    box: Box,
+    xs: Scale,
+    ys: Scale,
+    at: tuple[FloatArray, FloatArray],
+) -> str:
+    """Bars, words, and words on squares."""
+    x0, _, w, h = box
+    x, y = at
+    unit_y = abs(float(ys.place(np.array([ys.low + 1.0]))[0])) * h
+    if mark.kind == "bars":
+        zero = x0 + w * float(xs.place(np.zeros(1))[0])
+        high = mark.width * unit_y
+        return "".join(
+            f'<rect class="f-{mark.color}" x="{min(a, zero):.1f}" y="{b - high / 2:.1f}" width="{abs(a - zero):.1f}" '
+            f'height="{high:.1f}"/>'
+            for a, b in zip(x, y, strict=True)
+        )
+    if mark.kind == "words":
+        return "".join(text_svg(a + 5.0, b + 4.0, t) for a, b, t in zip(x, y, mark.texts, strict=True))
+    unit_x = abs(float(xs.place(np.array([xs.low + 1.0]))[0])) * w
+    shade = np.zeros(len(x)) if mark.far is None else mark.far
+    return "".join(
+        f'<rect class="f-{mark.color}" fill-opacity="{s:.2f}" x="{a - unit_x / 2:.1f}" y="{b - unit_y / 2:.1f}" '
+        f'width="{unit_x:.1f}" height="{unit_y:.1f}"/>' + text_svg(a, b + 4.0, t, anchor="middle")
+        for a, b, t, s in zip(x, y, mark.texts, shade, strict=True)
+    )
+
+
+def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A line of many points by the first, least, largest and last of each column of points: it looks the same."""
+    if len(x) < _MOST or not np.all(x[1:] >= x[:-1]) or not np.isfinite(y).all():
+        return x, y
+    column = np.floor(x).astype(np.int64)
+    starts = np.flatnonzero(np.concatenate(([True], column[1:] != column[:-1])))
+    kept = []
+    for a, b in pairwise([*starts.tolist(), len(x)]):
+        part = y[a:b]
+        kept += sorted({a, a + int(part.argmin()), a + int(part.argmax()), b - 1})
+    return x[kept], y[kept]
+
+
+def _path(x: FloatArray, y: FloatArray) -> str:
+    parts, pen = [], "M"
+    for a, b in zip(x.tolist(), y.tolist(), strict=True):
+        if math.isfinite(a) and math.isfinite(b):
+            parts.append(f"{pen}{a:.1f} {b:.1f}")
+            pen = "L"
+        else:
+            pen = "M"
+    return "".join(parts)
+
+
+def _points(x: FloatArray, y: FloatArray) -> str:
+    """Points, each place of half a point once."""
+    known = np.isfinite(x) & np.isfinite(y)
+    places = np.unique(np.round(2.0 * np.column_stack((x[known], y[known]))), axis=0) / 2.0
+    return "".join(f"M{a:g} {b:g}h0" for a, b in places.tolist())
+
+
+def _area(x: FloatArray, low: FloatArray, high: FloatArray) -> str:
+    known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    there = np.flatnonzero(known)
+    parts = []
+    for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+        if len(run):
+            back = run[::-1]
+            parts.append(_path(np.r_[x[run], x[back]], np.r_[low[run], high[back]]) + "z")
+    return "".join(parts)
