@@ -1,6 +1,6 @@
 """What a short run can show of a foreign unit in a lot, and what a lot costs to learn: parts of `python -m bench docs`.
 
-Strangers: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
+Unrelated units: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
 lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
 knows from what distribution unrelated are drawn (the likelihood ratio of that against the lot's; the distribution is

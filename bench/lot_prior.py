@@ -251,7 +251,7 @@ def _one(job: tuple[Case, int]) -> dict[str, Any]:
 
 _WAYS = {
     "lot": "**with the lot**",
-    "auto": "without: the ladder (`build`)",
+    "auto": "without: model selection (`build`)",
     "mrbf": "without: a map (`--method mrbf`)",
     "mean curve + offset": "mean curve + offset",
     "PCA regression": "PCA regression",
@@ -266,7 +266,7 @@ _HEAD = " ".join(
         "map's own, RMS of (map − truth), over the same. Median / worst of the units.\n",
     )
 )
-_STRANGERS = " ".join(
+_UNRELATED = " ".join(
     (
         "60 units teach a lot (family 0.93); 40 others of it and 40 unrelated, gyros whose physical parameters share nothing",
         "with the lot but the scenario, are held against it by one run of 2.5 h, 1 % false alarms. Beside the test that is",
@@ -341,7 +341,7 @@ def _case(case: dict[str, Any]) -> str:
         "| --- | --- | --- |",
         *rows,
         "",
-        f"Better with the lot than with the ladder alone: {case['better']:.0%} of units. The truth lies within 1 / 1.96 "
+        f"Better with the lot than with model selection alone: {case['better']:.0%} of units. The truth lies within 1 / 1.96 "
         f"sigma of the table at {case['coverage'][0]:.1%} / {case['coverage'][1]:.1%} of the exam. Own units refused: "
         f"{case['refused']:.1%}.",
         f"Longer programmes, {units} units, medians of RMS ÷ floor (error): {'; '.join(longer)}.",
@@ -398,7 +398,7 @@ def _unrelated(rows: Sequence[dict[str, Any]]) -> str:
     lines = [
         "### What a run of 2.5 h can show of an unrelated unit (`python -m bench docs --only lot-unrelated`)",
         "",
-        _STRANGERS,
+        _UNRELATED,
         "",
     ]
     lines += [

@@ -164,8 +164,8 @@ def _select(name: str, n: str, n_t: str, n_r: str, widths: str, centers: str) ->
     t, r, y = contestants.cloud(200)
     run((t, r, y, (4, 3), (0.5,), 3))  # imports
     t, r, y = contestants.cloud(int(n))
-    ladder = WIDTHS if int(widths) == len(WIDTHS) else (0.5,)
-    seconds, rms = measured(lambda: run((t, r, y, (int(n_t), int(n_r)), ladder, int(centers))))
+    factors = WIDTHS if int(widths) == len(WIDTHS) else (0.5,)
+    seconds, rms = measured(lambda: run((t, r, y, (int(n_t), int(n_r)), factors, int(centers))))
     return {"seconds": seconds, "rms": rms}
 
 

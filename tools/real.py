@@ -32,7 +32,7 @@ from real_peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
 SPANS = (CYCLE, ISOTHERMAL, "pan-lsm6dsm-cold")  # one run each: its branches, or parts, are left out
 RUNS = ("atoms3-mpu6886-heating",)  # runs are left out whole
-PICTURED = (CYCLE, ISOTHERMAL)  # with the last span left out
+PLOTTED = (CYCLE, ISOTHERMAL)  # with the last span left out
 PICTURE_S = 20.0  # shorter than the 100 s of the table, so that eleven minutes show something
 ALLOWED = 1.02
 
@@ -44,7 +44,7 @@ class Case:
     name: str
     left_out: str
     data: Path
-    pictured: bool
+    plotted: bool
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def _spans_out(source: Path, work: Path) -> Iterator[Case]:
         parts = [*([before] if k else []), held, *([after] if k + 1 < len(spans) else [])]
         _described(folder, source.name, [data] * len(parts), parts)
         label = f"{span.kind} {span.from_s:.0f} ... {span.to_s:.0f} s"
-        yield Case(source.name, label, folder, source.name in PICTURED and k + 1 == len(spans))
+        yield Case(source.name, label, folder, source.name in PLOTTED and k + 1 == len(spans))
 
 
 def _runs_out(source: Path, work: Path) -> Iterator[Case]:
@@ -133,7 +133,7 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         out.mkdir(parents=True, exist_ok=True)
         fitted.model.save(out / "model.json")
         emit(fitted.model, out, numerics=("f32",))
-        trace = out / "trace" if case.pictured else None
+        trace = out / "trace" if case.plotted else None
         result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()
         said = tuple(finding["id"] for finding in result["findings"])
         yield Result(
@@ -260,7 +260,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
         of_case = list(judged(case, work))
         for r in of_case:
             print(f"{_named(r)}: {r.rms:.4g}, best trivial {r.best_trivial:.4g}", flush=True)
-        if case.pictured:
+        if case.plotted:
             (docs / "real" / f"{case.name}.png").write_bytes(png(picture(of_case), dpi=125))
         results += of_case
     if results:

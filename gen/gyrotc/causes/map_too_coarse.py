@@ -20,7 +20,7 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
 
 
 def _features(history: History, values: Values) -> Features:
-    """Hat functions of T, `width_c` apart over −60 ... 100 C: any shape of that fineness is in their span."""
+    """Hat functions of T, one each `width_c` over −60 ... 100 C: any shape of that fineness is in their span."""
     nodes = np.arange(-60.0, 100.0, values["width_c"])
     distance = np.abs(history.temperature_c[:, None] - nodes) / values["width_c"]
     return Features(np.maximum(0.0, 1.0 - distance), np.ones(len(history.time_s), dtype=bool))

@@ -232,7 +232,7 @@ class _Search:
 
 
 def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatArray:
-    """Cubic B-splines over a range with knots about `step_c` apart."""
+    """Cubic B-splines over a range with a knot about every `step_c`."""
     from scipy.interpolate import BSpline  # with what it imports: not for diagnoses without a finer map
 
     inner = np.linspace(span[0] - 1e-6, span[1] + 1e-6, max(3, 1 + round((span[1] - span[0]) / step_c)))

@@ -30,7 +30,7 @@ _DEPENDENT = 1e-8
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
 _GAUSSIANS = ((3, 1.5, 1.5), (4, 1.5, 2.0))
 _TOLERANCE = 0.01  # of the noise floor
-_GRID = 201  # points at which Gaussians are held against powers, a hundredth of a half range apart
+_GRID = 201  # points at which Gaussians are held against powers, at a hundredth of a half range
 
 
 def without_rate(fitted: Network) -> dict[str, Any]:
