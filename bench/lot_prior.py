@@ -335,7 +335,7 @@ def _case(case: dict[str, Any]) -> str:
     lines = [
         f"#### {case['case'][0].upper()}{case['case'][1:]} (family {case['family']:g})",
         "",
-        f"`gyrotc lot`: {case['reported']}. {case['learnt_s']:.1f} s of processor time.",
+        f"`gyrotc lot`: {case['text']}. {case['learnt_s']:.1f} s of processor time.",
         "",
         "| way | RMS ÷ floor | error |",
         "| --- | --- | --- |",

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from gyrotc.causes.base import Scene
 from gyrotc.model import Model
-from gyrotc.paper.summary import keep
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows, joined_runs
 from gyrotc.simulate.campaign import simulate
@@ -32,6 +31,7 @@ from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, 
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
 from numpy.typing import NDArray
+from results import write
 
 from .bounds import gaussian_instructions
 
@@ -374,7 +374,7 @@ def main(arguments: list[str]) -> int:
         page = ROOT / "build" / "results" / "signals.md"
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(text, "utf-8")
-    keep(ROOT / arguments[0], "signals", headlines(found))
+    write(ROOT / arguments[0], "signals", headlines(found), lambda _: text)
     return 0
 
 

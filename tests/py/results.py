@@ -20,7 +20,10 @@ __all__ = ["Results", "machine", "recorded", "table", "write"]
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "promises"))
 
+import ages
 import figures
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Results:
@@ -69,4 +72,6 @@ def write(
     kept = json.loads(json.dumps(quoted(result)))
     keep(docs, name, shortened(kept, section))
     whole.with_suffix(".md").write_text(section(recorded(docs, name)), encoding="utf-8")
+    if name in ages.CODE:
+        keep(docs, "code", {**(recorded(docs, "code") or {}), name: ages.code_of(ROOT, name)})
     figures.write(docs.parent)

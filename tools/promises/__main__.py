@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import ages
 import analysers
 import figures
 import objects
@@ -23,6 +24,7 @@ CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "functions": source.long_functions,
     "origins": origins.unexplained_numbers,
     "figures": figures.stale_figures,
+    "ages": ages.unnamed,
     "sentences": prose.long_sentences,
     "vocabulary": prose.private_words,
     "oldest": oldest.younger_than_supported,

@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import ages
+
 _MARK = re.compile(r"([^\s|(*]+)(<!--= ([^;>]+); ([^;>]+?)(?:; (max|min|sum|median))? -->)")
 _OF_ALL: dict[str, Callable[[list[float]], float]] = {
     "max": max,
@@ -92,7 +94,7 @@ def write(root: Path) -> None:
     summary = json.loads((root / "docs" / "results" / "summary.json").read_text("utf-8"))
     for page in documents(root):
         before = page.read_text("utf-8")
-        after = filled(before, summary)
+        after = ages.filled(root, filled(before, summary))
         if after != before:
             page.write_text(after, "utf-8")
 

@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[3]
 DOCS = ROOT / "docs"
 sys.path[:0] = [str(ROOT), str(ROOT / "tools" / "promises")]
 
+import ages  # noqa: E402
 import figures  # noqa: E402
 from sections import SECTIONS, page  # noqa: E402
 
@@ -56,9 +57,28 @@ def test_a_stale_figure_and_a_name_that_leads_nowhere_are_seen(tmp_path: Path) -
     assert list(figures.stale_figures(tmp_path)) == []
 
 
+def test_the_page_names_campaigns_that_are_older_than_their_code(tmp_path: Path) -> None:
+    """A change of code makes a record old; one of comments, or of documentation, does not."""
+    (tmp_path / "docs" / "results").mkdir(parents=True)
+    code = tmp_path / "gen" / "gyrotc" / "store" / "a.py"
+    code.parent.mkdir(parents=True)
+    code.write_text('"""One."""\nX = 1\n')
+    (tmp_path / "docs" / "results.md").write_text("<!-- older -->\n<!-- /older -->\n")
+    keep(tmp_path / "docs", "kills", {"ended": 1})
+    keep(tmp_path / "docs", "code", {"kills": ages.code_of(tmp_path, "kills")})
+    figures.write(tmp_path)
+    code.write_text('"""Two."""\nX = 1  # why\n')
+    assert list(ages.unnamed(tmp_path)) == [] == ages.older(tmp_path)
+    code.write_text("X = 2\n")
+    assert ages.older(tmp_path) == ["kills"] and len(list(ages.unnamed(tmp_path))) == 1
+    figures.write(tmp_path)
+    assert list(ages.unnamed(tmp_path)) == []
+
+
 def test_every_record_has_a_section_and_the_page_of_the_site_holds_all() -> None:
-    pages = {"paper", "signals"}  # records of pages of their own
-    assert set(json.loads((DOCS / "results" / "summary.json").read_text("utf-8"))) <= set(SECTIONS) | pages
+    pages = {"code", "paper", "signals"}  # not of this page
+    names = set(json.loads((DOCS / "results" / "summary.json").read_text("utf-8")))
+    assert names <= set(SECTIONS) | pages and names - pages <= set(ages.CODE)
     text = page()
     assert all(SECTIONS[n](recorded(DOCS, n)) in text for n in SECTIONS if recorded(DOCS, n) is not None)
 
