@@ -158,8 +158,9 @@ def catalogue(
             f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
             f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
         )
-        tell(f"  model {one.model_hash}")
-        tell(f"  image {one.image_sha256}")
+        tell(f"  model {one.model_hash or 'none: the job failed without one'}")
+        if one.image_sha256:
+            tell(f"  image {one.image_sha256}")
         for file in one.recordings if serial else ():
             tell(f"  {file.role} {file.file} {file.sha256}")
     if exported is not None and answer.found:

@@ -17,7 +17,7 @@ from pathlib import Path
 from .. import __version__
 from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..jobs.release import unit_of
-from ..model import Model, load_model
+from ..model import DataFile, Model, load_model
 from ..results.base import read_optional
 from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry, FleetSummary
 from ..store.files import check_own, open_or_create, write_own
@@ -33,6 +33,7 @@ __all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter", "export"]
 CATALOGUE = "catalogue"
 _FILE = "catalogue.sqlite"
 _EXPECTED = "a catalogue as gyrotc fleet wrote it"
+_VERSION = 2  # of the tables below
 _APPLICATION = 0x47544331  # "GTC1", so that `file` and gyrotc know the file
 _MAGIC, _HEAD_BYTES, _APPLICATION_AT = b"SQLite format 3\0", 100, 68  # sqlite.org/fileformat2.html, 1.3
 _BESIDE = {"-journal": bytes.fromhex("d9d505f920a163d7"), "-wal": bytes.fromhex("377f06")}  # 3 and 4.1 there
@@ -50,14 +51,14 @@ CREATE TABLE calibration (
   tag           TEXT NOT NULL DEFAULT '', -- withdrawn: may not be carried
   status        TEXT NOT NULL,            -- done, failed
   verdict       TEXT,                     -- PASS, CONDITIONAL PASS, FAIL; null without limits
-  model_hash    TEXT NOT NULL,
-  image_sha256  TEXT NOT NULL,            -- payload
-  model_sha256  TEXT NOT NULL,            -- payload
+  model_hash    TEXT,                     -- null where a failed job made no model: so are both payloads
+  image_sha256  TEXT,                     -- payload
+  model_sha256  TEXT,                     -- payload
   input_sha256  TEXT NOT NULL,            -- over recordings, options, limits and program
   after_rms_dph REAL,
   expanded_dph  REAL,                     -- U of the compensated bias
   folder        TEXT NOT NULL,
-  UNIQUE (serial, axis, input_sha256)
+  UNIQUE (serial, axis, input_sha256, model_hash)
 );
 CREATE TABLE recording (
   calibration INTEGER NOT NULL REFERENCES calibration (id),
@@ -84,6 +85,7 @@ ORDER BY axis
 def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     """Adds what a fleet has made and the catalogue does not have yet; returns how many calibrations that are.
 
+    A calibration that failed is one, with a model or without: no earlier table of the gyro is valid after it.
     Gyros under one serial are not distinguished by it, so none of them is entered; nor is one that a finding in
     `fleet.json` bars. Of one that is released nevertheless the reason goes into its tag.
 
@@ -99,19 +101,26 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     summary = read_optional(out / "fleet.json", FleetSummary)
     barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
     made = [
-        e
-        for e in entries
-        if e.key and e.serial and e.model_hash and counts[e.serial, e.axis] == 1 and e.name not in barred
+        e for e in entries if e.key and e.serial and counts[e.serial, e.axis] == 1 and e.name not in barred
     ]
     place = out / CATALOGUE
     if not made and not place.exists():
         return 0
     place.mkdir(exist_ok=True)
     with _opened(place / _FILE) as base:
-        known = set(base.execute("SELECT serial, axis, input_sha256 FROM calibration"))
-        new = [e for e in made if (e.serial, e.axis or "", e.key) not in known]
+        known: dict[tuple[str, str, str], set[str | None]] = {}
+        for *inputs, model_hash in base.execute(
+            "SELECT serial, axis, input_sha256, model_hash FROM calibration"
+        ):
+            known.setdefault(tuple(inputs), set()).add(model_hash)
+        new = [e for e in made if _is_new(e, known.get((e.serial or "", e.axis or "", e.key or ""), set()))]
         with base:  # one transaction
             return sum(_add(base, out, entry, _tag_of(entry, tag)) for entry in new)
+
+
+def _is_new(entry: FleetEntry, known: set[str | None]) -> bool:
+    """Whether what came of it is not in the catalogue; `known`: models that came of the same inputs, None for none."""
+    return not known or (entry.model_hash is not None and known == {None})
 
 
 def _tag_of(entry: FleetEntry, tag: str) -> str:
@@ -127,7 +136,7 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
             if base.execute("PRAGMA user_version").fetchone()[0] == 0:
                 with base:
                     base.executescript(
-                        f"BEGIN; PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = 1; {SCHEMA}"
+                        f"BEGIN; PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {_VERSION}; {SCHEMA}"
                     )
             _check_schema(base, path)
             yield base
@@ -152,7 +161,13 @@ def _check_schema(base: sqlite3.Connection, path: Path) -> None:
     with closing(sqlite3.connect(":memory:")) as empty:
         empty.executescript(SCHEMA)
         wanted = empty.execute(text).fetchall()
-    application = base.execute("PRAGMA application_id").fetchone()[0]
+    application, version = (
+        base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version")
+    )
+    if application == _APPLICATION and 0 < version < _VERSION:
+        raise InputError(
+            str(path), f"is of an earlier gyrotc (version {version})", "a new --out of gyrotc fleet"
+        )
     if application != _APPLICATION or base.execute(text).fetchall() != wanted:
         raise InputError(str(path), "has other tables than a catalogue", _EXPECTED)
 
@@ -183,31 +198,29 @@ def _check_file(path: Path) -> None:
 
 def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> int:
     """Enters one result: payloads first, so that no row names what is not there; 0 where its folder has gone."""
-    folder = out / entry.name
-    if not (
-        folder / ENTRY
-    ).is_file():  # a name with bytes that are no character: it is reported, but lies elsewhere
-        return 0
-    unit = unit_of(folder)
-    model, budget = unit.model, unit.budget
-    if (unit.decision, model.hash) != (entry.verdict, entry.model_hash):
-        raise InputError(
-            str(folder / ENTRY), "is not what the other results give", "a result as fleet wrote it"
-        )
-    image, text = (
-        kept_by_hash(out / PAYLOADS, path).name for path in (_image(folder, model), folder / "model.json")
-    )
-    row = base.execute(
-        "INSERT INTO calibration (serial, axis, valid_from, valid_until, tag, status, verdict, model_hash,"
-        " image_sha256, model_sha256, input_sha256, after_rms_dph, expanded_dph, folder)"
-        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        (
-            entry.serial, entry.axis or "", entry.date[:10] if entry.date else None,
-            budget.valid_until if budget else None, tag, entry.status, entry.verdict, model.hash, image, text,
-            entry.key, entry.after_rms_dph, budget.expanded_dph if budget else None, entry.name,
-        ),
-    )  # fmt: skip
-    files = {(row.lastrowid, d.file, d.role, d.sha256) for d in model.data}
+    row = {
+        "serial": entry.serial, "axis": entry.axis or "", "valid_from": entry.date[:10] if entry.date else None,
+        "valid_until": None, "tag": tag, "status": entry.status, "verdict": entry.verdict,
+        "model_hash": entry.model_hash, "image_sha256": None, "model_sha256": None, "input_sha256": entry.key,
+        "after_rms_dph": entry.after_rms_dph, "expanded_dph": None, "folder": entry.name,
+    }  # fmt: skip
+    data: Sequence[DataFile] = ()
+    if entry.model_hash is not None:
+        folder = out / entry.name
+        if not (folder / ENTRY).is_file():  # a name with bytes that are no character lies elsewhere
+            return 0
+        unit = unit_of(folder)
+        if (unit.decision, unit.model.hash) != (entry.verdict, entry.model_hash):
+            found = "is not what the other results give"
+            raise InputError(str(folder / ENTRY), found, "a result as fleet wrote it")
+        data = unit.model.data
+        row["image_sha256"] = kept_by_hash(out / PAYLOADS, _image(folder, unit.model)).name
+        row["model_sha256"] = kept_by_hash(out / PAYLOADS, folder / "model.json").name
+        if unit.budget:
+            row |= {"valid_until": unit.budget.valid_until, "expanded_dph": unit.budget.expanded_dph}
+    places = ", ".join(f":{name}" for name in row)
+    number = base.execute(f"INSERT INTO calibration ({', '.join(row)}) VALUES ({places})", row).lastrowid
+    files = {(number, d.file, d.role, d.sha256) for d in data}
     base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", sorted(files))
     return 1
 
@@ -256,7 +269,7 @@ def _check_payloads(place: Path, one: Catalogued) -> None:
     Raises:
         InputError: It is not.
     """
-    image, text = (place / known[:2] / known for known in (one.image_sha256, one.model_sha256))
+    image, text = (place / known[:2] / known for known in (one.image_sha256 or "", one.model_sha256 or ""))
     for path in (image, text):
         if not path.is_file() or sha256(path) != path.name:
             raise InputError(str(path), "is missing or not what its name says", _EXPECTED)

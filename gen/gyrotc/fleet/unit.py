@@ -6,10 +6,11 @@ import itertools
 import os
 import socket
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from .. import __version__
 from ..assess.limits import coverage_factor
@@ -17,7 +18,7 @@ from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.build import Built, build_into
-from ..model import Model
+from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
 from ..results.evaluation import Evaluation
@@ -159,12 +160,40 @@ def do_unit(task: Task) -> FleetEntry:
             found = f"is {here}, and {there} where the fleet was started"
             raise InputError(f"the gyrotc of worker {_worker()}", found, "the same gyrotc everywhere")
         return _built(task)
+    except _NotCalibrated as error:
+        return _identified(failed(task, str(error)), task)
     except GyrotcError as error:
         return failed(task, str(error))
     except OSError as error:
         return failed(task, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:  # a fault of the program itself must not stop the other serials either
         return failed(task, f"{type(error).__name__}: {error}")
+
+
+class _NotCalibrated(GyrotcError):
+    """The recordings give no table: the reason lies in them, not in what ran where."""
+
+
+@contextmanager
+def _calibrating() -> Iterator[None]:
+    try:
+        yield
+    except GyrotcError as error:
+        raise _NotCalibrated(str(error)) from error
+
+
+def _identified(entry: FleetEntry, task: Task) -> FleetEntry:
+    """With serial, day and key, as far as the description of the data set can be read: it failed, and that is known."""
+    description = parse_description(task.unit.dataset / FILE, Problems(collect=True))
+    if description is None or not task.key:
+        return entry
+    days = [one.started.date().isoformat() for one in description.run if one.started is not None]
+    known = {
+        "serial": description.serial,
+        "date": _day_of(description.meta, days),
+        "key": task.key,
+    }
+    return entry.model_copy(update=known)
 
 
 def _worker() -> str:
@@ -199,21 +228,23 @@ def _built(task: Task) -> FleetEntry:
         raise InputError(
             f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere"
         )
-    dataset = load(task.unit.dataset, axis=task.unit.axis)
+    with _calibrating():
+        dataset = load(task.unit.dataset, axis=task.unit.axis)
     moved_to = move_away(task.out)
     runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
         fleet = task.fleet
-        built = build_into(
-            stage.folder,
-            dataset,
-            fleet.options,
-            numerics=fleet.numerics,
-            limits=fleet.limits,
-            compiled=task.full,
-            watch=lambda run, averages: runs.append((run.file, averages)),
-        )
+        with _calibrating():
+            built = build_into(
+                stage.folder,
+                dataset,
+                fleet.options,
+                numerics=fleet.numerics,
+                limits=fleet.limits,
+                compiled=task.full,
+                watch=lambda run, averages: runs.append((run.file, averages)),
+            )
         if task.found() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
         entry = _entry_of(task, key, dataset, built, runs)
@@ -254,7 +285,10 @@ def _entry_of(
         limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
         limits_held=len(held.limits) if held and held.limits else None,
         expanded_uncertainty_dph=_expanded(built.evaluation),
-        date=_date_of(built.model, dataset),
+        date=_day_of(
+            built.model.meta,
+            [run.started.date().isoformat() for run in dataset.runs if run.started is not None],
+        ),
         rows_left_out=built.evaluation.rows_left_out,
         facts=facts_of(runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
@@ -269,7 +303,7 @@ def _expanded(evaluation: Evaluation) -> float | None:
     return coverage_factor(known.freedom) * known.standard if known else None
 
 
-def _date_of(model: Model, dataset: Dataset) -> str | None:
-    stated = model.meta.get("calibrated_on")
-    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
+def _day_of(meta: Mapping[str, Any], days: Sequence[str]) -> str | None:
+    """Day of a calibration: as stated, else that of the last run."""
+    stated = meta.get("calibrated_on")
     return str(stated) if stated is not None else max(days, default=None)

@@ -49,9 +49,13 @@ class Catalogued(Part):
     tag: str = Field(description="`--tag` of the fleet; `withdrawn`: may not be carried")
     status: Literal["done", "failed"] = Field(description="as in the fleet")
     verdict: Verdict | None = Field(description="of its limits; null without limits")
-    model_hash: Sha256 = Field(description="of its model")
-    image_sha256: Sha256 = Field(description="of its image for a target, a payload of the catalogue")
-    model_sha256: Sha256 = Field(description="of its `model.json`, a payload of the catalogue")
+    model_hash: Sha256 | None = Field(description="of its model; null where a failed job made none")
+    image_sha256: Sha256 | None = Field(
+        description="of its image for a target, a payload of the catalogue; null without a model"
+    )
+    model_sha256: Sha256 | None = Field(
+        description="of its `model.json`, a payload of the catalogue; null without a model"
+    )
     after_rms_dph: Figure = Field(description="RMS after compensation, deg/h")
     expanded_dph: Figure = Field(description="U of the compensated bias, deg/h")
     folder: str = Field(description="its folder in the fleet when it was entered")

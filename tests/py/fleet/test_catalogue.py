@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.catalogue import SCHEMA, catalogued, export
+from gyrotc.fleet.catalogue import SCHEMA, catalogued, enter, export
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.results.base import read_result
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.training import Manifest
 from gyrotc.results.verification import Verification
 from gyrotc.store.files import json_text, write_atomically
@@ -57,6 +58,49 @@ def test_the_last_calibration_governs_and_one_that_failed_lets_none_fly(fleet: P
     assert catalogued(fleet, "RLG-1", "2026-09-01").found == ()  # failed in September
     assert catalogued(fleet, "RLG-2", "2026-08-31").found == ()
     assert catalogued(fleet, None, None).calibrations == 2
+
+
+def test_a_failed_job_without_a_model_is_entered_once_and_lets_none_fly(fleet: Path, tmp_path: Path) -> None:
+    place = shutil.copytree(fleet, tmp_path / "out")
+    failed = FleetEntry(
+        name="RLG-1", axis=None, status="failed", serial="RLG-1", date="2026-07-01", key="a" * 64, reason="x"
+    )
+    assert enter(place, [failed]) == 1 and enter(place, [failed]) == 0
+    assert len(catalogued(place, "RLG-1", "2026-06-30").found) == 1
+    assert catalogued(place, "RLG-1", "2026-07-01").found == ()
+
+
+@pytest.mark.slow
+def test_a_newer_calibration_that_gives_no_model_lets_the_earlier_one_fly_no_more(tmp_path: Path) -> None:
+    """Before: recordings that were refused left no row, and the table of March was valid for ever."""
+
+    def run(name: str) -> int:
+        run_fleet(load_manifest(tmp_path / "fleet.toml"), tmp_path / "out", jobs=1, tag=name)
+        return catalogued(tmp_path / "out", None, None).calibrations
+
+    gyro(tmp_path, DAYS[0], seed=1, rms_dph=1e3)
+    assert run("first") == 1
+    gyro(tmp_path, DAYS[1], seed=2, rms_dph=1e3)
+    rows = (tmp_path / "d" / "RLG-1" / "run-01.csv").read_text()
+    (tmp_path / "d" / "RLG-1" / "run-01.csv").write_text(rows + "abc,def,ghi\n")
+    assert run("broken") == 2 and run("once more") == 2
+    newest = catalogued(tmp_path / "out", None, None).found[0]
+    assert (newest.status, newest.valid_from, newest.model_hash) == ("failed", DAYS[1], None)
+    assert len(catalogued(tmp_path / "out", "RLG-1", "2026-08-31").found) == 1
+    assert catalogued(tmp_path / "out", "RLG-1", DAYS[1]).found == ()
+    (tmp_path / "d" / "RLG-1" / "run-01.csv").write_text(rows)
+    assert run("mended") == 3
+    [one] = catalogued(tmp_path / "out", "RLG-1", DAYS[1]).found
+    assert (one.valid_from, one.tag) == (DAYS[1], "mended")
+
+
+def test_a_catalogue_of_an_earlier_version_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.sqlite"
+    base = sqlite3.connect(path)
+    base.executescript(f"PRAGMA application_id = {0x47544331}; PRAGMA user_version = 1; {SCHEMA};")
+    base.close()
+    with pytest.raises(InputError, match="earlier gyrotc"):
+        catalogued(path, "RLG-1", "2026-01-01")
 
 
 def test_payloads_stay_when_the_result_was_replaced(fleet: Path) -> None:
@@ -136,7 +180,7 @@ def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:
 def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, tmp_path: Path) -> None:
     path = tmp_path / "a.sqlite"
     base = sqlite3.connect(path)
-    base.executescript(f"PRAGMA application_id = {0x47544331}; PRAGMA user_version = 1; {SCHEMA}; {more};")
+    base.executescript(f"PRAGMA application_id = {0x47544331}; PRAGMA user_version = 2; {SCHEMA}; {more};")
     base.close()
     with pytest.raises(InputError, match="has other tables than a catalogue"):
         catalogued(path, "RLG-1", "2026-01-01")
