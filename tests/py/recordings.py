@@ -205,10 +205,6 @@ REFUSED: dict[str, Refused] = {
     "rate and axes": Refused(
         with_columns(lambda c: c | {"rate_x_dph": np.ones(ROWS)}), ("both rate_dph and rate_x_dph",)
     ),
-    "axes without --axis": Refused(
-        with_columns(lambda c: {("rate_x_dph" if k == "rate_dph" else k): v for k, v in c.items()}),
-        ("a.csv", "rates of the axes x", "--axis x|all"),
-    ),
     "pulses without weight": Refused(
         with_columns(lambda c: columns_of_pulses()),
         ("a.csv, column pulses", "no weight", "pulse_weight_arcsec"),

@@ -199,7 +199,7 @@ AxisOption = Annotated[
     str | None,
     typer.Option(
         "--axis",
-        help="x, y or z of a three-axis recording, or all.",
+        help="x, y or z of a three-axis recording; build, check and diagnose do all without it.",
         autocompletion=completing((*(axis.value for axis in GyroAxis), "all")),
     ),
 ]

@@ -318,7 +318,7 @@ def diagnose(
     """
     from ..jobs.diagnosis import diagnosed
     from ..model import load_model
-    from ..recordings.load import axes_of, load
+    from ..recordings.load import asked_axes, load
     from ..recordings.records import Dataset
     from ..store.folder import result_folder
     from ..train.fitting import FitOptions
@@ -328,9 +328,8 @@ def diagnose(
     known = load_model(model) if model else None
     fitting = FitOptions(**options, prior=lot_in(lot))
     subtracted = applied_in(applied)
-    axes = axes_of(dataset) if axis == "all" else (axis,)
-    if not axes:
-        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    axes = asked_axes(dataset, axis or (known.axis if known else None))
+    several = len(axes) > 1 or axis == "all"
     results: dict[str, Diagnosed] = {}
 
     def one(name: str | None, into: Path | None) -> None:
@@ -346,7 +345,7 @@ def diagnose(
                 fresh=fresh,
             ).result
 
-    if axis != "all" or out is None:
+    if not several or out is None:
         for name in axes:
             one(name, out)
     else:
@@ -354,9 +353,9 @@ def diagnose(
             for name in axes:
                 one(name, stage.folder / str(name))
     contents = {name: result.content() for name, result in results.items()}
-    write_json(json_file, contents if axis == "all" else contents[axis or ""])
+    write_json(json_file, contents if several else next(iter(contents.values())))
     for name, result in results.items():
         for line in diagnosis_lines(result):
             tell(line)
         if out is not None:
-            tell(f"report: {(out / name if axis == 'all' else out) / 'report.html'}")
+            tell(f"report: {(out / name if several else out) / 'report.html'}")

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
-from ..recordings.load import axes_of
+from ..recordings.load import asked_axes
 from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.options import options_in
@@ -130,9 +130,8 @@ def load_manifest(path: Path) -> Fleet:
     """
     if path.is_dir():
         folders = [folder for folder in _listed(path) if _has_recordings(folder)]
-        return _distinct(
-            path, Fleet(tuple(Unit(folder, None) for folder in folders), FitOptions(), None, None)
-        )
+        every = tuple(unit for folder in folders for unit in _units(folder, None))
+        return _distinct(path, Fleet(every, FitOptions(), None, None))
     manifest = _parsed(path)
     named = (
         *((folder, manifest.axis) for folder in _matching(path, manifest.datasets)),
@@ -147,12 +146,10 @@ def load_manifest(path: Path) -> Fleet:
 
 def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
     """A unit for each axis that is asked for; where the recordings cannot tell their axes, the job will say why."""
-    axes: tuple[str | None, ...] = (axis,)
-    if axis == "all":
-        try:
-            axes = axes_of(folder) or (None,)
-        except (GyrotcError, OSError):
-            axes = (None,)
+    try:
+        axes = asked_axes(folder, axis)
+    except (GyrotcError, OSError):
+        axes = (None,) if axis == "all" else (axis,)
     yield from (Unit(folder, name) for name in axes)
 
 

@@ -21,7 +21,7 @@ from ..common.errors import InputError
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
-from ..recordings.load import axes_of, load
+from ..recordings.load import asked_axes, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
@@ -118,8 +118,8 @@ def build(
     `out` is replaced as a whole at the end; until then an older one stays as it was.
 
     Args:
-        axis: Axis of three-axis recordings; "all" makes a result for each in `out/x`, `out/y`, `out/z`, and in
-            `out/c` the runtime once with all tables.
+        axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
+            the runtime once with all tables; "all" the same, but refuses recordings of one rate.
         targets: Names of the targets that the code is verified on; none: as `verify`.
         applied: Model that was subtracted while recording.
         trust_units: Values that contradict their units are taken nevertheless.
@@ -144,23 +144,22 @@ def build(
     refuse_together(options, prior, ageing_dph)
     held = load_limits(limits) if limits else None
     order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph, targets=targets)
-    axes = axes_of(source) if axis == "all" else ()
-    if axis == "all" and not axes:
-        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    axes = asked_axes(source, axis)
     with result_folder(out, "build", inputs=[source]) as stage:
-        if not axes:
-            dataset = load(source, axis=axis, applied=known, trust_units=trust_units)
+        if len(axes) == 1 and axis != "all":
+            dataset = load(source, axis=axes[0], applied=known, trust_units=trust_units)
             stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
             return [_build_axis(dataset, stage.folder, options, order, say)]
         built = []
-        for k, name in enumerate(axes, 1):
+        names = [str(name) for name in axes]
+        for k, name in enumerate(names, 1):
             dataset = load(source, axis=name, applied=known, trust_units=trust_units)
             stage.of(dataset.serial, any_serial=any_serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
                 say_axis = _of_axis(f"{name} ({k} of {len(axes)})", say)
                 built.append(_build_axis(dataset, part.folder, options, order, say_axis))
-        join_axes(stage.folder, axes)
+        join_axes(stage.folder, names)
         return built
 
 

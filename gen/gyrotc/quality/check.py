@@ -16,7 +16,7 @@ from .. import __version__
 from ..common.errors import InputError
 from ..model import Model
 from ..recordings.description import Problems
-from ..recordings.load import axes_of, survey
+from ..recordings.load import asked_axes, survey
 from ..recordings.records import Applied, Dataset, Mark
 from ..results.recordings import Checked, CheckedRun, MarkedRows, Problem, Suspected
 from .facts import RunFacts
@@ -115,7 +115,7 @@ def check(
 
     Args:
         folder: The data set.
-        axis: Axis of three-axis recordings, or "all".
+        axis: Axis of three-axis recordings; None or "all": every one.
         envelope: Temperatures and rates that the training runs should cover.
         applied: Model that was subtracted while recording, if the data set says that there was one.
         trust_units: Values that contradict their units are a warning, not a problem.
@@ -168,12 +168,10 @@ def _of_axes(doubt: Doubt, seen: Sequence[str | None], axes: int) -> Doubt:
 
 def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
     """The axes to look at; where they cannot be read the problem comes up again with its place."""
-    if axis != "all":
-        return (axis,)
     try:
-        return axes_of(folder) or ("all",)
+        return asked_axes(folder, axis)
     except InputError:
-        return (None,)
+        return (axis,)
 
 
 def _run_line(axis: str | None, f: RunFacts) -> str:

@@ -25,6 +25,7 @@ from .units import NATIVE
 from .values import arrange
 
 __all__ = [
+    "asked_axes",
     "axes_of",
     "check_channel_units",
     "check_description",
@@ -238,6 +239,23 @@ def axes_of(folder: Path) -> tuple[str, ...]:
     layout = arrange(name, open_file(name, Path(folder) / name).names, description.columns, problems)
     assert layout is not None
     return tuple(layout.axes)
+
+
+def asked_axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
+    """Axes that a job does: the one that is named, else all that the recordings have; (None,): they have one rate.
+
+    Args:
+        axis: x, y or z; "all": of recordings that have axes; None: what there is.
+
+    Raises:
+        InputError: The description or the header of the first recording is wrong, or there are no axes for "all".
+    """
+    if axis not in (None, "all"):
+        return (axis,)
+    axes = axes_of(folder)
+    if axis == "all" and not axes:
+        raise InputError("--axis", "'all', but the recordings have one rate", "no --axis")
+    return axes or (None,)
 
 
 def survey(

@@ -95,9 +95,12 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     manifest = tmp_path / "fleet.toml"
     manifest.write_text(
         'schema = 1\ndatasets = ["a/*"]\nlimits = "product.toml"\nnumeric = ["f32"]\n'
-        '[options]\nblock_s = 20.0\n[[unit]]\ndataset = "IMU"\naxis = "all"\n'
+        '[options]\nblock_s = 20.0\n[[unit]]\ndataset = "IMU"\n'
     )
     fleet = load_manifest(manifest)
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "IMU").symlink_to(tmp_path / "IMU")
+    assert [unit.name for unit in load_manifest(tmp_path / "b").units] == ["IMU-x", "IMU-y"]
     assert [unit.name for unit in fleet.units] == ["RLG-1", "IMU-x", "IMU-y"]
     entries = run_fleet(fleet, tmp_path / "out", jobs=2)
     assert [entry.status for entry in entries] == ["failed"] * 3

@@ -128,15 +128,15 @@ def test_meta_and_warnings_travel_into_the_model(tmp_path: Path, gyrotc: Command
     assert meta["chamber"] == "K 3"
 
 
-def test_axes_are_named_where_none_is_chosen(tmp_path: Path, gyrotc: Command) -> None:
+def test_check_takes_every_axis_and_fit_names_them(tmp_path: Path, gyrotc: Command) -> None:
     base = columns()
     table = {name: base[name] for name in ("time_s", "temperature_c")}
     write_csv(tmp_path / "IMU" / "a.csv", table | {f"rate_{a}_dph": base["rate_dph"] for a in "xyz"})
-    for command in (["check"], ["fit", "--out", tmp_path / "out"]):
-        done = gyrotc(command[0], tmp_path / "IMU", *command[1:])
-        assert done.returncode == 2
-        assert "--axis x|y|z|all" in done.stdout + done.stderr
-    assert gyrotc("check", tmp_path / "IMU", "--axis", "all").returncode == 0
+    refused = gyrotc("fit", tmp_path / "IMU", "--out", tmp_path / "out")
+    assert refused.returncode == 2 and "--axis x|y|z|all" in refused.stderr
+    every = gyrotc("check", tmp_path / "IMU")
+    assert every.returncode == 0 and [f", axis {a} " in every.stdout for a in "xyz"] == [True] * 3
+    assert gyrotc("check", tmp_path / "IMU", "--axis", "all").stdout == every.stdout
     assert gyrotc("check", tmp_path / "IMU", "--axis", "y").returncode == 0
 
 
