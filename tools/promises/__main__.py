@@ -26,6 +26,7 @@ CHECKS: dict[str, Callable[[Path], Iterator[str]]] = {
     "figures": figures.stale_figures,
     "ages": ages.unnamed,
     "sentences": prose.long_sentences,
+    "files": prose.missing_files,
     "vocabulary": prose.private_words,
     "oldest": oldest.younger_than_supported,
     "warnings": objects.warnings,

@@ -1,8 +1,8 @@
 """Figures in documents come from docs/results/summary.json by name: `1.0040<!--= bench/accuracy/...; .4f -->`.
 
 The comment behind a figure names its place in the summary, the format of Python, and, where the place has a `*`, what
-to take of all values (`max`, `min`, `sum`, `median`). A step `key=value` of a place selects the entry of a list that
-has it. `python tools/promises/figures.py` writes the figures; `tools/promises figures` says which differ.
+to take of all values (`max`, `min`, `sum`, `median`, `mean`). A step `key=value` of a place selects the entry of a
+list that has it. `python tools/promises/figures.py` writes the figures; `tools/promises figures` says which differ.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from typing import Any
 
 import ages
 
-_MARK = re.compile(r"([^\s|(*]+)(<!--= ([^;>]+); ([^;>]+?)(?:; (max|min|sum|median))? -->)")
+_MARK = re.compile(r"([^\s|(*]+)(<!--= ([^;>]+); ([^;>]+?)(?:; (max|min|sum|median|mean))? -->)")
 _OF_ALL: dict[str, Callable[[list[float]], float]] = {
     "max": max,
     "min": min,
     "sum": sum,
     "median": statistics.median,
+    "mean": statistics.fmean,
 }
 
 

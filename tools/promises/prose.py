@@ -139,6 +139,23 @@ def long_sentences(root: Path) -> Iterator[str]:
         yield f"the median sentence of all pages has {statistics.median(every):g} words, more than {MEDIAN}"
 
 
+_SOURCE = re.compile(r"`([\w./-]+\.(?:py|cpp|hpp|inl|sh))`")
+_FOLDERS = ("bench", "examples", "gen", "include", "libc", "packages", "tests", "tools")
+_EXAMPLES = {"CONTRIBUTING.md"}  # names files that its reader writes
+
+
+def missing_files(root: Path) -> Iterator[str]:
+    """Source files that a page names and the tree does not have."""
+    have = {
+        path.relative_to(root).as_posix() for path in root.rglob("*") if _SOURCE.fullmatch(f"`{path.name}`")
+    }
+    for page in pages(root):
+        where = page.relative_to(root).as_posix()
+        for name in _SOURCE.findall(page.read_text("utf-8")) if where not in _EXAMPLES else ():
+            if not any(f"/{path}".endswith(f"/{name}") for path in have):
+                yield f"{where}: there is no {name}"
+
+
 def listed(root: Path) -> dict[str, Any]:
     """The list of words."""
     return tomllib.loads((root / "tools" / "promises" / "words.toml").read_text("utf-8"))

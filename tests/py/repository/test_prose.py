@@ -42,6 +42,17 @@ def test_lines_end_at_sentences(page: str, lines: list[str]) -> None:
     assert prose.broken(prose.broken(page)) == prose.broken(page)
 
 
+def test_a_page_that_names_a_file_that_is_gone_is_seen(tmp_path: Path) -> None:
+    assert list(prose.missing_files(ROOT)) == []
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "gen").mkdir()
+    (tmp_path / "gen" / "here.py").write_text("")
+    (tmp_path / "docs" / "a.md").write_text("See `gen/here.py`, `here.py` and `gone.py`.\n")
+    for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md"):
+        (tmp_path / name).write_text("")
+    assert list(prose.missing_files(tmp_path)) == ["docs/a.md: there is no gone.py"]
+
+
 def test_long_sentences_and_private_words_are_seen(tmp_path: Path) -> None:
     (tmp_path / "docs").mkdir()
     (tmp_path / "gen" / "gyrotc").mkdir(parents=True)
