@@ -1,16 +1,19 @@
-"""Units of columns: as loggers and data sheets write them, understood by `pint`, as a factor and an offset.
+"""Units of columns: as loggers and data sheets write them, as a factor and an offset.
 
-`pint` is loaded only when a unit has to be understood: a data set in gyrotc's own units does without.
+A unit is a product of powers of the names that stand here. Its size is a fraction of whole numbers times a power of pi,
+so a factor is rounded once. An angle has a dimension of its own: Hz is no rate of rotation.
 """
 
 from __future__ import annotations
 
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache
-from typing import Any, Literal
+from typing import Literal
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
@@ -32,33 +35,58 @@ Kind = Literal["time", "temperature", "rate"]
 NATIVE: Mapping[str, str] = {"time": "s", "temperature": "degC", "rate": "deg/h"}
 """gyrotc's own units."""
 
-_SPELT = {
+_BASE = ("s", "deg", "K", "m", "kg", "A", "pi")
+
+# Sizes by SI (BIPM, 9th edition, tables 2, 4 and 8); g_0 as CGPM 1901, pound and inch as agreed in 1959.
+_SI = {
+    "second sec": "s",
+    "Hz hertz": "1/s",
+    "rad radian": "180 deg/pi",
+    "metre meter": "m",
+    "kelvin": "K",
+    "amp ampere": "A",
+    "V volt": "kg m^2/s^3/A",
+    "W watt": "kg m^2/s^3",
+    "Pa pascal": "kg/m/s^2",
+    "bar": "100000 Pa",
+    "T tesla": "kg/s^2/A",
+    "gauss": "T/10000",
+    "ohm Ω": "V/A",
+    "N newton": "kg m/s^2",
+    "gram": "kg/1000",
+    "g g_0": "9.80665 m/s^2",  # what loggers call g is an acceleration
     "dps": "deg/s",
-    "mdps": "deg/s/1000",
-    "dph": "deg/hour",
-    "c": "degC",
-    "f": "degF",
-    "k": "kelvin",
-    "℃": "degC",
-    "℉": "degF",
-    "deg": "deg",
-    "fahrenheit": "degF",
-    "deg c": "degC",
-    "deg f": "degF",
-    "degc": "degC",
-    "degf": "degF",
-    "deg_c": "degC",
-    "deg_f": "degF",
-    "deg k": "kelvin",
-    "hrs": "hour",
-    "mins": "min",
-    "secs": "s",
-    "msecs": "ms",
-    "seconds since boot": "s",
-    "g": "g_0",
-    "gauss": "gauss",
+    "degree": "deg",
+    "arcsec arcsecond": "deg/3600",
 }
-"""What loggers write and `pint` does not know, or takes for coulomb, farad and gram; in lower case."""
+_OTHER = {
+    "°": "deg",
+    "arcmin arcminute": "deg/60",
+    "turn rev revolution": "360 deg",
+    "min minute": "60 s",
+    "h hr hour": "3600 s",
+    "d day": "86400 s",
+    "dph": "deg/h",
+    "rpm": "turn/min",
+    "C c °C ℃ degC celsius": "K",
+    "F f °F ℉ degF fahrenheit": "5 K/9",
+    "k degK": "K",
+    "% percent count LSB": "1",
+    "psi": "0.45359237 kg g_0/(0.0254 m)^2",
+}
+_ZERO = {"C": Fraction("273.15"), "F": Fraction("459.67") * 5 / 9}
+"""Kelvins at zero, by the first name."""
+
+_PREFIXES = {
+    "nano": -9, "micro": -6, "milli": -3, "centi": -2, "deci": -1, "hecto": 2, "kilo": 3, "mega": 6,
+    "n": -9, "u": -6, "µ": -6, "m": -3, "c": -2, "d": -1, "h": 2, "k": 3, "M": 6, "G": 9,
+}  # fmt: skip
+_PREFIXED = {"s", "deg", "m", "K", "A"} | {name for names in _SI for name in names.split()}
+_DEFINED = {
+    name: (names.split()[0], definition)
+    for names, definition in (_SI | _OTHER).items()
+    for name in names.split()
+}
 
 _ENDINGS = {
     "c": "degC",
@@ -83,17 +111,38 @@ _ENDINGS = {
 }
 """Endings of names of channels that say their unit, as in `case_temperature_c`."""
 
-_ALLOWED = re.compile(r"[\w\s.°*/^()+\-µ%]{1,60}")
-_LARGE_POWER = re.compile(r"(\*\*|\^)(?!\s*[-+]?[1-3](?!\s*(\d|\*\*|\^|\.)))")  # pint would compute any
-_ROUNDING = 1e-13  # what pint's products of binary numbers may be off, relative
-# Factors of units are fractions of small numbers (1/3600, 1/60, 5/9), not of larger ones
-_DENOMINATOR = 1000
-_SIZE = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
-_SCALED = re.compile(rf"(?:(?P<by>{_SIZE})\s*\*?\s*)?(?P<unit>[^\W\d][\w°]*)(?:\s*/\s*(?P<over>{_SIZE}))?")
+_MOST = 60  # characters: a data sheet's longest are a third of it
+_NAME = r"°?[^\W\d_]+(?:_(?:0|[^\W\d_]+))?|[°%℃℉]"
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<number>\d+(?:\.\d*)?(?:[eE][+-]?\d{{1,2}})?)|(?P<name>{_NAME})|(?P<sign>[*/()]))"
+    r"(?P<power>(?<![*/(])(?:\s*\^\s*[+-]?|(?<=[^\W\d])-?)[1-3](?![\d.]))?"
+)
+_RAISED = str.maketrans("⁻¹²³", "-123")
 
 
 class UnitError(ValueError):
     """A text that is no unit of the kind that is wanted; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """A number of base units; of a temperature alone also the kelvins at its zero."""
+
+    size: Fraction
+    powers: Counter[str] = field(default_factory=Counter)
+    named: bool = False
+    zero: Fraction = Fraction(0)
+
+    def times(self, other: _Size, power: int) -> _Size:
+        powers = Counter(self.powers)
+        for name, count in other.powers.items():
+            powers[name] += power * count
+        zero = self.zero if not other.kind else other.zero if not self.kind and power == 1 else Fraction(0)
+        return _Size(self.size * other.size**power, powers, self.named or other.named, zero)
+
+    @property
+    def kind(self) -> dict[str, int]:
+        return {name: power for name, power in self.powers.items() if power and name != "pi"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +178,7 @@ class Conversion:
         return (value - self.offset) / self.factor
 
 
+@cache
 def conversion(text: str, kind: str) -> Conversion:
     """How values of a unit become gyrotc's own.
 
@@ -139,16 +189,19 @@ def conversion(text: str, kind: str) -> Conversion:
     Raises:
         UnitError: It is no such unit.
     """
-    target = NATIVE.get(kind, kind)
-    spelt = _spelt(text)
-    for form in dict.fromkeys((spelt, spelt.lower())):
-        try:
-            return Conversion(text, *_affine(form, _spelt(target)))
-        except UnitError:
-            raise
-        except Exception:  # pint and the parsers under it raise what they like
-            continue
-    raise UnitError(f"{text!r} is not known as a unit")
+    given, wanted = _size(text), _size(NATIVE.get(kind, kind))
+    if not given.named:
+        raise UnitError(f"{text!r} is a number without a unit")
+    if given.kind != wanted.kind:
+        raise UnitError(f"{text!r} is no unit of the kind {NATIVE.get(kind, kind)}")
+    turns = given.powers["pi"] - wanted.powers["pi"]
+    try:
+        factor = float(given.size / wanted.size) * math.pi ** max(turns, 0) / math.pi ** max(-turns, 0)
+    except (OverflowError, ZeroDivisionError):
+        factor = math.inf
+    if not 0.0 < factor < math.inf:
+        raise UnitError(f"{text!r} is no unit: its size is {factor:g}")
+    return Conversion(text, factor, float((given.zero - wanted.zero) / wanted.size))
 
 
 def kind_of(text: str) -> Kind | None:
@@ -175,71 +228,83 @@ def channel_kind(name: str, declared: Mapping[str, str]) -> Kind | None:
     return kind_of(unit) if unit else None
 
 
-def _spelt(text: str) -> str:
-    """A unit as `pint` wants it."""
-    plain = " ".join(text.replace("º", "°").replace("μ", "µ").replace("·", "*").split())
-    while plain[:1] + plain[-1:] in ("[]", "()", "{}"):
+@cache
+def _size(text: str) -> _Size:
+    """A unit as a number of base units."""
+    unknown = UnitError(f"{text!r} is not known as a unit")
+    plain = " ".join(text.replace("º", "°").replace("μ", "µ").split())
+    while plain[:1] + plain[-1:] in ("[]", "{}"):
         plain = plain[1:-1].strip()
-    if plain.lower() in _SPELT:
-        return _SPELT[plain.lower()]
-    if not _ALLOWED.fullmatch(plain) or _LARGE_POWER.search(plain):
-        raise UnitError(f"{text!r} is not known as a unit")
-    plain = re.sub(r"(?<=[A-Za-zµ°])\.(?=[A-Za-zµ°])", "*", plain)  # pint reads deg.s^-1 until 0.25 only
-    plain = re.sub(r"\bdps\b", "deg/s", plain)
-    plain = re.sub(r"\bdeg(rees?)? ?/ ?", "deg/", plain)
-    plain = re.sub(r"(?<=[A-Za-z°]) s\^?-1\b", "/s", plain)
-    return re.sub(r"/ ?(hr|h)\b", "/hour", plain)
+    plain = re.sub("[⁻¹²³]+", lambda raised: "^" + raised[0].translate(_RAISED), plain).replace("**", "^")
+    plain = re.sub(r"·|(?<=[^\W\d_])\.(?=[^\W\d_°])", "*", plain)
+    plain = re.sub(r"(?i)\bdeg(?:rees?)?[ _]?([cfk])\b", lambda found: "deg" + found[1].upper(), plain)
+    plain = plain.removesuffix(" since boot")
+    words, at = list[str](), 0
+    while at < len(plain):
+        found = _TOKEN.match(plain, at)
+        if found is None or len(plain) > _MOST:
+            raise unknown
+        power = found["power"] or ""
+        words.append(found[0].removesuffix(power).strip())
+        words += ["^" + power.strip(" ^")] if power else []
+        at = found.end()
+    words.reverse()
+    try:
+        size = _product(words)
+    except (IndexError, ArithmeticError, UnitError) as error:
+        raise unknown from error
+    if words:
+        raise unknown
+    return size
+
+
+def _product(words: list[str]) -> _Size:
+    """The factors from the end of a reversed list to its beginning or a closing bracket, which are taken off it."""
+    size = _Size(Fraction(1))
+    sign = 1
+    while True:
+        size = size.times(_factor(words), sign)
+        if not words or words[-1] == ")":
+            return size
+        sign = 1
+        if words[-1] in ("*", "/", "per"):
+            sign = 1 if words.pop() == "*" else -1
+
+
+def _factor(words: list[str]) -> _Size:
+    word = words.pop()
+    if word == "(":
+        size = _product(words)
+        words.pop()
+    elif word[0].isdigit():
+        size = _Size(Fraction(word))
+    else:
+        size = _named(word)
+    if words and words[-1].startswith("^"):
+        power = int(words.pop()[1:])
+        size = _Size(Fraction(1)).times(size, power)
+    return size
 
 
 @cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
-
-
-@cache
-def _affine(text: str, target: str) -> tuple[float, float]:
-    """Factor and offset of a unit, exact where they are fractions of small whole numbers."""
-    registry = _registry()
-    wanted = registry.parse_units(target)
-    found = _SCALED.fullmatch(text)
-    if target == NATIVE["temperature"] and found and bool(found["by"]) != bool(found["over"]):
-        factor, offset = _affine(found["unit"], target)  # pint does not multiply a unit with an offset
-        size = float(found["by"]) if found["by"] else 1.0 / float(found["over"])
-        return _snapped(factor * size), offset
-    given = registry.parse_expression(text)
-    if isinstance(given, int | float):
-        raise UnitError(f"{text!r} is a number without a unit")
-    if given.dimensionality != wanted.dimensionality or _is_hertz(given, wanted):
-        raise UnitError(f"{text!r} is no unit of the kind {target}")
-    size = float(given.magnitude)
-    if not 0.0 < size < 1e300:
-        raise UnitError(f"{text!r} is no unit: its size is {size:g}")
-    unit = given.units
-    zero = float(registry.Quantity(0.0, unit).to(wanted).magnitude)
-    one = float(registry.Quantity(1.0, unit).to(wanted).magnitude)
-    ten = float(registry.Quantity(1000.0, unit).to(wanted).magnitude)
-    if zero == 0.0:
-        return _snapped(one * size), 0.0
-    return _snapped((ten - zero) / 1000.0 * size), _snapped(zero)
+def _named(word: str) -> _Size:
+    """A unit by its name: as it stands, with a prefix, in the plural, in small letters."""
+    for name in dict.fromkeys((word, word.lower())):
+        for stem in (name, name[:-1] if name.endswith("s") and len(name) > 2 else ""):
+            if stem in _DEFINED or stem in _BASE:
+                return _defined(stem)
+            for prefix, power in _PREFIXES.items():
+                rest = stem.removeprefix(prefix)
+                if rest != stem and rest in _PREFIXED:
+                    return _Size(Fraction(10) ** power).times(_defined(rest), 1)
+    raise UnitError(word)
 
 
-def _is_angle(quantity: Any) -> bool:
-    return any(name in str(quantity.units) for name in ("degree", "radian", "turn", "arc", "revolution"))
-
-
-def _is_hertz(given: Any, wanted: Any) -> bool:
-    """For `pint` an angle has no dimension; a rate of rotation has one here, so 1/s and Hz are none."""
-    return "hour" in str(wanted) and "degree" in str(wanted) and not _is_angle(given)
-
-
-def _snapped(value: float) -> float:
-    """The fraction of small whole numbers that a value misses by rounding only, else the value."""
-    near = float(Fraction(value).limit_denominator(_DENOMINATOR))
-    if near == 0.0 and value != 0.0:
-        return 1.0 / _snapped(1.0 / value)
-    return near if abs(value - near) <= _ROUNDING * abs(value) else value
+def _defined(name: str) -> _Size:
+    if name not in _DEFINED:
+        return _Size(Fraction(1), Counter((name,)), named=name != "pi")
+    first, definition = _DEFINED[name]
+    return replace(_size(definition), named=True, zero=_ZERO.get(first, Fraction(0)))
 
 
 def declared(units: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> dict[str, Conversion]:
@@ -255,12 +320,14 @@ def declared(units: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> 
     found = {}
     for key, text in units.items():
         names = columns.get(key, ()) if key in NATIVE else [key] * (key in columns["channels"])
+        wanted = NATIVE.get(key)
         for name in names:
-            wanted = NATIVE.get(key) or channel_unit(name) or text
+            if not (to := wanted or channel_unit(name)):
+                continue  # a channel whose name says no unit is taken as it is
             try:
-                found[name] = conversion(text, wanted)
+                found[name] = conversion(text, to)
             except UnitError as error:
-                expected = f"a unit as pint knows it, such as {_EXAMPLES.get(key, wanted)}"
+                expected = f"a unit such as {_EXAMPLES.get(key, to)}"
                 raise InputError(f"dataset.toml, field units.{key}", str(error), expected) from error
     return {name: one for name, one in found.items() if one.changes}
 
