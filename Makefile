@@ -113,12 +113,13 @@ picture: demo
 	@$(PYTHON) tools/pictures.py build/pictures
 
 ## the paper's table and figures again: docs/paper.md
-paper: setup
+paper:
+	@tools/setup.sh test
 	@$(PYTHON) -m gyrotc.paper docs
 
 ## measured recordings with runs or spans left out: docs/real.md (DATA=folder of the sets)
 real: setup
-	@$(PYTHON) -c "import sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench]"
+	@$(PYTHON) -c "import matplotlib, sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench,paper]"
 	@$(PYTHON) tools/real.py "$$SET_REAL" docs build/real
 	@$(PYTHON) tools/real_diagnosis.py "$$SET_REAL" docs build/real
 

@@ -31,13 +31,13 @@ DROPPED = {
 NAMES_ALONE = ("files",)
 #: Files of which only the name is compared.
 UNREAD = {
-    ".svg": "drawn by matplotlib, whose releases differ; the figures in it stand in the JSON results",
+    ".svg": "coordinates, rounded; the figures in it stand in the JSON results",
     ".png": "likewise",
     ".sqlite": "the order of rows and pages is SQLite's; `gyrotc catalogue` says what is in it",
 }
 #: What replaces parts of pages and certificates, with the reason.
 OF_PAGES = (
-    (re.compile(r"<svg.*?</svg>", re.DOTALL), "<svg/>"),  # drawn by matplotlib
+    (re.compile(r"<svg.*?</svg>", re.DOTALL), "<svg/>"),  # as above
     (re.compile(r"data:image/[^\"')]*"), "data:image"),  # likewise
     (
         re.compile(r'(<td class="pass">pass</td>).*'),

@@ -110,7 +110,7 @@ def _cause(cause: NamedCause) -> Iterator[str]:
             yield f"{toml_key(name)} = {toml_value(value)}"
 
 
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "jinja2", "pydantic", "pyarrow")
+_LIBRARIES = ("numpy", "scipy", "jinja2", "pydantic", "pyarrow")
 _REPORT, _RESULT = "report.html", "diagnose.json"
 _KINDS = (".html", ".json", ".svg", ".toml")
 

@@ -1,0 +1,84 @@
+"""What gyrotc loads is what its plain installation brings; extras are loaded where they are used."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+from conftest import ROOT
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+PACKAGE = ROOT / "gen" / "gyrotc"
+PROJECT = tomllib.loads((ROOT / "gen" / "pyproject.toml").read_text("utf-8"))["project"]
+#: Distributions by the name of what is imported; a part of pydantic with a name of its own comes with it.
+DISTRIBUTIONS = packages_distributions() | {"pydantic_core": ["pydantic"]}
+#: Modules that are one extra's, and are loaded where it is asked for.
+OF_EXTRA = {"train/estimator.py": "sklearn", "paper/figures.py": "paper"}
+
+
+def _named(requirements: list[str]) -> set[str]:
+    return {canonicalize_name(Requirement(word).name) for word in requirements}
+
+
+def _loaded(path: Path) -> set[str]:
+    """Distributions of other projects that a module imports when it is itself imported."""
+    tree = ast.parse(path.read_text("utf-8"))
+    nodes = [n for top in tree.body if not isinstance(top, ast.If) for n in _outside_functions(top)]
+    roots = {a.name.split(".")[0] for n in nodes if isinstance(n, ast.Import) for a in n.names}
+    roots |= {str(n.module).split(".")[0] for n in nodes if isinstance(n, ast.ImportFrom) and not n.level}
+    return {
+        canonicalize_name(DISTRIBUTIONS[root][0])
+        for root in roots - set(sys.stdlib_module_names)
+        if root in DISTRIBUTIONS
+    }
+
+
+def _outside_functions(node: ast.AST) -> list[ast.AST]:
+    if isinstance(node, ast.FunctionDef):
+        return []
+    return [node, *(n for child in ast.iter_child_nodes(node) for n in _outside_functions(child))]
+
+
+def test_the_plain_installation_has_what_modules_import() -> None:
+    plain = _named(PROJECT["dependencies"])
+    for path in PACKAGE.rglob("*.py"):
+        extra = OF_EXTRA.get(path.relative_to(PACKAGE).as_posix())
+        more = _named(PROJECT["optional-dependencies"][extra]) if extra else set()
+        assert _loaded(path) <= plain | more, path
+
+
+def test_every_dependency_is_imported_somewhere() -> None:
+    text = "\n".join(path.read_text("utf-8") for path in PACKAGE.rglob("*.py"))
+    for name in _named(PROJECT["dependencies"]):
+        module = name.replace("-", "_")
+        assert re.search(rf"(?m)^\s*(?:from|import) {module}\b", text), name
+
+
+def test_the_main_job_loads_no_extra() -> None:
+    extras = {
+        "matplotlib",
+        "PIL",
+        "sklearn",
+        "cryptography",
+        "distributed",
+        "h5py",
+        "nptdms",
+        "pyulog",
+        "rosbags",
+    }
+    program = (
+        "import sys, gyrotc.jobs.build, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.check\n"
+        f"sys.exit(' '.join({extras} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "", done.stderr
