@@ -104,6 +104,7 @@ def verify_axes(
     results: Mapping[str, Verification],
     edited: Sequence[str] = (),
     signature: Path | None = None,
+    replaces: Path | None = None,
 ) -> JointVerification:
     """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
 
@@ -118,7 +119,7 @@ def verify_axes(
     numeric = next(iter(results.values())).errors[0].numeric
     texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
     emitted = tuple(file_entries(folder / "c", texts, edited))
-    signed = check_signature(folder / "c", load_public_key(signature)) if signature else None
+    signed = check_signature(folder / "c", load_public_key(signature), replaces) if signature else None
     wrong = sum(file.status == "fail" for file in emitted)
     return JointVerification(
         gyrotc_version=__version__,

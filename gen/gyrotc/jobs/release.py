@@ -121,6 +121,11 @@ def _unit(model: Model, unit: UnitResults | None) -> ReleasedUnit:
         limits=limits.limits if limits else (),
         expanded_dph=budget.expanded_dph if budget else None,
         coverage_factor=budget.coverage_factor if budget else None,
-        calibrated_on=budget.calibrated_on if budget else None,
+        calibrated_on=budget.calibrated_on if budget else _day_of(model),
         valid_until=budget.valid_until if budget else None,
     )
+
+
+def _day_of(model: Model) -> str | None:
+    stated = model.meta.get("calibrated_on")
+    return None if stated is None else str(stated)

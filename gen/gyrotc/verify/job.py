@@ -226,6 +226,7 @@ def verify(
     compiled: bool = True,
     edited: Sequence[str] = (),
     signature: Path | None = None,
+    replaces: Path | None = None,
     trust_code: bool = False,
     progress: Progress | None = None,
 ) -> Verification:
@@ -241,6 +242,7 @@ def verify(
         compiled: False: no target; files and bounds are checked against model and reference alone.
         edited: Files of `EDITABLE` that the user made their own: they may differ.
         signature: Public key with which `folder/c` must be signed.
+        replaces: A result signed with it that this one is to replace: it may not be of a later calibration.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         progress: Called with the name of each target before it is tried.
 
@@ -265,7 +267,7 @@ def verify(
     texts = texts_again(model, options, emission)
     left_out = left_out_of(folder, model, texts)
     emitted = tuple(file_entries(job.c_folder, texts, edited, left_out))
-    signed = check_signature(job.c_folder, key) if key is not None else None
+    signed = check_signature(job.c_folder, key, replaces) if key is not None else None
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
     identity = (model.hash, c_hash(folder / "c", left_out))

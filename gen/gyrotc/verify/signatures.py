@@ -43,20 +43,27 @@ def sign_record(c_folder: Path, key: Ed25519PrivateKey) -> Path:
     return path
 
 
-def check_signature(c_folder: Path, key: Ed25519PublicKey) -> SignatureCheck:
-    """Whether the release's signature is of this key, and all that it names is as it was released."""
-    from cryptography.exceptions import InvalidSignature
+def check_signature(c_folder: Path, key: Ed25519PublicKey, replaces: Path | None = None) -> SignatureCheck:
+    """Whether the release's signature is of this key, and all that it names is as it was released.
 
+    Args:
+        replaces: A signed result that this one is to replace: it may not be of a later calibration.
+
+    Raises:
+        InputError: What it replaces is not signed by this key.
+    """
+    earlier = None
+    if replaces is not None:
+        try:
+            earlier = _signed(replaces / "c", key)
+        except InputError as error:
+            raise InputError("--replaces", str(error), "a result that this key has signed") from error
     reason, release = None, None
     try:
-        data = _bytes(c_folder / RELEASE, _LARGEST_RELEASE, "what gyrotc sign wrote")
-        key.verify(_bytes(c_folder / SIGNATURE, _LENGTH, ""), data)
-        release = checked_result(parse_json(data, str(c_folder / RELEASE), "a release"), Release, RELEASE)
-        reason = _departure(c_folder, release)
+        release = _signed(c_folder, key)
+        reason = _departure(c_folder, release) or (_older(release, earlier) if earlier else None)
     except InputError as error:
         reason = str(error)
-    except InvalidSignature:
-        reason = "not a signature of this release by this key"
     signed = release if release is not None and reason is None else None
     days = [unit.valid_until for unit in signed.units if unit.valid_until] if signed else []
     return SignatureCheck(
@@ -68,6 +75,40 @@ def check_signature(c_folder: Path, key: Ed25519PublicKey) -> SignatureCheck:
         accepted_fail=signed.accepted_fail if signed else None,
         valid_until=min(days, default=None),
     )
+
+
+def _signed(c_folder: Path, key: Ed25519PublicKey) -> Release:
+    """The release in a folder.
+
+    Raises:
+        InputError: There is none, or its signature is not of this key.
+    """
+    from cryptography.exceptions import InvalidSignature
+
+    data = _bytes(c_folder / RELEASE, _LARGEST_RELEASE, "what gyrotc sign wrote")
+    try:
+        key.verify(_bytes(c_folder / SIGNATURE, _LENGTH, ""), data)
+    except InvalidSignature:
+        raise InputError(str(c_folder / SIGNATURE), "not a signature of this release by this key") from None
+    return checked_result(parse_json(data, str(c_folder / RELEASE), "a release"), Release, RELEASE)
+
+
+def _older(release: Release, earlier: Release) -> str | None:
+    """Why a release may not replace another, whose signature is as good; None if it may."""
+    if (release.serial, release.axis) != (earlier.serial, earlier.axis):
+        return f"gyro {release.serial}, axis {release.axis} does not replace {earlier.serial}, axis {earlier.axis}"
+    days = {unit.axis: unit.calibrated_on for unit in earlier.units}
+    for unit in release.units:
+        of, day, before = (
+            f" of axis {unit.axis}" if unit.axis else "",
+            unit.calibrated_on,
+            days.get(unit.axis),
+        )
+        if day is None or before is None:
+            return f"a day of calibration{of} is not stated, so that the older release is not known"
+        if day[:10] < before[:10]:
+            return f"the calibration{of} of {day[:10]} is older than that of {before[:10]}, which it would replace"
+    return None
 
 
 def _departure(c_folder: Path, release: Release) -> str | None:

@@ -81,6 +81,38 @@ def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(
     assert _signed(folder, key) == ("fail", 1)
 
 
+def test_an_older_release_does_not_replace_a_newer_one(key: Path, tmp_path: Path, gyrotc: Command) -> None:
+    """Before: a table that was replaced for a reason could be handed over again, its signature is good for ever."""
+
+    def of(name: str, **meta: str) -> Path:
+        model = load_model(GOLDEN).model_copy(update={"meta": meta})
+        folder = emitted(tmp_path / name, model)
+        assert gyrotc("sign", folder, "--key", key).returncode == 0
+        return folder
+
+    old, new, undated = (
+        of("old", calibrated_on="2026-03-07"),
+        of("new", calibrated_on="2026-09-07"),
+        of("undated"),
+    )
+    public = key.with_suffix(".pub")
+
+    def status(result: Path, now: Path) -> str | None:
+        signed = verify(result, compiled=False, signature=public, replaces=now).signature
+        assert signed is not None
+        return signed.reason
+
+    assert status(new, old) is None and status(new, new) is None
+    assert "of 2026-03-07 is older than that of 2026-09-07" in (status(old, new) or "")
+    assert "not stated" in (status(undated, new) or "")
+    done = gyrotc("verify", old, "--signature", public, "--replaces", new, "--target", "host-gcc-O2")
+    assert done.returncode == 1 and "is older than that of 2026-09-07" in done.stdout
+    (new / "c" / SIGNATURE).write_bytes(bytes(64))
+    with pytest.raises(InputError, match="--replaces"):
+        status(old, new)
+    assert gyrotc("verify", old, "--replaces", new).returncode == 2
+
+
 def test_what_verify_refuses_is_not_signed(key: Path, tmp_path: Path, gyrotc: Command) -> None:
     folder = emitted(tmp_path / "result")
     spoil(folder / "c" / "main.c", "return 1;", "return 0;")
