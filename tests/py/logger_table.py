@@ -6,6 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
+from logger_analysis import ANALYSIS_CASES
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, Case
 from logger_foreign import FOREIGN
@@ -24,7 +25,7 @@ def table() -> str:
 
 def cases() -> list[Case]:
     """Every file, in the order of the table."""
-    return [*CSV_CASES, *FOREIGN, *BINARY_CASES]
+    return [*CSV_CASES, *FOREIGN, *BINARY_CASES, *ANALYSIS_CASES]
 
 
 def filled(page: str) -> str:

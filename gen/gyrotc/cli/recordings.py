@@ -80,13 +80,20 @@ def import_(
             "--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."
         ),
     ] = None,
+    exam: Annotated[
+        bool | None,
+        typer.Option(
+            "--exam/--no-exam",
+            help="The last file judges the correction and is not trained on; default: ask.",
+        ),
+    ] = None,
     trust_units: TrustUnitsOption = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only show how the files would be read.")
     ] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Make a data set of any logger's files: CSV of any dialect, MATLAB, HDF5, Parquet, TDMS, PX4, ArduPilot, ROS, MDF.
+    """Make a data set of files of loggers: CSV, Excel, Parquet, NumPy, MATLAB, HDF5, NetCDF, TDMS, PX4, ROS, MDF, ...
 
     Example: gyrotc import chamber.csv --out RLG-0042 --rate-unit deg/s
     """
@@ -100,7 +107,7 @@ def import_(
     content["csv"] |= _csv(csv or [], content["csv"])
     content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
     chosen = _stated(content, units, stated, _columns(column or []), table)
-    options = ImportOptions(serial, format.value, trust_units, dry_run)
+    options = ImportOptions(serial, format.value, trust_units, dry_run, exam)
     with progress() as say:
         result = import_files(
             files, out, Map.model_validate(chosen), options, ask=_ask, say=tell,

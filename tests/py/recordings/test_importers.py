@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import importlib
 import importlib.util
 import json
@@ -28,6 +29,7 @@ from gyrotc.recordings.importers.tables import LoggerFile
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.recordings import ImportedFiles
+from logger_analysis import ANALYSIS_CASES
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth
 from logger_foreign import FOREIGN, milliseconds
@@ -40,7 +42,7 @@ def run_alone(*arguments: str | Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("case", [*CSV_CASES, *FOREIGN, *BINARY_CASES], ids=lambda c: c.id)
+@pytest.mark.parametrize("case", [*CSV_CASES, *FOREIGN, *BINARY_CASES, *ANALYSIS_CASES], ids=lambda c: c.id)
 def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
     if case.needs and importlib.util.find_spec(case.needs) is None:
         pytest.skip(f"{case.needs} is not installed")
@@ -391,6 +393,36 @@ def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
     assert dataset.runs[0].power_on_s is None
 
 
+def test_the_last_file_becomes_the_exam_where_that_is_stated_or_answered(tmp_path: Path, run: Run) -> None:
+    files = [tmp_path / name for name in ("a.csv", "b.csv")]
+    for scale, file in enumerate(files, 1):
+        file.write_text(lines(OWN, lambda k, t, r, scale=scale: f"{k},{t},{scale * r}"))
+    status, out, error = run("import", *files, "--out", tmp_path / "R", "--exam")
+    assert status == 0, error
+    assert "600 rows of 1 s" in out and "b.parquet is the exam" in out
+    assert [one.role for one in load(tmp_path / "R").runs] == ["train", "exam"]
+    _, hint, _ = run("import", *files, "--out", tmp_path / "S")
+    assert "--exam makes the last run the exam" in hint
+    for answer, role in (("y", "exam"), ("", "train")):
+        options = ImportOptions(exam=None)
+        import_files(files, tmp_path / f"T-{role}", Map(), options, ask=lambda _, said=answer: said)
+        assert load(tmp_path / f"T-{role}").runs[1].role == role
+    status, _, error = run("import", files[0], "--out", tmp_path / "U", "--exam")
+    assert status == 2 and "--exam: with one file" in error
+
+
+def test_a_packed_file_larger_than_is_allowed_is_refused_while_it_is_unpacked(
+    tmp_path: Path, run: Run
+) -> None:
+    with gzip.open(tmp_path / "log.csv.gz", "wb", compresslevel=9) as file:
+        for _ in range(30):
+            file.write(bytes(2**20))
+    status, _, error = run(
+        "--max", "recording_mib=10", "import", tmp_path / "log.csv.gz", "--out", tmp_path / "R"
+    )
+    assert status == 2 and "recording_mib" in error and not (tmp_path / "R").exists()
+
+
 def test_a_folder_that_import_did_not_make_is_left_alone(tmp_path: Path, run: Run) -> None:
     (tmp_path / "log.csv").write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
     (tmp_path / "R").mkdir()
@@ -420,7 +452,8 @@ def test_a_dry_run_writes_nothing(tmp_path: Path, run: Run) -> None:
     "head",
     [b"", b"ULog\x01\x12\x35\x01\0", b"\x89HDF\r\n\x1a\n\0\0", b"MATLAB 5.0 MAT-file\0\0", b"TDSm\0\0\0",
      b"#ROSBAG V2.0\n\0", b"MDF     4.10    \0", b"\xa3\x95\x80\0\0", b"PAR1\0\0", b"SQLite format 3\x00\0",
-     b"PK\x03\x04", bytes(range(256)) * 9],
+     b"PK\x03\x04", bytes(range(256)) * 9, b"ARROW1\0\0", b"\x93NUMPY\x01\0", b"CDF\x01\0", b"\x1f\x8b\x08\0",
+     b"PK\x03\x04" + bytes(22) + b"\x05\0\0\0a.npy", b"PK\x03\x04" + bytes(22) + b"\x03\0\0\0xl/"],
     ids=lambda head: repr(head[:8]),
 )  # fmt: skip
 def test_a_damaged_file_is_one_message(head: bytes, tmp_path: Path, run: Run) -> None:
@@ -541,6 +574,8 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
         ("a.bag", "ros", b"#ROSBAG V2.0"),
         ("a.bin", "dataflash", b"\xa3\x95"),
         ("a.mf4", "mdf", b"MDF     "),
+        ("a.nc", "netcdf", b"CDF\x01"),
+        ("a.xlsx", "excel", b"PK\x03\x04" + bytes(22) + b"\x03\0\0\0xl/"),
     ],
 )
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(

@@ -118,6 +118,8 @@ def description_of(serial: str, chosen: Map, entries: Sequence[Mapping[str, Any]
 
 def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     yield "file", entry["file"]
+    if entry["exam"]:
+        yield "role", "exam"
     if entry["started"] is not None:
         yield "started", entry["started"]
     if not entry["since_power_on"]:
@@ -176,16 +178,26 @@ def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for entry in entries:
         cells = entry["evidence"].cells
         low, high = entry["evidence"].temperature_c
-        period = (cells[-1, 0] - cells[0, 0]) / max(entry["rows"] - 1, 1)
+        length = _period(*entry["period_s"])
         means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(cells[:, 2:].mean(axis=0)))
         left = "".join(f"; {count} left out: {reason}" for reason, count in entry["left_out"].items())
         yield (
-            f"{out / entry['file']}: {entry['rows']} rows of about {period:.4g} s, {low:.4g} ... {high:.4g} C, "
+            f"{out / entry['file']}: {entry['rows']} rows of {length} s, {low:.4g} ... {high:.4g} C, "
             f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}{left}"
         )
         for text in entry["trusted"]:
             yield f"  units are trusted: {text}"
     yield f"{out / 'map.toml'}: reads the next file of this logger: gyrotc import FILE --map map.toml --out ..."
+
+
+_EXACT = 1e-6  # of a period: what stamps in microseconds leave of rows of a second
+
+
+def _period(low: float, high: float) -> str:
+    """Length of rows: one number where all are alike, else from the shortest to the longest."""
+    if high - low <= _EXACT * high:
+        return f"{0.5 * (low + high):.6g}"
+    return f"{low:.4g} ... {high:.4g}"
 
 
 def _line(role: str, source: str, unit: str, why: str) -> str:
@@ -226,12 +238,14 @@ class ImportOptions:
         format: Format of the runs that are written.
         trust_units: Values that contradict their units are taken; it is recorded.
         dry_run: Tell what would be read and how, and write nothing.
+        exam: The last file is the exam, which judges the correction and is not trained on; None: a person is asked.
     """
 
     serial: str | None = None
     format: Format = "parquet"
     trust_units: bool = False
     dry_run: bool = False
+    exam: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,6 +320,7 @@ def _imported(
     entries: list[dict[str, Any]] = []
     names: set[str] = set()
     serial = ""
+    exam = _last_is_exam(files, options, ask)
     with result_folder(out, "import", inputs=files) as stage:
         folder = stage.folder
         for path in files:
@@ -321,11 +336,36 @@ def _imported(
                 target = folder / f"{run_name(path, names)}.{options.format}"
                 entries.append(_run(file, rows, target, chosen, options, tell, progress))
         chosen = chosen.model_copy(update={"serial": serial})
+        for entry in entries:
+            entry["exam"] = exam and entry is entries[-1]
         write_own(folder / MAP_FILE, map_text(chosen))
         write_own(folder / FILE, description_of(serial, chosen, entries))
     for line in summary(out, entries):
         tell(line)
+    tell(_judged_by(entries))
     return Imported(serial, chosen, tuple(entries))
+
+
+def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bool:
+    """Whether the last run is the exam: as stated, else as a person answers; nobody there: no.
+
+    Raises:
+        InputError: There is only one run.
+    """
+    if options.exam and len(files) < 2:
+        raise InputError("--exam", "with one file, which training needs", "two files or more")
+    if options.exam is not None or options.dry_run or len(files) < 2:
+        return bool(options.exam)
+    answer = ask(f"Is {files[-1].name} the exam, which judges the correction and is not trained on? [y/N]")
+    return (answer or "").lower() in ("y", "yes")
+
+
+def _judged_by(entries: Sequence[Mapping[str, Any]]) -> str:
+    """What will judge a correction made of these runs."""
+    if entries[-1]["exam"]:
+        return f"{entries[-1]['file']} is the exam; the other runs are trained on"
+    hint = "" if len(entries) < 2 else ": --exam makes the last run the exam"
+    return f"every run is trained on, so a correction is judged by parts left out in turn{hint}"
 
 
 class _DryRun(Exception):
@@ -373,6 +413,7 @@ def _run(
         | {k: v for t in file.tables for k, v in getattr(t, "remarks", {}).items() if v},
         "trusted": trusted,
         "evidence": rows.evidence,
+        "period_s": rows.period_s,
         "source": {
             "file": file.path.name,
             "sha256": sha256_of(file.path),

@@ -14,7 +14,7 @@ from ..parquet_file import ParquetBatches
 from .csv_dialect import kind_of_cells
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
-__all__ = ["open_parquet"]
+__all__ = ["column_of", "open_parquet", "values_of"]
 
 _SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count
 
@@ -27,7 +27,7 @@ def open_parquet(path: Path) -> LoggerFile:
     """
     file = ParquetBatches(path.name, path)
     sample = next(file.batches(file.schema.names, _SAMPLE_ROWS), None)
-    columns = tuple(column for field in file.schema if (column := _column(field, sample)) is not None)
+    columns = tuple(column for field in file.schema if (column := column_of(field, sample)) is not None)
     return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file),))
 
 
@@ -41,12 +41,17 @@ class ParquetTable(LoggerTable):
         """As `Table.chunks`."""
         at = 0
         for batch in self.file.batches(list(names) or [self.columns[0].name], CHUNK_ROWS):
-            values = {n: _values(batch.column(k)) for k, n in enumerate(batch.schema.names)}
+            values = {n: values_of(batch.column(k)) for k, n in enumerate(batch.schema.names)}
             yield Chunk(values, at, (at + len(batch)) / max(self.file.rows, 1))
             at += len(batch)
 
 
-def _column(field: Any, sample: Any) -> Column | None:
+def column_of(field: Any, sample: Any) -> Column | None:
+    """The column that a field of Arrow is; None where it holds neither numbers nor text.
+
+    Args:
+        sample: The first rows, None where there are none.
+    """
     metadata = {
         k.decode("utf-8", "replace").lower(): v.decode("utf-8", "replace")
         for k, v in (field.metadata or {}).items()
@@ -67,7 +72,8 @@ def _column(field: Any, sample: Any) -> Column | None:
     return None
 
 
-def _values(column: Any) -> Any:
+def values_of(column: Any) -> Any:
+    """Values of a column of Arrow as those of a chunk."""
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
         return column.cast(pa.string())
     if pa.types.is_timestamp(column.type):

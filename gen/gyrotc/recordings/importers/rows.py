@@ -49,6 +49,7 @@ class ImportedRows:
         evidence: What the units can be judged by.
         raw: The first rows as the file has them, by column; for a preview.
         first_rows: The same rows as they were given.
+        period_s: Shortest and longest step from row to row, s; from infinite to 0 before there is one.
     """
 
     file: str
@@ -58,6 +59,7 @@ class ImportedRows:
     left_out: dict[str, int] = field(default_factory=dict)
     raw: dict[str, list[str]] = field(default_factory=dict)
     first_rows: dict[str, list[float]] = field(default_factory=dict)
+    period_s: tuple[float, float] = (np.inf, 0.0)
 
     def __post_init__(self) -> None:
         plan = self.plan
@@ -197,6 +199,11 @@ class ImportedRows:
             at = int(np.argmax(wrong))
             self._refuse_time(kept["time_s"][at], before["time_s"][at], chunk.first + int(rows[at]))
         self._last = {name: float(values[-1]) for name, values in kept.items()}
+        steps = (kept["time_s"] - before["time_s"])[~copies]
+        steps = steps[np.isfinite(steps)]
+        if steps.size:
+            low, high = self.period_s
+            self.period_s = (min(low, float(steps.min())), max(high, float(steps.max())))
         return {name: values[~copies] for name, values in kept.items()} if copies.any() else kept
 
     def _refuse_time(self, time: float, before: float, row: int) -> None:

@@ -1,0 +1,76 @@
+"""NetCDF files by xarray, which knows the conventions for times, fill values, scales and offsets (CF, 4.4 and 8.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...common.errors import InputError
+from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
+
+__all__ = ["open_netcdf"]
+
+_MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
+
+
+def open_netcdf(path: Path) -> LoggerFile:
+    """A NetCDF file of version 3 or 4: variables over one dimension are columns of one table.
+
+    Raises:
+        InputError: xarray is not installed, the file is damaged, or holds nothing that can be read.
+    """
+    xarray = library(path, "xarray", "netcdf", "a NetCDF file")
+    with path.open("rb") as file:
+        classic = file.read(3) == b"CDF"
+    if not classic:
+        library(path, "h5netcdf", "netcdf", "a NetCDF 4 file")
+    try:
+        data = xarray.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_timedelta=True)
+    except Exception as error:  # whatever a damaged file makes of the parser
+        what = " ".join(str(error).split())[:100]
+        raise InputError(path.name, f"cannot be read as NetCDF ({what})", "a whole NetCDF file") from error
+    columns = [entry for name in data.variables for entry in _columns(str(name), data[name])]
+    rates: dict[str, tuple[float, str]] = {}
+    for key, value in data.attrs.items():
+        if isinstance(value, int | float | np.number) and (found := rate_of(str(key), float(value))):
+            rates = dict.fromkeys(map(str, data.sizes), found)
+    tables = grouped(columns, rates)
+    if not tables:
+        raise InputError(path.name, "no numeric variables over a dimension", "variables over time")
+    facts = {str(k).lower(): v for k, v in data.attrs.items() if isinstance(v, str)}
+    return LoggerFile(path, "NetCDF file", tables, facts, close=data.close)
+
+
+def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, Part]]:
+    kind = variable.dtype.kind
+    if kind not in "iufMm" or variable.ndim not in (1, 2):
+        return
+    group, rows = str(variable.dims[0]), variable.shape[0]
+    unit = variable.attrs.get("units")
+    if kind == "M":
+        column = Column(name, "UTC", "the conventions of CF: no zone is UTC", kind="stamp")
+    elif kind == "m":
+        column = Column(name, "ns", "the conventions of CF")
+    else:
+        column = Column(name, str(unit) if unit is not None else None, "an attribute" if unit else "")
+    if variable.ndim == 1:
+        yield group, group, rows, column, _part(variable, None)
+        return
+    width = variable.shape[1]
+    for k in range(width) if width <= _MOST_COLUMNS and kind not in "Mm" else ():
+        label = f"{name}_{'xyz'[k]}" if width == 3 else f"{name}_{k + 1}"
+        yield group, group, rows, Column(label, column.unit, column.why), _part(variable, k)
+
+
+def _part(variable: Any, index: int | None) -> Part:
+    def read(first: int, last: int) -> Any:
+        values = variable[first:last] if index is None else variable[first:last, index]
+        array = np.asarray(values.values)
+        if array.dtype.kind == "m":
+            return array.astype("m8[ns]").astype(np.int64)
+        return array.astype("M8[ns]") if array.dtype.kind == "M" else numbers(array)
+
+    return read

@@ -1,0 +1,106 @@
+"""Files of spreadsheets and analysis tools: written by the libraries that people use for them."""
+
+from __future__ import annotations
+
+import gzip
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.feather
+from logger_files import START, Case, Truth
+
+__all__ = ["ANALYSIS_CASES"]
+
+
+def excel(path: Path, t: Truth) -> None:
+    """Two sheets: notes, then a title, a header with units, stamps as cells of their own type."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.title = "Notes"
+    book.active.append(["chamber 3", "run of the morning"])
+    sheet = book.create_sheet("Log")
+    sheet.append(["Date", "Temp [°C]", "Rate [°/h]"])
+    for s, c, r in zip(t.time_s, t.temperature_c, t.rate_dph[:, 0], strict=True):
+        stamp = START.replace(tzinfo=None) + timedelta(seconds=float(s))
+        sheet.append([stamp, float(c), float(r)])
+    book.save(path)
+
+
+def csv_gz(path: Path, t: Truth) -> None:
+    with gzip.open(path, "wt", encoding="utf-8") as file:
+        file.write("time_s;temperature_degC;rate_dps\n")
+        for s, c, r in zip(t.time_s, t.temperature_c, t.rate_dps[:, 0], strict=True):
+            file.write(f"{float(s)!r};{float(c)!r};{float(r)!r}\n".replace(".", ","))
+
+
+def npz(path: Path, t: Truth) -> None:
+    np.savez_compressed(
+        path, time_ms=t.time_s * 1e3, temperature=t.temperature_c, temperature_unit="degC", gyro=t.rate_dps,
+        gyro_unit="deg/s",
+    )  # fmt: skip
+
+
+def npy_records(path: Path, t: Truth) -> None:
+    record = [("time_s", "f8"), ("temp_degC", "f8"), ("rate_dph", "f8")]
+    rows = np.zeros(len(t.time_s), dtype=record)
+    rows["time_s"], rows["temp_degC"], rows["rate_dph"] = t.time_s, t.temperature_c, t.rate_dph[:, 0]
+    np.save(path, rows)
+
+
+def feather(path: Path, t: Truth) -> None:
+    start = np.datetime64(START.replace(tzinfo=None), "ns")
+    times = start + np.round(t.time_s * 1e9).astype("m8[ns]")
+    table = pa.table(
+        {
+            "time": pa.array(times, pa.timestamp("ns", tz="UTC")),
+            "temperature_degC": t.temperature_c,
+            "rate_dps": t.rate_dps[:, 0],
+        }
+    )
+    pyarrow.feather.write_feather(table, path)
+
+
+def netcdf(path: Path, t: Truth) -> None:
+    """Times as CF has them, a packed temperature with scale, offset and fill value, a rate over two dimensions."""
+    import xarray as xr
+
+    since = f"seconds since {START:%Y-%m-%d %H:%M:%S}"
+    data = xr.Dataset(
+        {
+            "temperature": ("time", t.temperature_c, {"units": "degC"}),
+            "gyro": (("time", "axis"), t.rate_dps, {"units": "deg/s"}),
+        },
+        coords={"time": ("time", t.time_s, {"units": since, "standard_name": "time"})},
+    )
+    packed = {"dtype": "i4", "scale_factor": 1e-6, "add_offset": 20.0, "_FillValue": -(2**31)}
+    data.to_netcdf(path, engine="h5netcdf", encoding={"temperature": packed})
+
+
+def netcdf_3(path: Path, t: Truth) -> None:
+    import xarray as xr
+
+    data = xr.Dataset(
+        {
+            "temperature": ("row", t.temperature_c, {"units": "degC"}),
+            "rate": ("row", t.rate_dph[:, 0], {"units": "deg/h"}),
+            "time": ("row", t.time_s * 1e3, {"units": "milliseconds since 2026-03-01T08:00:00"}),
+        }
+    )
+    data.to_netcdf(path, engine="scipy")
+
+
+ANALYSIS_CASES = [
+    Case("Excel, a sheet of stamps behind one of notes", "book.xlsx", excel, needs="openpyxl", time_tolerance=1e-3),
+    Case("CSV packed by gzip, decimal commas", "log.csv.gz", csv_gz),
+    Case("NumPy arrays, units beside", "arrays.npz", npz, axes=True),
+    Case("NumPy records", "rows.npy", npy_records),
+    Case("Feather, stamps of UTC", "table.feather", feather, started=True),
+    Case(
+        "NetCDF 4, times and packing of CF", "run.nc", netcdf, axes=True, needs="h5netcdf", started=True,
+        temperature_tolerance=1e-6,
+    ),
+    Case("NetCDF 3, milliseconds of CF", "old.nc", netcdf_3, needs="xarray", started=True),
+]  # fmt: skip
