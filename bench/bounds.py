@@ -142,7 +142,7 @@ _HEAD = re.compile(r"[0-9a-f]+ <(\w+)>:$")
 _LINE = re.compile(r"\S*?gtc\.c:(\d+)(?: \(discriminator \d+\))?$")
 _INSTRUCTION = re.compile(r"\s+[0-9a-f]+:\t(?!\.(?:word|short|byte))")
 _GAUSSIANS = 2  # of a bent line
-_OF_GAUSSIAN = {"bell", "exp2", "high_of_squares", "high", "weighted", "accumulate"}
+_OF_GAUSSIAN = {"gaussian_of_channel", "exp2", "high_of_squares", "high", "weighted", "accumulate"}
 
 
 def gaussian_instructions() -> dict[str, float]:
@@ -182,6 +182,6 @@ def _count_of(rows: list[str], owner: list[str], function: str) -> int:
             line = int(where[1])
         elif inside and _INSTRUCTION.match(row):
             count[owner[line - 1]] += 1
-    if not count["bell"]:
+    if not count["gaussian_of_channel"]:
         raise ValueError(f"{function} holds no Gaussian: {dict(count)}")
     return sum(count[name] for name in _OF_GAUSSIAN)

@@ -23,10 +23,11 @@ static angle_t angle;
 static gtc_word_t words[GTC_SAVE_WORDS];
 static NUM channels[N_CHANNELS];
 static NUM temp, slope, bias, rate, dt;
-static uint_least32_t period = PERIOD_BLOCK, count, time_us, off, seconds;
+static uint_least32_t period = PERIOD_BLOCK, count, elapsed_us, off, seconds;
+static const NUM *read = channels; /* NULL: nothing was read */
 static uint_least32_t seed = 2463534242UL; /* Marsaglia, "Xorshift RNGs", 2003 */
 static volatile int said;
-static int alone; /* 1: further channels show nothing, so that stand-ins do */
+static int alone; /* 1: further channels show nothing, so that fallback models do */
 
 typedef struct {
     uint_least32_t calls, most, empty;
@@ -62,13 +63,10 @@ FUNCTION(open, (table_t * t, const gtc_word_t *w, uint_least32_t n, uint_least32
          (&opened, image, sizeof image / sizeof image[0], ID))
 FUNCTION(map, (const table_t *t, NUM x, NUM s, NUM *b), (table, temp, slope, &bias))
 FUNCTION(init, (state_t * s, const table_t *t, uint_least32_t p), (&state, table, period))
-FUNCTION(sample, (state_t * s, const NUM *c), (&state, channels))
-FUNCTION(sample_at, (state_t * s, uint_least32_t at, const NUM *c), (&state, time_us, channels))
-FUNCTION(missed, (state_t * s, uint_least32_t n), (&state, count))
+FUNCTION(sample, (state_t * s, uint_least32_t us, const NUM *c), (&state, elapsed_us, read))
 FUNCTION(bias, (const state_t *s, NUM *b), (&state, &bias))
 FUNCTION(snapshot, (const state_t *s, snapshot_t *to), (&state, &now))
 FUNCTION(rezero, (state_t * s, NUM r, uint_least32_t n), (&state, rate, seconds))
-FUNCTION(unzero, (state_t * s), (&state))
 FUNCTION(angle, (angle_t * a, NUM b, NUM t, NUM *to), (&angle, bias, dt, &rate))
 FUNCTION(save, (const state_t *s, gtc_word_t *w), (&state, words))
 FUNCTION(restore, (state_t * s, const table_t *t, uint_least32_t p, const gtc_word_t *w, uint_least32_t n),
@@ -145,21 +143,28 @@ static void wander(uint_least32_t c)
     }
 }
 
-/* Half of a block and more at one place, then at another one until it is believed: where the guard takes that long,
+/* A sample a period after the one before. */
+static void go_next(void)
+{
+    elapsed_us = period;
+    go_sample();
+}
+
+/* Half of a block and more at one place, then at another one until it is accepted: where the guard takes that long,
  * the sample that opens the next block closes a whole one and starts anew. */
 static void jump(uint_least32_t samples)
 {
     uint_least32_t k;
     all_somewhere(0U);
     for (k = 0U; k < (samples * 22U); k++) {
-        go_sample();
+        go_next();
     }
     for (k = 0U; k < ((samples + 1U) / 2U); k++) {
-        go_sample();
+        go_next();
     }
     all_somewhere(64U);
     for (k = 0U; k < samples; k++) {
-        go_sample();
+        go_next();
     }
 }
 
@@ -173,7 +178,7 @@ static void history(uint_least32_t samples)
         for (c = 0U; c < N_CHANNELS; c++) {
             wander(c);
         }
-        go_sample();
+        go_next();
         go_bias();
         go_snapshot();
         if ((k % 16U) == 15U) {
@@ -181,39 +186,35 @@ static void history(uint_least32_t samples)
             seconds = 1U + draw(4000U);
             go_rezero();
             go_bias();
-            go_sample();
+            go_next();
         }
         if (draw(40U) == 0U) {
             channels[0] = somewhere(0U, 64U);
         }
     }
-    go_unzero();
+    seconds = 0U;
+    go_rezero();
 }
 
 /* A block that is whole, then nothing for as long as can be. */
-static void outage(uint_least32_t samples, uint_least32_t for_samples, int stamped)
+static void outage(uint_least32_t samples, uint_least32_t for_samples, int then_read)
 {
     uint_least32_t k;
     period = PERIOD_BLOCK / samples;
     go_init();
     all_somewhere(0U);
     for (k = 0U; k < (samples * 24U); k++) {
-        time_us = k * period;
-        if (stamped != 0) {
-            go_sample_at();
-        } else {
-            go_sample();
-        }
+        go_next();
         go_snapshot();
     }
-    if (stamped != 0) {
-        time_us += for_samples * period;
+    elapsed_us = for_samples * period;
+    if (then_read != 0) {
         all_somewhere(64U);
-        go_sample_at();
     } else {
-        count = for_samples;
-        go_missed();
+        read = NULL;
     }
+    go_sample();
+    read = channels;
     go_snapshot();
     go_bias();
 }
@@ -227,13 +228,13 @@ static void late(uint_least32_t blocks)
     off = 0U;
     go_init();
     for (count = 0U; count < 3U; count++) {
-        go_sample();
+        go_next();
     }
     state.elapsed = blocks; /* of a state that has run for so long */
-    state.doubt.begun = 0U;
+    state.uncertainty.terms_since = 0U;
     channels[0] = none();
     for (count = 0U; count < 8U; count++) {
-        go_sample();
+        go_next();
         go_snapshot();
         rate = between(0, EDGE(table->authority[1]), 1);
         seconds = 1U;
@@ -251,7 +252,7 @@ static void power(uint_least32_t without, uint_least32_t samples)
     go_restore();
     off = 0U;
     for (k = 0U; k < 3U; k++) {
-        go_sample();
+        go_next();
         go_bias();
     }
     go_restore();
@@ -264,12 +265,9 @@ static void begin(void)
     begin_map();
     begin_init();
     begin_sample();
-    begin_sample_at();
-    begin_missed();
     begin_bias();
     begin_snapshot();
     begin_rezero();
-    begin_unzero();
     begin_angle();
     begin_save();
     begin_restore();
@@ -308,7 +306,7 @@ int main(void)
             outage(blocks[k % 4U], 1U + n, (int)(n & 1U));
         }
         outage(blocks[k % 4U], 0x0FFFFFFFUL / PERIOD_BLOCK, 1);
-        outage(blocks[k % 4U], 0x0FFFFFFFUL, 0);
+        outage(blocks[k % 4U], 0xE0000000UL / PERIOD_BLOCK, 0);
     }
     alone = 0;
     late(0x7FFFFFUL);
@@ -322,12 +320,9 @@ int main(void)
     put("map", &cost_map);
     put("init", &cost_init);
     put("sample", &cost_sample);
-    put("sample_at", &cost_sample_at);
-    put("missed", &cost_missed);
     put("bias", &cost_bias);
     put("snapshot", &cost_snapshot);
     put("rezero", &cost_rezero);
-    put("unzero", &cost_unzero);
     put("angle", &cost_angle);
     put("save", &cost_save);
     put("restore", &cost_restore);

@@ -47,7 +47,7 @@ int main(void)
 {calls}
     for (;;) {{
         c = in;
-        status = gtc_f32_sample(&state, &c);
+        status = gtc_f32_sample(&state, 1000000UL, &c);
         status = gtc_f32_bias(&state, &b);
         out = b;
     }}
@@ -59,10 +59,6 @@ _CALLS = {
     "rezero": "gtc_f32_rezero(&state, c, 60UL)",
     "save": "gtc_f32_save(&state, saved)",
     "restore": "gtc_f32_restore(&state, &gtc_{symbol}_f32, 1000000UL, saved, 0UL)",
-    "unzero": "gtc_f32_unzero(&state)",
-    "sample_at": "gtc_f32_sample_at(&state, 9UL, &c)",
-    "missed": "gtc_f32_missed(&state, 9UL)",
-    "map": "gtc_f32_map(&gtc_{symbol}_f32, c, c, &b)",
     "open": "gtc_f32_open(&opened, image, 64UL, 1UL)",
     "angle": "gtc_f32_angle(&angle, b, 0.5F, &c)",
 }

@@ -9,7 +9,7 @@
  *
  * At boot gtc_<n>_check(), then gtc_<n>_init(). Then for every temperature sample
  *
- *   status = gtc_f32_sample(&state, &temp_c);
+ *   status = gtc_f32_sample(&state, PERIOD_US, &temp_c);
  *   status = gtc_f32_bias(&state, &bias_dph);    compensated = measured - bias
  *
  * Samples are averaged over blocks of the table's `block_us`. The correction of block n comes from the blocks up to
@@ -17,8 +17,8 @@
  * with GTC_HELD until readings have agreed for the guard's time, then the map with slope 0 (GTC_WARMING) until the
  * window is full.
  *
- * Concurrency: a table is constant and may be read from anywhere. A state belongs to one task, a gtc_<n>_angle_t to
- * one task or interrupt; hand the bias from one to the other by an atomic store, a queue or with interrupts off.
+ * Concurrency: a table is constant and may be read from anywhere. A state belongs to one task, a gtc_<n>_angle_t
+ * (gtc_angle.h) to one task or interrupt; hand the bias from one to the other by an atomic store, a queue or with interrupts off.
  *
  * float32 needs C99 arithmetic (-std=c99 -ffp-contract=off, no -ffast-math), which gtc_f32_check() tests at boot.
  * Fixed point needs no flag.
@@ -29,6 +29,7 @@
 #define GTC_H_INCLUDED
 
 #include "gtc_private_state.h"
+#include "gtc_angle.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -62,21 +63,6 @@ extern "C" {
 /* A missing sample in q31. (In f32 it is a NaN.) */
 #define GTC_TEMP_MISSING (-2147483647L - 1L)
 
-#if defined(__GNUC__) || defined(__clang__)
-#define GTC_MUST_CHECK __attribute__((warn_unused_result))
-#else
-#define GTC_MUST_CHECK
-#endif
-
-/* Sum of angle increments. Starts as 0: `= {0}`, or static. */
-typedef struct {
-    float rest[2]; /* what rounding left, arcsec */
-} gtc_f32_angle_t;
-
-typedef struct {
-    int_least64_t rest; /* 10^-6 of a unit of the angle */
-} gtc_q31_angle_t;
-
 /* A correction with its uncertainty; see gtc_<n>_snapshot(). */
 typedef struct {
     float bias;                /* in force, deg/h */
@@ -101,18 +87,13 @@ typedef struct {
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
  * the compiler that is installed; docs/results.md of gyrotc has other targets.
  *               f32 code  stack   q31 code  stack
- *   check           4460    450       3570    470
+ *   check           4460    450       3630    470
  *   open            2760    500       2540    520
- *   map              920     20        790    120
  *   init             550     70        570     70
- *   sample          5830    250       6230    420
- *   sample_at       6230    270       6660    450
- *   missed          5030    240       5630    410
- *   bias              80      0         80     10
- *   snapshot        1210     50       2030    140
- *   rezero          1640     60       2960    170
- *   unzero           120     10        120     10
- *   angle            340      0        180     30
+ *   sample          6230    310       6660    470
+ *   bias              90      0         90     10
+ *   snapshot        1270     50       2030    140
+ *   rezero          1720     60       2960    170
  *   save             630     40        630     40
  *   restore         2270    620       2200    690 */
 
@@ -135,43 +116,28 @@ GTC_MUST_CHECK int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words,
 GTC_MUST_CHECK int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words,
                                 uint_least32_t n_words, uint_least32_t expected_id);
 
-/* The static map without terms at a temperature and a slope (C per block), within the authority. Stateless.
- * Returns 0, GTC_CLAMPED, GTC_UNCOVERED, or GTC_E_ARG. */
-GTC_MUST_CHECK int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bias);
-GTC_MUST_CHECK int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp,
-                               int_least32_t slope, int_least32_t *bias);
-
 /* Starts a state for a table that gtc_<n>_check() or gtc_<n>_open() accepted; its words are not tested again.
  * period_us: microseconds between samples; a whole number of them, at most 2^20, must make a block, to a thousandth.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (another layout, or beyond the options of this build) or GTC_E_PERIOD. */
 GTC_MUST_CHECK int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t period_us);
 GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_least32_t period_us);
 
-/* One sample: channels[0] is the temperature, then the table's auxiliary channels in the order of their names (q31:
- * 2^-16 of their unit). No reading is an error:
+/* What was read, `elapsed_us` after the call before (the first one: after init): the sample period, or the difference
+ * of a microsecond counter that wraps at 2^32. channels[0] is the temperature, then the table's auxiliary channels in
+ * the order of their names (q31: 2^-16 of their unit); NULL: nothing was read. No reading is an error:
  *   - A missing or stuck reading, one too far from those before it, and a temperature outside the guard's range are
  *     held; an auxiliary reading outside its range counts as the edge (GTC_CLAMPED).
  *   - After start, a jump or a loss, readings are accepted once they have agreed for the guard's time.
  *   - Missing too long: GTC_FALLBACK for the temperature, GTC_CHANNEL_LOST for an auxiliary channel.
- * Returns the status of the correction in force, with GTC_HELD if this temperature was not accepted; GTC_E_ARG for
- * NULL. Cost: about 40 operations a channel; the first call of a block also makes the correction (one map,
- * slope_blocks multiplications, the terms). */
-GTC_MUST_CHECK int gtc_f32_sample(gtc_f32_state_t *state, const float *channels);
-GTC_MUST_CHECK int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *channels);
-
-/* The same with a time stamp: a counter of microseconds that wraps at 2^32. A sample takes the slot of the period in
- * which its time lies, counted from the first one; slots that were passed count as missed. So jitter below half a
- * period does no harm, and lost samples leave the slope right. A sample whose slot is taken, or up to 268 s before
- * the last one, is not used (GTC_HELD); after a block of such samples each counts as a missed period, so a stopped
- * clock ends in GTC_FALLBACK. Call it at least once an hour, with missing readings if there are none. Use either this
- * or gtc_<n>_sample() and gtc_<n>_missed(). After gtc_<n>_restore() time begins anew. */
-GTC_MUST_CHECK int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time_us, const float *channels);
-GTC_MUST_CHECK int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels);
-
-/* `count` samples that did not arrive, the same bits as in `count` calls. Returns as a held sample does; GTC_E_ARG for
- * NULL and for a state that was never started. Cost: that of the blocks that end, at most missing_blocks + 1. */
-GTC_MUST_CHECK int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count);
-GTC_MUST_CHECK int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count);
+ *   - Times are put on a grid of periods, and periods without a reading count as missed: jitter below half a period does
+ *     no harm, lost samples leave the slope right. A reading whose period is taken, or that comes up to 268 s before the
+ *     last one, is not used (GTC_HELD); after a block of such calls each counts as a missed period, so a stopped clock
+ *     ends in GTC_FALLBACK. Longer than an hour: in several calls with NULL.
+ * Returns the status of the correction in force, with GTC_HELD if this temperature was not accepted; GTC_E_ARG for a
+ * state that is NULL or was never started. Cost: about 40 operations a channel; the first call of a block also makes
+ * the correction (one map, slope_blocks multiplications, the terms), a longer gap at most missing_blocks + 1 of them. */
+GTC_MUST_CHECK int gtc_f32_sample(gtc_f32_state_t *state, uint_least32_t elapsed_us, const float *channels);
+GTC_MUST_CHECK int gtc_q31_sample(gtc_q31_state_t *state, uint_least32_t elapsed_us, const int_least32_t *channels);
 
 /* The correction in force; compensated = measured - bias. Never outside the table's authority, whatever the state
  * holds. Returns its status or GTC_E_ARG. */
@@ -191,7 +157,7 @@ GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapsh
 /* Re-zero at rest: moves the constant of the correction, now and in the fallback.
  *   mean_rate  mean of (measured - bias) over the rest, Earth's rate along the axis taken off, deg/h (q31:
  *              2^-bias_frac_bits deg/h); 1 mrad of heading error at the equator is 0.015 deg/h
- *   seconds    length of the rest, s
+ *   seconds    length of the rest, s; 0: takes every re-zero back, whatever mean_rate is
  * The rest is weighed against the spread from power-on to power-on that training saw, the uncertainty of the
  * correction and the noise of the rate. All shifts together stay within the table's `rezero` (GTC_CLAMPED at its
  * edge). A mean rate beyond 4 sigma is refused. The shift is of this power-on: gtc_<n>_restore() keeps it over 0
@@ -200,24 +166,10 @@ GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapsh
 GTC_MUST_CHECK int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds);
 GTC_MUST_CHECK int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds);
 
-/* Takes every re-zero back. Returns 0 or GTC_E_ARG. */
-GTC_MUST_CHECK int gtc_f32_unzero(gtc_f32_state_t *state);
-GTC_MUST_CHECK int gtc_q31_unzero(gtc_q31_state_t *state);
-
-/* The angle to subtract from an angle increment over dt, for a copy of the bias; the rounding error is carried on.
- * f32: dt in s, increment in arcsec, a multiple of 2^-16 while below 64. q31: dt in microseconds, increment in
- * 2^-bias_frac_bits arcsec. Over 24 h the sum stays within one such unit of bias * t (f32 from 64 arcsec on: or one
- * last place of the largest increment), t being the sum of the dt given: 0.001F is off by 4e-8, 2^-10 s is exact.
- * Reads no state. Returns 0 or GTC_E_ARG (NULL, not a number, dt not in 0 ... 1000 s, increment beyond the numbers of
- * the arithmetic), which leaves the carried error as it was. */
-GTC_MUST_CHECK int gtc_f32_angle(gtc_f32_angle_t *angle, float bias, float dt, float *increment);
-GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int_least32_t dt,
-                                 int_least32_t *increment);
-
 /* State over power cycles. `save` writes GTC_SAVE_WORDS words with version, the table's checksum and a CRC. `restore`
- * starts `state` as gtc_<n>_init() does and takes over what survives `off_blocks` whole blocks without power:
- *   0: everything, bit for bit, even within a block; then tell it the samples in between by gtc_<n>_missed(). With
- *      another period_us only what survives longer.
+ * starts `state` as gtc_<n>_init() does and takes over what is kept over `off_blocks` whole blocks without power:
+ *   0: everything, bit for bit, even within a block; the first elapsed_us then counts from the last sample. With
+ *      another period_us only what is kept longer.
  *   more: the memories, which go on relaxing towards the first temperature, and plays.
  * A torn or foreign image, or one with numbers that no call leaves, leaves `state` unwritten: it is read into a state
  * on the stack first. examples/two_slots keeps it over power cuts.

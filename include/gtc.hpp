@@ -6,7 +6,7 @@
  *   gtc::f32::Correction correction;
  *   if (!gtc::f32::check(gtc_sim_0001_f32).is_ok()) { halt(); }
  *   if (!correction.init(gtc_sim_0001_f32, 10000UL).is_ok()) { halt(); }
- *   correction.sample(gtc::f32::Celsius(t));
+ *   correction.sample(10000UL, gtc::f32::Celsius(t));
  *   gtc::f32::DegPerHour bias(0.0F);
  *   gtc::Status status = correction.bias(bias);
  *
@@ -63,21 +63,17 @@ struct F32 {
     {
         return gtc_f32_open(table, words, n, id);
     }
-    static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_f32_map(table, t, s, b); }
     static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_f32_init(state, table, us); }
-    static int sample(State *state, const Number *x) noexcept { return gtc_f32_sample(state, x); }
-    static int sample_at(State *state, uint_least32_t us, const Number *x) noexcept
+    static int sample(State *state, uint_least32_t us, const Number *x) noexcept
     {
-        return gtc_f32_sample_at(state, us, x);
+        return gtc_f32_sample(state, us, x);
     }
-    static int missed(State *state, uint_least32_t n) noexcept { return gtc_f32_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_f32_bias(state, b); }
     static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_f32_snapshot(state, all); }
     static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
     {
         return gtc_f32_rezero(state, rate, seconds);
     }
-    static int unzero(State *state) noexcept { return gtc_f32_unzero(state); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_f32_save(state, words); }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
@@ -99,21 +95,17 @@ struct Q31 {
     {
         return gtc_q31_open(table, words, n, id);
     }
-    static int map(const Table *table, Number t, Number s, Number *b) noexcept { return gtc_q31_map(table, t, s, b); }
     static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_q31_init(state, table, us); }
-    static int sample(State *state, const Number *x) noexcept { return gtc_q31_sample(state, x); }
-    static int sample_at(State *state, uint_least32_t us, const Number *x) noexcept
+    static int sample(State *state, uint_least32_t us, const Number *x) noexcept
     {
-        return gtc_q31_sample_at(state, us, x);
+        return gtc_q31_sample(state, us, x);
     }
-    static int missed(State *state, uint_least32_t n) noexcept { return gtc_q31_missed(state, n); }
     static int bias(const State *state, Number *b) noexcept { return gtc_q31_bias(state, b); }
     static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_q31_snapshot(state, all); }
     static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
     {
         return gtc_q31_rezero(state, rate, seconds);
     }
-    static int unzero(State *state) noexcept { return gtc_q31_unzero(state); }
     static int save(const State *state, gtc_word_t *words) noexcept { return gtc_q31_save(state, words); }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
@@ -142,14 +134,6 @@ template <class A> struct Runtime {
         return Status(A::open(&table, words, n_words, expected_id));
     }
 
-    static Status map(const Table &table, Celsius temp, CelsiusPerBlock slope, DegPerHour &bias) noexcept
-    {
-        Number result = bias.value();
-        const Status status(A::map(&table, temp.value(), slope.value(), &result));
-        bias = DegPerHour(result);
-        return status;
-    }
-
     /* One state; owned by one task. */
     class Correction {
     public:
@@ -158,21 +142,18 @@ template <class A> struct Runtime {
         {
             return Status(A::init(&state_, &table, period_us));
         }
-        /* Of a table with one channel. */
-        Status sample(Celsius temp) noexcept
+        /* Of a table with one channel, so many microseconds after the call before. */
+        Status sample(uint_least32_t elapsed_us, Celsius temp) noexcept
         {
             const Number channel = temp.value();
             const bool alone = (state_.table != nullptr) && (state_.table->n_channels == 1U);
-            return Status(alone ? A::sample(&state_, &channel) : GTC_E_ARG);
+            return Status(alone ? A::sample(&state_, elapsed_us, &channel) : GTC_E_ARG);
         }
-        /* Of any table: n_channels numbers, the temperature first. */
-        Status sample(const Number *channels) noexcept { return Status(A::sample(&state_, channels)); }
-        /* The same with the time at which they were taken, microseconds. */
-        Status sample_at(uint_least32_t time_us, const Number *channels) noexcept
+        /* Of any table: n_channels numbers, the temperature first; nullptr: nothing was read. */
+        Status sample(uint_least32_t elapsed_us, const Number *channels) noexcept
         {
-            return Status(A::sample_at(&state_, time_us, channels));
+            return Status(A::sample(&state_, elapsed_us, channels));
         }
-        Status missed(uint_least32_t count) noexcept { return Status(A::missed(&state_, count)); }
         Status bias(DegPerHour &bias) const noexcept
         {
             Number result = bias.value();
@@ -182,12 +163,11 @@ template <class A> struct Runtime {
         }
         /* Correction, its uncertainty and more, as a filter takes them; the numbers as in gtc.h. */
         Status snapshot(Snapshot &all) const noexcept { return Status(A::snapshot(&state_, &all)); }
-        /* After a rest of so many seconds: the mean of the compensated rate. */
+        /* After a rest of so many seconds: the mean of the compensated rate. 0 seconds take every re-zero back. */
         Status rezero(DegPerHour mean_rate, uint_least32_t seconds) noexcept
         {
             return Status(A::rezero(&state_, mean_rate.value(), seconds));
         }
-        Status unzero() noexcept { return Status(A::unzero(&state_)); }
         /* The state of gtc.h, to copy it or to hand it to C. */
         State &state() noexcept { return state_; }
         const State &state() const noexcept { return state_; }

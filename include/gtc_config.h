@@ -59,6 +59,13 @@
 #define GTC_FRAC_BITS_MOST 60
 #endif
 
+/* What an assertion of a precondition or of a number's range becomes; a test build gives it an abort(). The default is
+ * nothing: with a table that gtc_<n>_check() or gtc_<n>_open() accepted, and a state that only the functions wrote, each
+ * of them holds. */
+#ifndef GTC_ASSERT
+#define GTC_ASSERT(claim) ((void)0)
+#endif
+
 /* 1: two Gaussians in each turn of the loop of the fixed-point map. The bits are the same; it takes
  * 6 % fewer instructions and 90 bytes more. The default follows the compiler's -Os. */
 #ifndef GTC_UNROLL
@@ -67,6 +74,13 @@
 #else
 #define GTC_UNROLL 1
 #endif
+#endif
+
+/* A compiler warns where a status is not looked at. */
+#if defined(__GNUC__) || defined(__clang__)
+#define GTC_MUST_CHECK __attribute__((warn_unused_result))
+#else
+#define GTC_MUST_CHECK
 #endif
 
 #if (GTC_MAX_SLOPE_BLOCKS < 2) || (GTC_MAX_SLOPE_BLOCKS > 32)

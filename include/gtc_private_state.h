@@ -9,94 +9,58 @@
 
 #include "gtc_table.h"
 
-/* The options that set the size of structs are part of every linked name (gtc_f32_init is
+/* The options that set the size of a state are part of the linked name of what starts one (gtc_f32_init is
  * gtc_f32_init_20blocks_4terms to the linker), so that units which were compiled with different ones do not
  * link: "undefined reference to gtc_f32_init_20blocks_1terms" says what the unit was compiled with.
  * MISRA 20.10: a name is made of the options. */
 #define GTC_LINKED_AS(name, b, t) name##_##b##blocks_##t##terms
 #define GTC_LINKED_WITH(name, b, t) GTC_LINKED_AS(name, b, t)
 #define GTC_LINKED(name) GTC_LINKED_WITH(name, GTC_MAX_SLOPE_BLOCKS, GTC_MAX_TERMS)
-#define gtc_f32_check GTC_LINKED(gtc_f32_check)
-#define gtc_f32_open GTC_LINKED(gtc_f32_open)
-#define gtc_f32_map GTC_LINKED(gtc_f32_map)
 #define gtc_f32_init GTC_LINKED(gtc_f32_init)
-#define gtc_f32_sample GTC_LINKED(gtc_f32_sample)
-#define gtc_f32_sample_at GTC_LINKED(gtc_f32_sample_at)
-#define gtc_f32_missed GTC_LINKED(gtc_f32_missed)
-#define gtc_f32_bias GTC_LINKED(gtc_f32_bias)
-#define gtc_f32_snapshot GTC_LINKED(gtc_f32_snapshot)
-#define gtc_f32_rezero GTC_LINKED(gtc_f32_rezero)
-#define gtc_f32_unzero GTC_LINKED(gtc_f32_unzero)
-#define gtc_f32_save GTC_LINKED(gtc_f32_save)
-#define gtc_f32_restore GTC_LINKED(gtc_f32_restore)
-#define gtc_f32_term_memory GTC_LINKED(gtc_f32_term_memory)
-#define gtc_f32_term_play GTC_LINKED(gtc_f32_term_play)
-#define gtc_f32_term_warm_up GTC_LINKED(gtc_f32_term_warm_up)
-#define gtc_f32_term_harmonic GTC_LINKED(gtc_f32_term_harmonic)
-#define gtc_f32_term_auxiliary GTC_LINKED(gtc_f32_term_auxiliary)
-#define gtc_f32_term_curve GTC_LINKED(gtc_f32_term_curve)
-#define gtc_f32_term_product GTC_LINKED(gtc_f32_term_product)
-#define gtc_q31_check GTC_LINKED(gtc_q31_check)
-#define gtc_q31_open GTC_LINKED(gtc_q31_open)
-#define gtc_q31_map GTC_LINKED(gtc_q31_map)
 #define gtc_q31_init GTC_LINKED(gtc_q31_init)
-#define gtc_q31_sample GTC_LINKED(gtc_q31_sample)
-#define gtc_q31_sample_at GTC_LINKED(gtc_q31_sample_at)
-#define gtc_q31_missed GTC_LINKED(gtc_q31_missed)
-#define gtc_q31_bias GTC_LINKED(gtc_q31_bias)
-#define gtc_q31_snapshot GTC_LINKED(gtc_q31_snapshot)
-#define gtc_q31_rezero GTC_LINKED(gtc_q31_rezero)
-#define gtc_q31_unzero GTC_LINKED(gtc_q31_unzero)
-#define gtc_q31_save GTC_LINKED(gtc_q31_save)
+#define gtc_f32_restore GTC_LINKED(gtc_f32_restore)
 #define gtc_q31_restore GTC_LINKED(gtc_q31_restore)
-#define gtc_q31_term_memory GTC_LINKED(gtc_q31_term_memory)
-#define gtc_q31_term_play GTC_LINKED(gtc_q31_term_play)
-#define gtc_q31_term_warm_up GTC_LINKED(gtc_q31_term_warm_up)
-#define gtc_q31_term_harmonic GTC_LINKED(gtc_q31_term_harmonic)
-#define gtc_q31_term_auxiliary GTC_LINKED(gtc_q31_term_auxiliary)
-#define gtc_q31_term_curve GTC_LINKED(gtc_q31_term_curve)
-#define gtc_q31_term_product GTC_LINKED(gtc_q31_term_product)
 
-/* What the uncertainty of a correction goes by; part of a state, as private. */
+/* What the uncertainty of a correction is computed from. */
 typedef struct {
-    float at[2];           /* where the map was asked: C, C/block */
-    float drift;           /* slope as far as it is known, C/block */
-    float start;           /* sample with which the front end began, C */
-    float low;             /* lowest ... */
-    float high;            /* ... and highest temperature that the terms saw since they began, C */
-    float plain;           /* correction without the shift, deg/h */
-    float edge;            /* what terms add of readings at the edge of their range, beyond their stand-ins, deg/h */
-    uint_least32_t begun;  /* blocks since init when the terms began */
-    uint_least32_t known;  /* one bit a term: it went on from where it was, or its channel is read */
-    uint_least32_t sure;   /* 0: there was no correction yet, 1: nothing is known of the slope, 2: drift is known */
-} gtc_f32_doubt_t;
+    float input[2];             /* of the map: C, C/block */
+    float slope;                /* as far as it is known, C/block */
+    float first_temp;           /* sample with which the front end began, C */
+    float lowest;               /* lowest ... */
+    float highest;              /* ... and highest temperature that the terms saw since they began, C */
+    float unshifted;            /* correction without the re-zero, deg/h */
+    float edge_effect;          /* what terms add of readings at the edge of their range, less their fallback, deg/h */
+    uint_least32_t terms_since; /* blocks since init when the terms began */
+    uint_least32_t terms_known; /* one bit a term: its memory was retained, or its channel is read */
+    uint_least32_t slope_known; /* 0: there was no correction yet, 1: nothing is known of the slope, 2: `slope` is */
+} gtc_f32_uncertainty_t;
 
 typedef struct {
-    int_least32_t at[2];
-    int_least32_t drift;
-    int_least32_t start;
-    int_least32_t low;
-    int_least32_t high;
-    int_least32_t plain;
-    int_least32_t edge;
-    uint_least32_t begun;
-    uint_least32_t known;
-    uint_least32_t sure;
-} gtc_q31_doubt_t;
+    int_least32_t input[2];
+    int_least32_t slope;
+    int_least32_t first_temp;
+    int_least32_t lowest;
+    int_least32_t highest;
+    int_least32_t unshifted;
+    int_least32_t edge_effect;
+    uint_least32_t terms_since;
+    uint_least32_t terms_known;
+    uint_least32_t slope_known;
+} gtc_q31_uncertainty_t;
 
 /* State of one channel of a table: temperature or auxiliary. */
 typedef struct {
-    uint_least32_t gap_us;      /* since the last believed reading; 0: none was */
+    uint_least32_t gap_us;      /* since the last accepted reading; 0: none was */
     uint_least32_t agreed_us;   /* for how long readings agree that do not follow it */
     uint_least32_t same_us;     /* for how long the reading has been the same */
     uint_least32_t received;    /* last reading, its bits */
-    uint_least32_t valid;       /* believed readings of the running block */
+    uint_least32_t valid;       /* accepted readings of the running block */
     uint_least32_t held_blocks; /* blocks in a row with too few of them */
     uint_least32_t clamped;     /* whether any was taken as the edge of its range */
     float near;                 /* limit of a change between samples */
-    float last;                 /* last believed reading */
+    float last;                 /* last accepted reading */
     float candidate;            /* last one that does not follow it */
-    float base;                 /* first believed reading of the block */
+    float base;                 /* first accepted reading of the block */
     float mean;                 /* of the last block with enough of them, or what stands for it */
     float sum;                  /* of differences from base */
 } gtc_f32_input_t;
@@ -129,12 +93,11 @@ typedef struct {
     float bias;                    /* in force, deg/h */
     uint_least32_t elapsed;        /* blocks since init */
     uint_least32_t off_blocks;     /* blocks without power before it */
-    uint_least32_t is_stamped;     /* 1: a sample with a time came, and ... */
-    uint_least32_t time_us;        /* ... this is the last one's, on the grid of sample periods */
-    uint_least32_t unused;         /* samples in a row whose time had not moved on */
+    uint_least32_t late_us;        /* from the slot of the last sample to the last call, modulo 2^32 */
+    uint_least32_t unused;         /* calls in a row whose time had not moved on */
     float shift;                   /* of the constant, deg/h: gtc_f32_rezero() */
-    float constant;                /* 1 sigma of the constant with it, deg/h */
-    gtc_f32_doubt_t doubt;
+    float shift_sigma;             /* 1 sigma of the constant with it, deg/h */
+    gtc_f32_uncertainty_t uncertainty;
     float window[GTC_MAX_SLOPE_BLOCKS];        /* block means, newest first, C */
     float term[GTC_TERM_SLOTS][2];              /* states of the terms */
     gtc_f32_input_t input[GTC_MAX_TERMS + 1];  /* temperature, auxiliary channels */
@@ -151,15 +114,27 @@ typedef struct {
     int_least32_t bias; /* 2^-bias_frac_bits deg/h */
     uint_least32_t elapsed;
     uint_least32_t off_blocks;
-    uint_least32_t is_stamped;
-    uint_least32_t time_us;
+    uint_least32_t late_us;
     uint_least32_t unused;
     int_least32_t shift;
-    int_least32_t constant;
-    gtc_q31_doubt_t doubt;
+    int_least32_t shift_sigma;
+    gtc_q31_uncertainty_t uncertainty;
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS]; /* 2^-16 C */
     int_least32_t term[GTC_TERM_SLOTS][2];
     gtc_q31_input_t input[GTC_MAX_TERMS + 1];
 } gtc_q31_state_t;
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* For tests: the static map without terms at a temperature and a slope (C per block), within the authority. Stateless.
+ * Returns 0, GTC_CLAMPED, GTC_UNCOVERED, or GTC_E_ARG. */
+int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bias);
+int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp, int_least32_t slope, int_least32_t *bias);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif /* GTC_PRIVATE_STATE_H_INCLUDED */

@@ -34,6 +34,7 @@
 #define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel; kinds from here on read one */
 #define GTC_TERM_CURVE 6U     /* a line and two Gaussians in an auxiliary channel */
 #define GTC_TERM_PRODUCT 7U   /* a line in T times a line in an auxiliary channel */
+#define GTC_N_KINDS 7U
 
 #if (UINT_LEAST32_MAX != 4294967295U) || (INT_LEAST32_MIN + 1 != -2147483647)
 #error "gtc needs least-width 32-bit integers of just 32 bits, in two's complement"
@@ -52,7 +53,7 @@ typedef union {
 #define GTC_GUARD_WORDS 8U   /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
 #define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
 #define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
-#define GTC_TERM_WORDS 8U    /* kind, channel + 65536 * number of the stand-in, then six parameters of the kind */
+#define GTC_TERM_WORDS 8U    /* kind, channel + 65536 * number of the fallback model, then six parameters of the kind */
 #define GTC_SIGMA_RULES 11U  /* words of `sigma` behind its two grids, before one for each term */
 #define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
@@ -84,9 +85,9 @@ typedef struct {
     uint_least32_t sigma_cells[2];    /* the same for the uncertainty; 0, 0: none */
     uint_least32_t n_sigma;           /* words of the uncertainty: 0, or 2 grids, GTC_SIGMA_RULES, one a term */
     uint_least32_t n_probes;          /* known answers */
-    uint_least32_t n_stand_ins;       /* networks behind those of the map, each for a term whose channel is lost */
+    uint_least32_t n_fallback_models;       /* networks behind those of the map, each for a term whose channel is lost */
     const gtc_word_t *serial;      /* [GTC_SERIAL_WORDS], as given by the gyro's maker */
-    const gtc_word_t *networks;    /* [n_networks + n_stand_ins][GTC_NETWORK_WORDS] */
+    const gtc_word_t *networks;    /* [n_networks + n_fallback_models][GTC_NETWORK_WORDS] */
     const gtc_word_t *centers;     /* [n_centers][GTC_CENTER_WORDS] */
     const gtc_word_t *guards;      /* [n_channels][GTC_GUARD_WORDS], the temperature first */
     const gtc_word_t *terms;       /* [n_terms][GTC_TERM_WORDS] */
@@ -94,7 +95,7 @@ typedef struct {
     const gtc_word_t *sigma;       /* [covered, uncovered][slope cell][T cell] deg/h, 1 sigma; rules; terms */
     const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
     uint_least32_t crc;            /* CRC-32 over all of the above */
-    const struct gtc_f32_term_code *term_code[GTC_TERM_SLOTS]; /* one for each term, else NULL */
+    const struct gtc_f32_term_code *const *term_code; /* [GTC_N_KINDS], by kind - 1; NULL where there are no terms */
 } gtc_f32_table_t;
 
 /* Table in fixed point. Words are two's complement 32-bit integers in `bits`. */
@@ -123,7 +124,7 @@ typedef struct {
     uint_least32_t sigma_cells[2];
     uint_least32_t n_sigma;
     uint_least32_t n_probes;
-    uint_least32_t n_stand_ins;
+    uint_least32_t n_fallback_models;
     const gtc_word_t *serial;
     const gtc_word_t *networks;
     const gtc_word_t *centers;
@@ -133,7 +134,7 @@ typedef struct {
     const gtc_word_t *sigma;
     const gtc_word_t *probes;
     uint_least32_t crc;
-    const struct gtc_q31_term_code *term_code[GTC_TERM_SLOTS];
+    const struct gtc_q31_term_code *const *term_code;
 } gtc_q31_table_t;
 
 #endif /* GTC_TABLE_H_INCLUDED */

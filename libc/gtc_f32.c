@@ -60,8 +60,8 @@ static int FN(envelope_fits)(const TABLE *table)
         fit &= (FN(is_width)(low, high) || (FN(bits)(low) == FN(bits)(high))) ? 1 : 0;
     }
     for (i = 0U; i < 2U; i++) {
-        fit &= FN(is_reach)(edges[i].value, table->scale[0].value, table->scale[1].value);
-        fit &= FN(is_reach)(edges[2U + i].value, 0.0F, table->scale[2].value);
+        fit &= FN(is_reach)(edges[i].value, table->scale[SCALE_CENTER].value, table->scale[SCALE_TEMP].value);
+        fit &= FN(is_reach)(edges[ENVELOPE_SLOPE + i].value, 0.0F, table->scale[SCALE_SLOPE].value);
     }
     return fit;
 }
@@ -234,19 +234,9 @@ int gtc_f32_init(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_leas
     return FN(run_init)(state, table, period_us);
 }
 
-int gtc_f32_sample(gtc_f32_state_t *state, const float *channels)
+int gtc_f32_sample(gtc_f32_state_t *state, uint_least32_t elapsed_us, const float *channels)
 {
-    return FN(run_sample)(state, channels);
-}
-
-int gtc_f32_sample_at(gtc_f32_state_t *state, uint_least32_t time_us, const float *channels)
-{
-    return FN(run_sample_at)(state, time_us, channels);
-}
-
-int gtc_f32_missed(gtc_f32_state_t *state, uint_least32_t count)
-{
-    return FN(run_missed)(state, count);
+    return FN(run_sample)(state, elapsed_us, channels);
 }
 
 int gtc_f32_bias(const gtc_f32_state_t *state, float *bias)
@@ -274,9 +264,4 @@ int gtc_f32_snapshot(const gtc_f32_state_t *state, gtc_f32_snapshot_t *snapshot)
 int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds)
 {
     return FN(run_rezero)(state, mean_rate, seconds);
-}
-
-int gtc_f32_unzero(gtc_f32_state_t *state)
-{
-    return FN(run_unzero)(state);
 }

@@ -22,69 +22,44 @@
 
 /* What becomes of a reading. */
 #define IS_HELD 0
-#define IS_BELIEVED 1
+#define IS_ACCEPTED 1
 #define IS_NEW_START 2
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
 /* Puts a correction in force, moved by the shift of the constant: the only place that writes one. */
-static void FN(put)(STATE *state, WIDE bias, int_least32_t status)
+static void FN(set_correction)(STATE *state, WIDE bias, int_least32_t status)
 {
-    WIDE governed = bias;
-    int remark = FN(govern)(state->table, &governed);
+    int_least32_t remarks = status;
+    NUM limited = FN(within_authority)(state->table, bias, &remarks);
 
-    state->doubt.plain = (NUM)governed;
+    state->uncertainty.unshifted = limited;
     if ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO)) {
-        governed = FN(add)(governed, state->shift);
-        remark |= FN(govern)(state->table, &governed);
+        limited = FN(within_authority)(state->table, FN(add)(limited, state->shift), &remarks);
     }
-    state->bias = (NUM)governed;
-    state->status = status | (int_least32_t)remark;
-}
-
-/* What the terms add, within what they may add. */
-static WIDE FN(added)(const TABLE *table, EFFECT *effect)
-{
-    const NUM low = MEMBER(table->effect[0]);
-    const NUM high = MEMBER(table->effect[1]);
-    WIDE added = effect->added;
-
-    if (!(added >= low)) {
-        added = low;
-        effect->remarks |= GTC_CLAMPED;
-    } else if (!(added <= high)) {
-        added = high;
-        effect->remarks |= GTC_CLAMPED;
-    } else {
-        /* as it is */
-    }
-    return added;
+    state->bias = limited;
+    state->status = remarks;
 }
 
 /* The temperature as the terms see it, which is as the map does: within the envelope. */
-static NUM FN(seen)(const TABLE *table, NUM temp)
+static NUM FN(within_envelope)(const TABLE *table, NUM temp, int_least32_t *remarks)
 {
-    const NUM low = MEMBER(table->envelope[0]);
-    const NUM high = MEMBER(table->envelope[1]);
-    const NUM most = (temp < high) ? temp : high;
-
-    return (most > low) ? most : low;
+    return FN(saturate)(temp, MEMBER(table->envelope[0]), MEMBER(table->envelope[1]), remarks);
 }
 
-/* Lets every term take note that a block ends; it sees this temperature, which lies within the envelope. */
-static void FN(step_terms)(STATE *state, NUM seen)
+/* Lets every term take note that a block ends, of this temperature, which lies within the envelope. */
+static void FN(step_terms)(STATE *state, NUM temp)
 {
-    const TABLE *const table = state->table;
     uint_least32_t i;
 
-    for (i = 0U; i < FN(n_terms)(table); i++) {
-        table->term_code[i]->step(state, i, seen);
+    for (i = 0U; i < FN(n_terms)(state->table); i++) {
+        FN(code_of)(state->table, i)->step(state, i, temp);
     }
-    FN(doubt_step)(state, seen);
+    FN(uncertainty_step)(state, temp);
 }
 
-/* Makes the correction for an input, whose temperature the terms see as `seen`, and puts it in force. */
-static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32_t remarks)
+/* Makes the correction for an input and puts it in force; `within`: its temperature within the envelope. */
+static void FN(correct)(STATE *state, NUM temp, NUM within, NUM slope, int_least32_t remarks)
 {
     const TABLE *const table = state->table;
     EFFECT effect;
@@ -96,34 +71,35 @@ static void FN(correct)(STATE *state, NUM temp, NUM seen, NUM slope, int_least32
     effect.temp = temp;
     effect.slope = slope;
     effect.added = NUM_ZERO;
-    effect.known = state->doubt.known;
-    effect.edge = NUM_ZERO;
-    effect.remarks = (FN(bits)(seen) != FN(bits)(temp)) ? (remarks | GTC_CLAMPED) : remarks;
+    effect.terms_known = state->uncertainty.terms_known;
+    effect.edge_effect = NUM_ZERO;
+    effect.remarks = remarks;
     for (i = 0U; i < FN(n_terms)(table); i++) {
-        table->term_code[i]->apply(state, i, seen, &effect);
+        FN(code_of)(table, i)->apply(state, i, within, &effect);
     }
     status = FN(map)(table, effect.temp, effect.slope, &bias);
-    FN(doubt_input)(state, &effect, slope);
+    FN(uncertainty_input)(state, &effect, slope);
     total = bias;
     if (FN(n_terms)(table) != 0U) {
-        total = FN(add)(total, FN(added)(table, &effect));
+        total = FN(add)(total, FN(saturate)(effect.added, MEMBER(table->effect[0]), MEMBER(table->effect[1]),
+                                            &effect.remarks));
     }
-    FN(put)(state, total, effect.remarks | (int_least32_t)status);
+    FN(set_correction)(state, total, effect.remarks | (int_least32_t)status);
 }
 
 /* A term that was never begun. */
-static void FN(forget)(volatile STATE *state, uint_least32_t i)
+static void FN(reset_term)(volatile STATE *state, uint_least32_t i)
 {
     state->term[i][0] = FN(missing)();
     state->term[i][1] = FN(missing)();
 }
 
-static void FN(forget_terms)(STATE *state)
+static void FN(reset_terms)(STATE *state)
 {
     uint_least32_t i;
 
     for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        FN(forget)(state, i);
+        FN(reset_term)(state, i);
     }
 }
 
@@ -131,20 +107,21 @@ static void FN(forget_terms)(STATE *state)
 static void FN(restart)(STATE *state, NUM x, int is_first)
 {
     const TABLE *const table = state->table;
-    const NUM seen = FN(seen)(table, x);
+    int_least32_t remarks = GTC_WARMING;
+    const NUM within = FN(within_envelope)(table, x, &remarks);
     uint_least32_t i;
 
     state->filled = 0U;
     state->window_valid = 0U;
-    state->doubt.start = x;
+    state->uncertainty.first_temp = x;
     if (is_first == 0) {
-        FN(forget_terms)(state);
+        FN(reset_terms)(state);
     }
-    FN(doubt_begin)(state, seen);
+    FN(uncertainty_begin)(state, within);
     for (i = 0U; i < FN(n_terms)(table); i++) {
-        table->term_code[i]->begin(state, i, seen);
+        FN(code_of)(table, i)->begin(state, i, within);
     }
-    FN(correct)(state, x, seen, NUM_ZERO, GTC_WARMING);
+    FN(correct)(state, x, within, NUM_ZERO, remarks);
 }
 
 /* ---- the window ---------------------------------------------------------------------------------- */
@@ -208,7 +185,7 @@ static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
     return GTC_OK;
 }
 
-/* ---- what is believed ---------------------------------------------------------------------------- */
+/* ---- what is accepted ---------------------------------------------------------------------------- */
 
 /* A time and another, microseconds, as far as can be counted. */
 static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
@@ -218,13 +195,13 @@ static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
     return (sum >= a) ? sum : MAX_US;
 }
 
-/* Nothing of a channel was ever believed, or not since it was lost. */
+/* Nothing of a channel was ever accepted, or not since it was lost. */
 static int FN(is_new)(const INPUT *in)
 {
     return (in->gap_us == 0U) ? 1 : 0;
 }
 
-/* `us` microseconds passed in which nothing was believed. */
+/* `us` microseconds passed in which nothing was accepted. */
 static void FN(hold)(INPUT *in, uint_least32_t us)
 {
     if (in->gap_us != 0U) {
@@ -249,7 +226,7 @@ static int FN(is_stuck)(INPUT *in, const gtc_word_t *guard, NUM x, uint_least32_
     return ((most != 0U) && (in->same_us >= most)) ? 1 : 0;
 }
 
-/* 1 if x follows the last believed reading. */
+/* 1 if x follows the last accepted reading. */
 static int FN(follows)(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
 {
     int near = 0;
@@ -265,7 +242,7 @@ static int FN(follows)(const STATE *state, const INPUT *in, const gtc_word_t *gu
 }
 
 /* What becomes of a reading that does not follow the last one: it must agree with those after it. */
-static int FN(suspect)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
 {
     const uint_least32_t before = in->agreed_us;
 
@@ -278,7 +255,7 @@ static int FN(suspect)(const STATE *state, INPUT *in, const gtc_word_t *guard, N
 }
 
 /* Takes x into the running block. */
-static void FN(believe)(INPUT *in, NUM x, uint_least32_t period_us)
+static void FN(accept)(INPUT *in, NUM x, uint_least32_t period_us)
 {
     if (in->valid == 0U) {
         in->base = x;
@@ -291,13 +268,13 @@ static void FN(believe)(INPUT *in, NUM x, uint_least32_t period_us)
     in->agreed_us = 0U;
 }
 
-/* One reading x within its range: held, believed, or believed as a new start, which is the mean until a block ends. */
-static int FN(admit)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+/* One reading x within its range: held, accepted, or accepted as a new start, which is the mean until a block ends. */
+static int FN(judge)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
 {
-    int verdict = IS_BELIEVED;
+    int verdict = IS_ACCEPTED;
 
     if (!FN(follows)(state, in, guard, x)) {
-        verdict = FN(suspect)(state, in, guard, x);
+        verdict = FN(confirm)(state, in, guard, x);
     }
     if (verdict == IS_HELD) {
         FN(hold)(in, state->period_us);
@@ -309,12 +286,12 @@ static int FN(admit)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM
         in->clamped = 0U;
         in->mean = x;
     }
-    FN(believe)(in, x, state->period_us);
+    FN(accept)(in, x, state->period_us);
     return verdict;
 }
 
 /* A reading that is none. */
-static void FN(refuse)(INPUT *in, uint_least32_t us)
+static void FN(reject)(INPUT *in, uint_least32_t us)
 {
     in->agreed_us = 0U;
     FN(hold)(in, us);
@@ -330,9 +307,9 @@ static int FN(take_temperature)(STATE *state, NUM x)
 
     if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
         || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
-        FN(refuse)(in, state->period_us);
+        FN(reject)(in, state->period_us);
     } else {
-        verdict = FN(admit)(state, in, guard, x);
+        verdict = FN(judge)(state, in, guard, x);
         if (verdict == IS_NEW_START) {
             FN(restart)(state, x, is_first);
         }
@@ -345,22 +322,17 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
 {
     INPUT *const in = &state->input[channel];
     const gtc_word_t *const guard = FN(guard)(state, channel);
-    NUM x = reading;
+    int_least32_t remarks = GTC_OK;
+    NUM x;
     int verdict;
 
     if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
-        FN(refuse)(in, state->period_us);
+        FN(reject)(in, state->period_us);
         return;
     }
-    if (x < ELEMENT(guard[GUARD_LOW])) {
-        x = ELEMENT(guard[GUARD_LOW]);
-    } else if (x > ELEMENT(guard[GUARD_HIGH])) {
-        x = ELEMENT(guard[GUARD_HIGH]);
-    } else {
-        /* in its range */
-    }
-    verdict = FN(admit)(state, in, guard, x);
-    if ((verdict != IS_HELD) && (FN(bits)(x) != FN(bits)(reading))) {
+    x = FN(saturate)(reading, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH]), &remarks);
+    verdict = FN(judge)(state, in, guard, x);
+    if ((verdict != IS_HELD) && (remarks != GTC_OK)) {
         in->clamped |= (verdict == IS_NEW_START) ? (CLAMPED_NOW | CLAMPED_MEAN) : CLAMPED_NOW;
     }
 }
@@ -373,7 +345,7 @@ static int FN(is_enough)(const STATE *state, const INPUT *in)
 }
 
 /* The running block of a channel ends. Returns 1 if it has enough readings; then the mean is theirs. When it is
- * lost its last reading is forgotten, so that it must agree with itself before it is believed again. */
+ * lost its last reading is forgotten, so that it must agree with itself before it is accepted again. */
 static int FN(end_block)(const STATE *state, INPUT *in, const gtc_word_t *guard)
 {
     const int is_valid = FN(is_enough)(state, in);
@@ -414,14 +386,16 @@ static void FN(close_channels)(STATE *state)
 static void FN(bridge)(STATE *state)
 {
     if (FN(is_lost)(&state->input[0], state->table->guards) != 0) {
-        FN(forget_terms)(state);
-        FN(put)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
+        FN(reset_terms)(state);
+        FN(set_correction)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
     } else if (state->input[0].gap_us != 0U) {
+        int_least32_t ignored = GTC_OK;
+
         FN(push)(state, 0U);
-        FN(step_terms)(state, FN(seen)(state->table, state->input[0].mean));
+        FN(step_terms)(state, FN(within_envelope)(state->table, state->input[0].mean, &ignored));
         state->status |= GTC_HELD;
     } else {
-        /* nothing was ever believed: no correction yet */
+        /* nothing was ever accepted: no correction yet */
     }
 }
 
@@ -439,16 +413,16 @@ static void FN(close)(STATE *state)
     FN(close_channels)(state);
     if (FN(end_block)(state, &state->input[0], state->table->guards) != 0) {
         NUM temp;
-        NUM seen;
+        NUM within;
         NUM slope;
         int_least32_t remarks;
 
         FN(push)(state, 1U);
         remarks = FN(window_slope)(state, &slope);
         temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
-        seen = FN(seen)(state->table, temp);
-        FN(step_terms)(state, seen);
-        FN(correct)(state, temp, seen, slope, remarks);
+        within = FN(within_envelope)(state->table, temp, &remarks);
+        FN(step_terms)(state, within);
+        FN(correct)(state, temp, within, slope, remarks);
     } else {
         FN(bridge)(state);
     }
@@ -528,10 +502,9 @@ static void FN(clear)(STATE *state)
     state->bias = NUM_ZERO;
     state->elapsed = 0U;
     state->off_blocks = 0U;
-    state->is_stamped = 0U;
-    state->time_us = 0U;
+    state->late_us = 0U;
     state->unused = 0U;
-    FN(doubt_clear)(state);
+    FN(uncertainty_clear)(state);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         window[i] = NUM_ZERO;
     }
@@ -559,7 +532,7 @@ static void FN(start)(STATE *state, const TABLE *table, uint_least32_t period_us
             state->input[i].near = FN(limit)(FN(guard)(state, i), period_us);
         }
     }
-    FN(forget_terms)(state);
+    FN(reset_terms)(state);
 }
 
 static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t period_us)
@@ -572,14 +545,12 @@ static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t period_
     return status;
 }
 
-static int FN(run_sample)(STATE *state, const NUM *channels)
+/* The next sample of the grid. */
+static int FN(take)(STATE *state, const NUM *channels)
 {
     uint_least32_t c;
     int remark;
 
-    if ((state == NULL) || (channels == NULL) || (state->table == NULL)) {
-        return GTC_E_ARG;
-    }
     if (state->position >= state->samples_per_block) {
         FN(close)(state);
     }
@@ -609,7 +580,7 @@ static void FN(miss)(STATE *state, uint_least32_t samples)
     uint_least32_t c;
 
     for (c = 0U; c < FN(n_channels)(state->table); c++) {
-        FN(refuse)(&state->input[c], samples * state->period_us);
+        FN(reject)(&state->input[c], samples * state->period_us);
     }
 }
 
@@ -622,22 +593,11 @@ static uint_least32_t FN(skip)(STATE *state, uint_least32_t samples)
     return samples - (blocks * state->samples_per_block);
 }
 
-/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
-static int FN(has_times)(const STATE *state)
-{
-    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
-}
-
-static int FN(run_missed)(STATE *state, uint_least32_t count)
+/* `count` samples of the grid in which nothing came, the same bits as in `count` calls. */
+static int FN(pass_over)(STATE *state, uint_least32_t count)
 {
     uint_least32_t rest = count;
 
-    if ((state == NULL) || (FN(has_times)(state) == 0)) {
-        return GTC_E_ARG;
-    }
-    if (count == 0U) {
-        return (int)state->status;
-    }
     while (rest > 0U) {
         uint_least32_t step;
 
@@ -656,11 +616,11 @@ static int FN(run_missed)(STATE *state, uint_least32_t count)
     return (int)state->status | GTC_HELD;
 }
 
-/* Sample periods from the slot of the last stamped sample to a time, rounded. */
-static uint_least32_t FN(slots)(const STATE *state, uint_least32_t later_us)
+/* Sample periods in a time, rounded. */
+static uint_least32_t FN(slots)(const STATE *state, uint_least32_t us)
 {
-    const uint_least32_t rest = later_us % state->period_us;
-    const uint_least32_t n = later_us / state->period_us;
+    const uint_least32_t rest = us % state->period_us;
+    const uint_least32_t n = us / state->period_us;
 
     return n + ((rest >= (state->period_us - rest)) ? 1U : 0U);
 }
@@ -673,44 +633,49 @@ static int FN(not_used)(STATE *state)
         state->unused++;
         return (int)state->status | GTC_HELD;
     }
-    return FN(run_missed)(state, 1U);
+    return FN(pass_over)(state, 1U);
 }
 
-/* Times are put on a grid of sample periods, from the first one on, so that no error of them adds up. */
-static int FN(run_sample_at)(STATE *state, uint_least32_t time_us, const NUM *channels)
+/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
+static int FN(has_times)(const STATE *state)
+{
+    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
+}
+
+/* Times are put on a grid of sample periods, from the start on, so that no error of them adds up. */
+static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *channels)
 {
     uint_least32_t later_us;
-    uint_least32_t n;
+    uint_least32_t n = 1U;
 
-    if ((state == NULL) || (channels == NULL) || (FN(has_times)(state) == 0)) {
+    if ((state == NULL) || (FN(has_times)(state) == 0)) {
         return GTC_E_ARG;
     }
-    if (state->is_stamped == 0U) {
-        state->is_stamped = 1U;
-        state->time_us = time_us & MAX_US;
-        return FN(run_sample)(state, channels);
+    later_us = (state->late_us + elapsed_us) & MAX_US;
+    if (later_us != state->period_us) {
+        n = FN(slots)(state, later_us);
     }
-    later_us = (time_us - state->time_us) & MAX_US;
-    n = FN(slots)(state, later_us);
     if ((n == 0U) || (later_us > (MAX_US - LATEST))) {
+        state->late_us = later_us;
         return FN(not_used)(state);
     }
     state->unused = 0U;
-    state->time_us = (state->time_us + (n * state->period_us)) & MAX_US;
-    (void)FN(run_missed)(state, n - 1U);
-    return FN(run_sample)(state, channels);
+    state->late_us = (later_us - (n * state->period_us)) & MAX_US;
+    if (channels == NULL) {
+        return FN(pass_over)(state, n);
+    }
+    (void)FN(pass_over)(state, n - 1U);
+    return FN(take)(state, channels);
 }
 
 static int FN(run_bias)(const STATE *state, NUM *bias)
 {
-    WIDE governed;
-    int remark;
+    int_least32_t remarks;
 
     if ((state == NULL) || (bias == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
     }
-    governed = state->bias;
-    remark = FN(govern)(state->table, &governed);
-    *bias = (NUM)governed;
-    return (int)state->status | remark;
+    remarks = state->status;
+    *bias = FN(within_authority)(state->table, state->bias, &remarks);
+    return (int)remarks;
 }

@@ -13,7 +13,34 @@
 #define N_WHOLE 18U    /* whole numbers of a table's header ... */
 #define FIRST_COUNT 8U /* ... of which the counts are the last */
 #define N_NUMBERS 13U  /* other numbers of the header */
-#define N_KINDS 7U     /* of terms */
+
+/* Whole numbers by name ... */
+#define WHOLE_QUANTITY 0U
+#define WHOLE_UNIT 1U
+#define WHOLE_ID 2U
+#define WHOLE_CALIBRATED 3U
+#define WHOLE_BLOCK_US 4U
+#define WHOLE_SLOPE_BLOCKS 5U
+#define WHOLE_LEAD_BLOCKS 6U
+#define WHOLE_BIAS_FRAC_BITS 7U
+#define WHOLE_NETWORKS 8U
+#define WHOLE_CENTERS 9U
+#define WHOLE_CHANNELS 10U
+#define WHOLE_TERMS 11U
+#define WHOLE_COVERAGE_TEMP 12U
+#define WHOLE_COVERAGE_SLOPE 13U
+#define WHOLE_SIGMA_TEMP 14U
+#define WHOLE_SIGMA_SLOPE 15U
+#define WHOLE_SIGMA_WORDS 16U
+#define WHOLE_PROBES 17U
+
+/* ... and the first of each kind of the others. */
+#define NUMBER_FALLBACK 0U
+#define NUMBER_AUTHORITY 1U
+#define NUMBER_EFFECT 3U
+#define NUMBER_REZERO 5U
+#define NUMBER_SCALE 6U
+#define NUMBER_ENVELOPE 9U
 
 typedef struct {
     NUM least;
@@ -94,7 +121,7 @@ static const uint_least32_t FN(guard_wholes)[3][2] = {
 };
 
 /* Parameters of the kinds of terms; kind - 1 is the row. What a kind does not use is 0. */
-static const FN(range_t) FN(term_limits)[N_KINDS][GTC_TERM_WORDS - 2U] = {
+static const FN(range_t) FN(term_limits)[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
     {
         RANGE(0.0F, 1.0F,              0, 2147483647),               /* memory: gain */
         RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* memory: amplitude */

@@ -38,33 +38,22 @@ NUM FN(blend)(const TABLE *table, const POINT *in)
     FN(edges)(table, edges);
     for (i = 0U; i < table->n_networks; i++) {
         const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
-        const SHARE share = FN(lesser)(FN(share_in)(IN_TEMP(in), &network[4], &edges[0]),
-                                       FN(share_in)(IN_SLOPE(in), &network[6], &edges[2]));
+        const SHARE share = FN(lesser)(FN(share_in)(IN_TEMP(in), &network[NETWORK_REGION_TEMP], &edges[ENVELOPE_TEMP]),
+                                       FN(share_in)(IN_SLOPE(in), &network[NETWORK_REGION_SLOPE], &edges[ENVELOPE_SLOPE]));
 
         if (share > NUM_ZERO) {
             FN(mix)(&blend, share, FN(network)(table, network, center, in));
         }
-        center = &center[network[0].bits * GTC_CENTER_WORDS];
+        center = &center[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
     }
     return FN(unmixed)(&blend, MEMBER(table->fallback));
 }
 #endif
 
-/* Moves a correction into the authority of the table, what is no number too. Returns GTC_OK or GTC_CLAMPED. */
-static int FN(govern)(const TABLE *table, WIDE *bias)
+/* A correction within the authority of the table. */
+static NUM FN(within_authority)(const TABLE *table, WIDE bias, int_least32_t *remarks)
 {
-    const NUM low = MEMBER(table->authority[0]);
-    const NUM high = MEMBER(table->authority[1]);
-    int status = GTC_CLAMPED;
-
-    if (!(*bias >= low)) {
-        *bias = low;
-    } else if (!(*bias <= high)) {
-        *bias = high;
-    } else {
-        status = GTC_OK;
-    }
-    return status;
+    return FN(saturate)(bias, MEMBER(table->authority[0]), MEMBER(table->authority[1]), remarks);
 }
 
 /* 1 if there was training data where the inputs lie, or no map says where it was. */
@@ -98,21 +87,18 @@ GTC_IN_LOOP NUM FN(result)(const TABLE *table, const POINT *in)
 GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
 {
     POINT in;
-    WIDE found;
-    int status;
+    int_least32_t remarks;
 
     if ((table == NULL) || (bias == NULL)) {
         return GTC_E_ARG;
     }
-    status = FN(locate)(table, temp, slope, &in);
-    if (status < 0) {
+    remarks = (int_least32_t)FN(locate)(table, temp, slope, &in);
+    if (remarks < 0) {
         return GTC_E_ARG;
     }
     if (!FN(is_covered)(table, &in)) {
-        status |= GTC_UNCOVERED;
+        remarks |= GTC_UNCOVERED;
     }
-    found = FN(result)(table, &in);
-    status |= FN(govern)(table, &found);
-    *bias = (NUM)found;
-    return status;
+    *bias = FN(within_authority)(table, FN(result)(table, &in), &remarks);
+    return (int)remarks;
 }

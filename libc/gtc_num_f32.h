@@ -25,6 +25,7 @@
 #define STATE gtc_f32_state_t
 #define EFFECT gtc_f32_effect_t
 #define INPUT gtc_f32_input_t
+#define CODE struct gtc_f32_term_code
 #define NUM float
 #define WIDE float
 #define NUM_ZERO 0.0F
@@ -33,11 +34,15 @@
 #define NUM_PLAUSIBLE_MAX 200.0F
 #define NUM_MISSING_BITS 0x7FC00000UL /* no finite number has these */
 #define ARITHMETIC 1U /* in the second word of an image */
+#define SCALE_TEMP 1U
+#define SCALE_SLOPE 2U
 
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) ((member).value)
 #define ELEMENT(word) ((word).value)
+
+#include "gtc_saturate.inl"
 
 static inline uint_least32_t FN(bits)(float x)
 {
@@ -74,21 +79,6 @@ extern const uint_least32_t FN(exp2_table)[64];
 #define F32_ROUND_BITS 0x4B400000U
 #define F32_CUT 2048U
 
-/* Moves x into a range; returns GTC_OK or GTC_CLAMPED. */
-static inline int FN(clamp)(float *x, const gtc_word_t range[2])
-{
-    int status = GTC_CLAMPED;
-
-    if (*x < range[0].value) {
-        *x = range[0].value;
-    } else if (*x > range[1].value) {
-        *x = range[1].value;
-    } else {
-        status = GTC_OK;
-    }
-    return status;
-}
-
 /* The inputs of a network, as they are and normalised. */
 typedef struct {
     float temp;
@@ -112,7 +102,8 @@ static inline float FN(on_grid)(float z)
 /* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
 static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT *in)
 {
-    int status;
+    const gtc_word_t *const edge = table->envelope;
+    int_least32_t remarks = GTC_OK;
     float z;
 
     if (FN(is_missing)(temp) || FN(is_missing)(slope)) {
@@ -122,15 +113,14 @@ static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT 
         in->z_slope = 0.0F;
         return GTC_E_ARG;
     }
-    status = FN(clamp)(&temp, &table->envelope[0]) | FN(clamp)(&slope, &table->envelope[2]);
-    in->temp = temp;
-    in->slope = slope;
-    z = temp - table->scale[0].value;
-    z = z * table->scale[1].value;
+    in->temp = FN(saturate)(temp, edge[ENVELOPE_TEMP].value, edge[ENVELOPE_TEMP + 1U].value, &remarks);
+    in->slope = FN(saturate)(slope, edge[ENVELOPE_SLOPE].value, edge[ENVELOPE_SLOPE + 1U].value, &remarks);
+    z = in->temp - table->scale[SCALE_CENTER].value;
+    z = z * table->scale[SCALE_TEMP].value;
     in->z_temp = FN(on_grid)(z);
-    z = slope * table->scale[2].value;
+    z = in->slope * table->scale[SCALE_SLOPE].value;
     in->z_slope = FN(on_grid)(z);
-    return status;
+    return (int)remarks;
 }
 
 /* 2^(-u/64), u >= 0; 0 from 2048 on, and where u is not a number. */
@@ -160,35 +150,35 @@ GTC_IN_LOOP float FN(gaussian)(float acc, const gtc_word_t *center, const POINT 
     float u;
     float f;
 
-    u = in->z_temp - center[0].value;
-    u = u * center[1].value;
+    u = in->z_temp - center[CENTER_TEMP].value;
+    u = u * center[CENTER_TEMP_GAIN].value;
     u = u * u;
-    f = in->z_slope - center[2].value;
-    f = f * center[3].value;
+    f = in->z_slope - center[CENTER_SLOPE].value;
+    f = f * center[CENTER_SLOPE_GAIN].value;
     f = f * f;
     u = u + f;
     f = FN(exp2)(u);
-    f = center[4].value * f;
+    f = center[CENTER_WEIGHT].value * f;
     f = acc + f;
     return f;
 }
 
-/* One network: w0 + linear part + its Gaussians. In the loop, so that a stand-in costs the map no call. */
+/* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
 GTC_IN_LOOP float FN(network)(const TABLE *table, const gtc_word_t *network,
                               const gtc_word_t *centers, const POINT *in)
 {
     const gtc_word_t *center = centers;
-    const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
-    float acc = network[1].value;
+    const gtc_word_t *const end = &centers[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
+    float acc = network[NETWORK_CONSTANT].value;
     float term;
 
     (void)table;
-    term = network[2].value * in->z_temp;
+    term = network[NETWORK_TEMP].value * in->z_temp;
     acc = acc + term;
-    term = network[3].value * in->z_slope;
+    term = network[NETWORK_SLOPE].value * in->z_slope;
     acc = acc + term;
 #if GTC_UNROLL
-    if ((network[0].bits & 1U) != 0U) {
+    if ((network[NETWORK_CENTERS].bits & 1U) != 0U) {
         acc = FN(gaussian)(acc, center, in);
         center = &center[GTC_CENTER_WORDS];
     }
@@ -227,8 +217,8 @@ static inline uint_least32_t FN(cell)(float x, const gtc_word_t *range, uint_lea
 static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_least32_t n[2],
                              uint_least32_t cell[2])
 {
-    cell[0] = FN(cell)(in->temp, &table->envelope[0], n[0]);
-    cell[1] = FN(cell)(in->slope, &table->envelope[2], n[1]);
+    cell[0] = FN(cell)(in->temp, &table->envelope[ENVELOPE_TEMP], n[0]);
+    cell[1] = FN(cell)(in->slope, &table->envelope[ENVELOPE_SLOPE], n[1]);
 }
 
 /* ---- the bank of networks --------------------------------------------------------------- */
@@ -382,7 +372,7 @@ static inline float FN(quotient)(float num, uint_least32_t den)
 
 static inline float FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
 {
-    return state->table->terms[(term * GTC_TERM_WORDS) + 2U + k].value;
+    return state->table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].value;
 }
 
 /* First-order memory: z, and the number kept for more digits (here none). */
@@ -487,7 +477,7 @@ static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitud
 }
 
 /* weight * 2^(-((x - center) gain)^2 / 64); bell: center, weight */
-GTC_IN_LOOP float FN(bell)(float x, float gain, const gtc_word_t *bell)
+GTC_IN_LOOP float FN(gaussian_of_channel)(float x, float gain, const gtc_word_t *bell)
 {
     float u;
 
@@ -500,12 +490,12 @@ GTC_IN_LOOP float FN(bell)(float x, float gain, const gtc_word_t *bell)
 }
 
 /* Two of one gain: gain; center, weight; center, weight. */
-static inline float FN(bells)(float x, const gtc_word_t *bells)
+static inline float FN(gaussians_of_channel)(float x, const gtc_word_t *bells)
 {
-    const float first = FN(bell)(x, bells[0].value, &bells[1]);
+    const float first = FN(gaussian_of_channel)(x, bells[0].value, &bells[1]);
     float sum;
 
-    sum = FN(bell)(x, bells[0].value, &bells[3]);
+    sum = FN(gaussian_of_channel)(x, bells[0].value, &bells[3]);
     sum = first + sum;
     return sum;
 }
@@ -516,7 +506,8 @@ static inline float FN(bells)(float x, const gtc_word_t *bells)
 #define SQUARE float /* (deg/h)^2 */
 #define NO_SQUARE 0.0F
 
-static inline float FN(limited)(float x)
+/* A factor: every number is one. */
+static inline float FN(factor)(float x)
 {
     return x;
 }

@@ -3,7 +3,7 @@
  * The same names as gtc_num_f32.h, in integers. Nothing here depends on the width of int, on byte
  * order, on the right shift of a negative number, or on a conversion that wraps. No operation
  * can overflow with a table that the generator made: docs/numerics.md says which range each has,
- * and a test build asserts every one (GTC_ASSERT_RANGE).
+ * and a test build asserts every one (GTC_ASSERT).
  *
  * SPDX-License-Identifier: MIT
  */
@@ -22,6 +22,7 @@
 #define STATE gtc_q31_state_t
 #define EFFECT gtc_q31_effect_t
 #define INPUT gtc_q31_input_t
+#define CODE struct gtc_q31_term_code
 #define NUM int_least32_t
 #define WIDE int_least64_t
 #define NUM_ZERO 0
@@ -30,21 +31,17 @@
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
 #define NUM_MISSING_BITS 0x80000000UL
 #define ARITHMETIC 2U /* in the second word of an image */
+#define SCALE_TEMP 0U
+#define SCALE_SLOPE 1U
 
 /* A table member as a number and as the word of an image; an array element as a number. */
 #define MEMBER(member) (member)
 #define ELEMENT(word) ((word).integer)
 
-/* Tests define it; see tests/c/gtc_checked.h. */
-#ifndef GTC_ASSERT_RANGE
-#define GTC_ASSERT_RANGE(claim) ((void)0)
-#else
-/* 1 if x and -x are numbers of 32 bits. */
-static inline int gtc_q31_is_32_bits(int_least64_t x)
-{
-    return ((x >= -2147483647) && (x <= 2147483647)) ? 1 : 0;
-}
-#endif
+#include "gtc_saturate.inl"
+
+/* A number and its negative, of 32 bits. */
+#define IS_32_BITS(x) (((x) >= -2147483647) && ((x) <= 2147483647))
 
 static inline uint_least32_t FN(bits)(int_least32_t x)
 {
@@ -176,7 +173,7 @@ static inline uint_least32_t FN(units)(FN(sum_t) sum)
 
 GTC_IN_LOOP uint_least32_t FN(ended)(FN(sum_t) sum, const gtc_word_t *network)
 {
-    return network[1].bits + FN(units)(sum);
+    return network[NETWORK_CONSTANT].bits + FN(units)(sum);
 }
 #else
 typedef int_least64_t FN(sum_t);
@@ -194,7 +191,7 @@ GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32
 /* Its value in units of the result, rounded down, in two's complement. */
 static inline uint_least32_t FN(units)(FN(sum_t) sum)
 {
-    GTC_ASSERT_RANGE((sum >= -0x1000000000000000LL) && (sum < 0x1000000000000000LL));
+    GTC_ASSERT((sum >= -0x1000000000000000LL) && (sum < 0x1000000000000000LL));
     return (uint_least32_t)(((uint_least64_t)sum >> 29) & 0xFFFFFFFFU);
 }
 
@@ -214,7 +211,7 @@ GTC_IN_LOOP int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
     const uint_least32_t s = FN(high_of_square)(v) + g;
     const uint_least32_t e = FN(high)(FN(exp2_table)[(u >> 18) & 63U], s) >> (u >> 24);
 
-    GTC_ASSERT_RANGE((u <= Q31_LAST) && (v <= Q31_H) && (s >= Q31_G));
+    GTC_ASSERT((u <= Q31_LAST) && (v <= Q31_H) && (s >= Q31_G));
     return (int_least32_t)e;
 }
 
@@ -234,7 +231,7 @@ static inline int FN(position)(int_least32_t x, const int_least32_t range[2], in
     uint_least32_t offset = (uint_least32_t)x - (uint_least32_t)range[0];
     int status = GTC_OK;
 
-    GTC_ASSERT_RANGE(span < 0x4000000U);
+    GTC_ASSERT(span < 0x4000000U);
     if (offset > span) {
         offset = span & (0U - (uint_least32_t)(x > range[0]));
         status = GTC_CLAMPED;
@@ -249,8 +246,8 @@ static inline int FN(position)(int_least32_t x, const int_least32_t range[2], in
 /* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
 static inline int FN(locate)(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
 {
-    const int status = FN(position)(temp, &table->envelope[0], table->scale[0], &in->x_temp);
-    const int other = FN(position)(slope, &table->envelope[2], table->scale[1], &in->x_slope);
+    const int status = FN(position)(temp, &table->envelope[ENVELOPE_TEMP], table->scale[SCALE_TEMP], &in->x_temp);
+    const int other = FN(position)(slope, &table->envelope[ENVELOPE_SLOPE], table->scale[SCALE_SLOPE], &in->x_slope);
 
     return ((status < 0) || (other < 0)) ? GTC_E_ARG : (status | other);
 }
@@ -270,9 +267,9 @@ GTC_IN_LOOP int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t 
     gtc_word_t argument;
 
     argument.bits = (center[0].bits * x) + center[1].bits;
-    GTC_ASSERT_RANGE(argument.integer
+    GTC_ASSERT(argument.integer
                      == ((int_least64_t)center[0].bits * x) + center[1].integer);
-    GTC_ASSERT_RANGE(argument.bits != 0x80000000U);
+    GTC_ASSERT(argument.bits != 0x80000000U);
     return argument.integer;
 }
 
@@ -290,10 +287,10 @@ GTC_IN_LOOP FN(sum_t) FN(weighted)(FN(sum_t) sum, int_least32_t weight, uint_lea
 GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
                                           const POINT *in, uint_least32_t g)
 {
-    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[0], in->x_temp),
-                                                 FN(argument)(&center[2], in->x_slope));
+    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[CENTER_TEMP], in->x_temp),
+                                                 FN(argument)(&center[CENTER_SLOPE], in->x_slope));
 
-    return FN(weighted)(sum, center[4].integer, u, g);
+    return FN(weighted)(sum, center[CENTER_WEIGHT].integer, u, g);
 }
 
 /* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
@@ -301,25 +298,25 @@ GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
 FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_t *end,
                      uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
 
-/* One network: w0 + linear part + its Gaussians. In the loop, so that a stand-in costs the map no call. */
+/* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
 GTC_IN_LOOP int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
                                       const gtc_word_t *centers, const POINT *in)
 {
     const gtc_word_t *center = centers;
-    const gtc_word_t *const end = &centers[network[0].bits * GTC_CENTER_WORDS];
+    const gtc_word_t *const end = &centers[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
     /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
     const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
-    FN(sum_t) sum = FN(begun)(network[1].integer);
+    FN(sum_t) sum = FN(begun)(network[NETWORK_CONSTANT].integer);
     gtc_word_t bias;
 
-    sum = FN(accumulate)(sum, network[2].integer, (int_least32_t)(in->x_temp << 13));
-    sum = FN(accumulate)(sum, network[3].integer, (int_least32_t)(in->x_slope << 13));
-    if (table->scale[2] != 0) {
+    sum = FN(accumulate)(sum, network[NETWORK_TEMP].integer, (int_least32_t)(in->x_temp << 13));
+    sum = FN(accumulate)(sum, network[NETWORK_SLOPE].integer, (int_least32_t)(in->x_slope << 13));
+    if (table->scale[SCALE_NARROW] != 0) {
         sum = FN(narrow)(sum, center, end, in->x_temp, in->x_slope,
-                         (uint_least32_t)table->scale[2]);
+                         (uint_least32_t)table->scale[SCALE_NARROW]);
     } else {
 #if GTC_UNROLL
-        if ((network[0].bits & 1U) != 0U) {
+        if ((network[NETWORK_CENTERS].bits & 1U) != 0U) {
             sum = FN(gaussian)(sum, center, in, g);
             center = &center[GTC_CENTER_WORDS];
         }
@@ -446,60 +443,44 @@ static inline int_least32_t FN(mean)(int_least32_t base, int_least64_t sum, uint
 {
     const int_least64_t mean = base + FN(divided)(sum, n);
 
-    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(mean));
+    GTC_ASSERT(IS_32_BITS(mean));
     return (int_least32_t)mean;
 }
 
 /* num / den */
 static inline int_least32_t FN(quotient)(int_least64_t num, uint_least32_t den)
 {
-    GTC_ASSERT_RANGE(gtc_q31_is_32_bits(FN(divided)(num, den)));
+    GTC_ASSERT(IS_32_BITS(FN(divided)(num, den)));
     return (int_least32_t)FN(divided)(num, den);
 }
 
 /* The nearest number of 32 bits, the mark of a missing one left out. */
-static inline int_least32_t FN(saturated)(int_least64_t x)
+static inline int_least32_t FN(narrowed)(int_least64_t x)
 {
-    int_least64_t y = x;
+    int_least32_t ignored = GTC_OK;
 
-    if (y > 2147483647) {
-        y = 2147483647;
-    } else if (y < -2147483647) {
-        y = -2147483647;
-    } else {
-        /* it fits */
-    }
-    return (int_least32_t)y;
+    return FN(saturate)(x, -2147483647, 2147483647, &ignored);
 }
 
 /* Where a temperature is after so many blocks. */
 static inline int_least32_t FN(ahead)(int_least32_t temp, int_least32_t slope, uint_least32_t blocks)
 {
-    return FN(saturated)(temp + ((int_least64_t)slope * (int_least64_t)blocks));
+    return FN(narrowed)(temp + ((int_least64_t)slope * (int_least64_t)blocks));
 }
 
-#define Q31_PART 1073741824 /* 2^30, so that products of two keep to 63 bits with room for a sum */
-
-/* The nearest number of magnitude 2^30 at most. */
-static inline int_least64_t FN(limited)(int_least64_t x)
+/* A factor: the nearest number of magnitude 2^30 at most, so that products of two keep to 63 bits with room for a sum. */
+static inline int_least64_t FN(factor)(int_least64_t x)
 {
-    int_least64_t y = x;
+    int_least32_t ignored = GTC_OK;
 
-    if (y > Q31_PART) {
-        y = Q31_PART;
-    } else if (y < -Q31_PART) {
-        y = -Q31_PART;
-    } else {
-        /* it fits */
-    }
-    return y;
+    return FN(saturate)(x, -1073741824, 1073741824, &ignored);
 }
 
 /* ---- the terms -------------------------------------------------------------------------- */
 
 static inline int_least32_t FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
 {
-    return state->table->terms[(term * GTC_TERM_WORDS) + 2U + k].integer;
+    return state->table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].integer;
 }
 
 /* floor(x / 2^n) */
@@ -554,7 +535,7 @@ static inline int_least64_t FN(scaled_difference)(int_least32_t a, int_least32_t
 /* rate (a - b), a slope; rate in 2^-24 */
 static inline int_least32_t FN(slope_of)(int_least32_t a, int_least32_t b, int_least32_t rate)
 {
-    return FN(saturated)(FN(floored)(((int_least64_t)a - b) * rate, 24U));
+    return FN(narrowed)(FN(floored)(((int_least64_t)a - b) * rate, 24U));
 }
 
 /* amplitude * exp(-blocks * gain), gain in 2^-28 of a factor 1/2 */
@@ -590,7 +571,7 @@ static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, i
 
 /* Takes weight * 2^-((x - center) gain)^2 into the sum; bell: center, weight. gain in 2^-24 for each unit of x;
  * |x| <= 2^30, |center| < 2^30, gain >= 0. From 6 on it is 0, as the square is then 36 octaves. */
-GTC_IN_LOOP FN(sum_t) FN(bell)(FN(sum_t) sum, int_least32_t x, int_least32_t gain, const gtc_word_t *bell,
+GTC_IN_LOOP FN(sum_t) FN(gaussian_of_channel)(FN(sum_t) sum, int_least32_t x, int_least32_t gain, const gtc_word_t *bell,
                                   uint_least32_t g)
 {
     const int_least32_t d = x - bell[0].integer;
@@ -599,7 +580,7 @@ GTC_IN_LOOP FN(sum_t) FN(bell)(FN(sum_t) sum, int_least32_t x, int_least32_t gai
     const uint_least32_t whole = (uint_least32_t)(way >> 32);
     gtc_word_t argument; /* in 2^-28 */
 
-    GTC_ASSERT_RANGE((d >= -2147483647) && (gain >= 0));
+    GTC_ASSERT((d >= -2147483647) && (gain >= 0));
     if (((whole + 0x600U) & 0xFFFFFFFFU) >= 0xC00U) {
         return sum;
     }
@@ -608,14 +589,14 @@ GTC_IN_LOOP FN(sum_t) FN(bell)(FN(sum_t) sum, int_least32_t x, int_least32_t gai
 }
 
 /* Two of one gain: gain; center, weight; center, weight. |weight| <= 2^29 */
-static inline int_least64_t FN(bells)(int_least32_t x, const gtc_word_t *bells)
+static inline int_least64_t FN(gaussians_of_channel)(int_least32_t x, const gtc_word_t *bells)
 {
     const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64]; /* as for the map */
     FN(sum_t) sum = FN(begun)(0);
     gtc_word_t total;
 
-    sum = FN(bell)(sum, x, bells[0].integer, &bells[1], g);
-    sum = FN(bell)(sum, x, bells[0].integer, &bells[3], g);
+    sum = FN(gaussian_of_channel)(sum, x, bells[0].integer, &bells[1], g);
+    sum = FN(gaussian_of_channel)(sum, x, bells[0].integer, &bells[3], g);
     total.bits = FN(units)(sum);
     return total.integer;
 }
@@ -628,7 +609,7 @@ static inline int_least64_t FN(bells)(int_least32_t x, const gtc_word_t *bells)
 
 static inline uint_least64_t FN(squared)(int_least64_t x)
 {
-    const int_least64_t y = FN(limited)(x);
+    const int_least64_t y = FN(factor)(x);
     const int_least64_t square = y * y;
 
     return (uint_least64_t)square;
@@ -715,7 +696,7 @@ static inline int_least64_t FN(unsettled)(int_least32_t width, int_least32_t low
 {
     const int_least64_t left = (2 * (int_least64_t)width) - ((int_least64_t)high - low);
 
-    return (left > 0) ? FN(floored)(FN(limited)(left) * word, 16U) : 0;
+    return (left > 0) ? FN(floored)(FN(factor)(left) * word, 16U) : 0;
 }
 
 #endif /* GTC_NUM_Q31_H_INCLUDED */

@@ -48,6 +48,62 @@ uint_least32_t gtc_crc_word(uint_least32_t crc, uint_least32_t word);
 /* The same for n words of a table; n may be 0. */
 uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_least32_t n);
 
+/* Parts of a table's scale: in float32 the center of T and the gains; in fixed point the gains, and bits by which squares
+ * are in larger units. */
+#define SCALE_CENTER 0U
+#define SCALE_NARROW 2U
+
+/* First of the two edges of an input. */
+#define ENVELOPE_TEMP 0U
+#define ENVELOPE_SLOPE 2U
+
+/* Words of a network. */
+#define NETWORK_CENTERS 0U
+#define NETWORK_CONSTANT 1U
+#define NETWORK_TEMP 2U
+#define NETWORK_SLOPE 3U
+#define NETWORK_REGION_TEMP 4U
+#define NETWORK_REGION_SLOPE 6U
+
+/* Words of a center; in fixed point the factor and the addend of an argument. */
+#define CENTER_TEMP 0U
+#define CENTER_TEMP_GAIN 1U
+#define CENTER_SLOPE 2U
+#define CENTER_SLOPE_GAIN 3U
+#define CENTER_WEIGHT 4U
+
+/* Words of a term. */
+#define TERM_KIND 0U
+#define TERM_CHANNEL 1U
+#define TERM_PARAMETERS 2U
+
+/* Parameters of the kinds of terms. */
+#define MEMORY_GAIN 0U
+#define MEMORY_AMPLITUDE 1U
+#define MEMORY_RATE 2U
+#define PLAY_WIDTH 0U
+#define PLAY_AMPLITUDE 1U
+#define WARM_UP_GAIN 0U
+#define WARM_UP_AMPLITUDE 1U
+#define HARMONIC_FREQUENCY 0U
+#define HARMONIC_PHASE 1U
+#define HARMONIC_AMPLITUDE 2U
+#define AUXILIARY_SLOPE 0U
+#define AUXILIARY_REFERENCE 1U
+#define CURVE_SLOPE 0U
+#define CURVE_GAIN 1U
+#define CURVE_REFERENCE 2U
+#define PRODUCT_SLOPE 0U
+#define PRODUCT_REFERENCE 1U
+#define PRODUCT_GROWTH 2U
+#define PRODUCT_REFERENCE_TEMP 3U
+
+/* Words of a known answer. */
+#define PROBE_TEMP 0U
+#define PROBE_SLOPE 1U
+#define PROBE_BIAS 2U
+#define PROBE_STATUS 3U
+
 /* Whether a kind of term reads an auxiliary channel. */
 #define READS_CHANNEL(kind) ((kind) >= GTC_TERM_AUXILIARY)
 
@@ -71,8 +127,8 @@ typedef struct {
     float slope;
     float added;
     int_least32_t remarks;
-    uint_least32_t known; /* as of a doubt */
-    float edge;           /* as of a doubt */
+    uint_least32_t terms_known; /* as of an uncertainty */
+    float edge_effect;          /* as of an uncertainty */
 } gtc_f32_effect_t;
 
 typedef struct {
@@ -80,24 +136,22 @@ typedef struct {
     int_least32_t slope;
     int_least64_t added;
     int_least32_t remarks;
-    uint_least32_t known;
-    int_least32_t edge;
+    uint_least32_t terms_known;
+    int_least32_t edge_effect;
 } gtc_q31_effect_t;
 
 /* Functions of one kind of term; i is the number of the term in its table.
- * begin: first believed temperature x; step: a block ends, of mean temperature x; apply: changes inputs, adds to
+ * begin: first accepted temperature x; step: a block ends, of mean temperature x; apply: changes inputs, adds to
  * the bias, at temperature x. All temperatures lie within the envelope. */
 struct gtc_f32_term_code {
-    uint_least32_t kind;
-    uint_least32_t survives; /* 1: its state is taken over after a time without power */
+    uint_least32_t is_retained; /* 1: its state is taken over after a time without power */
     void (*begin)(gtc_f32_state_t *state, uint_least32_t i, float x);
     void (*step)(gtc_f32_state_t *state, uint_least32_t i, float x);
     void (*apply)(const gtc_f32_state_t *state, uint_least32_t i, float x, gtc_f32_effect_t *effect);
 };
 
 struct gtc_q31_term_code {
-    uint_least32_t kind;
-    uint_least32_t survives;
+    uint_least32_t is_retained;
     void (*begin)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
     void (*step)(gtc_q31_state_t *state, uint_least32_t i, int_least32_t x);
     void (*apply)(const gtc_q31_state_t *state, uint_least32_t i, int_least32_t x,

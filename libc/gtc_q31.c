@@ -76,14 +76,14 @@ static int FN(sums_fit)(const gtc_word_t *network, const gtc_word_t *centers)
     uint_least32_t i;
     int fit = 1;
 
-    for (i = 1U; i <= 3U; i++) {
+    for (i = NETWORK_CONSTANT; i <= NETWORK_SLOPE; i++) {
         sum += FN(magnitude)(network[i].integer);
     }
-    for (i = 0U; i < network[0].bits; i++) {
+    for (i = 0U; i < network[NETWORK_CENTERS].bits; i++) {
         const gtc_word_t *const center = &centers[i * GTC_CENTER_WORDS];
 
-        fit &= FN(argument_fits)(&center[0]) & FN(argument_fits)(&center[2]);
-        sum += FN(magnitude)(center[4].integer);
+        fit &= FN(argument_fits)(&center[CENTER_TEMP]) & FN(argument_fits)(&center[CENTER_SLOPE]);
+        sum += FN(magnitude)(center[CENTER_WEIGHT].integer);
     }
     return ((fit != 0) && (sum <= LARGEST_SUM)) ? 1 : 0;
 }
@@ -113,14 +113,14 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
     const gtc_word_t *center;
 
     for (center = centers; center != end; center = &center[GTC_CENTER_WORDS]) {
-        const int_least64_t a = FN(argument)(&center[0], x_temp);
-        const int_least64_t b = FN(argument)(&center[2], x_slope);
+        const int_least64_t a = FN(argument)(&center[CENTER_TEMP], x_temp);
+        const int_least64_t b = FN(argument)(&center[CENTER_SLOPE], x_slope);
         const int_least64_t p = a * a;
         const int_least64_t q = b * b;
         const uint_least64_t u = ((uint_least64_t)p + (uint_least64_t)q) >> (32U - narrow);
 
         if (u <= Q31_LAST) {
-            sum = FN(accumulate)(sum, center[4].integer, FN(exp2)((uint_least32_t)u, Q31_G));
+            sum = FN(accumulate)(sum, center[CENTER_WEIGHT].integer, FN(exp2)((uint_least32_t)u, Q31_G));
         }
     }
     return sum;
@@ -204,19 +204,9 @@ int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *table, uint_leas
     return FN(run_init)(state, table, period_us);
 }
 
-int gtc_q31_sample(gtc_q31_state_t *state, const int_least32_t *channels)
+int gtc_q31_sample(gtc_q31_state_t *state, uint_least32_t elapsed_us, const int_least32_t *channels)
 {
-    return FN(run_sample)(state, channels);
-}
-
-int gtc_q31_sample_at(gtc_q31_state_t *state, uint_least32_t time_us, const int_least32_t *channels)
-{
-    return FN(run_sample_at)(state, time_us, channels);
-}
-
-int gtc_q31_missed(gtc_q31_state_t *state, uint_least32_t count)
-{
-    return FN(run_missed)(state, count);
+    return FN(run_sample)(state, elapsed_us, channels);
 }
 
 int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias)
@@ -244,9 +234,4 @@ int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapshot_t *snapshot)
 int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds)
 {
     return FN(run_rezero)(state, mean_rate, seconds);
-}
-
-int gtc_q31_unzero(gtc_q31_state_t *state)
-{
-    return FN(run_unzero)(state);
 }

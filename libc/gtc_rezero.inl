@@ -24,25 +24,9 @@ static int FN(run_snapshot)(const STATE *state, SNAPSHOT *snapshot)
     status = FN(run_bias)(state, &snapshot->bias);
     snapshot->sigma = FN(root)(FN(plus)(FN(variance)(state), FN(variance_of_constant)(state)));
     snapshot->correlation_s = FN(rule)(state->table, RULE_CORRELATION);
-    snapshot->age_blocks = (state->doubt.sure == 0U) ? 0U : state->input[0].held_blocks;
+    snapshot->age_blocks = (state->uncertainty.slope_known == 0U) ? 0U : state->input[0].held_blocks;
     snapshot->status = (int_least32_t)status;
     return status;
-}
-
-/* The nearest shift that the table grants. */
-static NUM FN(granted)(const TABLE *table, WIDE shift)
-{
-    const NUM most = MEMBER(table->rezero);
-    NUM found;
-
-    if (shift > most) {
-        found = most;
-    } else if (shift < -most) {
-        found = -most;
-    } else {
-        found = (NUM)shift;
-    }
-    return found;
 }
 
 /* Of a measurement and what it is compared with, in standard deviations: a rest is wrong once in 16,000. */
@@ -59,11 +43,11 @@ static SQUARE FN(variance_left)(const STATE *state, SQUARE prior, SQUARE rest, S
 }
 
 /* GTC_OK, or why a rest cannot move the constant. */
-static int FN(can_rezero)(const STATE *state, NUM mean_rate, uint_least32_t seconds)
+static int FN(can_rezero)(const STATE *state, NUM mean_rate)
 {
     int status = GTC_OK;
 
-    if ((state == NULL) || (state->table == NULL) || (FN(is_missing)(mean_rate) != 0) || (seconds == 0U)) {
+    if (FN(is_missing)(mean_rate) != 0) {
         status = GTC_E_ARG;
     } else if ((!FN(has_sigma)(state->table)) || (!(MEMBER(state->table->rezero) > NUM_ZERO))) {
         status = GTC_E_ABSENT;
@@ -73,41 +57,45 @@ static int FN(can_rezero)(const STATE *state, NUM mean_rate, uint_least32_t seco
     return status;
 }
 
-static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
+/* The measurement update with the mean residual of a rest. */
+static int FN(update)(STATE *state, NUM mean_rate, uint_least32_t seconds)
 {
-    int status = FN(can_rezero)(state, mean_rate, seconds);
-    SQUARE prior;
-    SQUARE of_map;
-    SQUARE rest;
+    const NUM most = MEMBER(state->table->rezero);
+    const SQUARE prior = FN(variance_of_constant)(state);
+    const SQUARE of_map = FN(variance)(state);
+    const SQUARE rest = FN(plus)(of_map, FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
+    int_least32_t remarks = GTC_OK;
     WIDE shift;
 
-    if (status != GTC_OK) {
-        return status;
-    }
-    prior = FN(variance_of_constant)(state);
-    of_map = FN(variance)(state);
-    rest = FN(plus)(of_map, FN(shared_out)(FN(squared)(FN(rule)(state->table, RULE_NOISE)), seconds));
     if (!(FN(shared_out)(FN(squared)(mean_rate), GATE * GATE) <= FN(plus)(prior, rest))) {
         return GTC_E_REST;
     }
     shift = FN(add)((FN(is_missing)(state->shift) != 0) ? NUM_ZERO : state->shift,
                     FN(part)(FN(share_of)(prior, rest), mean_rate));
-    state->shift = FN(granted)(state->table, shift);
-    if ((shift > state->shift) || (shift < state->shift)) {
-        status = GTC_CLAMPED;
-    } else {
-        state->constant = FN(root)(FN(variance_left)(state, prior, rest, of_map));
+    state->shift = FN(saturate)(shift, -most, most, &remarks);
+    if (remarks == GTC_OK) {
+        state->shift_sigma = FN(root)(FN(variance_left)(state, prior, rest, of_map));
     }
-    FN(put)(state, state->doubt.plain, state->status);
-    return status;
+    return (int)remarks;
 }
 
-static int FN(run_unzero)(STATE *state)
+static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
 {
+    int status = GTC_OK;
+
     if ((state == NULL) || (state->table == NULL)) {
         return GTC_E_ARG;
     }
-    FN(rezero_clear)(state);
-    FN(put)(state, state->doubt.plain, state->status);
-    return GTC_OK;
+    if (seconds == 0U) {
+        FN(rezero_clear)(state);
+    } else {
+        status = FN(can_rezero)(state, mean_rate);
+        if (status == GTC_OK) {
+            status = FN(update)(state, mean_rate, seconds);
+        }
+    }
+    if (status >= GTC_OK) {
+        FN(set_correction)(state, state->uncertainty.unshifted, state->status);
+    }
+    return status;
 }

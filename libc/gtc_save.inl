@@ -100,22 +100,22 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
     }
 }
 
-/* What the uncertainty goes by, and the shift of the constant. */
-static void FN(carry_doubt)(FN(cursor_t) *at, STATE *state)
+/* What the uncertainty is computed from, and the shift of the constant. */
+static void FN(carry_uncertainty)(FN(cursor_t) *at, STATE *state)
 {
-    FN(carry)(at, &state->doubt.at[0]);
-    FN(carry)(at, &state->doubt.at[1]);
-    FN(carry)(at, &state->doubt.drift);
-    FN(carry)(at, &state->doubt.start);
-    FN(carry)(at, &state->doubt.low);
-    FN(carry)(at, &state->doubt.high);
-    FN(carry)(at, &state->doubt.plain);
-    FN(carry)(at, &state->doubt.edge);
-    FN(carry_bits)(at, &state->doubt.begun);
-    FN(carry_bits)(at, &state->doubt.known);
-    FN(carry_bits)(at, &state->doubt.sure);
+    FN(carry)(at, &state->uncertainty.input[0]);
+    FN(carry)(at, &state->uncertainty.input[1]);
+    FN(carry)(at, &state->uncertainty.slope);
+    FN(carry)(at, &state->uncertainty.first_temp);
+    FN(carry)(at, &state->uncertainty.lowest);
+    FN(carry)(at, &state->uncertainty.highest);
+    FN(carry)(at, &state->uncertainty.unshifted);
+    FN(carry)(at, &state->uncertainty.edge_effect);
+    FN(carry_bits)(at, &state->uncertainty.terms_since);
+    FN(carry_bits)(at, &state->uncertainty.terms_known);
+    FN(carry_bits)(at, &state->uncertainty.slope_known);
     FN(carry)(at, &state->shift);
-    FN(carry)(at, &state->constant);
+    FN(carry)(at, &state->shift_sigma);
 }
 
 /* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written. */
@@ -131,7 +131,7 @@ static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from
         FN(carry)(&at, &state->term[i][0]);
         FN(carry)(&at, &state->term[i][1]);
     }
-    FN(carry_doubt)(&at, state);
+    FN(carry_uncertainty)(&at, state);
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
@@ -205,14 +205,14 @@ static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t 
 /* A temperature of the window, or of a term, which an envelope may have moved. */
 static int FN(is_temperature)(NUM x)
 {
-    return FN(is_within)(x, FN(number_limits)[9].least, FN(number_limits)[9].most);
+    return FN(is_within)(x, FN(number_limits)[NUMBER_ENVELOPE].least, FN(number_limits)[NUMBER_ENVELOPE].most);
 }
 
-/* Whether a term has remembered something since the first temperature. */
-static int FN(remembers)(const STATE *state, uint_least32_t i)
+/* Whether a term has a memory since the first temperature. */
+static int FN(is_retained)(const STATE *state, uint_least32_t i)
 {
     return ((state->input[0].gap_us != 0U) && (i < FN(n_terms)(state->table))
-            && (state->table->term_code[i]->survives != 0U)) ? 1 : 0;
+            && (FN(code_of)(state->table, i)->is_retained != 0U)) ? 1 : 0;
 }
 
 static int FN(terms_are_sound)(const STATE *state)
@@ -224,7 +224,7 @@ static int FN(terms_are_sound)(const STATE *state)
         const NUM z = state->term[i][0];
 
         if (FN(is_missing)(z) != 0) {
-            sound &= 1 - FN(remembers)(state, i);
+            sound &= 1 - FN(is_retained)(state, i);
         } else {
             sound &= FN(is_temperature)(z) & FN(is_fraction)(state->term[i][1]);
         }
@@ -237,16 +237,16 @@ static int FN(shift_is_sound)(const STATE *state)
 {
     const NUM most = MEMBER(state->table->rezero);
 
-    return ((!FN(is_missing)(state->constant)) && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
+    return ((!FN(is_missing)(state->shift_sigma)) && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
 }
 
-/* What the uncertainty goes by: numbers and temperatures. */
-static int FN(doubt_is_sound)(const STATE *state)
+/* What the uncertainty is computed from: numbers and temperatures. */
+static int FN(uncertainty_is_sound)(const STATE *state)
 {
-    return ((!FN(is_missing)(state->doubt.at[0])) && (!FN(is_missing)(state->doubt.at[1]))
-            && (!FN(is_missing)(state->doubt.drift)) && (!FN(is_missing)(state->doubt.plain)) && (!FN(is_missing)(state->doubt.edge))
-            && FN(is_temperature)(state->doubt.start) && FN(is_temperature)(state->doubt.low)
-            && FN(is_temperature)(state->doubt.high)) ? 1 : 0;
+    return ((!FN(is_missing)(state->uncertainty.input[0])) && (!FN(is_missing)(state->uncertainty.input[1]))
+            && (!FN(is_missing)(state->uncertainty.slope)) && (!FN(is_missing)(state->uncertainty.unshifted)) && (!FN(is_missing)(state->uncertainty.edge_effect))
+            && FN(is_temperature)(state->uncertainty.first_temp) && FN(is_temperature)(state->uncertainty.lowest)
+            && FN(is_temperature)(state->uncertainty.highest)) ? 1 : 0;
 }
 
 /* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
@@ -265,13 +265,13 @@ static int FN(is_sound)(const STATE *state)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         sound &= FN(is_temperature)(state->window[i]);
     }
-    return sound & FN(terms_are_sound)(state) & FN(doubt_is_sound)(state) & FN(shift_is_sound)(state)
+    return sound & FN(terms_are_sound)(state) & FN(uncertainty_is_sound)(state) & FN(shift_is_sound)(state)
            & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
 }
 
-/* Of a state that was read, what outlasts a time without power: terms. If it had not begun when it was saved,
+/* Of a state that was read, what is retained over a time without power: terms. If it had not begun when it was saved,
  * it had itself been without power before. */
-static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
+static void FN(retain)(STATE *state, uint_least32_t off_blocks)
 {
     const uint_least32_t before = (state->input[0].gap_us == 0U) ? state->off_blocks : 0U;
     const uint_least32_t room = 0xFFFFFFFFUL - before;
@@ -283,8 +283,8 @@ static void FN(outlast)(STATE *state, uint_least32_t off_blocks)
         FN(rezero_clear)(state);
     }
     for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        if ((i >= FN(n_terms)(state->table)) || (state->table->term_code[i]->survives == 0U)) {
-            FN(forget)(state, i);
+        if ((i >= FN(n_terms)(state->table)) || (FN(code_of)(state->table, i)->is_retained == 0U)) {
+            FN(reset_term)(state, i);
         }
     }
 }
@@ -297,7 +297,7 @@ static void FN(take_over)(STATE *state, const TABLE *table, uint_least32_t perio
     FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
     if ((off_blocks != 0U) || (state->period_us != period_us)) {
         state->period_us = period_us;
-        FN(outlast)(state, off_blocks);
+        FN(retain)(state, off_blocks);
     }
 }
 

@@ -41,66 +41,66 @@ static NUM FN(rule)(const TABLE *table, uint_least32_t k)
 
 /* ---- what a state takes note of ------------------------------------------------------------------ */
 
-static void FN(doubt_clear)(volatile STATE *state)
+static void FN(uncertainty_clear)(volatile STATE *state)
 {
-    state->doubt.at[0] = NUM_ZERO;
-    state->doubt.at[1] = NUM_ZERO;
-    state->doubt.drift = NUM_ZERO;
-    state->doubt.start = NUM_ZERO;
-    state->doubt.low = NUM_ZERO;
-    state->doubt.high = NUM_ZERO;
-    state->doubt.plain = NUM_ZERO;
-    state->doubt.edge = NUM_ZERO;
-    state->doubt.begun = 0U;
-    state->doubt.known = 0U;
-    state->doubt.sure = 0U;
+    state->uncertainty.input[0] = NUM_ZERO;
+    state->uncertainty.input[1] = NUM_ZERO;
+    state->uncertainty.slope = NUM_ZERO;
+    state->uncertainty.first_temp = NUM_ZERO;
+    state->uncertainty.lowest = NUM_ZERO;
+    state->uncertainty.highest = NUM_ZERO;
+    state->uncertainty.unshifted = NUM_ZERO;
+    state->uncertainty.edge_effect = NUM_ZERO;
+    state->uncertainty.terms_since = 0U;
+    state->uncertainty.terms_known = 0U;
+    state->uncertainty.slope_known = 0U;
 }
 
-/* The terms begin at x: which of them know where they were, is known by what outlasted. */
-static void FN(doubt_begin)(STATE *state, NUM x)
+/* The terms begin at x: those whose memory was retained know where they were. */
+static void FN(uncertainty_begin)(STATE *state, NUM x)
 {
     uint_least32_t i;
 
-    state->doubt.known = 0U;
+    state->uncertainty.terms_known = 0U;
     for (i = 0U; i < FN(n_terms)(state->table); i++) {
         if (!FN(is_missing)(state->term[i][0])) {
-            state->doubt.known |= (uint_least32_t)1U << i;
+            state->uncertainty.terms_known |= (uint_least32_t)1U << i;
         }
     }
-    state->doubt.begun = state->elapsed;
-    state->doubt.low = x;
-    state->doubt.high = x;
+    state->uncertainty.terms_since = state->elapsed;
+    state->uncertainty.lowest = x;
+    state->uncertainty.highest = x;
 }
 
 /* A block ends, of which the terms see this temperature. */
-static void FN(doubt_step)(STATE *state, NUM x)
+static void FN(uncertainty_step)(STATE *state, NUM x)
 {
-    if (x < state->doubt.low) {
-        state->doubt.low = x;
+    if (x < state->uncertainty.lowest) {
+        state->uncertainty.lowest = x;
     }
-    if (x > state->doubt.high) {
-        state->doubt.high = x;
+    if (x > state->uncertainty.highest) {
+        state->uncertainty.highest = x;
     }
 }
 
 /* The map is asked at an input; `slope` is that of the window, 0 while it is not full. */
-static void FN(doubt_input)(STATE *state, const EFFECT *effect, NUM slope)
+static void FN(uncertainty_input)(STATE *state, const EFFECT *effect, NUM slope)
 {
     const uint_least32_t filled = state->filled;
 
-    state->doubt.known = effect->known;
-    state->doubt.edge = effect->edge;
-    state->doubt.at[0] = effect->temp;
-    state->doubt.at[1] = effect->slope;
-    state->doubt.sure = 2U;
-    state->doubt.drift = slope;
+    state->uncertainty.terms_known = effect->terms_known;
+    state->uncertainty.edge_effect = effect->edge_effect;
+    state->uncertainty.input[0] = effect->temp;
+    state->uncertainty.input[1] = effect->slope;
+    state->uncertainty.slope_known = 2U;
+    state->uncertainty.slope = slope;
     if ((effect->remarks & GTC_WARMING) != 0) {
         if ((filled >= 2U) && (filled < state->table->slope_blocks)) {
-            const WIDE d = FN(diff)(state->input[0].mean, state->doubt.start);
+            const WIDE d = FN(diff)(state->input[0].mean, state->uncertainty.first_temp);
 
-            state->doubt.drift = FN(quotient)(FN(scaled)(2U, d), (2U * filled) - 1U);
+            state->uncertainty.slope = FN(quotient)(FN(scaled)(2U, d), (2U * filled) - 1U);
         } else {
-            state->doubt.sure = 1U;
+            state->uncertainty.slope_known = 1U;
         }
     }
 }
@@ -115,7 +115,7 @@ static SQUARE FN(variance_of_map)(const STATE *state)
     uint_least32_t index;
     POINT in;
 
-    if (FN(locate)(table, state->doubt.at[0], state->doubt.at[1], &in) < 0) {
+    if (FN(locate)(table, state->uncertainty.input[0], state->uncertainty.input[1], &in) < 0) {
         return FN(squared)(FN(rule)(table, RULE_NONE));
     }
     FN(cells)(table, &in, table->sigma_cells, cell);
@@ -136,7 +136,7 @@ static SQUARE FN(variance_of_age)(const STATE *state)
     if (age == 0U) {
         return NO_SQUARE;
     }
-    moved = FN(limited)(FN(scaled_difference)(state->doubt.drift, NUM_ZERO, FN(rule)(state->table, RULE_HOLD)));
+    moved = FN(factor)(FN(scaled_difference)(state->uncertainty.slope, NUM_ZERO, FN(rule)(state->table, RULE_HOLD)));
     square = FN(squared)(FN(scaled)(age, moved));
     return FN(plus)(square, FN(squared)(FN(scaled)(age, FN(rule)(state->table, RULE_REST))));
 }
@@ -147,23 +147,24 @@ static SQUARE FN(variance_of_start)(const STATE *state)
     if ((state->status & GTC_WARMING) == 0) {
         return NO_SQUARE;
     }
-    if (state->doubt.sure != 2U) {
+    if (state->uncertainty.slope_known != 2U) {
         return FN(squared)(FN(rule)(state->table, RULE_START));
     }
-    return FN(squared)(FN(scaled_difference)(state->doubt.drift, NUM_ZERO, FN(rule)(state->table, RULE_SLOPE)));
+    return FN(squared)(FN(scaled_difference)(state->uncertainty.slope, NUM_ZERO, FN(rule)(state->table, RULE_SLOPE)));
 }
 
 /* Of inputs beyond the envelope. */
 static SQUARE FN(variance_beyond)(const STATE *state)
 {
     SQUARE sum = NO_SQUARE;
+    int_least32_t ignored = GTC_OK;
     uint_least32_t k;
 
     for (k = 0U; k < 2U; k++) {
-        const NUM x = state->doubt.at[k];
+        const NUM x = state->uncertainty.input[k];
         const NUM low = MEMBER(state->table->envelope[2U * k]);
         const NUM high = MEMBER(state->table->envelope[(2U * k) + 1U]);
-        const NUM edge = (x < low) ? low : ((x > high) ? high : x);
+        const NUM edge = FN(saturate)(x, low, high, &ignored);
 
         sum = FN(plus)(sum, FN(squared)(FN(scaled_difference)(x, edge, FN(rule)(state->table, RULE_BEYOND + k))));
     }
@@ -174,22 +175,23 @@ static SQUARE FN(variance_beyond)(const STATE *state)
 static SQUARE FN(variance_of_terms)(const STATE *state)
 {
     const TABLE *const table = state->table;
-    SQUARE sum = FN(squared)(state->doubt.edge);
+    SQUARE sum = FN(squared)(state->uncertainty.edge_effect);
     uint_least32_t i;
 
     for (i = 0U; i < FN(n_terms)(table); i++) {
-        const uint_least32_t kind = table->terms[i * GTC_TERM_WORDS].bits;
+        const uint_least32_t kind = FN(term_of)(table, i)[TERM_KIND].bits;
         const NUM word = FN(rule)(table, GTC_SIGMA_RULES + i);
-        const NUM first = FN(parameter)(state, i, 0U);
 
-        if (((state->doubt.known >> i) & 1U) != 0U) {
+        if (((state->uncertainty.terms_known >> i) & 1U) != 0U) {
             /* it went on from where it was, or the mean of its channel is new and within its range */
         } else if (READS_CHANNEL(kind)) {
             sum = FN(plus)(sum, FN(squared)(word));
         } else if (kind == GTC_TERM_MEMORY) {
-            sum = FN(plus)(sum, FN(squared)(FN(remaining)(word, first, state->elapsed - state->doubt.begun)));
+            sum = FN(plus)(sum, FN(squared)(FN(remaining)(word, FN(parameter)(state, i, MEMORY_GAIN),
+                                                          state->elapsed - state->uncertainty.terms_since)));
         } else if (kind == GTC_TERM_PLAY) {
-            sum = FN(plus)(sum, FN(squared)(FN(unsettled)(first, state->doubt.low, state->doubt.high, word)));
+            sum = FN(plus)(sum, FN(squared)(FN(unsettled)(FN(parameter)(state, i, PLAY_WIDTH), state->uncertainty.lowest,
+                                                          state->uncertainty.highest, word)));
         } else {
             /* it has no state */
         }
@@ -206,7 +208,7 @@ static SQUARE FN(variance)(const STATE *state)
 
     if ((state->status & GTC_FALLBACK) != 0) {
         sum = FN(squared)(FN(rule)(state->table, RULE_FALLBACK));
-    } else if (state->doubt.sure == 0U) {
+    } else if (state->uncertainty.slope_known == 0U) {
         sum = unknown;
     } else {
         sum = FN(plus)(FN(variance_of_map)(state), FN(variance_of_age)(state));
@@ -223,11 +225,11 @@ static SQUARE FN(variance)(const STATE *state)
 static void FN(rezero_clear)(STATE *state)
 {
     state->shift = NUM_ZERO;
-    state->constant = FN(has_sigma)(state->table) ? FN(rule)(state->table, RULE_BETWEEN) : NUM_ZERO;
+    state->shift_sigma = FN(has_sigma)(state->table) ? FN(rule)(state->table, RULE_BETWEEN) : NUM_ZERO;
 }
 
 /* Variance of the constant. */
 static SQUARE FN(variance_of_constant)(const STATE *state)
 {
-    return FN(square_or)(FN(squared)(state->constant), FN(squared)(FN(rule)(state->table, RULE_BETWEEN)));
+    return FN(square_or)(FN(squared)(state->shift_sigma), FN(squared)(FN(rule)(state->table, RULE_BETWEEN)));
 }

@@ -8,6 +8,12 @@
 
 /* ---- an image ------------------------------------------------------------------------------------ */
 
+/* Places in an image. */
+#define IMAGE_MAGIC 0U
+#define IMAGE_LAYOUT 1U
+#define IMAGE_LENGTH 2U
+#define IMAGE_WHOLES 3U
+
 /* Words between the magic and the arrays. */
 #define HEADER_WORDS (2U + N_WHOLE + N_NUMBERS)
 
@@ -16,10 +22,10 @@ static uint_least32_t FN(coverage_words)(const TABLE *table)
     return ((table->coverage_cells[0] * table->coverage_cells[1]) + 31U) / 32U;
 }
 
-/* Networks of the map, and the stand-ins behind them. */
+/* Networks of the map, and the fallback models behind them. */
 static uint_least32_t FN(all_networks)(const TABLE *table)
 {
-    return table->n_networks + table->n_stand_ins;
+    return table->n_networks + table->n_fallback_models;
 }
 
 /* Words of all arrays. */
@@ -79,24 +85,24 @@ static int FN(arrays_fit)(const TABLE *table)
 /* The whole numbers of the header, in the order of an image. */
 static void FN(wholes)(const TABLE *table, uint_least32_t found[N_WHOLE])
 {
-    found[0] = table->quantity;
-    found[1] = table->unit;
-    found[2] = table->id;
-    found[3] = table->calibrated;
-    found[4] = table->block_us;
-    found[5] = table->slope_blocks;
-    found[6] = table->lead_blocks;
-    found[7] = table->bias_frac_bits;
-    found[8] = FN(all_networks)(table);
-    found[9] = table->n_centers;
-    found[10] = table->n_channels;
-    found[11] = table->n_terms;
-    found[12] = table->coverage_cells[0];
-    found[13] = table->coverage_cells[1];
-    found[14] = table->sigma_cells[0];
-    found[15] = table->sigma_cells[1];
-    found[16] = table->n_sigma;
-    found[17] = table->n_probes;
+    found[WHOLE_QUANTITY] = table->quantity;
+    found[WHOLE_UNIT] = table->unit;
+    found[WHOLE_ID] = table->id;
+    found[WHOLE_CALIBRATED] = table->calibrated;
+    found[WHOLE_BLOCK_US] = table->block_us;
+    found[WHOLE_SLOPE_BLOCKS] = table->slope_blocks;
+    found[WHOLE_LEAD_BLOCKS] = table->lead_blocks;
+    found[WHOLE_BIAS_FRAC_BITS] = table->bias_frac_bits;
+    found[WHOLE_NETWORKS] = FN(all_networks)(table);
+    found[WHOLE_CENTERS] = table->n_centers;
+    found[WHOLE_CHANNELS] = table->n_channels;
+    found[WHOLE_TERMS] = table->n_terms;
+    found[WHOLE_COVERAGE_TEMP] = table->coverage_cells[0];
+    found[WHOLE_COVERAGE_SLOPE] = table->coverage_cells[1];
+    found[WHOLE_SIGMA_TEMP] = table->sigma_cells[0];
+    found[WHOLE_SIGMA_SLOPE] = table->sigma_cells[1];
+    found[WHOLE_SIGMA_WORDS] = table->n_sigma;
+    found[WHOLE_PROBES] = table->n_probes;
 }
 
 /* The other numbers of the header. */
@@ -104,17 +110,17 @@ static void FN(numbers)(const TABLE *table, gtc_word_t found[N_NUMBERS])
 {
     uint_least32_t i;
 
-    ELEMENT(found[0]) = MEMBER(table->fallback);
+    ELEMENT(found[NUMBER_FALLBACK]) = MEMBER(table->fallback);
     for (i = 0U; i < 2U; i++) {
-        ELEMENT(found[1U + i]) = MEMBER(table->authority[i]);
-        ELEMENT(found[3U + i]) = MEMBER(table->effect[i]);
+        ELEMENT(found[NUMBER_AUTHORITY + i]) = MEMBER(table->authority[i]);
+        ELEMENT(found[NUMBER_EFFECT + i]) = MEMBER(table->effect[i]);
     }
-    ELEMENT(found[5]) = MEMBER(table->rezero);
+    ELEMENT(found[NUMBER_REZERO]) = MEMBER(table->rezero);
     for (i = 0U; i < 3U; i++) {
-        ELEMENT(found[6U + i]) = MEMBER(table->scale[i]);
+        ELEMENT(found[NUMBER_SCALE + i]) = MEMBER(table->scale[i]);
     }
     for (i = 0U; i < 4U; i++) {
-        ELEMENT(found[9U + i]) = MEMBER(table->envelope[i]);
+        ELEMENT(found[NUMBER_ENVELOPE + i]) = MEMBER(table->envelope[i]);
     }
 }
 
@@ -132,7 +138,7 @@ static int FN(wholes_fit)(const TABLE *table, uint_least32_t first)
     return fit;
 }
 
-/* One network, or several where the code of the hand-over is there, and stand-ins; they share out the centers. */
+/* One network, or several where the code of the hand-over is there, and fallback models; they share out the centers. */
 static int FN(centers_fit)(const TABLE *table)
 {
     const uint_least32_t n_networks = FN(all_networks)(table);
@@ -158,14 +164,15 @@ static int FN(centers_fit)(const TABLE *table)
 /* A term comes with its code; some kinds read a further channel, others the temperature. */
 static int FN(term_fits)(const TABLE *table, uint_least32_t i)
 {
-    const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+    const gtc_word_t *const term = FN(term_of)(table, i);
+    const uint_least32_t kind = term[TERM_KIND].bits;
     const uint_least32_t channel = FN(channel_of)(term);
 
-    return ((table->term_code[i] != NULL) && (table->term_code[i]->kind == term[0].bits)
-            && (channel < table->n_channels) && ((channel != 0U) == READS_CHANNEL(term[0].bits))) ? 1 : 0;
+    return ((kind >= 1U) && (kind <= GTC_N_KINDS) && (table->term_code != NULL) && (FN(code_of)(table, i) != NULL)
+            && (channel < table->n_channels) && ((channel != 0U) == READS_CHANNEL(kind))) ? 1 : 0;
 }
 
-/* All of them; stand-ins belong to terms of a channel, one to each that has one, in their order, behind at least one
+/* All of them; fallback models belong to terms of a channel, one to each that has one, in their order, behind at least one
  * network of the map. */
 static int FN(terms_fit)(const TABLE *table)
 {
@@ -173,15 +180,15 @@ static int FN(terms_fit)(const TABLE *table)
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
-        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
-        const uint_least32_t stand_in = FN(stand_in_of)(term);
+        const gtc_word_t *const term = FN(term_of)(table, i);
+        const uint_least32_t fallback_model = FN(fallback_model_of)(term);
 
         if (!FN(term_fits)(table, i)) {
             return 0;
         }
-        if (stand_in != 0U) {
+        if (fallback_model != 0U) {
             last++;
-            if ((stand_in != last) || (FN(channel_of)(term) == 0U)) {
+            if ((fallback_model != last) || (FN(channel_of)(term) == 0U)) {
                 return 0;
             }
         }
@@ -260,10 +267,10 @@ static int FN(region_fits)(const gtc_word_t region[2], uint_least32_t n_networks
 static int FN(network_fits)(const TABLE *table, const gtc_word_t *network, const gtc_word_t *centers)
 {
     uint_least32_t i;
-    int fit = FN(numbers_fit)(&network[1], FN(network_limits), GTC_NETWORK_WORDS - 1U)
-              & FN(region_fits)(&network[4], table->n_networks) & FN(region_fits)(&network[6], table->n_networks);
+    int fit = FN(numbers_fit)(&network[NETWORK_CONSTANT], FN(network_limits), GTC_NETWORK_WORDS - 1U)
+              & FN(region_fits)(&network[NETWORK_REGION_TEMP], table->n_networks) & FN(region_fits)(&network[NETWORK_REGION_SLOPE], table->n_networks);
 
-    for (i = 0U; i < network[0].bits; i++) {
+    for (i = 0U; i < network[NETWORK_CENTERS].bits; i++) {
         fit &= FN(numbers_fit)(&centers[i * GTC_CENTER_WORDS], FN(center_limits), GTC_CENTER_WORDS);
     }
     return fit & FN(sums_fit)(network, centers);
@@ -280,7 +287,7 @@ static int FN(networks_fit)(const TABLE *table)
         const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
 
         fit &= FN(network_fits)(table, network, center);
-        center = &center[network[0].bits * GTC_CENTER_WORDS];
+        center = &center[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
     }
     return fit;
 }
@@ -292,9 +299,10 @@ static int FN(rest_fits)(const TABLE *table)
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
-        const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
+        const gtc_word_t *const term = FN(term_of)(table, i);
 
-        fit &= FN(numbers_fit)(&term[2], FN(term_limits)[term[0].bits - 1U], GTC_TERM_WORDS - 2U);
+        fit &= FN(numbers_fit)(&term[TERM_PARAMETERS], FN(term_limits)[term[TERM_KIND].bits - 1U],
+                               GTC_TERM_WORDS - TERM_PARAMETERS);
     }
     for (i = 0U; i < table->n_sigma; i++) {
         fit &= FN(numbers_fit)(&table->sigma[i], FN(sigma_limits), 1U);
@@ -357,10 +365,10 @@ static int FN(probes_agree)(const TABLE *table)
     for (i = 0U; i < table->n_probes; i++) {
         const gtc_word_t *const probe = &table->probes[i * GTC_PROBE_WORDS];
         NUM bias = NUM_ZERO;
-        const int status = FN(map)(table, ELEMENT(probe[0]), ELEMENT(probe[1]), &bias);
+        const int status = FN(map)(table, ELEMENT(probe[PROBE_TEMP]), ELEMENT(probe[PROBE_SLOPE]), &bias);
 
-        if ((status < 0) || ((uint_least32_t)status != probe[3].bits)
-            || (FN(bits)(bias) != probe[2].bits)) {
+        if ((status < 0) || ((uint_least32_t)status != probe[PROBE_STATUS].bits)
+            || (FN(bits)(bias) != probe[PROBE_BIAS].bits)) {
             return 0;
         }
     }
@@ -399,40 +407,41 @@ static int FN(run_check)(const TABLE *table)
 /* The members of a table as the image has them; arrays and code of terms are NULL. */
 static void FN(read_header)(volatile TABLE *table, const gtc_word_t *words)
 {
-    const gtc_word_t *const numbers = &words[3U + FIRST_COUNT];
+    const gtc_word_t *const wholes = &words[IMAGE_WHOLES];
+    const gtc_word_t *const numbers = &wholes[FIRST_COUNT];
     const gtc_word_t *const counts = &numbers[N_NUMBERS];
     uint_least32_t i;
 
-    table->layout = words[1].bits & 0xFFFFU;
-    table->quantity = words[3].bits;
-    table->unit = words[4].bits;
-    table->id = words[5].bits;
-    table->calibrated = words[6].bits;
-    table->block_us = words[7].bits;
-    table->slope_blocks = words[8].bits;
-    table->lead_blocks = words[9].bits;
-    table->bias_frac_bits = words[10].bits;
-    MEMBER(table->fallback) = ELEMENT(numbers[0]);
-    MEMBER(table->rezero) = ELEMENT(numbers[5]);
+    table->layout = words[IMAGE_LAYOUT].bits & 0xFFFFU;
+    table->quantity = wholes[WHOLE_QUANTITY].bits;
+    table->unit = wholes[WHOLE_UNIT].bits;
+    table->id = wholes[WHOLE_ID].bits;
+    table->calibrated = wholes[WHOLE_CALIBRATED].bits;
+    table->block_us = wholes[WHOLE_BLOCK_US].bits;
+    table->slope_blocks = wholes[WHOLE_SLOPE_BLOCKS].bits;
+    table->lead_blocks = wholes[WHOLE_LEAD_BLOCKS].bits;
+    table->bias_frac_bits = wholes[WHOLE_BIAS_FRAC_BITS].bits;
+    MEMBER(table->fallback) = ELEMENT(numbers[NUMBER_FALLBACK]);
+    MEMBER(table->rezero) = ELEMENT(numbers[NUMBER_REZERO]);
     for (i = 0U; i < 3U; i++) {
-        MEMBER(table->scale[i]) = ELEMENT(numbers[6U + i]);
+        MEMBER(table->scale[i]) = ELEMENT(numbers[NUMBER_SCALE + i]);
     }
     for (i = 0U; i < 4U; i++) {
-        MEMBER(table->envelope[i]) = ELEMENT(numbers[9U + i]);
+        MEMBER(table->envelope[i]) = ELEMENT(numbers[NUMBER_ENVELOPE + i]);
     }
-    table->n_networks = counts[0].bits;
-    table->n_stand_ins = 0U;
-    table->n_centers = counts[1].bits;
-    table->n_channels = counts[2].bits;
-    table->n_terms = counts[3].bits;
+    table->n_networks = counts[WHOLE_NETWORKS - FIRST_COUNT].bits;
+    table->n_fallback_models = 0U;
+    table->n_centers = counts[WHOLE_CENTERS - FIRST_COUNT].bits;
+    table->n_channels = counts[WHOLE_CHANNELS - FIRST_COUNT].bits;
+    table->n_terms = counts[WHOLE_TERMS - FIRST_COUNT].bits;
     for (i = 0U; i < 2U; i++) {
-        MEMBER(table->authority[i]) = ELEMENT(numbers[1U + i]);
-        MEMBER(table->effect[i]) = ELEMENT(numbers[3U + i]);
-        table->coverage_cells[i] = counts[4U + i].bits;
-        table->sigma_cells[i] = counts[6U + i].bits;
+        MEMBER(table->authority[i]) = ELEMENT(numbers[NUMBER_AUTHORITY + i]);
+        MEMBER(table->effect[i]) = ELEMENT(numbers[NUMBER_EFFECT + i]);
+        table->coverage_cells[i] = counts[WHOLE_COVERAGE_TEMP - FIRST_COUNT + i].bits;
+        table->sigma_cells[i] = counts[WHOLE_SIGMA_TEMP - FIRST_COUNT + i].bits;
     }
-    table->n_sigma = counts[8].bits;
-    table->n_probes = counts[9].bits;
+    table->n_sigma = counts[WHOLE_SIGMA_WORDS - FIRST_COUNT].bits;
+    table->n_probes = counts[WHOLE_PROBES - FIRST_COUNT].bits;
 }
 
 /* Counts so small that no sum of words overflows. */
@@ -469,36 +478,27 @@ static void FN(find_arrays)(TABLE *table, const gtc_word_t *words)
     table->crc = next[0].bits;
 }
 
-/* Code of every term of the image; NULL where there is none, the kind is unknown, or images have no terms. Networks that
- * terms name are stand-ins, not the map's; one at least is left to the map. */
-static void FN(find_terms)(volatile TABLE *table)
+/* Code of the terms of an image; NULL where images have none. Networks that terms name are fallback models, not the map's;
+ * one at least is left to the map. */
+static void FN(find_terms)(TABLE *table)
 {
 #if GTC_OPEN_TERMS
-    /* MISRA 9.3: all are there; their names are macros, which the checker does not count. */
-    static const struct FN(term_code) *const all[N_KINDS] = {
+    static const CODE *const all[GTC_N_KINDS] = {
         &FN(term_memory), &FN(term_play), &FN(term_warm_up), &FN(term_harmonic), &FN(term_auxiliary),
         &FN(term_curve), &FN(term_product),
     };
-#endif
     uint_least32_t i;
 
-    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        table->term_code[i] = NULL;
-#if GTC_OPEN_TERMS
-        if (i < table->n_terms) {
-            const gtc_word_t *const term = &table->terms[i * GTC_TERM_WORDS];
-            const uint_least32_t kind = term[0].bits;
-
-            if ((FN(stand_in_of)(term) != 0U) && (table->n_networks > 1U)) {
-                table->n_networks--;
-                table->n_stand_ins++;
-            }
-            if ((kind >= 1U) && (kind <= N_KINDS)) {
-                table->term_code[i] = all[kind - 1U];
-            }
+    table->term_code = all;
+    for (i = 0U; i < table->n_terms; i++) {
+        if ((FN(fallback_model_of)(FN(term_of)(table, i)) != 0U) && (table->n_networks > 1U)) {
+            table->n_networks--;
+            table->n_fallback_models++;
         }
-#endif
     }
+#else
+    table->term_code = NULL;
+#endif
 }
 
 /* All of a table from an image whose counts are sane. */
@@ -515,14 +515,14 @@ static int FN(is_image)(const gtc_word_t *words, uint_least32_t n_words)
     uint_least32_t length;
     uint_least32_t crc;
 
-    if ((n_words < SHORTEST) || (words[0].bits != GTC_IMAGE_MAGIC)) {
+    if ((n_words < SHORTEST) || (words[IMAGE_MAGIC].bits != GTC_IMAGE_MAGIC)) {
         return 0;
     }
-    length = words[2].bits;
+    length = words[IMAGE_LENGTH].bits;
     if ((length < SHORTEST) || (length > n_words)) {
         return 0;
     }
-    crc = gtc_crc_words(GTC_CRC_START, &words[1], length - 2U) ^ GTC_CRC_FINAL;
+    crc = gtc_crc_words(GTC_CRC_START, &words[IMAGE_LAYOUT], length - 2U) ^ GTC_CRC_FINAL;
     return (crc == words[length - 1U].bits) ? 1 : 0;
 }
 
@@ -537,10 +537,10 @@ static int FN(run_open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_
     if (!FN(is_image)(words, n_words)) {
         return GTC_E_IMAGE;
     }
-    if (words[1].bits != (GTC_TABLE_LAYOUT + (ARITHMETIC * 65536UL))) {
+    if (words[IMAGE_LAYOUT].bits != (GTC_TABLE_LAYOUT + (ARITHMETIC * 65536UL))) {
         return GTC_E_LAYOUT;
     }
-    if (words[2].bits < (BEFORE_ARRAYS + AFTER_ARRAYS)) {
+    if (words[IMAGE_LENGTH].bits < (BEFORE_ARRAYS + AFTER_ARRAYS)) {
         return GTC_E_IMAGE;
     }
     FN(read_header)(&read, words);
@@ -548,7 +548,7 @@ static int FN(run_open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_
         return GTC_E_ID;
     }
     if ((!FN(counts_are_sane)(&read))
-        || ((BEFORE_ARRAYS + FN(array_words)(&read) + AFTER_ARRAYS) != words[2].bits)) {
+        || ((BEFORE_ARRAYS + FN(array_words)(&read) + AFTER_ARRAYS) != words[IMAGE_LENGTH].bits)) {
         return GTC_E_IMAGE;
     }
     FN(read_image)(&read, words);

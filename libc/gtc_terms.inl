@@ -16,20 +16,31 @@ static inline uint_least32_t FN(n_channels)(const TABLE *table)
     return (GTC_MAX_TERMS > 0) ? table->n_channels : 1U;
 }
 
-/* The channel that a term reads, and the number of its stand-in among the networks, from 1 on; 0: it has none. */
+static const gtc_word_t *FN(term_of)(const TABLE *table, uint_least32_t i)
+{
+    return &table->terms[i * GTC_TERM_WORDS];
+}
+
+/* The functions of a term. */
+static const CODE *FN(code_of)(const TABLE *table, uint_least32_t i)
+{
+    return table->term_code[FN(term_of)(table, i)[TERM_KIND].bits - 1U];
+}
+
+/* The channel that a term reads, and the number of its fallback model among the networks, from 1 on; 0: it has none. */
 static uint_least32_t FN(channel_of)(const gtc_word_t *term)
 {
-    return term[1].bits & 0xFFFFU;
+    return term[TERM_CHANNEL].bits & 0xFFFFU;
 }
 
-static uint_least32_t FN(stand_in_of)(const gtc_word_t *term)
+static uint_least32_t FN(fallback_model_of)(const gtc_word_t *term)
 {
-    return term[1].bits >> 16;
+    return term[TERM_CHANNEL].bits >> 16;
 }
 
-/* What a term adds on average where its channel is not known: its stand-in, at the inputs of the map. Where they are
+/* What a term adds on average where its channel is not known: its fallback model, at the inputs of the map. Where they are
  * none (something else wrote over the state) the map says so. */
-static NUM FN(stand_in)(const TABLE *table, uint_least32_t number, const EFFECT *effect)
+static NUM FN(fallback_model)(const TABLE *table, uint_least32_t number, const EFFECT *effect)
 {
     const gtc_word_t *network = table->networks;
     const gtc_word_t *center = table->centers;
@@ -38,7 +49,7 @@ static NUM FN(stand_in)(const TABLE *table, uint_least32_t number, const EFFECT 
 
     (void)FN(locate)(table, effect->temp, effect->slope, &in);
     for (i = 1U; i < number; i++) {
-        center = &center[network[0].bits * GTC_CENTER_WORDS];
+        center = &center[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
         network = &network[GTC_NETWORK_WORDS];
     }
     return FN(network)(table, network, center, &in);
@@ -60,7 +71,7 @@ static void FN(nothing)(STATE *state, uint_least32_t i, NUM x)
 
 static void FN(memory_follow)(NUM z[2], NUM x, NUM gain)
 {
-    const NUM most = FN(number_limits)[9].most;
+    const NUM most = FN(number_limits)[NUMBER_ENVELOPE].most;
 
     if ((z[0] >= -most) && (z[0] <= most)) {
         FN(follow)(z, x, gain);
@@ -71,28 +82,28 @@ static void FN(memory_follow)(NUM z[2], NUM x, NUM gain)
 
 static void FN(memory_begin)(STATE *state, uint_least32_t i, NUM x)
 {
-    FN(memory_follow)(state->term[i], x, FN(power)(FN(parameter)(state, i, 0U), state->off_blocks));
+    FN(memory_follow)(state->term[i], x, FN(power)(FN(parameter)(state, i, MEMORY_GAIN), state->off_blocks));
 }
 
 static void FN(memory_step)(STATE *state, uint_least32_t i, NUM x)
 {
-    FN(memory_follow)(state->term[i], x, FN(parameter)(state, i, 0U));
+    FN(memory_follow)(state->term[i], x, FN(parameter)(state, i, MEMORY_GAIN));
 }
 
 static void FN(memory_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
     const NUM z = state->term[i][0];
-    const NUM rate = FN(parameter)(state, i, 2U);
+    const NUM rate = FN(parameter)(state, i, MEMORY_RATE);
 
     if (FN(bits)(rate) != 0U) {
         effect->temp = z;
         effect->slope = FN(slope_of)(x, z, rate);
     }
-    effect->added = FN(add)(effect->added, FN(scaled_difference)(z, x, FN(parameter)(state, i, 1U)));
+    effect->added = FN(add)(effect->added, FN(scaled_difference)(z, x, FN(parameter)(state, i, MEMORY_AMPLITUDE)));
 }
 
 const struct FN(term_code) FN(term_memory) = {
-    GTC_TERM_MEMORY, 1U, FN(memory_begin), FN(memory_step), FN(memory_apply),
+    1U, FN(memory_begin), FN(memory_step), FN(memory_apply),
 };
 
 /* ---- play operator: hysteresis
@@ -102,7 +113,7 @@ const struct FN(term_code) FN(term_memory) = {
 
 static void FN(play_step)(STATE *state, uint_least32_t i, NUM x)
 {
-    const NUM width = FN(parameter)(state, i, 0U);
+    const NUM width = FN(parameter)(state, i, PLAY_WIDTH);
     const NUM low = (NUM)FN(diff)(x, width);
     const NUM high = (NUM)FN(add)(x, width);
     NUM *const z = state->term[i];
@@ -126,13 +137,13 @@ static void FN(play_begin)(STATE *state, uint_least32_t i, NUM x)
 
 static void FN(play_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM amplitude = FN(parameter)(state, i, 1U);
+    const NUM amplitude = FN(parameter)(state, i, PLAY_AMPLITUDE);
 
     effect->added = FN(add)(effect->added, FN(scaled_difference)(state->term[i][0], x, amplitude));
 }
 
 const struct FN(term_code) FN(term_play) = {
-    GTC_TERM_PLAY, 1U, FN(play_begin), FN(play_step), FN(play_apply),
+    1U, FN(play_begin), FN(play_step), FN(play_apply),
 };
 
 /* ---- exponential in the time since init: warm_up
@@ -141,15 +152,15 @@ const struct FN(term_code) FN(term_play) = {
 
 static void FN(warm_up_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM gain = FN(parameter)(state, i, 0U);
-    const NUM amplitude = FN(parameter)(state, i, 1U);
+    const NUM gain = FN(parameter)(state, i, WARM_UP_GAIN);
+    const NUM amplitude = FN(parameter)(state, i, WARM_UP_AMPLITUDE);
 
     (void)x;
     effect->added = FN(add)(effect->added, FN(fading)(state->elapsed, gain, amplitude));
 }
 
 const struct FN(term_code) FN(term_warm_up) = {
-    GTC_TERM_WARM_UP, 0U, FN(nothing), FN(nothing), FN(warm_up_apply),
+    0U, FN(nothing), FN(nothing), FN(warm_up_apply),
 };
 
 /* ---- harmonic in the temperature: path_length_periodicity
@@ -158,21 +169,21 @@ const struct FN(term_code) FN(term_warm_up) = {
 
 static void FN(harmonic_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM frequency = FN(parameter)(state, i, 0U);
-    const NUM phase = FN(parameter)(state, i, 1U);
-    const NUM amplitude = FN(parameter)(state, i, 2U);
+    const NUM frequency = FN(parameter)(state, i, HARMONIC_FREQUENCY);
+    const NUM phase = FN(parameter)(state, i, HARMONIC_PHASE);
+    const NUM amplitude = FN(parameter)(state, i, HARMONIC_AMPLITUDE);
 
     effect->added = FN(add)(effect->added, FN(wave)(x, frequency, phase, amplitude));
 }
 
 const struct FN(term_code) FN(term_harmonic) = {
-    GTC_TERM_HARMONIC, 0U, FN(nothing), FN(nothing), FN(harmonic_apply),
+    0U, FN(nothing), FN(nothing), FN(harmonic_apply),
 };
 
 /* ---- functions of the block mean of an auxiliary channel
  *
- * The mean is that of the channel's last block with enough readings. While nothing of the channel is believed a term
- * adds its stand-in; one that has none takes the guard's fallback for the mean (gtc_front.inl). */
+ * The mean is that of the channel's last block with enough readings. While nothing of the channel is accepted a term
+ * adds its fallback model; one that has none takes the guard's fallback for the mean (gtc_front.inl). */
 
 static const gtc_word_t *FN(guard)(const STATE *state, uint_least32_t channel)
 {
@@ -185,12 +196,12 @@ static int FN(is_lost)(const INPUT *in, const gtc_word_t *guard)
     return (in->held_blocks > guard[GUARD_MISSING].bits) ? 1 : 0;
 }
 
-/* Whether the channel of a term shows a mean, with the remarks about it; else the stand-in is added. */
-static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NUM *mean)
+/* Whether the channel of a term has a mean, with the remarks about it; else the fallback model is added. */
+static int FN(has_mean)(const STATE *state, uint_least32_t i, EFFECT *effect, NUM *mean)
 {
-    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
+    const gtc_word_t *const term = FN(term_of)(state->table, i);
     const uint_least32_t channel = FN(channel_of)(term);
-    const uint_least32_t stand_in = FN(stand_in_of)(term);
+    const uint_least32_t fallback_model = FN(fallback_model_of)(term);
     const INPUT *const in = &state->input[channel];
     const uint_least32_t bit = (uint_least32_t)1U << i;
 
@@ -205,47 +216,47 @@ static int FN(is_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, NU
     if ((in->clamped & CLAMPED_MEAN) != 0U) {
         remarks |= GTC_CLAMPED;
     }
-    effect->known = (remarks == GTC_OK) ? (effect->known | bit) : (effect->known & ~bit);
+    effect->terms_known = (remarks == GTC_OK) ? (effect->terms_known | bit) : (effect->terms_known & ~bit);
     effect->remarks |= remarks;
-    if ((in->gap_us == 0U) && (stand_in != 0U)) {
-        effect->added = FN(add)(effect->added, FN(stand_in)(state->table, stand_in, effect));
+    if ((in->gap_us == 0U) && (fallback_model != 0U)) {
+        effect->added = FN(add)(effect->added, FN(fallback_model)(state->table, fallback_model, effect));
         return 0;
     }
     *mean = in->mean;
     return 1;
 }
 
-/* Adds the effect of what a channel shows. Where that is the edge of its range, the sensor may be at fault as well as the
+/* Adds the effect of a channel's mean. Where that is the edge of its range, the sensor may be at fault as well as the
  * supply: the effect may be wrong by what it is beyond that which the term adds without a reading. */
-static void FN(add_shown)(const STATE *state, uint_least32_t i, EFFECT *effect, WIDE shown)
+static void FN(add_effect)(const STATE *state, uint_least32_t i, EFFECT *effect, WIDE added)
 {
-    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
-    const uint_least32_t stand_in = FN(stand_in_of)(term);
+    const gtc_word_t *const term = FN(term_of)(state->table, i);
+    const uint_least32_t fallback_model = FN(fallback_model_of)(term);
 
-    effect->added = FN(add)(effect->added, shown);
+    effect->added = FN(add)(effect->added, added);
     if ((state->input[FN(channel_of)(term)].clamped & CLAMPED_MEAN) != 0U) {
-        const WIDE usual = (stand_in != 0U) ? FN(stand_in)(state->table, stand_in, effect) : NUM_ZERO;
-        const WIDE beyond = FN(diff)(shown, usual);
+        const WIDE usual = (fallback_model != 0U) ? FN(fallback_model)(state->table, fallback_model, effect) : NUM_ZERO;
+        const WIDE beyond = FN(diff)(added, usual);
 
-        effect->edge = (NUM)FN(limited)(FN(add)(effect->edge, (beyond < NUM_ZERO) ? -beyond : beyond));
+        effect->edge_effect = (NUM)FN(factor)(FN(add)(effect->edge_effect, (beyond < NUM_ZERO) ? -beyond : beyond));
     }
 }
 
 /* Linear. Parameters: slope; reference. Adds slope (mean - reference). */
 static void FN(auxiliary_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM slope = FN(parameter)(state, i, 0U);
-    const NUM reference = FN(parameter)(state, i, 1U);
+    const NUM slope = FN(parameter)(state, i, AUXILIARY_SLOPE);
+    const NUM reference = FN(parameter)(state, i, AUXILIARY_REFERENCE);
     NUM mean = NUM_ZERO;
 
     (void)x;
-    if (FN(is_shown)(state, i, effect, &mean) != 0) {
-        FN(add_shown)(state, i, effect, FN(scaled_difference)(mean, reference, slope));
+    if (FN(has_mean)(state, i, effect, &mean) != 0) {
+        FN(add_effect)(state, i, effect, FN(scaled_difference)(mean, reference, slope));
     }
 }
 
 const struct FN(term_code) FN(term_auxiliary) = {
-    GTC_TERM_AUXILIARY, 0U, FN(nothing), FN(nothing), FN(auxiliary_apply),
+    0U, FN(nothing), FN(nothing), FN(auxiliary_apply),
 };
 
 /* ---- a line and two Gaussians in the block mean of an auxiliary channel
@@ -255,21 +266,22 @@ const struct FN(term_code) FN(term_auxiliary) = {
 
 static void FN(curve_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const gtc_word_t *const term = &state->table->terms[i * GTC_TERM_WORDS];
+    const gtc_word_t *const term = FN(term_of)(state->table, i);
     NUM mean = NUM_ZERO;
     WIDE sum;
 
     (void)x;
-    if (FN(is_shown)(state, i, effect, &mean) != 0) {
-        mean = (NUM)FN(limited)(mean);
-        sum = FN(scaled_difference)(mean, ELEMENT(term[4]), ELEMENT(term[2]));
-        sum = FN(add)(sum, FN(bells)(mean, &term[3]));
-        FN(add_shown)(state, i, effect, sum);
+    if (FN(has_mean)(state, i, effect, &mean) != 0) {
+        mean = (NUM)FN(factor)(mean);
+        sum = FN(scaled_difference)(mean, ELEMENT(term[TERM_PARAMETERS + CURVE_REFERENCE]),
+                                    ELEMENT(term[TERM_PARAMETERS + CURVE_SLOPE]));
+        sum = FN(add)(sum, FN(gaussians_of_channel)(mean, &term[TERM_PARAMETERS + CURVE_GAIN]));
+        FN(add_effect)(state, i, effect, sum);
     }
 }
 
 const struct FN(term_code) FN(term_curve) = {
-    GTC_TERM_CURVE, 0U, FN(nothing), FN(nothing), FN(curve_apply),
+    0U, FN(nothing), FN(nothing), FN(curve_apply),
 };
 
 /* ---- a line in the temperature times a line in the block mean of an auxiliary channel
@@ -279,17 +291,17 @@ const struct FN(term_code) FN(term_curve) = {
 
 static void FN(product_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM reference = FN(parameter)(state, i, 1U);
-    const NUM growth = FN(parameter)(state, i, 2U);
-    const NUM middle = FN(parameter)(state, i, 3U);
-    const WIDE here = FN(add)(FN(parameter)(state, i, 0U), FN(scaled_difference)(x, middle, growth));
+    const NUM reference = FN(parameter)(state, i, PRODUCT_REFERENCE);
+    const NUM growth = FN(parameter)(state, i, PRODUCT_GROWTH);
+    const NUM middle = FN(parameter)(state, i, PRODUCT_REFERENCE_TEMP);
+    const WIDE here = FN(add)(FN(parameter)(state, i, PRODUCT_SLOPE), FN(scaled_difference)(x, middle, growth));
     NUM mean = NUM_ZERO;
 
-    if (FN(is_shown)(state, i, effect, &mean) != 0) {
-        FN(add_shown)(state, i, effect, FN(scaled_difference)(mean, reference, (NUM)FN(limited)(here)));
+    if (FN(has_mean)(state, i, effect, &mean) != 0) {
+        FN(add_effect)(state, i, effect, FN(scaled_difference)(mean, reference, (NUM)FN(factor)(here)));
     }
 }
 
 const struct FN(term_code) FN(term_product) = {
-    GTC_TERM_PRODUCT, 0U, FN(nothing), FN(nothing), FN(product_apply),
+    0U, FN(nothing), FN(nothing), FN(product_apply),
 };

@@ -317,7 +317,7 @@ def source_words(text: str, numeric: str) -> list[int]:
         raise Unreadable(f"no {numeric} table in the C source")
     members = dict(re.findall(r"^\s*\.(\w+) = (.*?),?$", struct_text[1], re.M))
     found = {entry: constants(members[entry.partition(":")[0]]) for entry in HEAD}
-    found["n_networks"][0] += constants(members["n_stand_ins"])[0]
+    found["n_networks"][0] += constants(members["n_fallback_models"])[0]
     words = [word for entry in HEAD for word in found[entry]]
     for name in ARRAYS:
         if members[name] != "NULL":
@@ -336,11 +336,13 @@ def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
     if image.crc() != image.words[-1]:
         yield "the CRC-32 is not that of the words"
     text = (folder / f"gtc_{name}.c").read_text(encoding="ascii")
-    codes = re.search(rf"gtc_{image.numeric}_table_t \w+ = .*?\.term_code = \{{ (.*?) \}}", text, re.S)
-    kinds = [TERM_CODES.get(kind) for kind in image.array["terms"][::8]]
-    wanted = ", ".join(f"&gtc_{image.numeric}_term_{kind}" for kind in kinds) or "NULL"
-    if codes is None or codes[1] != wanted:
-        yield f"the code of the terms is {codes and codes[1]}, their kinds are {kinds}"
+    kinds = set(image.array["terms"][::8])
+    codes = re.search(rf"{image.numeric}_codes\[GTC_N_KINDS\] = \{{\s+(.*?),\s+\}}", text)
+    wanted = ", ".join(
+        f"&gtc_{image.numeric}_term_{name}" if kind in kinds else "NULL" for kind, name in TERM_CODES.items()
+    )
+    if (codes[1] if codes else None) != (wanted if kinds else None):
+        yield f"the code of the terms is {codes and codes[1]}, their kinds are {sorted(kinds)}"
     source = source_words(text, image.numeric)
     if source != image.words:
         wrong = [k for k, pair in enumerate(zip(source, image.words, strict=False)) if pair[0] != pair[1]]
@@ -483,8 +485,8 @@ def check_header(model: Model, image: Image, name: str, header: str) -> Iterator
         "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
         "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
         "N_CHANNELS": 1 + len(model.channels()),
-        # 13 pointers, number of fallback models; neither magic nor arithmetic and length
-        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 11),
+        # 9 pointers, number of fallback models, code of 7 kinds of terms; neither magic nor arithmetic and length
+        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + (14 if image.array["terms"] else 7)),
     }  # fmt: skip
     if image.numeric == "q31":
         whole["Q31_BIAS_FRAC_BITS"] = image.one("bias_frac_bits")
@@ -605,9 +607,9 @@ def check_stand_ins(model: Model, image: Image, header: str) -> Iterator[str]:
     """What stands for the terms of lost channels against the model's networks."""
     if not model.stand_ins():
         return
-    printed = re.search(rf"\* {image.numeric} stand-ins: .*\|error\| <= (\S+) deg/h", header)
+    printed = re.search(rf"\* {image.numeric} fallback models: .*\|error\| <= (\S+) deg/h", header)
     if printed is None:
-        raise Unreadable(f"the header prints no bound of the stand-ins of {image.numeric}")
+        raise Unreadable(f"the header prints no bound of the fallback models of {image.numeric}")
     (t0, t1), (r0, r1) = model.t_range, model.r_range
     own = list(image.networks())[-len(model.stand_ins()) :]
     for network, (head, centers) in zip(model.stand_ins(), own, strict=True):
@@ -616,7 +618,7 @@ def check_stand_ins(model: Model, image: Image, header: str) -> Iterator[str]:
             want = model.of_network(network, min(max(t, t0), t1), min(max(slope / model.per_block, r0), r1))
             error = abs(image.to_dph(image.of_network(head, centers, point)) - want)
             if error > float(printed[1]):
-                yield f"a stand-in departs by {error:.3e} deg/h at T = {t:.4f} C, more than {printed[1]}"
+                yield f"a fallback model departs by {error:.3e} deg/h at T = {t:.4f} C, more than {printed[1]}"
                 break
 
 

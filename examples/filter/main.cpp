@@ -12,6 +12,7 @@
 
 namespace {
 
+const uint_least32_t kPeriodUs = 1000000UL; /* a temperature each second */
 const float kArwVariance = 1e-6F; /* deg^2 per hour of integration: (1e-3 deg/sqrt(h))^2 */
 
 class Heading {
@@ -38,11 +39,11 @@ int main()
     gtc::f32::Correction correction;
     Heading heading;
 
-    if (!gtc::f32::check(gtc_rlg_0042_f32).is_ok() || !correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok()) {
+    if (!gtc::f32::check(gtc_rlg_0042_f32).is_ok() || !correction.init(gtc_rlg_0042_f32, kPeriodUs).is_ok()) {
         return 1;
     }
     for (int second = 0; second < 600; ++second) {
-        const gtc::Status sampled = correction.sample(gtc::f32::Celsius(20.0F + static_cast<float>(second) / 64.0F));
+        const gtc::Status sampled = correction.sample(kPeriodUs, gtc::f32::Celsius(20.0F + static_cast<float>(second) / 64.0F));
         gtc::f32::Snapshot now = {};
         const gtc::Status known = correction.snapshot(now);
         if (sampled.failed() || (known.failed() && known.code() != GTC_E_ABSENT)) {

@@ -95,7 +95,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .sigma_cells = { 0UL, 0UL },
     .n_sigma = 0UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -105,7 +105,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .sigma = NULL,
     .probes = f32_probes,
     .crc = 0xd2514b2cUL,
-    .term_code = { NULL },
+    .term_code = NULL,
 };
 
 /* ---- fixed point ---- */
@@ -183,7 +183,7 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .sigma_cells = { 0UL, 0UL },
     .n_sigma = 0UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -193,6 +193,6 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .sigma = NULL,
     .probes = q31_probes,
     .crc = 0x0b9fb6e3UL,
-    .term_code = { NULL },
+    .term_code = NULL,
 };
 

@@ -8,8 +8,8 @@
  *
  * Valid:       -32.82 ... 68.01 C, -2.357 ... 2.356 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
- * f32:         688 bytes of read-only data, 224 of them parameters; |error| <= 1.16e-07 deg/h against the model (terms excluded)
- * q31:         688 bytes of read-only data, 224 of them parameters; |error| <= 1.24e-06 deg/h against the model (terms excluded)
+ * f32:         676 bytes of read-only data, 224 of them parameters; |error| <= 1.16e-07 deg/h against the model (terms excluded)
+ * q31:         676 bytes of read-only data, 224 of them parameters; |error| <= 1.24e-06 deg/h against the model (terms excluded)
  * Options:     -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
@@ -39,9 +39,9 @@ extern "C" {
 #define GTC_RLG_0042_AUTHORITY_MAX_DPH (0.00946235238F) /* no correction lies above it, deg/h: margin 25% of the range */
 #define GTC_RLG_0042_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_RLG_0042_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
-#define GTC_RLG_0042_F32_TABLE_BYTES 688UL /* read-only data, with pointers of 32 bits */
+#define GTC_RLG_0042_F32_TABLE_BYTES 676UL /* read-only data, with pointers of 32 bits */
 #define GTC_RLG_0042_Q31_BIAS_FRAC_BITS 32 /* bias in 2^-this deg/h */
-#define GTC_RLG_0042_Q31_TABLE_BYTES 688UL /* read-only data, with pointers of 32 bits */
+#define GTC_RLG_0042_Q31_TABLE_BYTES 676UL /* read-only data, with pointers of 32 bits */
 
 extern const gtc_f32_table_t gtc_rlg_0042_f32;
 extern const gtc_q31_table_t gtc_rlg_0042_q31;

@@ -13,8 +13,8 @@ int main(void)
         (gtc_f32_init(&state, &gtc_rlg_0042_f32, 10000UL) < 0)) { /* a sample each 10000 microseconds */
         return 1; /* do not navigate with this build or table */
     }
-    for (k = 0; k < 101; k++) { /* a start must agree with itself for a while before it is believed */
-        if (gtc_f32_sample(&state, channels) < 0) {
+    for (k = 0; k < 101; k++) { /* a start must agree with itself for a while before it is accepted */
+        if (gtc_f32_sample(&state, 10000UL, channels) < 0) {
             return 1;
         }
     }

@@ -37,7 +37,7 @@ int main(void)
     }
     while (scanf("%ld %ld %ld", &word, &truth, &measured) == 3) {
         const float temperature = (float)word / 128.0F;
-        const int taken = (word == -32768L) ? gtc_f32_missed(&state, 1U) : gtc_f32_sample(&state, &temperature);
+        const int taken = gtc_f32_sample(&state, PERIOD_US, (word == -32768L) ? NULL : &temperature);
         gtc_f32_snapshot_t now;
         float rate;
         double error;

@@ -13,6 +13,10 @@
 #error "gtc_sim_0003.c was written for table layout 2: emit it again with the gyrotc of this runtime"
 #endif
 
+#if (GTC_MAX_SLOPE_BLOCKS < 10) || (GTC_MAX_TERMS < 0)
+#error "gtc_sim_0003.c needs -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 or more"
+#endif
+
 #define V(x) { .value = (x) } /* a float32 number */
 #define B(x) { .bits = (x) }  /* an integer */
 
@@ -101,7 +105,7 @@ const gtc_f32_table_t gtc_sim_0003_f32 = {
     .sigma_cells = { 8UL, 5UL },
     .n_sigma = 91UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -111,6 +115,6 @@ const gtc_f32_table_t gtc_sim_0003_f32 = {
     .sigma = f32_sigma,
     .probes = f32_probes,
     .crc = 0x2ae71cf8UL,
-    .term_code = { NULL },
+    .term_code = NULL,
 };
 

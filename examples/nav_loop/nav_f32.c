@@ -19,7 +19,7 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const float temperature = (float)word * 0.0078125F;
-    const int taken = (word == NAV_NO_READING) ? gtc_f32_missed(&state, 1U) : gtc_f32_sample(&state, &temperature);
+    const int taken = gtc_f32_sample(&state, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
     float bias = 0.0F;
     const int status = gtc_f32_bias(&state, &bias);
     bias_dph = bias;

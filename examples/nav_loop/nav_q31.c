@@ -19,7 +19,7 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const int_least32_t temperature = word * 512L; /* 2^-16 C */
-    const int taken = (word == NAV_NO_READING) ? gtc_q31_missed(&state, 1U) : gtc_q31_sample(&state, &temperature);
+    const int taken = gtc_q31_sample(&state, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
     int_least32_t now = 0;
     const int status = gtc_q31_bias(&state, &now);
     bias = now;

@@ -44,7 +44,7 @@ static int correct(const float temperature[N_AXES], float rate[N_AXES])
 
     for (axis = 0; axis < N_AXES; axis++) {
         float bias = 0.0F;
-        int status = gtc_f32_sample(&states[axis], &temperature[axis]);
+        int status = gtc_f32_sample(&states[axis], PERIOD_US, &temperature[axis]);
 
         if (status >= 0) {
             status |= gtc_f32_bias(&states[axis], &bias);

@@ -59,7 +59,7 @@ static int state_at(int save, gtc_f32_state_t *state)
     for (i = 0; (i < (37 * save)) && (status >= 0); i++) {
         const float temp = 20.0F + (0.0625F * (float)i);
 
-        status = gtc_f32_sample(state, &temp);
+        status = gtc_f32_sample(state, PERIOD_US, &temp);
     }
     return status;
 }

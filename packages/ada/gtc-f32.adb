@@ -6,16 +6,14 @@ is
 
    function Run_Init (S : in out State; T : Table; Period_Us : Period) return Status
    with Import, Convention => C, External_Name => "gtc_f32_init_20blocks_4terms";
-   function Run_Sample (S : in out State; Readings : Numbers) return Status
-   with Import, Convention => C, External_Name => "gtc_f32_sample_20blocks_4terms";
-   function Run_Missed (S : in out State; Count : Interfaces.Unsigned_32) return Status
-   with Import, Convention => C, External_Name => "gtc_f32_missed_20blocks_4terms";
+   function Run_Sample (S : in out State; Elapsed_Us : Period; Readings : System.Address) return Status
+   with Import, Convention => C, External_Name => "gtc_f32_sample";
    function Run_Bias (S : State; Value : in out Number) return Status
-   with Import, Convention => C, External_Name => "gtc_f32_bias_20blocks_4terms";
+   with Import, Convention => C, External_Name => "gtc_f32_bias";
    function Run_Snapshot (S : State; Value : in out Snapshot) return Status
-   with Import, Convention => C, External_Name => "gtc_f32_snapshot_20blocks_4terms";
+   with Import, Convention => C, External_Name => "gtc_f32_snapshot";
    function Run_Save (S : State; To : in out Saved_State) return Status
-   with Import, Convention => C, External_Name => "gtc_f32_save_20blocks_4terms";
+   with Import, Convention => C, External_Name => "gtc_f32_save";
    function Run_Restore
      (S : in out State; T : Table; Period_Us : Period; From : Saved_State; Off : Interfaces.Unsigned_32)
       return Status
@@ -39,14 +37,14 @@ is
       Result := Run_Init (S, T, Period_Us);
    end Init;
 
-   procedure Sample (S : in out State; Readings : Numbers; Result : out Status) is
+   procedure Sample (S : in out State; Elapsed_Us : Period; Readings : Numbers; Result : out Status) is
    begin
-      Result := Run_Sample (S, Readings);
+      Result := Run_Sample (S, Elapsed_Us, Readings'Address);
    end Sample;
 
-   procedure Missed (S : in out State; Count : Interfaces.Unsigned_32; Result : out Status) is
+   procedure Missed (S : in out State; Elapsed_Us : Period; Result : out Status) is
    begin
-      Result := Run_Missed (S, Count);
+      Result := Run_Sample (S, Elapsed_Us, System.Null_Address);
    end Missed;
 
    procedure Bias (S : State; Value : out Number; Result : out Status) is

@@ -41,20 +41,20 @@ is
    --  Boot self-test: layout, arithmetic, checksum, ranges, known answers.
    function Check (T : Table) return Status
    with Global => null, Post => Check'Result in E_Image | E_Self_Test | E_Layout | Ok,
-        Import, Convention => C, External_Name => "gtc_q31_check_20blocks_4terms";
+        Import, Convention => C, External_Name => "gtc_q31_check";
 
    --  Starts a state for samples that come each Period_Us.
    procedure Init (S : in out State; T : aliased Table; Period_Us : Period; Result : out Status)
    with Global => null, Post => Result <= Ok and then (if Result = Ok then Is_Started (S));
 
-   --  One sample: the temperature, then the auxiliary channels.
-   procedure Sample (S : in out State; Readings : Numbers; Result : out Status)
+   --  What was read Elapsed_Us after the call before: the temperature, then the auxiliary channels.
+   procedure Sample (S : in out State; Elapsed_Us : Period; Readings : Numbers; Result : out Status)
    with Global => null,
         Pre  => Is_Started (S) and then Readings'Length = Channels (S),
         Post => Result >= Ok and then Is_Started (S);
 
-   --  Samples that did not arrive.
-   procedure Missed (S : in out State; Count : Interfaces.Unsigned_32; Result : out Status)
+   --  Elapsed_Us in which nothing was read.
+   procedure Missed (S : in out State; Elapsed_Us : Period; Result : out Status)
    with Global => null, Pre => Is_Started (S), Post => Result >= Ok and then Is_Started (S);
 
    --  The correction in force; compensated = measured - bias.
@@ -69,7 +69,7 @@ is
    procedure Save (S : State; To : out Saved_State; Result : out Status)
    with Global => null, Pre => Is_Started (S), Post => Result = Ok;
 
-   --  Takes over what survives Off_Blocks whole blocks without power; negative: Init instead.
+   --  Takes over what is kept over Off_Blocks whole blocks without power; negative: Init instead.
    procedure Restore
      (S      : in out State; T : aliased Table; Period_Us : Period; From : Saved_State;
       Off_Blocks : Interfaces.Unsigned_32; Result : out Status)
@@ -88,7 +88,7 @@ private
       Head      : Words (1 .. 33);
       Arrays    : Addresses (1 .. 8);
       Crc       : Word;
-      Term_Code : Addresses (1 .. Max_Terms);
+      Term_Code : System.Address := System.Null_Address;
    end record
    with Convention => C;
 
@@ -102,7 +102,7 @@ private
 
    type Contents is limited record
       Of_Table : System.Address := System.Null_Address;
-      Numbers  : Words (1 .. 25 + Max_Slope_Blocks + 2 * Max_Terms);
+      Numbers  : Words (1 .. 24 + Max_Slope_Blocks + 2 * Max_Terms);
       Channel  : Inputs;
    end record
    with Convention => C;

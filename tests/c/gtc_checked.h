@@ -1,5 +1,5 @@
-/* gtc_checked.h - configuration in which the fixed-point runtime asserts the range of every intermediate
- * number; a claim that does not hold ends the test.
+/* gtc_checked.h - configuration in which the runtime asserts its preconditions and, in fixed point, the range of
+ * every intermediate number; a claim that does not hold ends the test.
  *
  * SPDX-License-Identifier: MIT
  */
@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define GTC_ASSERT_RANGE(claim) \
-    ((claim) ? (void)0 : (printf("%s:%d: out of range: %s\n", __FILE__, __LINE__, #claim), abort()))
+#define GTC_ASSERT(claim) \
+    ((claim) ? (void)0 : (printf("%s:%d: not true: %s\n", __FILE__, __LINE__, #claim), abort()))
 
 #endif /* GTC_CHECKED_H_INCLUDED */

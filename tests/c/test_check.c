@@ -68,7 +68,7 @@ TEST(changed_members_are_found)
 /* Counts of arrays whose end nothing can check are left out: in an image its length checks them. */
 TEST(every_flipped_bit_of_a_member_is_found)
 {
-    const size_t more[3] = {offsetof(table_t, n_centers), offsetof(table_t, n_terms), offsetof(table_t, n_stand_ins)};
+    const size_t more[3] = {offsetof(table_t, n_centers), offsetof(table_t, n_terms), offsetof(table_t, n_fallback_models)};
     const size_t settings = offsetof(table_t, n_networks) / sizeof(uint_least32_t);
     size_t i;
 

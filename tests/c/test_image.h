@@ -77,7 +77,7 @@ static inline uint_least32_t image_of(const table_t *table, gtc_word_t *image)
     for (i = 0U; i < 4U; i++) {
         image[n++].bits = MEMBER_WORD(table->envelope[i]);
     }
-    image[n++].bits = table->n_networks + table->n_stand_ins;
+    image[n++].bits = table->n_networks + table->n_fallback_models;
     image[n++].bits = table->n_centers;
     image[n++].bits = table->n_channels;
     image[n++].bits = table->n_terms;
@@ -88,7 +88,7 @@ static inline uint_least32_t image_of(const table_t *table, gtc_word_t *image)
     image[n++].bits = table->n_sigma;
     image[n++].bits = table->n_probes;
     n = put(image, n, table->serial, 16U);
-    n = put(image, n, table->networks, (table->n_networks + table->n_stand_ins) * 8U);
+    n = put(image, n, table->networks, (table->n_networks + table->n_fallback_models) * 8U);
     n = put(image, n, table->centers, table->n_centers * 5U);
     n = put(image, n, table->guards, table->n_channels * 8U);
     n = put(image, n, table->terms, table->n_terms * 8U);

@@ -42,7 +42,7 @@ static int status_with(const table_t *from, uint_least32_t at, gtc_word_t word)
 
 static uint_least32_t centers_at(const table_t *table)
 {
-    return NETWORK + ((table->n_networks + table->n_stand_ins) * GTC_NETWORK_WORDS);
+    return NETWORK + ((table->n_networks + table->n_fallback_models) * GTC_NETWORK_WORDS);
 }
 
 #if GTC_OPEN_TERMS

@@ -82,6 +82,37 @@ static inline state_t started(void)
     return state;
 }
 
+/* The next sample of the state's period. */
+static inline int feed_one(state_t *state, const num_t *channels)
+{
+    return FN(sample)(state, state->period_us, channels);
+}
+
+/* `count` samples that did not arrive, in as few calls as take them; returns the last status, or that in force. */
+static inline int missed(state_t *state, uint_least32_t count)
+{
+    const uint_least32_t most = 0xE0000000UL / state->period_us;
+    uint_least32_t rest = count;
+    int status = (int)state->status;
+
+    while (rest > 0U) {
+        const uint_least32_t now = (rest < most) ? rest : most;
+
+        status = FN(sample)(state, now * state->period_us, NULL);
+        rest -= now;
+    }
+    return status;
+}
+
+/* A sample at the time that a clock of microseconds shows, which wraps; *clock is its time at the call before. */
+static inline int sample_at(state_t *state, uint_least32_t *clock, uint_least32_t time_us, const num_t *channels)
+{
+    const uint_least32_t elapsed_us = (time_us - *clock) & 0xFFFFFFFFUL;
+
+    *clock = time_us;
+    return FN(sample)(state, elapsed_us, channels);
+}
+
 /* Feeds n equal samples; returns the last status. */
 static inline int feed(state_t *state, num_t temp, int n)
 {
@@ -89,7 +120,7 @@ static inline int feed(state_t *state, num_t temp, int n)
     int i;
 
     for (i = 0; i < n; i++) {
-        status = FN(sample)(state, &temp);
+        status = feed_one(state, &temp);
     }
     return status;
 }
@@ -101,7 +132,7 @@ static inline int ramp(state_t *state, num_t *temp, num_t step, int n)
     int i;
 
     for (i = 0; i < n; i++) {
-        status = FN(sample)(state, temp);
+        status = feed_one(state, temp);
         *temp += step;
     }
     return status;

@@ -21,8 +21,8 @@ TEST(terms_open_where_their_code_is)
 #if GTC_OPEN_TERMS
     CHECK_INT(GTC_OK, FN(open)(&table, image, n, TERMS.id));
     CHECK_INT(GTC_OK, FN(check)(&table));
-    CHECK(table.term_code[0] == TERMS.term_code[0]);
-    CHECK(table.term_code[3] == TERMS.term_code[3]);
+    CHECK(table.term_code[GTC_TERM_MEMORY - 1U] == TERMS.term_code[GTC_TERM_MEMORY - 1U]);
+    CHECK(table.term_code[GTC_TERM_AUXILIARY - 1U] == TERMS.term_code[GTC_TERM_AUXILIARY - 1U]);
 #else
     (void)table;
 #endif
@@ -46,7 +46,7 @@ TEST(an_image_whose_terms_name_other_networks_is_refused)
         head->bits = 1U + (number << 16);
         CHECK_INT((number == 2U) ? GTC_OK : GTC_E_LAYOUT, try_open(n));
     }
-    /* No stand-in: then both networks are the map's. */
+    /* No fallback model: then both networks are the map's. */
     head->bits = 1U;
     CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, try_open(n));
     head->bits = 1U + (2UL << 16);
@@ -59,7 +59,7 @@ TEST(an_image_whose_terms_name_other_networks_is_refused)
     }
     CHECK_INT(GTC_OK, try_open(n));
     CHECK_INT(GTC_OK, FN(open)(&table, image, n, TERMS.id));
-    CHECK((table.n_networks == 1U) && (table.n_stand_ins == 1U));
+    CHECK((table.n_networks == 1U) && (table.n_fallback_models == 1U));
     image[24].bits = 1U; /* networks: with its CRC, but the length does not fit any more */
     CHECK_INT(GTC_E_IMAGE, try_open(n));
 }

@@ -19,9 +19,9 @@ static void walk(state_t *state, int from, int to)
             /* as it is */
         }
         if ((i % 29) == 13) {
-            CHECK(FN(missed)(state, (uint_least32_t)i % 7U) >= 0);
+            CHECK(missed(state, (uint_least32_t)i % 7U) >= 0);
         }
-        CHECK(FN(sample)(state, &temp) >= 0);
+        CHECK(feed_one(state, &temp) >= 0);
     }
 }
 
@@ -267,7 +267,7 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
 }
 
 /* What the uncertainty goes by must be numbers and temperatures, the shift what the table grants. */
-TEST(doubts_that_no_call_leaves_are_refused_with_a_right_crc)
+TEST(uncertainties_that_no_call_leaves_are_refused_with_a_right_crc)
 {
     static const int at[11] = {
         DOUBT_AT, DOUBT_AT + 1, DOUBT_AT + 2, DOUBT_AT + 3, DOUBT_AT + 4, DOUBT_AT + 5, DOUBT_AT + 6, DOUBT_AT + 7,
@@ -327,7 +327,7 @@ int main(void)
     RUN(erased_memory_is_refused);
     RUN(a_state_of_the_other_arithmetic_is_refused);
     RUN(numbers_that_no_call_leaves_are_refused_with_a_right_crc);
-    RUN(doubts_that_no_call_leaves_are_refused_with_a_right_crc);
+    RUN(uncertainties_that_no_call_leaves_are_refused_with_a_right_crc);
     RUN(bad_arguments_are_refused);
     return test_end();
 }

@@ -35,7 +35,7 @@ static void rest(state_t *state, num_t temp, int n)
     for (i = 0; i < n; i++) {
         const num_t x = (num_t)(temp + (((i % 2) == 0) ? (C(1) / 64) : -(C(1) / 64)));
 
-        CHECK(FN(sample)(state, &x) >= 0);
+        CHECK(feed_one(state, &x) >= 0);
     }
 }
 
@@ -49,17 +49,16 @@ TEST(bad_arguments_are_refused_and_nothing_is_written)
     CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, NULL));
     CHECK_INT(GTC_E_ARG, FN(rezero)(NULL, DPH(0.01), 600U));
     CHECK_INT(GTC_E_ARG, FN(rezero)(&state, MISSING, 600U));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, DPH(0.01), 0U));
-    CHECK_INT(GTC_E_ARG, FN(unzero)(NULL));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(NULL, 0, 0U));
     CHECK(same(bias_of(&state), map_of(C(15), 0)));
     memset(&state, 0, sizeof state);
     CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, &snapshot));
     CHECK_INT(GTC_E_ARG, FN(rezero)(&state, DPH(0.01), 600U));
-    CHECK_INT(GTC_E_ARG, FN(unzero)(&state));
+    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, MISSING, 0U));
     CHECK(memcmp(&snapshot, &nothing, sizeof snapshot) == 0);
 }
 
-/* Before anything is believed, warming, then as trained. */
+/* Before anything is accepted, warming, then as trained. */
 TEST(sigma_falls_while_the_front_end_learns)
 {
     state_t state = started();
@@ -90,7 +89,7 @@ TEST(sigma_grows_with_the_age_of_a_held_correction)
     ramp(&state, &temp, C(1) / 64, 60);
     last = snapshot_of(&state).sigma;
     for (age = 1U; age < 4U; age++) {
-        CHECK(FN(missed)(&state, (age == 1U) ? (N + 1U) : N) >= 0);
+        CHECK(missed(&state, (age == 1U) ? (N + 1U) : N) >= 0);
         CHECK_INT(age, snapshot_of(&state).age_blocks);
         CHECK(snapshot_of(&state).sigma > last);
         last = snapshot_of(&state).sigma;
@@ -135,7 +134,7 @@ TEST(a_rest_moves_the_constant_and_one_call_takes_it_back)
     CHECK(same(bias_of(&state), snapshot_of(&state).bias));
     rest(&state, C(15), 100);
     CHECK(same(bias_of(&state), (num_t)(before + moved)));
-    CHECK_INT(GTC_OK, FN(unzero)(&state));
+    CHECK_INT(GTC_OK, FN(rezero)(&state, MISSING, 0U));
     CHECK(same(bias_of(&state), before));
     CHECK(same(snapshot_of(&state).sigma, sigma));
 }
@@ -168,7 +167,7 @@ TEST(the_bound_holds_for_any_rate_and_any_number_of_calls)
         CHECK(snapshot_of(&state).sigma > 0);
     }
     CHECK(clamped > 0);
-    CHECK_INT(GTC_OK, FN(unzero)(&state));
+    CHECK_INT(GTC_OK, FN(rezero)(&state, MISSING, 0U));
     CHECK(same(bias_of(&state), plain));
 }
 
@@ -259,7 +258,7 @@ static void terms_ramp(state_t *state, num_t *temp, num_t step, num_t supply, in
 
         channels[0] = *temp;
         channels[1] = supply;
-        CHECK(FN(sample)(state, channels) >= 0);
+        CHECK(feed_one(state, channels) >= 0);
         *temp = (num_t)(*temp + step);
     }
 }
@@ -403,15 +402,15 @@ TEST(the_largest_words_give_a_sigma)
     table.sigma = words;
     CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
     feed(&state, temp, 3);
-    CHECK(FN(missed)(&state, 2U * N) >= 0);
+    CHECK(missed(&state, 2U * N) >= 0);
     CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
     for (i = 0U; i < 2U; i++) { /* slopes to either side, beyond the largest product */
         ramp(&state, &temp, (num_t)((i == 0U) ? -(C(1) / 8) : (C(1) / 8)), 100);
-        CHECK(FN(missed)(&state, 2U * N) >= 0);
+        CHECK(missed(&state, 2U * N) >= 0);
         CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
     }
     CHECK(FN(rezero)(&state, DPH(0.001), 1U) >= 0);
-    shift = (num_t)(bias_of(&state) - state.doubt.plain);
+    shift = (num_t)(bias_of(&state) - state.uncertainty.unshifted);
     CHECK((shift >= -VALUE(TABLE.rezero)) && (shift <= VALUE(TABLE.rezero)));
 }
 
@@ -422,8 +421,8 @@ TEST(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no
     snapshot_t snapshot;
 
     rest(&state, C(15), 100);
-    state.constant = MUCH;
-    state.doubt.at[0] = MISSING;
+    state.shift_sigma = MUCH;
+    state.uncertainty.input[0] = MISSING;
     snapshot = snapshot_of(&state);
     CHECK(same(snapshot.bias, bias_of(&state)));
     state.bias = MISSING;
@@ -451,12 +450,12 @@ TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
         rest(&rested, C(15), 100);
         CHECK(snapshot_of(&rested).sigma < unknown);
         map = drift = constant = rested;
-        map.doubt.at[0] = none[k];
+        map.uncertainty.input[0] = none[k];
         CHECK(snapshot_of(&map).sigma >= unknown);
-        drift.doubt.drift = none[k];
+        drift.uncertainty.slope = none[k];
         drift.input[0].held_blocks = 2U;
         CHECK(snapshot_of(&drift).sigma >= unknown);
-        constant.constant = none[k];
+        constant.shift_sigma = none[k];
         before = snapshot_of(&constant).sigma;
         CHECK(before >= snapshot_of(&rested).sigma);
         CHECK(FN(rezero)(&constant, DPH(0.004), 3600U) >= 0);
@@ -468,15 +467,15 @@ TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
 /* Each number that the uncertainty goes by, in turn. */
 static num_t *number_of(state_t *state, int k)
 {
-    num_t *const numbers[11] = {&state->doubt.at[0], &state->doubt.at[1], &state->doubt.drift, &state->doubt.start,
-                                &state->doubt.low,   &state->doubt.high,  &state->doubt.plain, &state->bias,
-                                &state->constant,    &state->shift,       &state->doubt.edge};
+    num_t *const numbers[11] = {&state->uncertainty.input[0], &state->uncertainty.input[1], &state->uncertainty.slope, &state->uncertainty.first_temp,
+                                &state->uncertainty.lowest,   &state->uncertainty.highest,  &state->uncertainty.unshifted, &state->bias,
+                                &state->shift_sigma,    &state->shift,       &state->uncertainty.edge_effect};
 
     return numbers[k];
 }
 
 /* What no call leaves, in a number that the uncertainty goes by, while the correction is held and terms are not sure of
- * their past: a filter would believe a sigma of 0 for ever, and fail at one that is none. */
+ * their past: a filter would trust a sigma of 0 for ever, and fail at one that is none. */
 TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
 {
     const num_t wrong[4] = {MISSING, MUCH, (num_t)-MUCH, INFINITE};
@@ -487,7 +486,7 @@ TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
 
     CHECK_INT(GTC_OK, FN(init)(&whole, &TERMS, PERIOD));
     terms_ramp(&whole, &temp, C(1) / 64, C(12), 10);
-    CHECK(FN(missed)(&whole, 2U * N) >= 0);
+    CHECK(missed(&whole, 2U * N) >= 0);
     sure = NUMBER(TERMS.sigma[(2U * TERMS.sigma_cells[0] * TERMS.sigma_cells[1]) + 8U]); /* of the constant alone */
     for (k = 0; k < 44; k++) {
         state_t state = whole;
@@ -551,7 +550,7 @@ TEST(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest)
 }
 
 /* A state without uncertainties is saved and restored as others are. */
-TEST(a_state_without_uncertainties_outlasts_a_time_without_power)
+TEST(a_state_without_uncertainties_is_kept_over_a_time_without_power)
 {
     gtc_word_t words[GTC_SAVE_WORDS];
     state_t state;
@@ -577,7 +576,7 @@ int main(void)
     RUN(a_number_that_was_overwritten_never_makes_the_correction_sure);
     RUN(a_table_that_is_sure_of_everything_takes_no_rest);
     RUN(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest);
-    RUN(a_state_without_uncertainties_outlasts_a_time_without_power);
+    RUN(a_state_without_uncertainties_is_kept_over_a_time_without_power);
     RUN(bad_arguments_are_refused_and_nothing_is_written);
     RUN(sigma_falls_while_the_front_end_learns);
     RUN(sigma_grows_with_the_age_of_a_held_correction);

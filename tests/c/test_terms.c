@@ -17,7 +17,7 @@ static int sample(state_t *state, num_t temp, num_t supply)
 
     channels[0] = temp;
     channels[1] = supply;
-    return FN(sample)(state, channels);
+    return feed_one(state, channels);
 }
 
 static int samples(state_t *state, num_t temp, num_t supply, int n)
@@ -209,10 +209,10 @@ TEST(holds_and_fallback_step_the_terms_too)
         (void)sample(&a, temp, C(12.0));
     }
     z = a.term[0][0];
-    CHECK((FN(missed)(&a, 3U * N) & GTC_HELD) != 0);
+    CHECK((missed(&a, 3U * N) & GTC_HELD) != 0);
     CHECK(a.term[0][0] > z);
-    CHECK((FN(missed)(&a, 1000000UL) & GTC_FALLBACK) != 0);
-    CHECK((FN(missed)(&a, 0xFFFFFFFFUL) & GTC_FALLBACK) != 0);
+    CHECK((missed(&a, 1000000UL) & GTC_FALLBACK) != 0);
+    CHECK((missed(&a, 0xFFFFFFFFUL) & GTC_FALLBACK) != 0);
     CHECK_INT(GTC_WARMING, samples(&a, C(15.0), C(12.0), 3) & GTC_WARMING);
 }
 
@@ -253,7 +253,7 @@ TEST(narrow_gaussians_are_there_where_they_are)
     CHECK_INT(GTC_OK, FN(map)(&NARROW, C(55.0), C(-0.4), &at));
 }
 
-TEST(memories_and_plays_outlast_a_time_without_power)
+TEST(memories_and_plays_are_kept_over_a_time_without_power)
 {
     gtc_word_t words[GTC_SAVE_WORDS];
     state_t a = started_with(&TERMS);
@@ -370,33 +370,33 @@ TEST(no_reading_makes_a_correction_that_is_no_number)
 #endif
 
 /* The test table, where the guard's fallback stands for the channel. */
-static table_t without_stand_in(gtc_word_t terms[4U * GTC_TERM_WORDS])
+static table_t without_fallback_model(gtc_word_t terms[4U * GTC_TERM_WORDS])
 {
     table_t table = TERMS;
 
     memcpy(terms, TERMS.terms, 4U * GTC_TERM_WORDS * sizeof terms[0]);
     terms[(3U * GTC_TERM_WORDS) + 1U].bits = 1U;
     table.terms = terms;
-    table.n_stand_ins = 0U;
+    table.n_fallback_models = 0U;
     table.n_centers = TERMS.networks[0].bits;
     return table;
 }
 
-/* The stand-in of the test table's channel, as a map. */
-static table_t stand_in_alone(void)
+/* The fallback model of the test table's channel, as a map. */
+static table_t fallback_model_alone(void)
 {
     table_t table = TERMS;
 
     table.networks = &TERMS.networks[GTC_NETWORK_WORDS];
     table.centers = &TERMS.centers[TERMS.networks[0].bits * GTC_CENTER_WORDS];
-    table.n_stand_ins = 0U;
+    table.n_fallback_models = 0U;
     table.n_centers = table.networks[0].bits;
     return table;
 }
 
-TEST(a_stand_in_is_added_while_nothing_of_its_channel_is_believed)
+TEST(a_fallback_model_is_added_while_nothing_of_its_channel_is_accepted)
 {
-    const table_t alone = stand_in_alone();
+    const table_t alone = fallback_model_alone();
     const num_t plain = map_with(&TERMS, C(15.0));
     const num_t instead = plain + map_with(&alone, C(15.0));
     state_t a = started_with(&TERMS);
@@ -420,11 +420,11 @@ TEST(a_stand_in_is_added_while_nothing_of_its_channel_is_believed)
     CHECK(same(map_with(&TERMS, C(40.0)) + map_with(&alone, C(40.0)), bias_of(&b)));
 }
 
-/* A reading at either edge of its range is doubtful by what it adds beyond the stand-in, or beyond nothing. */
+/* A reading at either edge of its range is doubtful by what it adds beyond the fallback model, or beyond nothing. */
 TEST(a_reading_at_the_edge_says_how_far_it_may_be_wrong)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
-    const table_t without = without_stand_in(terms);
+    const table_t without = without_fallback_model(terms);
     int k;
 
     for (k = 0; k < 4; k++) {
@@ -432,15 +432,15 @@ TEST(a_reading_at_the_edge_says_how_far_it_may_be_wrong)
         const num_t reading = ((k % 2) == 0) ? C(-300.0) : C(300.0);
 
         (void)samples(&a, C(15.0), C(12.0), 401);
-        CHECK(a.doubt.edge == 0);
+        CHECK(a.uncertainty.edge_effect == 0);
         (void)samples(&a, C(15.0), reading, 20);
         CHECK_INT(GTC_CLAMPED, status_of(&a));
-        CHECK(a.doubt.edge > 0);
+        CHECK(a.uncertainty.edge_effect > 0);
     }
 }
 
-/* CURVED with two stand-ins, both the map's own network. */
-TEST(bent_lines_and_products_have_stand_ins_too)
+/* CURVED with two fallback models, both the map's own network. */
+TEST(bent_lines_and_products_have_fallback_models_too)
 {
     const uint_least32_t n = CURVED.networks[0].bits;
     gtc_word_t networks[3U * GTC_NETWORK_WORDS];
@@ -462,7 +462,7 @@ TEST(bent_lines_and_products_have_stand_ins_too)
     table.networks = networks;
     table.centers = centers;
     table.terms = terms;
-    table.n_stand_ins = 2U;
+    table.n_fallback_models = 2U;
     table.n_centers = 3U * n;
     state = started_with(&table);
     (void)samples(&state, C(15.0), MISSING, 2001);
@@ -525,11 +525,11 @@ TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
     gtc_word_t *const head = &terms[(3U * GTC_TERM_WORDS) + 1U];
-    table_t table = without_stand_in(terms);
+    table_t table = without_fallback_model(terms);
 
     CHECK(checked(&table) != GTC_E_LAYOUT);
     table.n_centers = TERMS.n_centers;
-    table.n_stand_ins = 1U;
+    table.n_fallback_models = 1U;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
     head->bits = 1U + (2UL << 16);
     CHECK(checked(&table) != GTC_E_LAYOUT);
@@ -545,13 +545,13 @@ TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
     terms[1].bits = 0U;
     head->bits = 1U + (2UL << 16);
     table.n_networks = 0U;
-    table.n_stand_ins = 2U;
+    table.n_fallback_models = 2U;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table.n_networks = 0xFFFFFFFFUL;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
-    head->bits = 1U + (1UL << 16); /* a stand-in, and no network of the map before it */
+    head->bits = 1U + (1UL << 16); /* a fallback model, and no network of the map before it */
     table.n_networks = 0U;
-    table.n_stand_ins = 1U;
+    table.n_fallback_models = 1U;
     table.n_centers = TERMS.networks[0].bits;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
 }
@@ -559,7 +559,7 @@ TEST(networks_that_no_term_names_or_that_are_not_there_are_refused)
 TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
-    const table_t table = without_stand_in(terms);
+    const table_t table = without_fallback_model(terms);
     state_t a = started_with(&table);
     state_t b = started_with(&table);
 
@@ -579,7 +579,7 @@ TEST(a_channel_that_stays_away_falls_back_with_a_bit_of_its_own)
 TEST(a_channel_that_never_came_is_taken_as_its_fallback)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
-    const table_t table = without_stand_in(terms);
+    const table_t table = without_fallback_model(terms);
     state_t a = started_with(&table);
     state_t b = started_with(&table);
 
@@ -632,7 +632,7 @@ TEST(terms_begin_again_with_the_map)
     (void)samples(&a, C(45.0), C(12.0), 3);
     CHECK(same(C(45.0), a.term[0][0]));
     CHECK(same(C(45.0), a.term[1][0]));
-    CHECK((FN(missed)(&a, 100UL * N) & GTC_FALLBACK) != 0);
+    CHECK((missed(&a, 100UL * N) & GTC_FALLBACK) != 0);
     (void)samples(&a, C(20.0), C(12.0), 3);
     CHECK(same(C(20.0), a.term[0][0]));
     CHECK(same(C(20.0), a.term[1][0]));
@@ -710,7 +710,7 @@ TEST(an_auxiliary_channel_has_the_mean_of_its_extremes)
     (void)samples(&state, C(15.0), 0x40000000, (int)N - 1);
     (void)sample(&state, C(15.0), 0);
     CHECK_INT(0x20000000, state.input[1].mean);
-    /* After so long any change is believed. */
+    /* After so long any change is accepted. */
     (void)samples(&state, C(15.0), MISSING, 8);
     (void)sample(&state, C(15.0), 0x7FFFFFFF);
     CHECK_INT(0x7FFFFFFF, state.input[1].last);
@@ -798,11 +798,26 @@ TEST(a_slope_that_a_memory_makes_saturates)
 
 TEST(terms_without_their_code_or_channel_are_refused)
 {
+    const struct FN(term_code) *codes[GTC_N_KINDS];
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
     table_t table = TERMS;
+    uint_least32_t i;
 
-    table.term_code[1] = NULL;
+    for (i = 0U; i < GTC_N_KINDS; i++) {
+        codes[i] = TERMS.term_code[i];
+    }
+    table.term_code = codes;
+    CHECK_INT(GTC_OK, checked(&table));
+    codes[TERMS.terms[0].bits - 1U] = NULL;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
-    table.term_code[1] = TERMS.term_code[0];
+    table.term_code = NULL;
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
+    table.term_code = TERMS.term_code;
+    memcpy(terms, TERMS.terms, TERMS.n_terms * GTC_TERM_WORDS * sizeof terms[0]);
+    table.terms = terms;
+    terms[0].bits = 0U;
+    CHECK_INT(GTC_E_LAYOUT, checked(&table));
+    terms[0].bits = GTC_N_KINDS + 1U;
     CHECK_INT(GTC_E_LAYOUT, checked(&table));
     table = TERMS;
     table.n_channels = 1U;
@@ -826,9 +841,9 @@ int main(void)
 #if !TEST_Q31
     RUN(no_reading_makes_a_correction_that_is_no_number);
 #endif
-    RUN(a_stand_in_is_added_while_nothing_of_its_channel_is_believed);
+    RUN(a_fallback_model_is_added_while_nothing_of_its_channel_is_accepted);
     RUN(a_reading_at_the_edge_says_how_far_it_may_be_wrong);
-    RUN(bent_lines_and_products_have_stand_ins_too);
+    RUN(bent_lines_and_products_have_fallback_models_too);
     RUN(a_block_that_was_overwritten_stays_within_the_authority);
     RUN(a_term_that_was_overwritten_is_back_by_the_end_of_the_block);
     RUN(networks_that_no_term_names_or_that_are_not_there_are_refused);
@@ -843,7 +858,7 @@ int main(void)
     RUN(holds_and_fallback_step_the_terms_too);
     RUN(a_harmonic_repeats_itself_after_its_period);
     RUN(narrow_gaussians_are_there_where_they_are);
-    RUN(memories_and_plays_outlast_a_time_without_power);
+    RUN(memories_and_plays_are_kept_over_a_time_without_power);
     RUN(times_without_power_add_up);
     RUN(a_forged_state_is_refused_before_anything_is_computed_of_it);
 #if TEST_Q31

@@ -70,7 +70,7 @@ static inline const table_t *next_table(stream_t *in)
 }
 
 /* A correction is one that the table may give. */
-static inline int is_governed(const table_t *table, num_t x)
+static inline int is_within_authority(const table_t *table, num_t x)
 {
     return ((x >= WORD_OF(table->authority[0])) && (x <= WORD_OF(table->authority[1]))) ? 1 : 0;
 }

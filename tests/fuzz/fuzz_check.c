@@ -22,7 +22,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     table_t table = *from;
     uint_least32_t n;
 
-    table.networks = copied(0, from->networks, (from->n_networks + from->n_stand_ins) * 8U);
+    table.networks = copied(0, from->networks, (from->n_networks + from->n_fallback_models) * 8U);
     table.centers = copied(1, from->centers, from->n_centers * 5U);
     table.terms = copied(2, from->terms, from->n_terms * 8U);
     table.coverage = copied(3, from->coverage, ((from->coverage_cells[0] * from->coverage_cells[1]) + 31U) / 32U);

@@ -97,9 +97,10 @@ static void walk(stream_t *in, const table_t *table)
         for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
             channels[i] = (i < 2U) ? some_number(in) : channels[1];
         }
-        status = ((k % 6U) == 5U) ? FN(missed)(&state, next_byte(in) % 64U) : FN(sample)(&state, channels);
+        status = ((k % 6U) == 5U) ? FN(sample)(&state, (next_byte(in) % 64U) * state.period_us, NULL)
+                                 : FN(sample)(&state, state.period_us, channels);
         CLAIM((status >= 0) && ((status & ~REMARKS) == 0));
-        CLAIM((FN(bias)(&state, &result) >= 0) && is_number(result) && is_governed(table, result));
+        CLAIM((FN(bias)(&state, &result) >= 0) && is_number(result) && is_within_authority(table, result));
     }
     memset(&sum, 0, sizeof sum);
     result = some_number(in);
@@ -108,7 +109,7 @@ static void walk(stream_t *in, const table_t *table)
     }
     CLAIM(FN(save)(&state, saved) == GTC_OK);
     CLAIM(FN(restore)(&state, table, state.period_us, saved, next_byte(in) % 3U) == GTC_OK);
-    CLAIM((FN(missed)(&state, 9U) >= 0) && (FN(bias)(&state, &result) >= 0) && is_number(result));
+    CLAIM((FN(sample)(&state, 9U * state.period_us, NULL) >= 0) && (FN(bias)(&state, &result) >= 0) && is_number(result));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -135,7 +136,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             const int status = FN(map)(&table, some_number(&in), some_number(&in), &bias);
 
             CLAIM((status == GTC_E_ARG) || ((status & ~(GTC_CLAMPED | GTC_UNCOVERED)) == 0));
-            CLAIM(is_number(bias) && ((status < 0) || is_governed(&table, bias)));
+            CLAIM(is_number(bias) && ((status < 0) || is_within_authority(&table, bias)));
         }
         walk(&in, &table);
     }

@@ -68,7 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         CLAIM((status == GTC_E_IMAGE) || (status == GTC_E_LAYOUT) || (status == GTC_E_ID));
     } else {
         CLAIM((status == GTC_OK) && (table.id == id) && (table.layout == GTC_TABLE_LAYOUT));
-        read_all(table.networks, (table.n_networks + table.n_stand_ins) * GTC_NETWORK_WORDS);
+        read_all(table.networks, (table.n_networks + table.n_fallback_models) * GTC_NETWORK_WORDS);
         read_all(table.centers, table.n_centers * GTC_CENTER_WORDS);
         read_all(table.terms, table.n_terms * GTC_TERM_WORDS);
         read_all(table.coverage, ((table.coverage_cells[0] * table.coverage_cells[1]) + 31U) / 32U);

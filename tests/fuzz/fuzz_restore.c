@@ -15,8 +15,8 @@ static void walked(uint_least32_t samples, state_t *state)
         num_t bias = 0;
 
         channels[0] = C(10) + ((C(1) / 64) * (num_t)i);
-        CLAIM(FN(sample)(state, channels) >= 0);
-        CLAIM((FN(bias)(state, &bias) >= 0) && is_governed(state->table, bias));
+        CLAIM(FN(sample)(state, state->period_us, channels) >= 0);
+        CLAIM((FN(bias)(state, &bias) >= 0) && is_within_authority(state->table, bias));
     }
 }
 

@@ -1,4 +1,4 @@
-/* fuzz_step.c - any sequence of init, sample, missed, bias, angle, save and restore, with any numbers.
+/* fuzz_step.c - any sequence of init, sample, bias, angle, save and restore, with any numbers.
  *
  * Every status is one of those that gtc.h names, every correction a number, and a state that was
  * saved and restored is the state.
@@ -30,7 +30,7 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
 
     switch (next_byte(in) % 9U) {
     case 0:
-        check_status(FN(missed)(state, next_word(in)));
+        check_status(FN(sample)(state, next_word(in), NULL));
         break;
     case 1:
         CLAIM(FN(bias)(state, &bias) >= 0);
@@ -43,21 +43,21 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
     case 3: /* anything at all */
         channels[0] = next_number(in);
         channels[1] = next_number(in);
-        check_status(FN(sample)(state, channels));
+        check_status(FN(sample)(state, state->period_us, channels));
         break;
     case 4: /* at any time */
         channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
         channels[1] = next_number(in);
-        check_status(FN(sample_at)(state, next_word(in), channels));
+        check_status(FN(sample)(state, next_word(in), channels));
         break;
     default: /* something plausible */
         channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
         channels[1] = channels[0];
-        check_status(FN(sample)(state, channels));
+        check_status(FN(sample)(state, state->period_us, channels));
         break;
     }
     check_status(FN(bias)(state, &result));
-    CLAIM(is_number(result) && is_governed(state->table, result));
+    CLAIM(is_number(result) && is_within_authority(state->table, result));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

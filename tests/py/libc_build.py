@@ -25,8 +25,8 @@ ALL = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")
 
 
 def linked(name: str) -> str:
-    """What the linker calls a function or a kind of terms, with the default options."""
-    return f"{name}_20blocks_4terms"
+    """What the linker calls a function, with the default options."""
+    return f"{name}_20blocks_4terms" if name.endswith(("_init", "_restore")) else name
 
 
 def _table_struct() -> type[ctypes.Structure]:
@@ -42,10 +42,10 @@ def _table_struct() -> type[ctypes.Structure]:
         ("sigma_cells", u32 * 2),
         ("n_sigma", u32),
         ("n_probes", u32),
-        ("n_stand_ins", u32),
+        ("n_fallback_models", u32),
     ]
     fields += [(name, pointer) for name in ARRAYS]
-    fields += [("crc", u32), ("term_code", pointer * 4)]
+    fields += [("crc", u32), ("term_code", pointer)]
     return type("TableStruct", (ctypes.Structure,), {"_fields_": fields})
 
 
@@ -171,12 +171,13 @@ class Runtime:
             setattr(struct, name, words.ctypes.data if words.size else None)
             if width and name != "guards":
                 setattr(struct, f"n_{name}", words.size // width)
-        struct.n_networks, struct.n_stand_ins = table.n_networks, table.n_stand_ins
-        for i, kind in enumerate(table.terms[:: ARRAYS["terms"]].tolist()):
-            name = linked(f"gtc_{table.numeric}_term_{TERMS[kind]}")
-            code = ctypes.c_char.in_dll(self.library, name)
-            struct.term_code[i] = ctypes.addressof(code)
-        return struct, keep
+        struct.n_networks, struct.n_fallback_models = table.n_networks, table.n_stand_ins
+        codes = (ctypes.c_void_p * len(TERMS))()
+        for kind, name in TERMS.items():
+            code = ctypes.c_char.in_dll(self.library, f"gtc_{table.numeric}_term_{name}")
+            codes[kind - 1] = ctypes.addressof(code)
+        struct.term_code = ctypes.addressof(codes)
+        return struct, [*keep, codes]
 
     def function(self, numeric: str, name: str) -> Any:
         """A public function of the runtime."""

@@ -3,6 +3,6 @@
 #define LIBC_COUNTED_H_INCLUDED
 
 extern long shim_out_of_range;
-#define GTC_ASSERT_RANGE(claim) ((claim) ? (void)0 : (void)shim_out_of_range++)
+#define GTC_ASSERT(claim) ((claim) ? (void)0 : (void)shim_out_of_range++)
 
 #endif /* LIBC_COUNTED_H_INCLUDED */

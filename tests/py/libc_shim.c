@@ -3,6 +3,18 @@
 
 #include "gtc.h"
 
+/* Samples that did not arrive; a call takes a time of less than 2^32 microseconds. */
+#define MISSED(n, state, count, period, status)                                                   \
+    do {                                                                                          \
+        uint_least32_t left = (count);                                                            \
+        const uint_least32_t most = 0xE0000000UL / (period);                                      \
+        while (left > 0U) {                                                                       \
+            const uint_least32_t now = (left < most) ? left : most;                               \
+            (status) = gtc_##n##_sample((state), now * (period), NULL);                           \
+            left -= now;                                                                          \
+        }                                                                                         \
+    } while (0)
+
 #define SHIM(n, num)                                                                              \
     size_t shim_##n##_state_size(void);                                                           \
     void shim_##n##_maps(const gtc_##n##_table_t *table, const num *in, long n_in, int *status,   \
@@ -33,8 +45,9 @@
     {                                                                                             \
         long i;                                                                                   \
         for (i = 0; i < rows; i++) {                                                              \
-            status[3 * i] = (missed[i] != 0U) ? gtc_##n##_missed(state, missed[i]) : 0;           \
-            status[(3 * i) + 1] = gtc_##n##_sample(state, &channels[i * n_channels]);             \
+            status[3 * i] = 0;                                                                    \
+            MISSED(n, state, missed[i], state->period_us, status[3 * i]);                         \
+            status[(3 * i) + 1] = gtc_##n##_sample(state, state->period_us, &channels[i * n_channels]); \
             status[(3 * i) + 2] = gtc_##n##_bias(state, &bias[i]);                                \
         }                                                                                         \
     }                                                                                             \
@@ -44,8 +57,8 @@
         long i;                                                                                   \
         for (i = 0; i < rows; i++) {                                                              \
             gtc_##n##_snapshot_t snapshot = {0, 0, 0, 0U, 0};                                      \
-            status[4 * i] = (missed[i] != 0U) ? gtc_##n##_missed(state, missed[i]) : 0;           \
-            status[4 * i] = gtc_##n##_sample(state, &channels[i * n_channels]);                   \
+            MISSED(n, state, missed[i], state->period_us, status[4 * i]);                         \
+            status[4 * i] = gtc_##n##_sample(state, state->period_us, &channels[i * n_channels]); \
             status[(4 * i) + 1] = gtc_##n##_snapshot(state, &snapshot);                           \
             status[(4 * i) + 2] = snapshot.status;                                                \
             status[(4 * i) + 3] = (int)snapshot.age_blocks;                                       \
@@ -60,6 +73,7 @@
                           long rows, int *status, num *out)                                       \
     {                                                                                             \
         gtc_word_t words[GTC_SAVE_WORDS];                                                         \
+        uint_least32_t clock_us = 0U - period_us;                                                 \
         long i;                                                                                   \
         for (i = 0; i < rows; i++) {                                                              \
             gtc_##n##_snapshot_t snapshot = {0, 0, 0, 0U, 0};                                     \
@@ -68,9 +82,12 @@
             long k;                                                                               \
             int done = 0;                                                                         \
             switch (kind[i]) {                                                                    \
-            case 0: done = gtc_##n##_sample(state, at); break;                                    \
-            case 1: done = gtc_##n##_sample_at(state, number[i], at); break;                      \
-            case 2: done = gtc_##n##_missed(state, number[i]); break;                             \
+            case 0: done = gtc_##n##_sample(state, period_us, at); break;                         \
+            case 1: /* the time that a clock shows, which was at 0 a period before the first sample */ \
+                done = gtc_##n##_sample(state, number[i] - clock_us, at);                         \
+                clock_us = number[i];                                                             \
+                break;                                                                            \
+            case 2: MISSED(n, state, number[i], period_us, done); break;                          \
             case 3: /* the mean of what the calls before it gave is taken off */                  \
                 for (k = i - (long)number[i]; k < i; k++) {                                       \
                     sum += (double)out[2 * k];                                                    \
@@ -93,6 +110,6 @@
 SHIM(f32, float)
 SHIM(q31, int_least32_t)
 
-/* Claims of GTC_ASSERT_RANGE that did not hold; see libc_counted.h. */
+/* Claims of GTC_ASSERT that did not hold; see libc_counted.h. */
 extern long shim_out_of_range;
 long shim_out_of_range;

@@ -81,7 +81,7 @@ static void history(const subject_t *subject)
             channels[c] = (float)between(10000, 4000) * 0x1p-10F;
         }
         channels[0] = (float)t * 0x1p-9F;
-        status = ((k % 37) == 36) ? gtc_f32_missed(&state, 2U) : gtc_f32_sample(&state, channels);
+        status = ((k % 37) == 36) ? gtc_f32_sample(&state, 2U * state.period_us, NULL) : gtc_f32_sample(&state, state.period_us, channels);
         take_word((uint_least32_t)status);
         status = gtc_f32_bias(&state, &bias);
         take_result(status, bias);

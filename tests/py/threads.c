@@ -29,7 +29,7 @@ static void *task(void *unused)
         gtc_word_t words[GTC_SAVE_WORDS];
         float bias = 0.0F;
 
-        if ((gtc_f32_sample(&state, &temperature) < 0) || (gtc_f32_bias(&state, &bias) < 0)
+        if ((gtc_f32_sample(&state, state.period_us, &temperature) < 0) || (gtc_f32_bias(&state, &bias) < 0)
             || (((i % 100) == 0) && (gtc_f32_save(&state, words) < 0))) {
             fail();
         }

@@ -13,7 +13,7 @@ from pathlib import Path
 
 __all__ = ["ARITHMETICS", "amalgamate"]
 
-_HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc.h")
+_HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc_angle.h", "gtc.h")
 ARITHMETICS = ("f32", "q31")
 _INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
 _DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")

@@ -269,8 +269,8 @@ def _sizes(model: Model, emission: Emission) -> Iterator[str]:
         )
         if table.n_stand_ins:
             yield (
-                f"{numeric} stand-ins: {table.stand_in_bytes} of these parameters stand in for channels that are "
-                f"lost; of each |error| <= {_upwards(max(table.stand_in_bounds_dph))} deg/h"
+                f"{numeric} fallback models: {table.stand_in_bytes} of these parameters are added for channels "
+                f"that are lost; of each |error| <= {_upwards(max(table.stand_in_bounds_dph))} deg/h"
             )
 
 

@@ -97,6 +97,7 @@ class TableText:
     members: tuple[_Member, ...]
     arrays: tuple[_Array, ...]
     term_codes: tuple[str, ...]
+    code_of_kinds: CText
 
 
 def table_text(table: Table, model: Model) -> TableText:
@@ -114,9 +115,9 @@ def table_text(table: Table, model: Model) -> TableText:
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
         text = ", ".join(f"{n}UL" for n in counts[name])
-        text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts the stand-ins, too
+        text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts the fallback models, too
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
-    members.append(_member("n_stand_ins", f"{table.n_stand_ins}UL"))
+    members.append(_member("n_fallback_models", f"{table.n_stand_ins}UL"))
     arrays = []
     kinds: list[int] = []
     for name, length in _array_lengths(counts).items():
@@ -127,11 +128,15 @@ def table_text(table: Table, model: Model) -> TableText:
             arrays.append(_array(table.numeric, name, body, counts, comments.get(name, [])))
         members.append(_member(name, f"{table.numeric}_{name}" if length else "NULL"))
     members.append(_member("crc", f"0x{next(words):08x}UL"))
-    codes = [f"gtc_{table.numeric}_term_{TableKind(k).name.lower()}" for k in kinds]
-    filled = ", ".join([f"&{c}" for c in codes] or ["NULL"])
-    members.append(_member("term_code", f"{{ {filled} }}"))
+    codes = {k: f"gtc_{table.numeric}_term_{TableKind(k).name.lower()}" for k in dict.fromkeys(kinds)}
+    members.append(_member("term_code", f"{table.numeric}_codes" if codes else "NULL"))
     return TableText(
-        table.numeric, _TITLES[table.numeric], tuple(members), tuple(arrays), tuple(dict.fromkeys(codes))
+        table.numeric,
+        _TITLES[table.numeric],
+        tuple(members),
+        tuple(arrays),
+        tuple(codes.values()),
+        c_code(", ".join(f"&{codes[k]}" if k in codes else "NULL" for k in TableKind)),
     )
 
 
@@ -161,7 +166,7 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
         for (t, r), (d_t, d_r), w in zip(n.centers, n.widths, n.weights, strict=True)
     ]
     channels = ["temperature_c", *channel_names(model)]
-    stand_ins = [f"stands in for {term.channel}" for term in model.terms if term.stand_in is not None]
+    stand_ins = [f"fallback model of {term.channel}" for term in model.terms if term.stand_in is not None]
     networks = [*[""] * len(model.networks), *stand_ins]
     return {
         "networks": networks,

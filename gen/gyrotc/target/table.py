@@ -171,7 +171,8 @@ class Table:
     @property
     def read_only_bytes(self) -> int:
         """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
-        pointers = len(ARRAYS) + 4  # arrays, code of terms
+        kinds = 7 if self.terms.size else 0  # code of terms by kind
+        pointers = len(ARRAYS) + 1 + kinds
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
         # The header without its length, and CRC and number of fallback models
         return 4 * (len(self.header) - 1 + pointers + 2 + arrays)

@@ -441,11 +441,10 @@ def _bound(program: Program, numeric: str, function: str, address: int) -> int:
 def _of_blocks(paths: Paths, function: str, n_channels: int, missing_blocks: int) -> None:
     """Of the blocks that end while samples are missing, only the first can have readings; terms take note of it and of
     those until the temperature counts as missing."""
-    if function in ("sample", "missed", "sample_at"):
+    if function == "sample":
         # A mean of each channel, and either a slope or, while the window fills, what stands for it.
         paths.limit(paths.calls("gtc_", "__aeabi_uldivmod"), n_channels + 1)
-    if function in ("missed", "sample_at"):
-        paths.limit(paths.calls(".*", "gtc_..._map"), 1 if function == "missed" else 2)
+        paths.limit(paths.calls(".*", "gtc_..._map"), 2)
         paths.limit(paths.calls("gtc_..._end_block", ".*"), n_channels)
         paths.limit(paths.calls(".*", "gtc_..._step_terms"), missing_blocks + 1)
 
@@ -456,7 +455,7 @@ def _of_memories(paths: Paths, function: str, memories: int) -> None:
     for text in POWER:
         begun = [{e: 1.0} for e in paths.begun.get(text, [])]
         paths.limit(begun, memories)
-        if function in ("sample", "sample_at") and memories:
+        if function == "sample" and memories:
             shares = [{e: 1.0 / memories} for (e,) in begun]
             paths.limit([*shares, *paths.calls(".*", "gtc_..._map")], 2)
         if function in ("snapshot", "rezero"):

@@ -198,6 +198,8 @@ _TABLE_C = (
     r"static const gtc_word_t <n>_[a-z]{{1,10}}\[[0-9]{{1,6}}\] = \{{",
     "    (?:<cells>),<note>",
     r"extern const struct gtc_<n>_term_code gtc_\1_term_[a-z_]{{1,16}};",
+    r"static const struct gtc_<n>_term_code \*const \1_codes\[GTC_N_KINDS\] = \{{",
+    "    (?:(?:, )?(?:NULL|&gtc_(?:f32|q31)_term_[a-z_]{{1,16}})){{7}},",
     r"const gtc_<n>_table_t gtc_{symbol}_\1 = \{{",
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
     r"\}};",

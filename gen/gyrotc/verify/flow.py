@@ -323,8 +323,8 @@ _SAVED = 256  # more words than any state that is saved has
 _NUMBERS = "for (i = 0U; i < n; i++) {"  # of numbers_fit(); n is that of the records which the loop around it goes over
 #: Words of a record that are numbers with a range, by what the loop over the records is bounded by: docs/FORMAT.md,
 #: section 3.
-_RECORDS = {"n_sigma": 1, "network[0].bits": 5, "n_networks": 7, "n_terms": 6, "n_channels": 4}
-#: Lines whose quotient has 32 bits: of means and slopes, which fit a word (GTC_ASSERT_RANGE of `mean` and `quotient`),
+_RECORDS = {"n_sigma": 1, "network[NETWORK_CENTERS].bits": 5, "n_networks": 7, "n_terms": 6, "n_channels": 4}
+#: Lines whose quotient has 32 bits: of means and slopes, which fit a word (GTC_ASSERT of `mean` and `quotient`),
 #: and of a part by its whole, in 2^-31.
 SHORT_QUOTIENTS = (
     "const uint_least64_t q = (magnitude + (den / 2U)) / den;",
@@ -396,7 +396,7 @@ class LoopText:
     def _number(self, text: str) -> int | None:
         word = re.sub(r"^\(uint_least32_t\)|^FN\((?=n_\w+\)\()", "", text)
         word = word.partition(")(")[0].rsplit("->", 1)[-1]
-        if word == "network[0].bits":
+        if word == "network[NETWORK_CENTERS].bits":
             return self.counts.centers
         if number := re.fullmatch(r"(\d+)U?L?", word):
             return int(number[1])

@@ -63,11 +63,11 @@ begin
          Demand (Status = Gtc.Ok);
       end if;
       if K mod 100 = 99 then
-         Gtc.F32.Missed (Float_State, 1, Status);
-         Gtc.Q31.Missed (Fixed_State, 1, Status);
+         Gtc.F32.Missed (Float_State, 1_000_000, Status);
+         Gtc.Q31.Missed (Fixed_State, 1_000_000, Status);
       else
-         Gtc.F32.Sample (Float_State, (1 => 20.0 + Interfaces.C.C_float (K) / 64.0), Status);
-         Gtc.Q31.Sample (Fixed_State, (1 => 20 * 65536 + Interfaces.Integer_32 (K) * 1024), Status);
+         Gtc.F32.Sample (Float_State, 1_000_000, (1 => 20.0 + Interfaces.C.C_float (K) / 64.0), Status);
+         Gtc.Q31.Sample (Fixed_State, 1_000_000, (1 => 20 * 65536 + Interfaces.Integer_32 (K) * 1024), Status);
       end if;
       Gtc.F32.Bias (Float_State, Float_Bias, Remarks);
       Gtc.Q31.Bias (Fixed_State, Fixed_Bias, Status);

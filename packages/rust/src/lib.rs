@@ -85,8 +85,8 @@ macro_rules! arithmetic {
     (
         $(#[$text:meta])* $module:ident, number $number:ty, age $seconds:ty, interval $interval:ty,
         state words $words:literal, input $input:ty, inputs $inputs:expr, angle $rest:ty,
-        $check:literal $open:literal $map:literal $init:literal $sample:literal $sample_at:literal $missed:literal
-        $bias:literal $snapshot:literal $rezero:literal $unzero:literal $save:literal $restore:literal $angle:literal
+        $check:literal $open:literal $init:literal $sample:literal
+        $bias:literal $snapshot:literal $rezero:literal $save:literal $restore:literal $angle:literal
     ) => {
         $(#[$text])*
         pub mod $module {
@@ -101,7 +101,7 @@ macro_rules! arithmetic {
                 head: [Word; 33],
                 arrays: [*const Word; 8],
                 crc: Word,
-                term_code: [*const c_void; MAX_TERMS],
+                term_code: *const c_void,
             }
 
             // A table is read only, by any number of threads and interrupts.
@@ -142,24 +142,16 @@ macro_rules! arithmetic {
                 fn check(table: *const Table) -> c_int;
                 #[link_name = $open]
                 fn open(table: *mut Table, words: *const Word, n_words: u32, id: u32) -> c_int;
-                #[link_name = $map]
-                fn map(table: *const Table, temp: $number, slope: $number, bias: *mut $number) -> c_int;
                 #[link_name = $init]
                 fn init(state: *mut Raw, table: *const Table, period_us: u32) -> c_int;
                 #[link_name = $sample]
-                fn sample(state: *mut Raw, channels: *const $number) -> c_int;
-                #[link_name = $sample_at]
-                fn sample_at(state: *mut Raw, time_us: u32, channels: *const $number) -> c_int;
-                #[link_name = $missed]
-                fn missed(state: *mut Raw, count: u32) -> c_int;
+                fn sample(state: *mut Raw, elapsed_us: u32, channels: *const $number) -> c_int;
                 #[link_name = $bias]
                 fn bias(state: *const Raw, bias: *mut $number) -> c_int;
                 #[link_name = $snapshot]
                 fn snapshot(state: *const Raw, snapshot: *mut Snapshot) -> c_int;
                 #[link_name = $rezero]
                 fn rezero(state: *mut Raw, mean_rate: $number, seconds: u32) -> c_int;
-                #[link_name = $unzero]
-                fn unzero(state: *mut Raw) -> c_int;
                 #[link_name = $save]
                 fn save(state: *const Raw, words: *mut Word) -> c_int;
                 #[link_name = $restore]
@@ -195,16 +187,6 @@ macro_rules! arithmetic {
                 pub fn check(&self) -> Result<(), Error> {
                     done(unsafe { check(self) }).map(|_| ())
                 }
-
-                /// The static map at a temperature and a slope, without terms.
-                ///
-                /// # Errors
-                /// [`Error::Argument`] for what is not a number.
-                pub fn map(&self, temp: $number, slope: $number) -> Result<($number, Remarks), Error> {
-                    let mut value = <$number>::default();
-                    let remarks = done(unsafe { map(self, temp, slope, &mut value) })?;
-                    Ok((value, remarks))
-                }
             }
 
             /// A table that reads an image in place.
@@ -224,7 +206,7 @@ macro_rules! arithmetic {
                         head: [0; 33],
                         arrays: [ptr::null(); 8],
                         crc: 0,
-                        term_code: [ptr::null(); MAX_TERMS],
+                        term_code: ptr::null(),
                     };
                     done(unsafe { open(&mut table, words.as_ptr(), count, expected_id) })?;
                     Ok(Self { table, words: PhantomData })
@@ -258,7 +240,7 @@ macro_rules! arithmetic {
                     Ok(state)
                 }
 
-                /// Takes over what survives `off_blocks` whole blocks without power.
+                /// Takes over what is kept over `off_blocks` whole blocks without power.
                 ///
                 /// # Errors
                 /// [`Error::Image`], [`Error::Id`], [`Error::Layout`], [`Error::Period`]: start with [`State::new`].
@@ -283,30 +265,20 @@ macro_rules! arithmetic {
                     Ok(words)
                 }
 
-                /// One sample: the temperature, then the auxiliary channels of the table.
+                /// What was read `elapsed_us` after the call before: the temperature, then the auxiliary channels of the
+                /// table; `None`: nothing was.
                 ///
                 /// # Errors
                 /// [`Error::Argument`] for another number of channels; no reading is an error.
-                pub fn sample(&mut self, channels: &[$number]) -> Result<Remarks, Error> {
-                    self.fitting(channels)?;
-                    done(unsafe { sample(&mut self.raw, channels.as_ptr()) })
-                }
-
-                /// The same with the time of a microsecond counter that wraps at 2^32.
-                ///
-                /// # Errors
-                /// As [`State::sample`].
-                pub fn sample_at(&mut self, time_us: u32, channels: &[$number]) -> Result<Remarks, Error> {
-                    self.fitting(channels)?;
-                    done(unsafe { sample_at(&mut self.raw, time_us, channels.as_ptr()) })
-                }
-
-                /// Samples that did not arrive.
-                ///
-                /// # Errors
-                /// None for a state that [`State::new`] or [`State::restore`] gave.
-                pub fn missed(&mut self, count: u32) -> Result<Remarks, Error> {
-                    done(unsafe { missed(&mut self.raw, count) })
+                pub fn sample(&mut self, elapsed_us: u32, channels: Option<&[$number]>) -> Result<Remarks, Error> {
+                    let readings = match channels {
+                        Some(readings) => {
+                            self.fitting(readings)?;
+                            readings.as_ptr()
+                        }
+                        None => ptr::null(),
+                    };
+                    done(unsafe { sample(&mut self.raw, elapsed_us, readings) })
                 }
 
                 /// The correction in force; compensated = measured - bias.
@@ -329,20 +301,12 @@ macro_rules! arithmetic {
                     Ok((value, remarks))
                 }
 
-                /// Moves the constant by a rest of known length, within the table's bound.
+                /// Moves the constant by a rest of known length, within the table's bound; 0 seconds take every re-zero back.
                 ///
                 /// # Errors
                 /// [`Error::Argument`], or [`Error::Layout`] for a table that grants no shift.
                 pub fn rezero(&mut self, mean_rate: $number, seconds: u32) -> Result<Remarks, Error> {
                     done(unsafe { rezero(&mut self.raw, mean_rate, seconds) })
-                }
-
-                /// Takes every re-zero back.
-                ///
-                /// # Errors
-                /// None for a state that [`State::new`] or [`State::restore`] gave.
-                pub fn unzero(&mut self) -> Result<Remarks, Error> {
-                    done(unsafe { unzero(&mut self.raw) })
                 }
 
                 fn fitting(&self, channels: &[$number]) -> Result<(), Error> {
@@ -394,22 +358,22 @@ struct FixedInput {
 arithmetic! {
     /// float32: C, C per block, deg/h; increments in arcsec over seconds.
     float32, number f32, age f32, interval f32,
-    state words 53, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
-    "gtc_f32_check_20blocks_4terms" "gtc_f32_open_20blocks_4terms" "gtc_f32_map_20blocks_4terms"
-    "gtc_f32_init_20blocks_4terms" "gtc_f32_sample_20blocks_4terms" "gtc_f32_sample_at_20blocks_4terms"
-    "gtc_f32_missed_20blocks_4terms" "gtc_f32_bias_20blocks_4terms" "gtc_f32_snapshot_20blocks_4terms"
-    "gtc_f32_rezero_20blocks_4terms" "gtc_f32_unzero_20blocks_4terms" "gtc_f32_save_20blocks_4terms"
+    state words 52, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
+    "gtc_f32_check" "gtc_f32_open"
+    "gtc_f32_init_20blocks_4terms" "gtc_f32_sample"
+    "gtc_f32_bias" "gtc_f32_snapshot"
+    "gtc_f32_rezero" "gtc_f32_save"
     "gtc_f32_restore_20blocks_4terms" "gtc_f32_angle"
 }
 
 arithmetic! {
     /// Fixed point: 2^-16 C, 2^-16 C per block, 2^-`bias_frac_bits` deg/h; increments over microseconds.
     q31, number i32, age i32, interval i32,
-    state words 53, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
-    "gtc_q31_check_20blocks_4terms" "gtc_q31_open_20blocks_4terms" "gtc_q31_map_20blocks_4terms"
-    "gtc_q31_init_20blocks_4terms" "gtc_q31_sample_20blocks_4terms" "gtc_q31_sample_at_20blocks_4terms"
-    "gtc_q31_missed_20blocks_4terms" "gtc_q31_bias_20blocks_4terms" "gtc_q31_snapshot_20blocks_4terms"
-    "gtc_q31_rezero_20blocks_4terms" "gtc_q31_unzero_20blocks_4terms" "gtc_q31_save_20blocks_4terms"
+    state words 52, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
+    "gtc_q31_check" "gtc_q31_open"
+    "gtc_q31_init_20blocks_4terms" "gtc_q31_sample"
+    "gtc_q31_bias" "gtc_q31_snapshot"
+    "gtc_q31_rezero" "gtc_q31_save"
     "gtc_q31_restore_20blocks_4terms" "gtc_q31_angle"
 }
 

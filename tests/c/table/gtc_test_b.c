@@ -104,7 +104,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 15UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -114,7 +114,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .sigma = f32_sigma,
     .probes = f32_probes,
     .crc = 0xaec5889dUL,
-    .term_code = { NULL },
+    .term_code = NULL,
 };
 
 /* ---- fixed point ---- */
@@ -201,7 +201,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 15UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -211,6 +211,6 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .sigma = q31_sigma,
     .probes = q31_probes,
     .crc = 0x2687e6a0UL,
-    .term_code = { NULL },
+    .term_code = NULL,
 };
 

@@ -82,6 +82,11 @@ extern const struct gtc_f32_term_code gtc_f32_term_curve;
 
 extern const struct gtc_f32_term_code gtc_f32_term_product;
 
+/* by kind - 1 */
+static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
+    NULL, NULL, NULL, NULL, NULL, &gtc_f32_term_curve, &gtc_f32_term_product,
+};
+
 const gtc_f32_table_t gtc_test_c_f32 = {
     .layout = 2,
     .quantity = 0UL,
@@ -106,7 +111,7 @@ const gtc_f32_table_t gtc_test_c_f32 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 17UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -116,7 +121,7 @@ const gtc_f32_table_t gtc_test_c_f32 = {
     .sigma = f32_sigma,
     .probes = f32_probes,
     .crc = 0x68adc95cUL,
-    .term_code = { &gtc_f32_term_curve, &gtc_f32_term_product },
+    .term_code = f32_codes,
 };
 
 /* ---- fixed point ---- */
@@ -181,6 +186,11 @@ extern const struct gtc_q31_term_code gtc_q31_term_curve;
 
 extern const struct gtc_q31_term_code gtc_q31_term_product;
 
+/* by kind - 1 */
+static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
+    NULL, NULL, NULL, NULL, NULL, &gtc_q31_term_curve, &gtc_q31_term_product,
+};
+
 const gtc_q31_table_t gtc_test_c_q31 = {
     .layout = 2,
     .quantity = 0UL,
@@ -205,7 +215,7 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 17UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -215,6 +225,6 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .sigma = q31_sigma,
     .probes = q31_probes,
     .crc = 0xef5aaee4UL,
-    .term_code = { &gtc_q31_term_curve, &gtc_q31_term_product },
+    .term_code = q31_codes,
 };
 

@@ -67,6 +67,11 @@ extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
 
 extern const struct gtc_f32_term_code gtc_f32_term_memory;
 
+/* by kind - 1 */
+static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
+    &gtc_f32_term_memory, NULL, NULL, &gtc_f32_term_harmonic, NULL, NULL, NULL,
+};
+
 const gtc_f32_table_t gtc_test_h_f32 = {
     .layout = 2,
     .quantity = 0UL,
@@ -91,7 +96,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .sigma_cells = { 0UL, 0UL },
     .n_sigma = 0UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -101,7 +106,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .sigma = NULL,
     .probes = f32_probes,
     .crc = 0xf72b950dUL,
-    .term_code = { &gtc_f32_term_harmonic, &gtc_f32_term_memory },
+    .term_code = f32_codes,
 };
 
 /* ---- fixed point ---- */
@@ -151,6 +156,11 @@ extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
 
 extern const struct gtc_q31_term_code gtc_q31_term_memory;
 
+/* by kind - 1 */
+static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
+    &gtc_q31_term_memory, NULL, NULL, &gtc_q31_term_harmonic, NULL, NULL, NULL,
+};
+
 const gtc_q31_table_t gtc_test_h_q31 = {
     .layout = 2,
     .quantity = 0UL,
@@ -175,7 +185,7 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .sigma_cells = { 0UL, 0UL },
     .n_sigma = 0UL,
     .n_probes = 8UL,
-    .n_stand_ins = 0UL,
+    .n_fallback_models = 0UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -185,6 +195,6 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .sigma = NULL,
     .probes = q31_probes,
     .crc = 0xce3674daUL,
-    .term_code = { &gtc_q31_term_harmonic, &gtc_q31_term_memory },
+    .term_code = q31_codes,
 };
 

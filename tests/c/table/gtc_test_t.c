@@ -32,7 +32,7 @@ static const gtc_word_t f32_serial[16] = {
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t f32_networks[16] = {
     B(0x3UL), V(0.125F), V(0.5F), V(-0.25F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F),
-    B(0x1UL), V(0.0625F), V(0.25F), V(-0.125F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F), /* stands in for supply_v */
+    B(0x1UL), V(0.0625F), V(0.25F), V(-0.125F), V(-20.0F), V(60.0F), V(-0.5F), V(0.5F), /* fallback model of supply_v */
 };
 
 /* T: center, gain; slope: center, gain; weight */
@@ -91,6 +91,11 @@ extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
 
 extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
 
+/* by kind - 1 */
+static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
+    &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, NULL, &gtc_f32_term_auxiliary, NULL, NULL,
+};
+
 const gtc_f32_table_t gtc_test_t_f32 = {
     .layout = 2,
     .quantity = 0UL,
@@ -115,7 +120,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 19UL,
     .n_probes = 8UL,
-    .n_stand_ins = 1UL,
+    .n_fallback_models = 1UL,
     .serial = f32_serial,
     .networks = f32_networks,
     .centers = f32_centers,
@@ -125,7 +130,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .sigma = f32_sigma,
     .probes = f32_probes,
     .crc = 0xaf383b86UL,
-    .term_code = { &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, &gtc_f32_term_auxiliary },
+    .term_code = f32_codes,
 };
 
 /* ---- fixed point ---- */
@@ -140,7 +145,7 @@ static const gtc_word_t q31_serial[16] = {
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[16] = {
     B(0x3UL), B(0xffe00374UL), B(0x00fffef8UL), B(0xff7fff37UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
-    B(0x1UL), B(0xffeffff5UL), B(0x00800015UL), B(0xffc00000UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL), /* stands in for supply_v */
+    B(0x1UL), B(0xffeffff5UL), B(0x00800015UL), B(0xffc00000UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL), /* fallback model of supply_v */
 };
 
 /* T: center, gain; slope: center, gain; weight */
@@ -199,6 +204,11 @@ extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
 
 extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
 
+/* by kind - 1 */
+static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
+    &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, NULL, &gtc_q31_term_auxiliary, NULL, NULL,
+};
+
 const gtc_q31_table_t gtc_test_t_q31 = {
     .layout = 2,
     .quantity = 0UL,
@@ -223,7 +233,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .sigma_cells = { 2UL, 1UL },
     .n_sigma = 19UL,
     .n_probes = 8UL,
-    .n_stand_ins = 1UL,
+    .n_fallback_models = 1UL,
     .serial = q31_serial,
     .networks = q31_networks,
     .centers = q31_centers,
@@ -233,6 +243,6 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .sigma = q31_sigma,
     .probes = q31_probes,
     .crc = 0xdfb784b2UL,
-    .term_code = { &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, &gtc_q31_term_auxiliary },
+    .term_code = q31_codes,
 };
 

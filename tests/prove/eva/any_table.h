@@ -88,26 +88,29 @@ static void any_arrays(void)
     any.n_channels = 2U;
 }
 
-static void any_record(unsigned i, const struct NAME(term_code) *code)
+static const struct NAME(term_code) *any_codes[GTC_N_KINDS];
+
+static void any_record(unsigned i, unsigned long kind, const struct NAME(term_code) *code)
 {
-    any_terms[i * GTC_TERM_WORDS].bits = code->kind;
+    any_terms[i * GTC_TERM_WORDS].bits = kind;
     any_terms[(i * GTC_TERM_WORDS) + 1U].bits = 0U;
-    if (READS_CHANNEL(code->kind)) {
-        any.n_stand_ins = (Frama_C_interval(0, 1) != 0) ? 1U : 0U;
-        any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (any.n_stand_ins != 0U) ? (1U + (ALL_NETWORKS * 65536UL)) : 1U;
+    if (READS_CHANNEL(kind)) {
+        any.n_fallback_models = (Frama_C_interval(0, 1) != 0) ? 1U : 0U;
+        any_terms[(i * GTC_TERM_WORDS) + 1U].bits = (any.n_fallback_models != 0U) ? (1U + (ALL_NETWORKS * 65536UL)) : 1U;
     }
-    any_words(&any_terms[(i * GTC_TERM_WORDS) + 2U], NAME(term_limits)[code->kind - 1U], GTC_TERM_WORDS - 2U);
-    any.term_code[i] = code;
+    any_words(&any_terms[(i * GTC_TERM_WORDS) + 2U], NAME(term_limits)[kind - 1U], GTC_TERM_WORDS - 2U);
+    any_codes[kind - 1U] = code;
 }
 
 static void any_table(void)
 {
     any_members();
     any_arrays();
-    any_record(0, &NAME(term_memory));
-    any_record(1, &NAME(term_play));
-    any_record(2, &NAME(term_harmonic));
-    any_record(3, &CODE_OF(SHAPE_LAST));
+    any_record(0, GTC_TERM_MEMORY, &NAME(term_memory));
+    any_record(1, GTC_TERM_PLAY, &NAME(term_play));
+    any_record(2, GTC_TERM_HARMONIC, &NAME(term_harmonic));
+    any_record(3, SHAPE_KIND, &CODE_OF(SHAPE_LAST));
+    any.term_code = any_codes;
     any.terms = any_terms;
     any.n_terms = 4U;
 }

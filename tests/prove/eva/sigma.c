@@ -59,16 +59,16 @@ static void any_state(void)
 #else
     state.shift = (int_least32_t)Frama_C_long_interval(-BOUND, BOUND);
 #endif
-    state.constant = any_number(0);
-    state.doubt.at[0] = any_number(0);
-    state.doubt.at[1] = any_number(0);
-    state.doubt.drift = any_number(0);
-    state.doubt.low = ANY_PLAUSIBLE();
-    state.doubt.high = ANY_PLAUSIBLE();
-    state.doubt.plain = any_number(0);
-    state.doubt.begun = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
-    state.doubt.known = Frama_C_unsigned_long_interval(0, 15);
-    state.doubt.sure = Frama_C_unsigned_long_interval(0, 2);
+    state.shift_sigma = any_number(0);
+    state.uncertainty.input[0] = any_number(0);
+    state.uncertainty.input[1] = any_number(0);
+    state.uncertainty.slope = any_number(0);
+    state.uncertainty.lowest = ANY_PLAUSIBLE();
+    state.uncertainty.highest = ANY_PLAUSIBLE();
+    state.uncertainty.unshifted = any_number(0);
+    state.uncertainty.terms_since = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
+    state.uncertainty.terms_known = Frama_C_unsigned_long_interval(0, 15);
+    state.uncertainty.slope_known = Frama_C_unsigned_long_interval(0, 2);
     /*@ loop unroll 4; */
     for (i = 0; i < GTC_MAX_TERMS; i++) {
         state.term[i][0] = any_number((unsigned)Frama_C_interval(0, KINDS - 1));
@@ -89,9 +89,9 @@ int main(void)
         //@ check status >= 0;
         //@ check snapshot.sigma >= 0;
         status = NAME(rezero)(&state, any_number(kind), Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
-        //@ check status == -1 || status == 0 || status == 2;
+        //@ check status == -8 || status == -1 || status == 0 || status == 2;
         //@ check -BOUND <= state.shift <= BOUND;
-        status = NAME(unzero)(&state);
+        status = NAME(rezero)(&state, any_number(kind), 0U);
         //@ check status == 0 && state.shift == 0;
     }
     return 0;

@@ -109,13 +109,13 @@ static void one_call(unsigned kind, uint_least32_t least_valid, uint_least32_t m
     channels[0] = any_number(kind);
     switch (Frama_C_interval(0, 3)) {
     case 0:
-        status = NAME(sample)(&state, channels);
+        status = NAME(sample)(&state, state.period_us, channels);
         break;
     case 1:
-        status = NAME(missed)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
+        status = NAME(sample)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL), NULL);
         break;
     case 2:
-        status = NAME(sample_at)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL), channels);
+        status = NAME(sample)(&state, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL), channels);
         break;
     default:
         status = NAME(bias)(&state, &bias);

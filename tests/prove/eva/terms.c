@@ -79,7 +79,7 @@ static void invariant_holds(unsigned i, unsigned hook)
 
 static void one_hook(unsigned i, unsigned hook)
 {
-    const struct NAME(term_code) *const code = THE_TABLE.term_code[i];
+    const struct NAME(term_code) *const code = NAME(code_of)(&THE_TABLE, i);
     NAME(effect_t) effect;
     any_term(i);
     if (hook == 0U) {
@@ -90,14 +90,15 @@ static void one_hook(unsigned i, unsigned hook)
         effect.temp = ANY_PLAUSIBLE();
         effect.slope = any_number(0);
         effect.remarks = Frama_C_interval(0, 63);
-        effect.known = Frama_C_unsigned_long_interval(0, 15);
+        effect.edge_effect = any_number(0);
+        effect.terms_known = Frama_C_unsigned_long_interval(0, 15);
 #if defined(F32)
         effect.added = any_number(0);
 #else
         effect.added = Frama_C_long_long_interval(-0x1000000000000000LL, 0x1000000000000000LL);
 #endif
         code->apply(&state, i, ANY_PLAUSIBLE(), &effect);
-        (void)NAME(added)(&THE_TABLE, &effect);
+        (void)NAME(saturate)(effect.added, MEMBER(THE_TABLE.effect[0]), MEMBER(THE_TABLE.effect[1]), &effect.remarks);
     }
     invariant_holds(i, hook);
 }

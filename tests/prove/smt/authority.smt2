@@ -1,4 +1,4 @@
-; gtc_<n>_govern() (libc/gtc_map.inl), through which every correction goes that gtc_<n>_bias() and gtc_<n>_map() give:
+; gtc_<n>_saturate() (libc/gtc_saturate.inl), through which every correction goes that gtc_<n>_bias() and gtc_<n>_map() give:
 ; whatever the correction, of whatever state, and whatever bounds a table may have, the result lies within them.
 ; `unsat` says that no words break the claim.
 (set-logic ALL)
@@ -8,11 +8,11 @@
 (declare-const high number)
 ; what `open`, `check` and `init` see to: numbers, the smallest not above 0, the largest not below it
 (define-fun zero () number (_ +zero 8 24))
-(define-fun governed () number (ite (not (fp.geq x low)) low (ite (not (fp.leq x high)) high x)))
+(define-fun limited () number (ite (and (fp.geq x low) (fp.leq x high)) x (ite (fp.gt x high) high low)))
 
 (push)
 (assert (and (fp.leq low zero) (fp.geq high zero)))
-(assert (not (and (fp.leq low governed) (fp.leq governed high))))
+(assert (not (and (fp.leq low limited) (fp.leq limited high))))
 (check-sat)
 (pop)
 
@@ -20,7 +20,7 @@
 (declare-const least (_ BitVec 32))
 (declare-const most (_ BitVec 32))
 (define-fun wide ((a (_ BitVec 32))) (_ BitVec 64) ((_ sign_extend 32) a))
-(define-fun whole () (_ BitVec 64) (ite (not (bvsge y (wide least))) (wide least) (ite (not (bvsle y (wide most))) (wide most) y)))
+(define-fun whole () (_ BitVec 64) (ite (and (bvsge y (wide least)) (bvsle y (wide most))) y (ite (bvsgt y (wide most)) (wide most) (wide least))))
 
 (push)
 (assert (and (bvsle least #x00000000) (bvsge most #x00000000)))

@@ -55,9 +55,9 @@ int main(void)
         const int lost = (k % 100 == 99);
         gtc_word_t bits;
         int_least32_t bias;
-        int status = lost ? gtc_f32_missed(&single, 1) : gtc_f32_sample(&single, &warm);
+        int status = gtc_f32_sample(&single, 1000000UL, lost ? NULL : &warm);
 
-        if ((status < 0) || ((lost ? gtc_q31_missed(&fixed, 1) : gtc_q31_sample(&fixed, &word)) < 0)) {
+        if ((status < 0) || (gtc_q31_sample(&fixed, 1000000UL, lost ? NULL : &word) < 0)) {
             return 2;
         }
         status = gtc_f32_bias(&single, &bits.value);
@@ -403,8 +403,8 @@ int main(void)
     if ((gtc_f32_check(&gtc_sn_rlg_0042_f32) != 0) || (gtc_q31_check(&gtc_sn_rlg_0042_q31) != 0)) {
         return 1;
     }
-    if ((gtc_q31_init(&state, &gtc_sn_rlg_0042_q31, 1000000UL) != 0) || (gtc_q31_sample(&state, &temp) < 0)
-        || (gtc_q31_sample(&state, &temp) < 0)) { /* one alone is not believed */
+    if ((gtc_q31_init(&state, &gtc_sn_rlg_0042_q31, 1000000UL) != 0) || (gtc_q31_sample(&state, 1000000UL, &temp) < 0)
+        || (gtc_q31_sample(&state, 1000000UL, &temp) < 0)) { /* one alone is not accepted */
         return 2;
     }
     return ((gtc_q31_bias(&state, &bias) >= 0) && (bias != 0)) ? 0 : 3;

@@ -183,7 +183,7 @@ def shifts(numeric: str, between: float, offsets: np.ndarray, seed: int) -> np.n
         assert device.function("rezero")(state, given, ctypes.c_uint32(REST_S)) >= 0
         moved = [number(), number()]
         assert device.function("bias")(state, ctypes.byref(moved[0])) >= 0
-        assert device.function("unzero")(state) == 0
+        assert device.function("rezero")(state, number(), ctypes.c_uint32(0)) == 0
         assert device.function("bias")(state, ctypes.byref(moved[1])) >= 0
         found.append((moved[0].value - moved[1].value) / unit)
     return np.array(found)

@@ -16,18 +16,18 @@ fn main() -> Result<(), Error> {
     fixed.check()?;
     let mut single = float32::State::new(float, PERIOD_US)?;
     let mut integer = q31::State::new(fixed, PERIOD_US)?;
-    assert_eq!(single.sample(&[0.0, 0.0]), Err(Error::Argument), "the table has one channel");
+    assert_eq!(single.sample(PERIOD_US, Some(&[0.0, 0.0])), Err(Error::Argument), "the table has one channel");
     for k in 0..SAMPLES {
         if k == 300 {
             let words = integer.save()?;
             integer = q31::State::restore(fixed, PERIOD_US, &words, 0)?;
         }
         if k % 100 == 99 {
-            let _ = single.missed(1)?;
-            let _ = integer.missed(1)?;
+            let _ = single.sample(PERIOD_US, None)?;
+            let _ = integer.sample(PERIOD_US, None)?;
         } else {
-            let _ = single.sample(&[20.0 + f32::from(k) / 64.0])?;
-            let _ = integer.sample(&[20 * 65536 + i32::from(k) * 1024])?;
+            let _ = single.sample(PERIOD_US, Some(&[20.0 + f32::from(k) / 64.0]))?;
+            let _ = integer.sample(PERIOD_US, Some(&[20 * 65536 + i32::from(k) * 1024]))?;
         }
         let ((a, remarks), (b, _)) = (single.bias()?, integer.bias()?);
         println!("{k} {:08x} {:08x} {}", a.to_bits(), b, remarks.0);

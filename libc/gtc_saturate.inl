@@ -1,0 +1,20 @@
+/* gtc_saturate.inl - the one limit of a number to a range, in the numbers of the header that includes it.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+
+/* The nearest number in a range; GTC_CLAMPED joins the remarks if it is another one. The least for what is no number. */
+static inline NUM FN(saturate)(WIDE x, NUM least, NUM most, int_least32_t *remarks)
+{
+    NUM nearest = least;
+
+    if ((x >= least) && (x <= most)) {
+        nearest = (NUM)x;
+    } else {
+        *remarks |= GTC_CLAMPED;
+        if (x > most) {
+            nearest = most;
+        }
+    }
+    return nearest;
+}
