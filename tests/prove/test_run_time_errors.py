@@ -86,7 +86,8 @@ def _analysed(c: Path, part: Part, numeric: str, machine: str) -> str:
     define = "-DF32" if numeric == "f32" else "-DQ31"
     if part.shape:
         networks, term = part.shape
-        define += f" -DANY_TABLE -DSHAPE_NETWORKS={networks}U -DSHAPE_LAST=term_{term} -DSHAPE_KIND=GTC_TERM_{term.upper()}"
+        define += f" -DANY_TABLE -DSHAPE_NETWORKS={networks}U -DSHAPE_LAST=term_{term}"
+        define += f" -DSHAPE_KIND=GTC_TERM_{term.upper()}"
         define += " -DGTC_WITH_BANK=1 -DGTC_OPEN_TERMS=1"
     command = ["frama-c", *OPTIONS, *options, "-machdep", machine, f"-cpp-extra-args=-I{c} -I{HERE} {define}"]
     files = [str(HERE / f"{part.file}.c"), str(c / "gtc_rlg_0042.c")]

@@ -115,7 +115,7 @@ def table_text(table: Table, model: Model) -> TableText:
     for name in _COUNTS:
         counts[name] = [next(words) for _ in range(2 if name.endswith("cells") else 1)]
         text = ", ".join(f"{n}UL" for n in counts[name])
-        text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts the fallback models, too
+        text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts all
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
     members.append(_member("n_fallback_models", f"{table.n_stand_ins}UL"))
     arrays = []

@@ -77,7 +77,7 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
 PUBLIC = (
     "check", "open", "map", "init", "sample", "bias", "snapshot", "rezero", "angle", "save", "restore",
 )  # fmt: skip
-"""Every function that gtc.h and the headers that it includes declare, without its prefix (`tests/py/verify/test_exhaustive.py`)."""
+"""Every function that gtc.h and what it includes declare, without its prefix."""
 _NODE = re.compile(
     r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
 )

@@ -155,7 +155,8 @@ int main(void)
     gtc_q31_state_t state;
     const int_least32_t channels[3] = {{0, 0, 0}};
 
-    return (gtc_q31_init(&state, &{table}_q31, 2500000UL) == 0) && (gtc_q31_sample(&state, 2500000UL, channels) >= 0) ? 0 : 1;
+    return (gtc_q31_init(&state, &{table}_q31, 2500000UL) == 0)
+        && (gtc_q31_sample(&state, 2500000UL, channels) >= 0) ? 0 : 1;
 }}
 """
 ALL = {"memory", "play", "warm_up", "harmonic", "auxiliary", "curve", "product"}
@@ -295,7 +296,8 @@ int main()
     gtc::f32::Angle angle(0.0F);
     gtc_word_t words[GTC_SAVE_WORDS];
     const bool started = gtc::f32::check(gtc_rlg_0042_f32).is_ok()
-        && fixed.init(gtc_rlg_0042_q31, 1000000UL).is_ok() && !fixed.sample(1000000UL, gtc::q31::Celsius(20L * 65536L)).failed()
+        && fixed.init(gtc_rlg_0042_q31, 1000000UL).is_ok()
+        && !fixed.sample(1000000UL, gtc::q31::Celsius(20L * 65536L)).failed()
         && correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok()
         && correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_HELD); // one alone is not accepted
     const bool went = correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_WARMING)

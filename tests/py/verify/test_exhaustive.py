@@ -151,7 +151,7 @@ def test_a_function_that_both_arithmetics_share_is_counted_under_its_one_name() 
 
 
 def test_public_functions_are_those_of_the_header() -> None:
-    """None is left out of the figures of code, stack and cost; the map is for tests, angles have a header of their own."""
+    """None is left out of the figures of code, stack and cost; map and angle stand in headers of their own."""
     for numeric in ("f32", "q31"):
         declared = _declared("gtc.h", numeric)
         assert len(declared) <= 9, "a header that is read in ten minutes"
