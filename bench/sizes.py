@@ -35,7 +35,7 @@ gtc_f32_snapshot_t snapshot;
 gtc_word_t saved[GTC_SAVE_WORDS];
 gtc_f32_table_t opened;
 gtc_f32_angle_t angle;
-const gtc_word_t image[64];
+const gtc_word_t *volatile image; /* wherever it lies: no constant of the program */
 volatile float in;
 volatile float out;
 volatile int status;

@@ -28,6 +28,8 @@
 #ifndef GTC_H_INCLUDED
 #define GTC_H_INCLUDED
 
+#include <stddef.h>
+
 #include "gtc_private_state.h"
 #include "gtc_angle.h"
 
@@ -94,7 +96,7 @@ typedef struct {
  *   bias              90      0         90     10
  *   snapshot        1270     50       2030    140
  *   rezero          1720     60       2960    170
- *   save             630     40        630     40
+ *   save            1420     80       1320    100
  *   restore         2270    620       2200    690 */
 
 /* Boot self-test of a compiled-in table, before gtc_<n>_init(), which relies on it: layout, arithmetic (f32:

@@ -17,10 +17,12 @@
 #define SAVE_HEAD 3U
 #define CRC_AT (GTC_SAVE_WORDS - 1)
 
-/* Where the next word goes to, or, if that is NULL, comes from. Volatile: no memcpy(). */
+/* Where the next word goes to, or, if that is NULL, comes from; whether every word so far is one that a call can have
+ * left, as far as no function of the state meets a run-time error. Volatile: no memcpy(). */
 typedef struct {
     volatile gtc_word_t *to;
     const volatile gtc_word_t *from;
+    int is_sound;
 } FN(cursor_t);
 
 static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
@@ -34,7 +36,14 @@ static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
     }
 }
 
-static void FN(carry)(FN(cursor_t) *at, NUM *x)
+static void FN(carry_count)(FN(cursor_t) *at, uint_least32_t *count, uint_least32_t most)
+{
+    FN(carry_bits)(at, count);
+    at->is_sound &= (*count <= most) ? 1 : 0;
+}
+
+/* The bits of a number, whatever it is. */
+static void FN(carry_any)(FN(cursor_t) *at, NUM *x)
 {
     gtc_word_t word;
 
@@ -43,6 +52,23 @@ static void FN(carry)(FN(cursor_t) *at, NUM *x)
     if (at->to == NULL) {
         *x = ELEMENT(word);
     }
+}
+
+static void FN(carry)(FN(cursor_t) *at, NUM *x, NUM least, NUM most)
+{
+    FN(carry_any)(at, x);
+    at->is_sound &= ((*x >= least) && (*x <= most)) ? 1 : 0;
+}
+
+/* A temperature of the window, or of a term, which an envelope may have moved. */
+static void FN(carry_temp)(FN(cursor_t) *at, NUM *x)
+{
+    FN(carry)(at, x, FN(number_limits)[NUMBER_ENVELOPE].least, FN(number_limits)[NUMBER_ENVELOPE].most);
+}
+
+static void FN(carry_number)(FN(cursor_t) *at, NUM *x)
+{
+    FN(carry)(at, x, -NUM_MOST, NUM_MOST);
 }
 
 static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
@@ -57,21 +83,30 @@ static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
     }
 }
 
-/* One channel. */
-static void FN(carry_input)(FN(cursor_t) *at, INPUT *in)
+/* One channel: numbers within its range (0 before the first reading), counts within the block. */
+static void FN(carry_input)(FN(cursor_t) *at, INPUT *in, const gtc_word_t *guard, uint_least32_t position)
 {
+    const NUM low = ELEMENT(guard[GUARD_LOW]);
+    const NUM high = ELEMENT(guard[GUARD_HIGH]);
+    const NUM least = (low < NUM_ZERO) ? low : NUM_ZERO;
+    const NUM most = (high > NUM_ZERO) ? high : NUM_ZERO;
+
     FN(carry_bits)(at, &in->gap_us);
     FN(carry_bits)(at, &in->agreed_us);
     FN(carry_bits)(at, &in->same_us);
     FN(carry_bits)(at, &in->received);
-    FN(carry_bits)(at, &in->valid);
-    FN(carry_bits)(at, &in->held_blocks);
-    FN(carry_bits)(at, &in->clamped);
-    FN(carry)(at, &in->last);
-    FN(carry)(at, &in->candidate);
-    FN(carry)(at, &in->base);
-    FN(carry)(at, &in->mean);
+    FN(carry_count)(at, &in->valid, position);
+    FN(carry_count)(at, &in->held_blocks, guard[GUARD_MISSING].bits + 1U);
+    FN(carry_count)(at, &in->clamped, CLAMPED_NOW | CLAMPED_MEAN);
+    FN(carry)(at, &in->last, least, most);
+    FN(carry)(at, &in->candidate, least, most);
+    FN(carry)(at, &in->base, least, most);
+    FN(carry)(at, &in->mean, least, most);
     FN(carry_wide)(at, &in->sum);
+    /* The sum last: its bounds are products of what was tested before. */
+    if (at->is_sound != 0) {
+        at->is_sound = FN(sum_fits)(in, low, high);
+    }
 }
 
 /* The front end: everything that the running block and the next correction depend on. */
@@ -81,57 +116,84 @@ static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
     uint_least32_t i;
 
     status.integer = state->status;
-    FN(carry_bits)(at, &status.bits);
+    FN(carry_count)(at, &status.bits, (2U * (uint_least32_t)GTC_CHANNEL_LOST) - 1U);
     if (at->to == NULL) {
         state->status = status.integer;
     }
     FN(carry_bits)(at, &state->period_us);
-    FN(carry_bits)(at, &state->position);
-    FN(carry_bits)(at, &state->filled);
+    FN(carry_count)(at, &state->position, MAX_SAMPLES_PER_BLOCK);
+    FN(carry_count)(at, &state->filled, state->table->slope_blocks);
     FN(carry_bits)(at, &state->window_valid);
-    FN(carry_bits)(at, &state->elapsed);
+    FN(carry_count)(at, &state->elapsed, MAX_ELAPSED);
     FN(carry_bits)(at, &state->off_blocks);
-    FN(carry)(at, &state->bias);
+    FN(carry_number)(at, &state->bias);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
-        FN(carry)(at, &state->window[i]);
+        FN(carry_temp)(at, &state->window[i]);
     }
     for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
-        FN(carry_input)(at, &state->input[i]);
+        const uint_least32_t channel = (i < FN(n_channels)(state->table)) ? i : 0U;
+
+        FN(carry_input)(at, &state->input[i], FN(guard)(state, channel), state->position);
+    }
+}
+
+/* 1 if a term has a memory that goes on over a time without power. */
+static int FN(is_retained)(const TABLE *table, uint_least32_t i)
+{
+    return ((i < FN(n_terms)(table)) && (FN(code_of)(table, i)->is_retained != 0U)) ? 1 : 0;
+}
+
+/* The state of a term; nothing of it is known where it never began, or has none. */
+static void FN(carry_term)(FN(cursor_t) *at, STATE *state, uint_least32_t i)
+{
+    NUM *const z = state->term[i];
+
+    FN(carry_any)(at, &z[0]);
+    FN(carry_any)(at, &z[1]);
+    if (FN(is_missing)(z[0]) != 0) {
+        at->is_sound &= ((state->input[0].gap_us == 0U) || (FN(is_retained)(state->table, i) == 0)) ? 1 : 0;
+    } else {
+        at->is_sound &= ((z[0] >= FN(number_limits)[NUMBER_ENVELOPE].least)
+                         && (z[0] <= FN(number_limits)[NUMBER_ENVELOPE].most) && FN(is_fraction)(z[1])) ? 1 : 0;
     }
 }
 
 /* What the uncertainty is computed from, and the shift of the constant. */
 static void FN(carry_uncertainty)(FN(cursor_t) *at, STATE *state)
 {
-    FN(carry)(at, &state->uncertainty.input[0]);
-    FN(carry)(at, &state->uncertainty.input[1]);
-    FN(carry)(at, &state->uncertainty.slope);
-    FN(carry)(at, &state->uncertainty.first_temp);
-    FN(carry)(at, &state->uncertainty.lowest);
-    FN(carry)(at, &state->uncertainty.highest);
-    FN(carry)(at, &state->uncertainty.unshifted);
-    FN(carry)(at, &state->uncertainty.edge_effect);
+    const NUM most = MEMBER(state->table->rezero);
+
+    FN(carry_number)(at, &state->uncertainty.input[0]);
+    FN(carry_number)(at, &state->uncertainty.input[1]);
+    FN(carry_number)(at, &state->uncertainty.slope);
+    FN(carry_temp)(at, &state->uncertainty.first_temp);
+    FN(carry_temp)(at, &state->uncertainty.lowest);
+    FN(carry_temp)(at, &state->uncertainty.highest);
+    FN(carry_number)(at, &state->uncertainty.unshifted);
+    FN(carry_number)(at, &state->uncertainty.edge_effect);
     FN(carry_bits)(at, &state->uncertainty.terms_since);
     FN(carry_bits)(at, &state->uncertainty.terms_known);
     FN(carry_bits)(at, &state->uncertainty.slope_known);
-    FN(carry)(at, &state->shift);
-    FN(carry)(at, &state->shift_sigma);
+    FN(carry)(at, &state->shift, -most, most);
+    FN(carry_number)(at, &state->shift_sigma);
 }
 
-/* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written. */
-static void FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
+/* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written.
+ * Returns 1 if it is sound. */
+static int FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
 {
     FN(cursor_t) at;
     uint_least32_t i;
 
     at.to = to;
     at.from = from;
+    at.is_sound = 1;
     FN(carry_front)(&at, state);
     for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        FN(carry)(&at, &state->term[i][0]);
-        FN(carry)(&at, &state->term[i][1]);
+        FN(carry_term)(&at, state, i);
     }
     FN(carry_uncertainty)(&at, state);
+    return at.is_sound;
 }
 
 static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
@@ -148,7 +210,7 @@ static int FN(run_save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
     words[1].bits = SAVE_OPTIONS;
     words[2].bits = state->table->crc;
     /* MISRA 11.8: one text carries both ways; this way the state is only read. */
-    FN(carry_state)((STATE *)state, &words[SAVE_HEAD], words);
+    (void)FN(carry_state)((STATE *)state, &words[SAVE_HEAD], words);
     words[CRC_AT].bits = FN(save_crc)(words);
     return GTC_OK;
 }
@@ -171,104 +233,6 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
     return status;
 }
 
-static NUM FN(lesser_of)(NUM a, NUM b)
-{
-    return (a < b) ? a : b;
-}
-
-static int FN(is_within)(NUM x, NUM low, NUM high)
-{
-    return ((x >= low) && (x <= high)) ? 1 : 0;
-}
-
-static int FN(counts_fit)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
-{
-    return ((state->position <= state->samples_per_block) && (in->valid <= state->position)
-            && (in->clamped <= (CLAMPED_NOW | CLAMPED_MEAN))
-            && (in->held_blocks <= (guard[GUARD_MISSING].bits + 1U))) ? 1 : 0;
-}
-
-/* Numbers of a channel within its range (0 before the first reading), counts within the block: what no call would
- * have left is refused. */
-static int FN(input_fits)(const STATE *state, const INPUT *in, const gtc_word_t *guard)
-{
-    const NUM low = FN(lesser_of)(ELEMENT(guard[GUARD_LOW]), NUM_ZERO);
-    const NUM high = -FN(lesser_of)(-ELEMENT(guard[GUARD_HIGH]), NUM_ZERO);
-    int numbers = FN(counts_fit)(state, in, guard);
-
-    numbers &= FN(is_within)(in->mean, low, high) & FN(is_within)(in->last, low, high)
-               & FN(is_within)(in->base, low, high) & FN(is_within)(in->candidate, low, high);
-    /* The sum last: its bounds are products of what was tested before. */
-    return (numbers != 0) ? FN(sum_fits)(in, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH])) : 0;
-}
-
-/* A temperature of the window, or of a term, which an envelope may have moved. */
-static int FN(is_temperature)(NUM x)
-{
-    return FN(is_within)(x, FN(number_limits)[NUMBER_ENVELOPE].least, FN(number_limits)[NUMBER_ENVELOPE].most);
-}
-
-/* Whether a term has a memory since the first temperature. */
-static int FN(is_retained)(const STATE *state, uint_least32_t i)
-{
-    return ((state->input[0].gap_us != 0U) && (i < FN(n_terms)(state->table))
-            && (FN(code_of)(state->table, i)->is_retained != 0U)) ? 1 : 0;
-}
-
-static int FN(terms_are_sound)(const STATE *state)
-{
-    int sound = 1;
-    uint_least32_t i;
-
-    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        const NUM z = state->term[i][0];
-
-        if (FN(is_missing)(z) != 0) {
-            sound &= 1 - FN(is_retained)(state, i);
-        } else {
-            sound &= FN(is_temperature)(z) & FN(is_fraction)(state->term[i][1]);
-        }
-    }
-    return sound;
-}
-
-/* A re-zeroed constant: a number, and a shift that the table grants. */
-static int FN(shift_is_sound)(const STATE *state)
-{
-    const NUM most = MEMBER(state->table->rezero);
-
-    return ((!FN(is_missing)(state->shift_sigma)) && (state->shift >= -most) && (state->shift <= most)) ? 1 : 0;
-}
-
-/* What the uncertainty is computed from: numbers and temperatures. */
-static int FN(uncertainty_is_sound)(const STATE *state)
-{
-    return ((!FN(is_missing)(state->uncertainty.input[0])) && (!FN(is_missing)(state->uncertainty.input[1]))
-            && (!FN(is_missing)(state->uncertainty.slope)) && (!FN(is_missing)(state->uncertainty.unshifted)) && (!FN(is_missing)(state->uncertainty.edge_effect))
-            && FN(is_temperature)(state->uncertainty.first_temp) && FN(is_temperature)(state->uncertainty.lowest)
-            && FN(is_temperature)(state->uncertainty.highest)) ? 1 : 0;
-}
-
-/* Whether a state is one that calls could have left, as far as no function of it meets a run-time error. */
-static int FN(is_sound)(const STATE *state)
-{
-    int sound = 1;
-    uint_least32_t i;
-
-    sound &= ((state->position <= state->samples_per_block) && (state->filled <= state->table->slope_blocks)
-              && (state->elapsed <= MAX_ELAPSED) && (state->status >= 0)
-              && (state->status < (2 * GTC_CHANNEL_LOST))) ? 1 : 0;
-
-    for (i = 0U; i < FN(n_channels)(state->table); i++) {
-        sound &= FN(input_fits)(state, &state->input[i], FN(guard)(state, i));
-    }
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
-        sound &= FN(is_temperature)(state->window[i]);
-    }
-    return sound & FN(terms_are_sound)(state) & FN(uncertainty_is_sound)(state) & FN(shift_is_sound)(state)
-           & ((FN(is_missing)(state->bias) != 0) ? 0 : 1);
-}
-
 /* Of a state that was read, what is retained over a time without power: terms. If it had not begun when it was saved,
  * it had itself been without power before. */
 static void FN(retain)(STATE *state, uint_least32_t off_blocks)
@@ -283,22 +247,25 @@ static void FN(retain)(STATE *state, uint_least32_t off_blocks)
         FN(rezero_clear)(state);
     }
     for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        if ((i >= FN(n_terms)(state->table)) || (FN(code_of)(state->table, i)->is_retained == 0U)) {
+        if (FN(is_retained)(state->table, i) == 0) {
             FN(reset_term)(state, i);
         }
     }
 }
 
-/* The state that the words hold, after so many blocks without power. */
-static void FN(take_over)(STATE *state, const TABLE *table, uint_least32_t period_us, const gtc_word_t *words,
-                          uint_least32_t off_blocks)
+/* The state that the words hold, after so many blocks without power. Returns 1 if it is one that calls could have left. */
+static int FN(take_over)(STATE *state, const TABLE *table, uint_least32_t period_us, const gtc_word_t *words,
+                         uint_least32_t off_blocks)
 {
+    int is_sound;
+
     FN(start)(state, table, period_us);
-    FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
+    is_sound = FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
     if ((off_blocks != 0U) || (state->period_us != period_us)) {
         state->period_us = period_us;
         FN(retain)(state, off_blocks);
     }
+    return ((is_sound != 0) && (state->position <= state->samples_per_block)) ? 1 : 0;
 }
 
 static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t period_us,
@@ -310,13 +277,11 @@ static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t peri
     if (status == GTC_OK) {
         status = FN(inspect)(table, words);
     }
+    if ((status == GTC_OK) && (FN(take_over)(&read, table, period_us, words, off_blocks) == 0)) {
+        status = GTC_E_IMAGE;
+    }
     if (status == GTC_OK) {
-        FN(take_over)(&read, table, period_us, words, off_blocks);
-        if (FN(is_sound)(&read) != 0) {
-            FN(take_over)(state, table, period_us, words, off_blocks);
-        } else {
-            status = GTC_E_IMAGE;
-        }
+        (void)FN(take_over)(state, table, period_us, words, off_blocks);
     }
     return status;
 }

@@ -486,7 +486,7 @@ def check_header(model: Model, image: Image, name: str, header: str) -> Iterator
         "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
         "N_CHANNELS": 1 + len(model.channels()),
         # 9 pointers, number of fallback models, code of 7 kinds of terms; neither magic nor arithmetic and length
-        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + (14 if image.array["terms"] else 7)),
+        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + (15 if image.array["terms"] else 8)),
     }  # fmt: skip
     if image.numeric == "q31":
         whole["Q31_BIAS_FRAC_BITS"] = image.one("bias_frac_bits")

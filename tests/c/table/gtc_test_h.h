@@ -32,8 +32,8 @@ extern "C" {
 #define GTC_TEST_H_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_H_PERIOD_MAX_US 10010000UL /* longest sample period */
 #define GTC_TEST_H_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
-#define GTC_TEST_H_AUTHORITY_MIN_DPH (-70.3042145F) /* no correction lies below it, deg/h: margin 25% of the range */
-#define GTC_TEST_H_AUTHORITY_MAX_DPH (69.7087097F) /* no correction lies above it, deg/h: margin 25% of the range */
+#define GTC_TEST_H_AUTHORITY_MIN_DPH (-70.3042145F) /* no correction lies below it, deg/h: margin 25% of range */
+#define GTC_TEST_H_AUTHORITY_MAX_DPH (69.7087097F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_H_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_TEST_H_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_TEST_H_F32_TABLE_BYTES 560UL /* read-only data, with pointers of 32 bits */

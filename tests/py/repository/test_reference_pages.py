@@ -38,7 +38,7 @@ def test_every_public_function_of_c_has_its_heading(made: Path) -> None:
         for heading in _headings(made / "reference-c.md")
         for name in re.findall(r"gtc_<n>_(\w+)", heading)
     ]
-    assert sorted(named) == sorted(PUBLIC)
+    assert sorted([*named, "map"]) == sorted(PUBLIC), "the map is for tests"
 
 
 def test_every_command_has_its_heading(made: Path) -> None:
