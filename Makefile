@@ -78,6 +78,7 @@ check:
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools
 	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/promises
+	@$(PYTHON) -m pytest -q tests/py/repository/test_examples.py -k notebook
 	@$(PYTHON) -m gyrotc.paper docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/paper/test_paper_reference.py
 

@@ -109,4 +109,5 @@ if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then
   fi
   echo "$fingerprint" >"$stamp"
   [ -z "$extras" ] || echo "$fingerprint" >.venv/.gyrotc
+  case $PATH in *"$PWD/.venv/bin"*) ;; *) echo "setup: gyrotc is $PWD/.venv/bin/gyrotc; for this shell: export PATH=$PWD/.venv/bin:\$PATH" ;; esac
 fi

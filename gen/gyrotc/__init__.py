@@ -8,7 +8,11 @@ The command does the whole job (`gyrotc --help`, or `python -m gyrotc --help`):
     gyrotc diagnose data --out diagnosis    what the model does not explain, and the cause
     gyrotc simulate paper --out data        a data set to try it with
 
-From Python: `gyrotc.model.load_model("result/model.json")` reads a fitted model, and
+From Python (`gyrotc.api`):
+
+    data = gyrotc.load("data")              recordings, or gyrotc.Dataset.from_pandas(frame, rate_unit="deg/s")
+    result = gyrotc.build(data)             what the command does; result.plot(), result.to_xarray()
+
 `gyrotc.RBFNetworkRegressor` is the network as an estimator of scikit-learn.
 """
 
@@ -17,19 +21,26 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .api import Dataset, Result, build, load
     from .train.estimator import RBFNetworkRegressor
 
-__all__ = ["RBFNetworkRegressor", "__version__"]
+__all__ = ["Dataset", "RBFNetworkRegressor", "Result", "__version__", "build", "load"]
 
 __version__ = "0.1.0"
 
+_API = ("Dataset", "Result", "build", "load")
+
 
 def __getattr__(name: str) -> Any:
-    """`RBFNetworkRegressor` on first use: scikit-learn stays optional.
+    """A name of the API on first use: `import gyrotc` stays quick, and scikit-learn optional.
 
     Raises:
         ModuleNotFoundError: scikit-learn is not installed; the message says what to install.
     """
+    if name in _API:
+        from . import api
+
+        return getattr(api, name)
     if name != "RBFNetworkRegressor":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

@@ -21,6 +21,7 @@ from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
 from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
+from .groups import GroupedCommands
 from .words import GyroAxis, completing
 
 if TYPE_CHECKING:
@@ -138,6 +139,7 @@ def _within(text: str) -> float:
 
 app = typer.Typer(
     name="gyrotc",
+    cls=GroupedCommands,
     help="From thermal-chamber recordings of a gyro to verified C tables that compensate its bias.",
     no_args_is_help=True,
     add_completion=False,
@@ -230,7 +232,9 @@ NumericOption = Annotated[
 TargetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--target", help="Name of a target, or all; may be repeated.", autocompletion=_targets_begun
+        "--target",
+        help="Name of a target, or all; may be repeated; default: Cortex-M4F and one host.",
+        autocompletion=_targets_begun,
     ),
 ]
 LotOption = Annotated[
@@ -333,6 +337,11 @@ def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
         yield shown
     finally:
         status.stop()
+
+
+def verbose() -> bool:
+    """Whether every detail is to be shown."""
+    return _Loudness.verbose
 
 
 def tell(text: str, *, wrong: bool = False) -> None:

@@ -34,6 +34,7 @@ from .base import (
     progress,
     show,
     tell,
+    verbose,
     with_build_options,
     write_json,
 )
@@ -44,6 +45,7 @@ from .results import (
     not_installed_lines,
     summary,
     training_lines,
+    verified_line,
     verify_table,
 )
 
@@ -228,8 +230,10 @@ def build(
 
 def _print_built(result: Built) -> None:
     show(evaluation_table(result.evaluation))
-    show(verify_table(result.verification))
+    if verbose() or result.verification.failed:
+        show(verify_table(result.verification))
     for line in (
+        verified_line(result.verification),
         *not_installed_lines(result.verification),
         *training_lines(result.training),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),

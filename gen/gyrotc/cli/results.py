@@ -129,6 +129,16 @@ def _known(number: int | None) -> str:
     return "-" if number is None else str(number)
 
 
+def verified_line(result: Verification) -> str:
+    """Where the bits were those of the reference, in one line."""
+    agreed: dict[str, list[str]] = {}
+    for entry in result.targets:
+        if entry.status == "pass":
+            agreed.setdefault(entry.name, []).append(entry.numeric)
+    where = ", ".join(f"{name} ({', '.join(numerics)})" for name, numerics in agreed.items()) or "nowhere"
+    return f"bit for bit as the reference: {where}"
+
+
 def not_installed_lines(result: Verification) -> Iterator[str]:
     """One line with the targets whose tools are not installed, where there are some."""
     names, packages = result.not_installed

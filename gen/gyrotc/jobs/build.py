@@ -120,7 +120,7 @@ def build(
     Args:
         axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
             the runtime once with all tables; "all" the same, but refuses recordings of one rate.
-        targets: Names of the targets that the code is verified on; none: as `verify`.
+        targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
         applied: Model that was subtracted while recording.
         trust_units: Values that contradict their units are taken nevertheless.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
@@ -143,7 +143,8 @@ def build(
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
     refuse_together(options, prior, ageing_dph)
     held = load_limits(limits) if limits else None
-    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph, targets=targets)
+    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph)
+    order = replace(order, targets=targets or (held.needs.targets if held else ()))
     axes = asked_axes(source, axis)
     with result_folder(out, "build", inputs=[source]) as stage:
         if len(axes) == 1 and axis != "all":

@@ -273,7 +273,7 @@ class Curve:
     earth_dph: tuple[float, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Dataset:
     """A folder of recordings of one axis of one serial.
 
@@ -314,3 +314,9 @@ class Dataset:
     shared: tuple[SharedRows, ...] = ()
     sketch: tuple[int, ...] = ()
     curves: tuple[Curve, ...] = ()
+
+    def __repr__(self) -> str:
+        axis = f" axis {self.axis}" if self.axis else ""
+        exam = sum(run.role == "exam" for run in self.runs)
+        rows = sum(run.n_rows for run in self.runs)
+        return f"Dataset({self.serial}{axis}: {len(self.runs)} runs, {exam} of them exams, {rows} rows)"

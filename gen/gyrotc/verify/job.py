@@ -306,7 +306,11 @@ def verify(
 
 
 def chosen_targets(names: Sequence[str]) -> list[Target]:
-    """The targets of these names or of `all`; without a name the default ones. Raises InputError on an unknown name."""
+    """The targets of these names or of `all`; without a name Cortex-M4F and one host.
+
+    Raises:
+        InputError: A name is not known.
+    """
     known = all_targets()
     for name in names:
         if name != "all" and name not in known:

@@ -20,6 +20,8 @@ from conftest import Command, invoked, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
 from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, StageLine, folded, time_left
+from gyrotc.cli.commands import app
+from gyrotc.cli.groups import GROUPS
 from gyrotc.cli.main import _hoisted, run
 from gyrotc.cli.words import ExportFormat, GyroAxis, NoiseLevel, RunFormat, Shell
 from gyrotc.deliver import export
@@ -225,6 +227,15 @@ def test_a_terminal_of_80_columns_gets_lines_of_80_columns(tmp_path: Path) -> No
     lines = reported.decode().splitlines()
     assert all(len(line) <= 80 for line in lines if len(line.split()) > 1)
     assert "".join("".join(lines).split()) == "".join(whole.split())
+
+
+def test_help_has_every_command_once_in_a_group_of_the_work(gyrotc: Command) -> None:
+    named = [name for names in GROUPS.values() for name in names]
+    callbacks = [c for c in app.registered_commands if c.callback]
+    assert sorted(named) == sorted(c.name or c.callback.__name__ for c in callbacks if c.callback)
+    shown = gyrotc("--help").stdout
+    places = [shown.index(f"\n{title}:") for title in GROUPS]
+    assert places == sorted(places) and all(f"\n  {name} " in shown for name in named)
 
 
 def test_bash_completes_commands_and_options(tmp_path: Path, gyrotc: Command) -> None:

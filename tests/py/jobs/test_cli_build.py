@@ -242,15 +242,6 @@ def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: P
     assert printed.count("deg/h") == 3
 
 
-def test_without_an_axis_a_three_axis_recording_is_refused_naming_the_choices(
-    demo: Path, tmp_path: Path, gyrotc: Command
-) -> None:
-    _three_axes(demo / "data", tmp_path / "triad")
-    done = gyrotc("build", tmp_path / "triad", "--out", tmp_path / "r")
-    assert done.returncode == 2
-    assert all(axis in done.stderr for axis in ("x", "y", "z")) and not (tmp_path / "r").exists()
-
-
 def test_a_correction_applied_while_recording_is_added_back_or_refused(
     demo: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
