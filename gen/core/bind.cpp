@@ -11,6 +11,7 @@
 #include "equal_gaussians.hpp"
 #include "fingerprints.hpp"
 #include "kohonen.hpp"
+#include "mixed.hpp"
 #include "ols.hpp"
 #include "posteriors.hpp"
 #include "varpro.hpp"
@@ -31,6 +32,13 @@ void same_length(std::initializer_list<Eigen::Index> sizes) {
 Bins bins(VectorXd t, VectorXd r, VectorXd count, VectorXd mean, double within, double samples) {
     same_length({t.size(), r.size(), count.size(), mean.size()});
     return {std::move(t), std::move(r), std::move(count), std::move(mean), within, samples};
+}
+
+MixedMeans mixed_means(const MatrixXd &columns, VectorXd y, VectorXd count, VectorXd time_s, const Eigen::VectorXi &power_on,
+                       const Eigen::VectorXi &group) {
+    same_length({columns.rows(), y.size(), count.size(), time_s.size(), power_on.size(), group.size()});
+    if (columns.cols() != kMixedColumns) throw nb::value_error("columns: five are wanted");
+    return {columns, std::move(y), std::move(count), std::move(time_s), power_on, group};
 }
 
 Samples samples(VectorXd t, VectorXd r, VectorXd y, VectorXd weight) {
@@ -105,6 +113,21 @@ NB_MODULE(_core, m) {
         .def_prop_ro("freedom", &EvidenceModel::freedom)
         .def_prop_ro("value", &EvidenceModel::value)
         .def_prop_ro("evaluations", &EvidenceModel::evaluations);
+
+    nb::class_<MixedModel>(m, "MixedModel")
+        .def(
+            "__init__",
+            [](MixedModel *self, const MatrixXd &columns, VectorXd y, VectorXd count, VectorXd time_s,
+               const Eigen::VectorXi &power_on, const Eigen::VectorXi &group, double white, double length_s) {
+                new (self) MixedModel(
+                    mixed_means(columns, std::move(y), std::move(count), std::move(time_s), power_on, group), white,
+                    length_s);
+            },
+            "columns"_a, "y"_a, "count"_a, "time_s"_a, "power_on"_a, "group"_a, nb::kw_only(), "white"_a, "length_s"_a)
+        .def("objective", &MixedModel::objective)
+        .def("optimise", &MixedModel::optimise)
+        .def("weights", &MixedModel::weights, "kept"_a)
+        .def_prop_ro("log_parameters", [](const MixedModel &self) { return self.log_parameters(); });
 
     nb::class_<Network>(m, "Network")
         .def_ro("shapes", &Network::shapes)

@@ -55,6 +55,25 @@ class EvidenceModel:
     @property
     def evaluations(self) -> int: ...
 
+class MixedModel:
+    def __init__(
+        self,
+        columns: _Floats,
+        y: _Floats,
+        count: _Floats,
+        time_s: _Floats,
+        power_on: NDArray[np.int32],
+        group: NDArray[np.int32],
+        *,
+        white: float,
+        length_s: float,
+    ) -> None: ...
+    def objective(self, log_parameters: _Floats) -> float: ...
+    def optimise(self) -> None: ...
+    def weights(self, kept: NDArray[np.bool_]) -> _Floats: ...
+    @property
+    def log_parameters(self) -> _Floats: ...
+
 class Network:
     shapes: _Floats
     weights: _Floats

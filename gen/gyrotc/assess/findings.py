@@ -46,7 +46,7 @@ _OF_TRAINING = (
     "not_of_its_lot",
     "prior_does_not_hold",
 )
-_POLYNOMIALS = ("cubic", "cubic_slope")
+_POLYNOMIALS = ("cubic", "cubic_slope", "mixed")
 
 
 def findings_of(

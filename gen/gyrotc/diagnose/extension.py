@@ -1,8 +1,8 @@
 """The compensation model extended with the named causes: terms, overtones, and whether it is shipped.
 
-States beside a map are one candidate more in model selection (`train.selection`): every stretch of thermal history
-is left out in turn, and the rung is taken where it is clearly better than the rung that the ladder would emit
-without states, and better than a constant. Causes and their parameters are those of all training runs, as the
+States beside a map are one candidate more in model selection (`train.selection`), the richest: every piece of thermal
+history is left out in turn, and they are taken where pieces agree that they are better than what would be emitted
+without them. Causes and their parameters are those of all training runs, as the
 parameters of the evidence process are; the map beside them is fitted anew without each stretch.
 
 The training runs choose, what is shipped, too (`shipping`). Where there are exam runs, they measure. Where there are
@@ -32,7 +32,7 @@ from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, front_end, map_method, power_ons
 from ..train.mrbf import Bumps
 from ..train.result import Fit
-from ..train.selection import RUNGS, Ladder, climb
+from ..train.selection import Ladder, climb
 from .attribution import choose
 from .blocks import Records
 from .gain import Gain, floor_of, gain_of
@@ -237,36 +237,31 @@ class Shipping:
 def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     """Adds the effects that a table can hold one after the other; those of a single cycle all at once."""
     able = [e for e in effects if e.term.shipped][:MOST_TERMS]
-    plain = _ladder(refitting, [], None)
-    rung = plain.chosen()
+    best = _ladder(refitting, [])
+    rung = best.chosen()
     shipped: list[Effect] = []
-    best, last = (plain, rung), None
+    before, last = best.rms_of(rung), None
     together = refitting.single_cycle
     for tried in [able] if together and able else [able[: k + 1] for k in range(len(able))]:
         new = tried if together else [*shipped, tried[-1]]
-        name = "mrbf_t" if together else "mrbf"
-        last = _ladder(refitting, new, plain)
-        if best[0].beaten_by(best[1], last, name) and plain.beaten_by(rung, last, name):
-            shipped, best = new, (last, name)
-    after = None if last is None else _rung_rms(last, "mrbf_t" if together else "mrbf")
-    return Shipping(shipped, rung, plain.stretches(), _rung_rms(plain, rung), after)
+        name = f"{len(new)} states"
+        with_them = best.with_richer(name, _ladder(refitting, new))
+        last = with_them.rms_of(name)
+        if with_them.chosen() == name:
+            shipped, best = new, with_them
+    return Shipping(shipped, rung, best.stretches(), before, last)
 
 
-def _ladder(refitting: Refitting, effects: Sequence[Effect], like: Ladder | None) -> Ladder:
-    """Every candidate beside the effects, without each stretch of history (those of `like`, where it is given)."""
+def _ladder(refitting: Refitting, effects: Sequence[Effect]) -> Ladder:
+    """Every candidate beside the effects, without each piece of history."""
     data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
     scaling = scaling_of(data)
     try:
         process = fit_process(data, scaling)
     except TrainingFailed:
         process = None
-    folds = None if like is None else like.folds
-    return climb(data, scaling, process, power_ons(refitting.runs), refitting.average_s, folds)
-
-
-def _rung_rms(ladder: Ladder, rung: str) -> float | None:
-    square = ladder.rms_dph[:, RUNGS.index(rung)] ** 2
-    return float(np.sqrt(square.mean())) if len(square) and np.all(np.isfinite(square)) else None
+    rate = not (effects and refitting.single_cycle)
+    return climb(data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate)
 
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts

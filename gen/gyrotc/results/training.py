@@ -143,6 +143,9 @@ class CandidateModel(Part):
     left_out_rms_dph: Figure = Field(description="RMS on thermal history left out in turn, deg/h")
     standard_error_dph: Figure = Field(description="of this RMS, deg/h")
     beats_constant: bool = Field(description="whether it was shown to leave less than a constant does")
+    t: Figure = Field(
+        default=None, description="Student's t of its gain over a constant, over pieces left out"
+    )
     chosen: bool = Field(description="whether it was taken")
     refused: str | None = Field(default=None, description="why it could not be taken, where it was the best")
 

@@ -278,7 +278,6 @@ def chosen_channels(
     dataset: Dataset,
     samples: TrainingData,
     columns: Mapping[str, FloatArray],
-    power_on: NDArray[np.int64],
     average_s: float,
 ) -> ChannelChoice | None:
     """Chooses channels; None where there is none, or no map beside which to judge them.
@@ -287,7 +286,6 @@ def chosen_channels(
         dataset: The recordings.
         samples: Training samples in order.
         columns: Of every candidate at these samples, shape (n,) each.
-        power_on: Number of the power-on of each run.
         average_s: Averaging of what is judged, s.
     """
     if not columns:
@@ -305,9 +303,9 @@ def chosen_channels(
     seen, of = {n: line.columns[known] for n, line in lines.items()}, samples.select(known)
     alike = _alike(seen, of, process, scaling)
     part = Parts(seen, rivals={n: frozenset(others) for n, others in alike.items()})
-    trial = chosen_parts(of, scaling, part, power_on, average_s, _MOST)
+    trial = chosen_parts(of, scaling, part, average_s, _MOST)
     trial, shapes = _bent(trial, {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}, of, known,
-                          scaling, power_on, average_s)  # fmt: skip
+                          scaling, average_s)  # fmt: skip
     parts = {n: shapes[n].columns @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
     rows = [_row(n, trial, shapes, parts, samples, against[n], alike.get(n, {})) for n in columns]
@@ -328,7 +326,6 @@ def _bent(
     of: TrainingData,
     known: NDArray[np.bool_],
     scaling: Scaling,
-    power_on: NDArray[np.int64],
     average_s: float,
 ) -> tuple[PartsTrial, dict[str, ChannelShape]]:
     """What the taken channels add, by channel: lines, or what is earned in their place.
@@ -342,7 +339,7 @@ def _bent(
     columns = {name: line.columns[known] for name, line in found.items()}
     columns |= {part: shape.columns[known, 1:] for part, (_, shape) in behind.items()}
     richer = {name: [part for part, (n, _) in behind.items() if n == name] for name in shapes}
-    trial = bent_parts(of, scaling, Parts(columns), plain, richer, power_on, average_s)
+    trial = bent_parts(of, scaling, Parts(columns), plain, richer, average_s)
     weights, rms = dict(trial.weights), list(trial.left_out_rms_dph)
     for part in (p for p in trial.chosen if p in behind):
         name, found[name] = behind[part]

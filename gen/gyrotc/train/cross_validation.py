@@ -1,7 +1,7 @@
-"""Stretches of thermal history that are left out in turn, and paired comparisons over them.
+"""Pieces of thermal history that are left out in turn, and paired comparisons over them.
 
-`history_folds` is what model selection is chosen by: runs, power-ons, branches, the fastest rate, and the
-hottest and the coldest tenth, each with a guard gap; never random samples, which lie between samples that were seen.
+`pieces` is what model selection is chosen by: whole runs, of a single run its branches; never random samples, which lie
+between samples that were seen, and no two that overlap, which would count one stretch of history twice.
 
 `training_spans` is what a model of few runs is judged by: with fewer than three runs, whole runs are too few to learn
 from the rest. A run is cut at the turning points of its temperature (where smoothed dT/dt changes sign: the branches
@@ -25,51 +25,27 @@ from ..recordings.records import Run
 from ..results.training import SpanLeftOut
 
 __all__ = [
+    "LIKELIER",
     "Fold",
     "Span",
     "edges_of",
-    "history_folds",
-    "more_than_error_of_pieces",
     "more_than_its_error",
-    "of_pieces",
+    "pieces",
     "surely_above_0",
     "t_statistic",
     "training_spans",
     "turning_points",
+    "unseen_log_likelihood",
 ]
 
-_SIGNIFICANCE = 0.05  # of the t test: docs/training.md, section 2
+LIKELIER = 3.0  # of log-likelihoods on unseen means: twenty to one for what is richer
+
+_SIGNIFICANCE = 0.025  # of the t test: docs/training.md, section 2
 
 
 def more_than_its_error(*differences: FloatArray) -> bool:
     """Whether the mean of each of these, one entry a stretch, is above its standard error."""
     return not any(d.mean() <= d.std(ddof=1) / np.sqrt(len(d)) for d in differences)
-
-
-def more_than_error_of_pieces(pieces: NDArray[np.int64], *differences: FloatArray) -> bool:
-    """The same where stretches of one piece of history resemble each other; those of the piece -1 are left out.
-
-    The standard error of a mean over clusters: the sums of deviations within pieces are what scatters independently
-    (Liang and Zeger 1986). False with fewer than two pieces.
-    """
-    used = pieces >= 0
-    _, index = np.unique(pieces[used], return_inverse=True)
-    count = int(index.max(initial=-1)) + 1
-    if count < 2:
-        return False
-    for d in (difference[used] for difference in differences):
-        sums = np.bincount(index, d - d.mean())
-        error = np.sqrt(count / (count - 1.0) * (sums**2).sum()) / len(d)
-        if d.mean() <= error:
-            return False
-    return True
-
-
-def of_pieces(values: FloatArray, pieces: NDArray[np.int64]) -> FloatArray:
-    """Means over the independent pieces of history, shape (pieces,); stretches of the piece -1 belong to none."""
-    used = pieces >= 0
-    _, index = np.unique(pieces[used], return_inverse=True)
-    return np.asarray(np.bincount(index, values[used]) / np.bincount(index))
 
 
 def t_statistic(gains: FloatArray) -> tuple[float, int]:
@@ -81,9 +57,24 @@ def t_statistic(gains: FloatArray) -> tuple[float, int]:
 
 
 def surely_above_0(gains: FloatArray, tried: int = 1) -> bool:
-    """Whether the mean is above 0 by a t test, one-sided, at 5 % for all that are `tried` alike (Bonferroni)."""
+    """Whether the mean is above 0 by a t test, one-sided, at 2.5 % for all that are `tried` alike (Bonferroni)."""
     t, freedom = t_statistic(gains)
     return freedom > 0 and bool(t > stdtrit(freedom, 1.0 - _SIGNIFICANCE / tried))
+
+
+def unseen_log_likelihood(square: FloatArray, means: FloatArray, white: float) -> float | None:
+    """Of pieces under white noise; None where more than noise is left on any of them.
+
+    Pieces then differ by that noise alone, and what is known about it says more than they do.
+
+    Args:
+        square: Mean square left on each piece, shape (pieces,).
+        means: Number of means in each, shape (pieces,).
+        white: Standard deviation of a mean, in the unit of the root of `square`.
+    """
+    if len(square) == 0 or not square.max() < 2.0 * white**2:
+        return None
+    return -0.5 * float(means @ square) / white**2
 
 
 _ENOUGH_RUNS = 3  # docs/recordings.md: fewer are cut into spans
@@ -93,9 +84,6 @@ _SMOOTHING_S = 60.0  # a thermometer's noise is averaged, a turn of a chamber st
 _GUARD_S = 100.0  # docs/training.md, section 2: as long as the means that are judged
 _SMALLEST_TURN_C = 1.0  # a smaller swing of temperature is noise or control, not a branch
 _SMALLEST_TURN_SHARE = 0.05  # of the span: smaller turns are the control of a chamber
-_LEAST_SPAN_C = 2.0  # less temperature than this has no branches and no ends
-_TAIL_SHARE = 0.1  # of the range of temperature, at either end
-_FAST_SHARE = 0.8  # of the largest |dT/dt|
 _LEAST_REST = 8  # samples that must remain to train on
 
 
@@ -143,28 +131,19 @@ class Span:
         return f"{self.file} {self.from_s:g} ... {self.to_s:g} s ({self.kind})"
 
 
-class Rated(Samples, Protocol):
-    """Samples with the rate of temperature."""
-
-    @property
-    def slope_c_per_min(self) -> FloatArray: ...
-
-
 @dataclass(frozen=True, slots=True)
 class Fold:
-    """A stretch of thermal history that is left out.
+    """A piece of thermal history that is left out.
 
     Attributes:
         kind: What is left out.
-        run: The run that it belongs to, −1 where it is a range of temperatures or rates of all runs.
-        power_on: The power-on that it belongs to, −1 likewise.
+        run: The run that it belongs to.
         held: Indices of the samples that are left out, ascending.
         near: Of these and of the samples within the guard gap of them: none of them is trained on.
     """
 
-    kind: Literal["run", "power_on", "branch", "part", "hottest", "coldest", "fastest"]
+    kind: Literal["run", "branch", "part"]
     run: int
-    power_on: int
     held: NDArray[np.intp]
     near: NDArray[np.intp]
 
@@ -174,50 +153,25 @@ def edges_of(run: NDArray[np.int64]) -> NDArray[np.intp]:
     return np.concatenate([[0], np.flatnonzero(np.diff(run)) + 1, [len(run)]])
 
 
-def history_folds(samples: Rated, power_on: NDArray[np.int64]) -> tuple[Fold, ...]:
-    """Every stretch that can be left out while enough remains; in an order that does not hang on numbers of runs.
+def pieces(samples: Samples) -> tuple[Fold, ...]:
+    """Whole runs; of a single run its branches, of one that never turns five equal parts. No two of them overlap.
 
     Args:
         samples: In order of time within each run.
-        power_on: Number of the power-on of every sample, shape (n,).
     """
     edges = edges_of(samples.run)
-    alone = len(edges) == 2
     found: list[Fold] = []
-
-    def add(kind: Any, held: NDArray[np.intp], run: int = -1, of: int = -1) -> None:
-        near = _with_guard(samples.time_s, edges, held)
-        if len(held) and len(power_on) - len(near) >= _LEAST_REST:
-            found.append(Fold(kind, run, of, held, near))
-
     for begin, end in pairwise(edges.tolist()):
-        run, of = int(samples.run[begin]), int(power_on[begin])
-        time, t = samples.time_s[begin:end], samples.temperature_c[begin:end]
-        if not alone:
-            add("run", np.arange(begin, end), run, of)
-        for span in _branches(run, time, t, alone=alone):
-            add(span.kind, begin + np.flatnonzero(span.contains(samples.run[begin:end], time)), run, of)
-    power_ons, number = np.unique(power_on, return_inverse=True)
-    if 1 < len(power_ons) < len(edges) - 1:
-        together = np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
-        for one, held in zip(power_ons, together, strict=True):
-            add("power_on", held, of=int(one))
-    t, rate = samples.temperature_c, np.abs(samples.slope_c_per_min)
-    low, high = float(t.min()), float(t.max())
-    if high - low >= _LEAST_SPAN_C:
-        add("hottest", np.flatnonzero(t > high - _TAIL_SHARE * (high - low)))
-        add("coldest", np.flatnonzero(t < low + _TAIL_SHARE * (high - low)))
-    if rate.max() > 0.0:
-        add("fastest", np.flatnonzero(rate > _FAST_SHARE * float(rate.max())))
+        run, time = int(samples.run[begin]), samples.time_s[begin:end]
+        held: list[tuple[Any, NDArray[np.intp]]] = [("run", np.arange(begin, end))]
+        if len(edges) == 2:
+            spans = _cut(run, "", time, samples.temperature_c)
+            held = [(s.kind, np.flatnonzero(s.contains(samples.run, time))) for s in spans]
+        for kind, own in held:
+            near = _with_guard(samples.time_s, edges, own)
+            if len(own) and edges[-1] - len(near) >= _LEAST_REST:
+                found.append(Fold(kind, run, own, near))
     return tuple(found)
-
-
-def _branches(run: int, time_s: FloatArray, temperature_c: FloatArray, *, alone: bool) -> list[Span]:
-    """Branches of a run; of the only run parts of equal length where it has none."""
-    if np.ptp(temperature_c) < _LEAST_SPAN_C and not alone:
-        return []
-    spans = _cut(run, "", time_s, temperature_c)
-    return spans if alone or spans[0].kind == "branch" else []
 
 
 def _with_guard(time_s: FloatArray, edges: NDArray[np.intp], held: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -165,7 +165,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     say("training")
     choice = None
     if options.channels:
-        choice = chosen_channels(dataset, data, read.channels, power_ons(stretches), options.average_s)
+        choice = chosen_channels(dataset, data, read.channels, options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)

@@ -18,7 +18,7 @@ from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOpti
 from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
 from .prior import Prior
 from .result import Fit, Outcome, network, predict
-from .selection import chosen_by_ladder
+from .selection import chosen_by_ladder, fit_mixed
 from .simple import fit_simple
 from .uncertainty import coverage, uncertainty
 
@@ -104,7 +104,8 @@ def fit(
         findings += found.findings
     else:
         outcome = trained(
-            method, samples, scaling, seed=seed, centers=centers, rho=rho, size_rule=size_rule, average_s=average_s
+            method, samples, scaling, seed=seed, centers=centers, rho=rho, size_rule=size_rule, average_s=average_s,
+            power_on=power_on,
         )  # fmt: skip
         against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
         if against:
@@ -137,11 +138,13 @@ def trained(
     size_rule: str | None = None,
     average_s: float = DEFAULTS.average_s,
     ridge: float = RIDGE,
+    power_on: NDArray[np.int64] | None = None,
 ) -> Outcome:
     """What one method makes of cleaned samples, whatever they tell about temperature; arguments as those of `fit`.
 
     Args:
         ridge: For the methods by orthogonal least squares, as `fit_ols` takes it.
+        power_on: Of each run, for "mixed".
 
     Raises:
         InputError: A size rule that does not exist.
@@ -149,6 +152,8 @@ def trained(
     """
     if method in _POLYNOMIALS:
         return _POLYNOMIALS[method](data, scaling, average_s)
+    if method == "mixed":
+        return fit_mixed(data, scaling, power_on, average_s)
     if method in SIMPLE:
         return fit_simple(method, data, scaling, average_s)
     if method in _MAPS:

@@ -40,7 +40,7 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
 }
 """Corrections without a search: powers of (z_T, z_r) of each."""
 METHODS = ("mlr", "poly", "poly_slope", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
-NETWORK_METHODS = (*SIMPLE, "mrbf_t", "mlr", *METHODS[3:])
+NETWORK_METHODS = (*SIMPLE, "mixed", "mrbf_t", "mlr", *METHODS[3:])
 """Those whose map is networks alone, so that a table can hold it."""
 AUTO = "auto"
 """Model selection: the simplest correction that does on unseen history what the best one does."""

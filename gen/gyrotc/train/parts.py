@@ -6,8 +6,8 @@ weights are those of generalised least squares, β = (Uᵀ E U + Λ)⁻¹ Uᵀ E
 stretch that is left out; after that any set of parts costs a small linear system.
 
 Choice: forward, then the fewest parts that are not worse than the best number of them by more than one standard error
-of the paired difference over stretches, in score and in mean square, as rungs of the ladder are (`selection`); and with
-these the correction must be better than without any by a t test at 5 % over independent pieces of history.
+of the paired difference over pieces of history, in score and in mean square; and with these the correction must be
+better than without any by a t test over pieces, or, where only noise is left, by the likelihood of what was not seen.
 """
 
 from __future__ import annotations
@@ -19,11 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from .cross_validation import Fold, history_folds, more_than_its_error, of_pieces, surely_above_0
+from .cross_validation import (
+    LIKELIER,
+    Fold,
+    more_than_its_error,
+    pieces,
+    surely_above_0,
+    unseen_log_likelihood,
+)
 from .data import Scaling, TrainingData, average
 from .evidence import MEAN_S, Process, conditioned, fit_process
 from .noise import difference_sigma
-from .selection import pieces_of
 
 __all__ = ["Parts", "PartsTrial", "bent_parts", "chosen_parts"]
 
@@ -75,7 +81,6 @@ def chosen_parts(
     samples: TrainingData,
     scaling: Scaling,
     parts: Parts,
-    power_on: NDArray[np.int64] | None,
     average_s: float,
     most: int,
 ) -> PartsTrial:
@@ -85,14 +90,13 @@ def chosen_parts(
         samples: Samples as `cleaned` returns them.
         scaling: Scaling of them.
         parts: Candidates at these samples.
-        power_on: Number of the power-on of each run, by the run's index; None: each run is one.
         average_s: Averaging of what is judged, s.
         most: Largest number of parts.
 
     Raises:
         TrainingFailed: The process cannot be fitted.
     """
-    course = _Course.of(samples, scaling, parts, power_on, average_s)
+    course = _Course.of(samples, scaling, parts, average_s)
     return _settled(course, lambda folds: course.choose(folds, most))
 
 
@@ -102,7 +106,6 @@ def bent_parts(
     parts: Parts,
     plain: PartsTrial,
     richer: Mapping[str, Sequence[str]],
-    power_on: NDArray[np.int64] | None,
     average_s: float,
 ) -> PartsTrial:
     """Chosen parts, each with one more behind it where that is earned; else `plain`.
@@ -116,13 +119,12 @@ def bent_parts(
         parts: The chosen parts and all that may stand behind them, at these samples.
         plain: What was chosen.
         richer: For every chosen part those of which one may stand behind it, the simplest first.
-        power_on: As of `chosen_parts`.
         average_s: Averaging of what is judged, s.
 
     Raises:
         TrainingFailed: The process cannot be fitted.
     """
-    course = _Course.of(samples, scaling, parts, power_on, average_s)
+    course = _Course.of(samples, scaling, parts, average_s)
     trial = _settled(course, lambda folds: course.bent(folds, plain.chosen, richer), plain)
     return plain if trial.chosen == plain.chosen else replace(trial, gain_dph2=plain.gain_dph2)
 
@@ -165,7 +167,6 @@ class _Course:
     table: FloatArray  # bias and all columns as means, shape (m, 1 + k)
     where: Mapping[str, NDArray[np.int64]]  # columns of each part in `table`
     folds: Sequence[Fold]
-    pieces: NDArray[np.int64]
     average_s: float
     noise_dph: float
 
@@ -175,7 +176,6 @@ class _Course:
         samples: TrainingData,
         scaling: Scaling,
         parts: Parts,
-        power_on: NDArray[np.int64] | None,
         average_s: float,
     ) -> _Course:
         means = average(samples, MEAN_S)
@@ -184,15 +184,12 @@ class _Course:
             columns += [average(replace(samples, bias_dph=column), MEAN_S).bias_dph for column in values.T]
             where[name] = np.arange(at, len(columns))
             at = len(columns)
-        groups = means.run if power_on is None else power_on[means.run]
-        folds = history_folds(means, groups)
+        folds = pieces(means)
         judged = average(means, average_s)
         noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
         table = np.stack(columns, axis=1)
         names = tuple(parts.columns)
-        return cls(
-            samples, means, scaling, parts, names, table, where, folds, pieces_of(folds), average_s, noise
-        )
+        return cls(samples, means, scaling, parts, names, table, where, folds, average_s, noise)
 
     def added(self, weights: Mapping[str, FloatArray]) -> FloatArray:
         """What parts add to every sample, deg/h, shape (n,)."""
@@ -294,8 +291,8 @@ class _Course:
         return chosen
 
     def _earned(self, beside: FloatArray, without: FloatArray, tried: int) -> bool:
-        """Of one of as many that are tried; over pieces of history alone: of many, stretches make too many sure."""
-        gain = of_pieces(self._score(without) - self._score(beside), self.pieces)
+        """Of one of as many that are tried."""
+        gain = self._score(without) - self._score(beside)
         return self._clearly_worse(without, beside) and surely_above_0(gain, tried)
 
     def _open(self, taken: Sequence[str]) -> list[str]:
@@ -307,17 +304,19 @@ class _Course:
         return np.asarray(0.5 * np.log(square + self.noise_dph**2))
 
     def _clearly_worse(self, square: FloatArray, best: FloatArray) -> bool:
-        """By more than a standard error of the paired difference over stretches, in score and in mean square."""
+        """By more than a standard error of the paired difference over pieces, in score and in mean square."""
         return more_than_its_error(self._score(square) - self._score(best), square - best)
 
     def _surely_better(self, beside: FloatArray, without: FloatArray) -> bool:
-        """Over pieces of history, or over all stretches where pieces differ by noise alone."""
-        used = self.pieces >= 0
-        gain = self._score(without) - self._score(beside)
-        tests = [of_pieces(gain, self.pieces)]
-        if used.any() and (beside[used] < 2.0 * self.noise_dph**2).all():
-            tests.append(gain[used])
-        return any(surely_above_0(one) for one in tests)
+        """By a t test over pieces; where only noise is left, by the likelihood of what was not seen."""
+        count = np.array([float(self._averaged_count(fold)) for fold in self.folds])
+        likely = [unseen_log_likelihood(square, count, self.noise_dph) for square in (beside, without)]
+        if likely[0] is not None:
+            return likely[1] is None or likely[0] > likely[1] + LIKELIER
+        return surely_above_0(self._score(without) - self._score(beside))
+
+    def _averaged_count(self, fold: Fold) -> int:
+        return len(average(self.means.select(fold.held), self.average_s))
 
     def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, FloatArray]:
         """Weights of the chosen parts from all means."""

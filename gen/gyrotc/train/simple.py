@@ -17,10 +17,20 @@ from .noise import floor_dph
 from .options import SIMPLE
 from .result import Network, Outcome, network
 
-__all__ = ["all_solved", "design", "fit_simple", "powers_of", "solve", "triangle_of", "without_rate"]
+__all__ = [
+    "all_solved",
+    "design",
+    "fit_simple",
+    "outcome_of",
+    "powers_of",
+    "solve",
+    "triangle_of",
+    "without_rate",
+]
 
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
+_POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
 """How many of `powers_of` each has."""
 _DEPENDENT = 1e-8
@@ -96,28 +106,33 @@ def solve(columns: FloatArray, y: FloatArray, weight: FloatArray) -> FloatArray:
 
 def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
     """One of `SIMPLE` on cleaned samples, as a network."""
-    began = time.process_time()
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     center = float(np.average(data.bias_dph, weights=data.weight))
-    columns = design(name, t, r)
-    found = solve(columns, data.bias_dph - center, data.weight)
-    by_power = dict(zip(SIMPLE[name], found, strict=True))
-    w0 = center + by_power[0, 0]
-    linear = [by_power.get((1, 0), 0.0), by_power.get((0, 1), 0.0)]
-    centers, widths, weights = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
-    if (3, 0) in by_power:
-        residual = data.bias_dph - center - columns @ found
-        floor = floor_dph(data, residual, average_s)
-        extra, z, width, weights = _as_gaussians(by_power[2, 0], by_power[3, 0], _TOLERANCE * floor)
+    found = solve(design(name, t, r), data.bias_dph - center, data.weight)
+    weights = np.zeros(len(_POWERS))
+    weights[[_POWERS.index(power) for power in SIMPLE[name]]] = found
+    weights[0] += center
+    return outcome_of(weights, data, scaling, average_s)
+
+
+def outcome_of(weights: FloatArray, data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
+    """Weights of `powers_of`, deg/h, as a network."""
+    began = time.process_time()
+    w0, linear = float(weights[0]), [float(weights[1]), float(weights[4])]
+    centers, widths, of_gaussians = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
+    if weights[2] != 0.0 or weights[3] != 0.0:
+        t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
+        floor = floor_dph(data, data.bias_dph - powers_of(t, r) @ weights, average_s)
+        extra, z, width, of_gaussians = _as_gaussians(weights[2], weights[3], _TOLERANCE * floor)
         w0, linear[0] = w0 + extra[0], linear[0] + extra[1]
         centers = np.stack([scaling.center_c + scaling.half_range_c * z, np.zeros(len(z))], axis=1)
         widths = np.stack([np.full(len(z), width), np.full(len(z), FLAT)], axis=1)
     means = len(average(data, average_s))
     return Outcome(
-        networks=(network(w0, linear, centers, widths, weights),),
+        networks=(network(w0, linear, centers, widths, of_gaussians),),
         curves={
             "sizes": [],
-            "chosen": len(weights),
+            "chosen": len(of_gaussians),
             "samples": len(data),
             "means": means,
             "seconds": {"total": time.process_time() - began},

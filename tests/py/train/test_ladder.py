@@ -14,15 +14,16 @@ from conftest import ROOT
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Run
-from gyrotc.train.cross_validation import Fold, Span, history_folds, training_spans
+from gyrotc.train.cross_validation import Fold, Span, pieces, training_spans
 from gyrotc.train.data import TrainingData, average, cleaned, gather, scaling_of, weighted_mean
 from gyrotc.train.evidence import conditioned, fit_process
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guards import objection
 from gyrotc.train.methods import METHODS, NETWORK_METHODS, fit
+from gyrotc.train.mixed import fit_mixed_model
 from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
-from gyrotc.train.selection import RUNGS, Ladder, Remaining, RunSums
+from gyrotc.train.selection import RUNGS, Ladder, Rest
 from gyrotc.train.simple import all_solved, design, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -56,7 +57,6 @@ def test_a_gyro_that_repeats_gets_a_map_that_is_as_good_as_the_default_was(seed:
     ("name", "bias"),
     [
         ("constant", lambda t, r: 0.0 * t + 5.0),
-        ("linear", lambda t, r: 5.0 + 4e-5 * t),
         ("cubic", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 1e-8 * (t - 10.0) ** 3),
         ("cubic_slope", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 8e-4 * r),
     ],
@@ -84,65 +84,103 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
 def ladder(**rms: list[float]) -> Ladder:
     """What each rung leaves on four runs; others leave what a constant does. The noise is 1."""
     table = np.array([rms.get(name, rms["constant"]) for name in RUNGS]).T
-    whole = np.ones(4, dtype=bool)
-    folds = [Fold("run", k, k, whole, whole) for k in range(4)]
-    return Ladder(folds, table, 0.5 * np.log(table**2 + 1.0), 1.0, np.arange(4))
+    whole = np.arange(4)
+    folds = [Fold("run", k, whole, whole) for k in range(4)]
+    return Ladder(folds, table, 1.0, 1.0, np.full(4, 50.0))
 
 
-def test_what_is_within_a_standard_error_but_worse_than_a_cubic_is_not_taken() -> None:
-    """Four stretches that scatter have a standard error of a third: simpler is no reason to lose that."""
+def test_the_least_score_is_taken_the_network_only_where_pieces_agree() -> None:
     constant, cubic = [900.0, 1100.0, 1000.0, 950.0], [20.0, 90.0, 30.0, 60.0]
-    scattered = [45.0, 60.0, 80.0, 55.0]
-    assert ladder(constant=constant, linear=scattered, cubic=cubic).chosen() == "cubic"
-    assert ladder(constant=constant, linear=[10.0, 40.0, 15.0, 30.0], cubic=cubic).chosen() == "linear"
-    assert ladder(constant=constant, mrbf_t=[19.0, 91.0, 29.0, 60.0], cubic=cubic).chosen() == "cubic"
-    assert ladder(constant=constant, cubic=cubic, cubic_slope=[x * 0.995 for x in cubic]).chosen() == "cubic"
-    assert ladder(constant=constant, linear=[1.1, 0.95, 1.2, 0.9], cubic=[1.0] * 4).chosen() == "linear"
-    assert ladder(constant=[30.0, 40.0, 35.0, 20.0], cubic=[300.0, 5.0, 400.0, 9.0]).chosen() == "constant"
+    assert ladder(constant=constant, cubic=cubic).chosen() == "cubic"
+    assert (
+        ladder(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen() == "cubic_slope"
+    )
+    assert ladder(constant=constant, cubic=cubic, mixed=[0.9 * x for x in cubic]).chosen() == "mixed"
+    assert ladder(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
+    assert ladder(constant=constant, cubic=cubic, mrbf=[0.9 * x for x in cubic]).chosen() == "mrbf"
+    assert ladder(constant=constant, cubic=cubic, mrbf=[12.0, 91.0, 29.0, 60.0]).chosen() == "cubic"
 
 
-def test_what_gains_at_the_ends_of_temperature_alone_is_no_reason_to_ship() -> None:
-    """A wave of no use on whole runs was shipped for the hottest and the coldest tenth, which belong to all runs."""
-    plain = [1.07, 1.12, 1.96, 1.05, 1.07, 1.06, 1.63, 2.06]
-    only_ends = [1.082, 1.104, 1.964, 1.042, 1.072, 1.063, 1.42, 1.73]
-    everywhere = [0.9 * x for x in plain]
-
-    def of_runs_and_ends(rms: list[float]) -> Ladder:
-        whole = np.arange(4)
-        folds = [Fold("run", k, k, whole, whole) for k in range(6)]
-        folds += [Fold("hottest", -1, -1, whole, whole), Fold("coldest", -1, -1, whole, whole)]
-        table = np.array([rms if name.startswith("mrbf") else [40.0] * 8 for name in RUNGS]).T
-        return Ladder(folds, table, 0.5 * np.log(table**2 + 1.0), 1.0, np.array([*range(6), -1, -1]))
-
-    before = of_runs_and_ends(plain)
-    assert before.beaten_by("mrbf_t", of_runs_and_ends(everywhere), "mrbf")
-    assert not before.beaten_by("mrbf_t", of_runs_and_ends(only_ends), "mrbf")
-    assert not before.beaten_by("mrbf_t", before, "mrbf")
+def test_the_constant_stays_unless_it_is_beaten_by_a_tenth_or_surely() -> None:
+    constant = [300.0, 400.0, 350.0, 320.0]
+    assert ladder(constant=constant, cubic=[0.95 * x for x in constant]).chosen() == "cubic", "surely"
+    assert ladder(constant=constant, cubic=[250.0, 390.0, 360.0, 320.0]).chosen() == "constant"
+    undecided = ladder(constant=constant, cubic=[60.0, 900.0, 500.0, 340.0])
+    assert undecided.gain("cubic")[0] < 1.0 and undecided.chosen() == "constant"
+    assert ladder(constant=constant, cubic=[60.0, 200.0, 400.0, 340.0]).chosen() == "cubic"
 
 
-def test_no_fold_is_a_random_sample_and_every_one_keeps_its_distance() -> None:
+def test_where_only_noise_is_left_the_likelihood_on_unseen_means_decides() -> None:
+    """Two hundred means: what explains 3 % more of the squares is three units of likelihood, and hardly luck."""
+    constant, noise = [1.1, 1.0, 1.3, 1.0], [1.0] * 4
+    assert ladder(constant=constant, cubic=noise).chosen() == "cubic"
+    assert ladder(constant=noise, cubic=[0.999] * 4).chosen() == "constant"
+    assert ladder(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.1] * 4, mrbf=noise).chosen() == "mrbf"
+    assert ladder(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.001] * 4, mrbf=noise).chosen() == "cubic"
+
+
+def test_states_are_one_candidate_more() -> None:
+    constant = [900.0, 1100.0, 1000.0, 950.0]
+    plain = ladder(constant=constant, cubic=[x / 10.0 for x in constant])
+    better = ladder(constant=constant, mrbf=[x / 20.0 for x in constant])
+    alike = ladder(constant=constant, mrbf=[80.0, 112.0, 99.0, 96.0])
+    assert plain.with_richer("states", better).chosen() == "states"
+    assert plain.with_richer("states", alike).chosen() == "cubic"
+
+
+def test_a_mixed_model_is_the_most_probable_map_of_a_linear_mixed_model() -> None:
+    """Against plain matrices: columns with scatter between power-ons, an exponential drift, white noise."""
+    data = average(cleaned(samples(0)), 50.0)
+    scaling = scaling_of(data)
+    found = fit_mixed_model(data, scaling, data.run)
+    p = np.exp(2.0 * found.model.log_parameters[:9])
+    length = float(np.exp(found.model.log_parameters[9]))
+    x, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
+    r = r / found.rate
+    columns = np.stack([x**0, x, (3 * x**2 - 1) / 2, (5 * x**3 - 3 * x) / 4, r], axis=1)
+    same = np.equal.outer(data.run, data.run)
+    apart = np.abs(np.subtract.outer(data.time_s, data.time_s))
+    common = columns * [25.0, p[0], p[1], p[1], p[2]] @ columns.T
+    own = (columns * [p[3], p[4], p[5], p[5], p[6]] @ columns.T) * same
+    white = p[8] / (data.weight / np.median(data.weight))
+    total = common + own + p[7] * np.exp(-apart / length) * same + np.diag(white)
+    y = (data.bias_dph - found.center) / found.spread
+    weights = np.array([25.0, p[0], p[1], p[1], p[2]]) * (columns.T @ np.linalg.solve(total, y))
+    expected = found.center + found.spread * columns @ weights
+    powers = np.stack([x**0, x, x**2, x**3, r * found.rate], axis=1)
+    np.testing.assert_allclose(powers @ found.powers(), expected, atol=2e-5 * found.spread)
+
+
+def test_coefficients_that_scatter_between_power_ons_are_shrunk() -> None:
+    """Six power-ons with a slope of their own about none: least squares follows their mean, the mixed model less."""
     data = samples(0)
-    folds = history_folds(data, data.run)
-    kinds = [fold.kind for fold in folds]
-    assert {"run", "branch", "hottest", "coldest", "fastest"} == set(kinds)
-    assert kinds.count("run") == 3
-    for fold in folds:
-        assert set(fold.held) <= set(fold.near)
-        for run in range(3):
-            mine = np.flatnonzero(data.run == run)
-            held, free = (
-                data.time_s[np.intersect1d(mine, fold.held)],
-                data.time_s[np.setdiff1d(mine, fold.near)],
-            )
-            if len(held) and len(free):
-                assert np.abs(held[:, None] - free[None, :]).min() >= 100.0
+    parts = [replace(data, run=data.run + 3 * k) for k in range(2)]
+    data = TrainingData(
+        *(np.concatenate([getattr(p, n) for p in parts]) for n in TrainingData.__dataclass_fields__)
+    )
+    slope = np.array([3e-4, -4e-4, 1e-4, 2e-4, -1e-4, 3e-4])[data.run]
+    data = with_bias(data, 5.0 + slope * data.temperature_c)
+    fits = [fit(data, method=name) for name in ("cubic_slope", "mixed")]
+    spans = [np.ptp(predict(f, np.linspace(-30.0, 50.0, 9), 0.0)) for f in fits]
+    assert spans[1] < 0.9 * spans[0]
 
 
-def test_spans_of_one_recording_are_left_out_together_as_a_power_on() -> None:
+def test_pieces_are_whole_runs_and_do_not_overlap() -> None:
     data = samples(0)
-    data = replace(data, run=2 * data.run + (data.time_s > 7200.0))
-    kinds = [(fold.kind, fold.power_on) for fold in history_folds(data, data.run // 2)]
-    assert [of for kind, of in kinds if kind == "power_on"] == [0, 1, 2]
+    found = pieces(data)
+    assert [(fold.kind, fold.run) for fold in found] == [("run", 0), ("run", 1), ("run", 2)]
+    assert sorted(np.concatenate([fold.held for fold in found])) == list(range(len(data)))
+
+
+def test_of_a_single_run_branches_are_left_out_and_keep_their_distance() -> None:
+    one = samples(0).select(samples(0).run == 0)
+    data = replace(one, temperature_c=30.0 * np.sin(one.time_s / 1500.0))
+    found = pieces(data)
+    assert {fold.kind for fold in found} == {"branch"} and len(found) > 2
+    assert sorted(np.concatenate([fold.held for fold in found])) == list(range(len(data)))
+    for fold in found:
+        free = np.setdiff1d(np.arange(len(data)), fold.near)
+        assert np.abs(data.time_s[fold.held][:, None] - data.time_s[free][None, :]).min() >= 100.0
 
 
 @pytest.mark.parametrize("name", list(SIMPLE))
@@ -312,8 +350,8 @@ def test_one_factor_gives_all_simple_rungs_as_least_squares_does(still: bool) ->
 
 
 @pytest.mark.parametrize("still", [False, True])
-def test_sums_over_runs_give_what_a_fit_of_the_rest_gives(still: bool) -> None:
-    """Runs of very different weight, a run that alone has the hot half, and stretches that leave little behind.
+def test_what_remains_without_a_piece_is_what_a_fit_of_the_rest_gives(still: bool) -> None:
+    """Runs of very different weight, and stretches that leave little behind.
 
     1e-7 of the bias: products of the process' functions are known to 1e-16 of the largest, and what is solved for has
     a condition of up to 1e9 (variances from 1e-10 on beside noise); simple corrections agree to 1e-11.
@@ -327,23 +365,22 @@ def test_sums_over_runs_give_what_a_fit_of_the_rest_gives(still: bool) -> None:
     data = average(cleaned(replace(data, slope_c_per_min=slope, weight=weight)), 50.0)
     scaling = scaling_of(data)
     process = fit_process(data, scaling)
-    sums = RunSums(data, process.kept, scaling, process)
+    rest = Rest(data, process.kept, scaling, process, data.run)
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     most = np.flatnonzero(data.time_s > 300.0)  # some minutes remain of each run
-    stretches = [*(fold.near for fold in history_folds(data, data.run)), most]
-    for near in stretches:
-        rest, out = Remaining(sums, near), np.ones(len(data), dtype=bool)
+    for near in [*(fold.near for fold in pieces(data)), most]:
+        found = rest.corrections(near, t, r, RUNGS[1:])
+        out = np.ones(len(data), dtype=bool)
         out[near] = False
         left = data.select(out)
         center = weighted_mean(left.bias_dph, left.weight)
-        for name in SIMPLE:
+        for name in ("constant", "cubic", "cubic_slope"):
             columns = design(name, t, r)
             expected = center + columns @ solve(columns[out], left.bias_dph - center, left.weight)
-            np.testing.assert_allclose(rest.correction(name, t, r)[out], expected[out], rtol=1e-9, atol=1e-11)
+            np.testing.assert_allclose(found[name][out], expected[out], rtol=1e-9, atol=1e-11)
         known = out & process.kept
-        for name, factor in (("mrbf_t", 0.0), ("mrbf", 1.0)):
-            mean = conditioned(process, t[known], factor * r[known], data.bias_dph[known], data.weight[known])
-            np.testing.assert_allclose(rest.correction(name, t, r), mean(t, factor * r), rtol=1e-7)
+        mean = conditioned(process, t[known], r[known], data.bias_dph[known], data.weight[known])
+        np.testing.assert_allclose(found["mrbf"], mean(t, r), rtol=1e-7)
 
 
 @pytest.mark.parametrize("reach", [1.0, 30.0])

@@ -1,0 +1,211 @@
+"""What is emitted for measured gyros, judged on parts of their history that training has not seen.
+
+Every axis of every set in a folder, with each of its parts left out in turn: a run of several; of a single chamber
+cycle its branches, its hot and its cold end; of a single ramp its ends and its middle. The ratio is the RMS over means
+of 100 s on the part left out, over that of the best of a constant, a cubic, and a cubic with a slope in dT/dt: the best
+in hindsight, which no choice can know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.recordings.load import axes_of, load
+from gyrotc.recordings.records import Dataset
+from gyrotc.train.cross_validation import turning_points
+from gyrotc.train.data import TrainingData, average, joined, scaling_of
+from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
+from gyrotc.train.simple import design, solve
+from numpy.typing import NDArray
+
+__all__ = ["Judged", "Split", "counts", "judged", "samples", "splits"]
+
+TRIVIAL = ("constant", "cubic", "cubic_slope")
+AVERAGE_S = 100.0
+_GOOD, _FAIR = (
+    1.03,
+    1.10,
+)  # times the best trivial correction: what no worse means, and what little worse means
+_END = 0.25  # of a ramp, left out at either end; of the range of a cycle's temperature
+_MIDDLE = (0.4, 0.65)  # shares of the time of a ramp
+_HALVES = (0.33, 0.67)  # shares of the time of a recording at one temperature
+_STILL_C = 2.0  # spans less: nothing is said about temperature
+Say = Callable[[str], None]
+Span = tuple[float, float, bool]  # from, to, whether it is the exam
+
+
+@dataclass(frozen=True)
+class Split:
+    """A set with a part left out.
+
+    Attributes:
+        name: Of the set.
+        left_out: The part, in words.
+        folder: Its recordings with a `dataset.toml` in which that part is the exam.
+    """
+
+    name: str
+    left_out: str
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was emitted for an axis of a split, and what it leaves.
+
+    Attributes:
+        split: Which.
+        axis: Of its sensor.
+        method: What was emitted.
+        t: Of the gain over a constant, over pieces of history; 0 where there is none.
+        rms_dph: What it leaves on the part left out, deg/h.
+        trivial_dph: What the trivial corrections leave there, deg/h.
+    """
+
+    split: Split
+    axis: str
+    method: str
+    t: float
+    rms_dph: float
+    trivial_dph: dict[str, float]
+
+    @property
+    def ratio(self) -> float:
+        return self.rms_dph / min(self.trivial_dph.values())
+
+    @property
+    def of_constant(self) -> float:
+        return self.rms_dph / self.trivial_dph["constant"]
+
+
+def splits(sets: Path, work: Path) -> Iterator[Split]:
+    """Every set of a folder with each part left out.
+
+    Args:
+        sets: A folder with a folder of recordings for each set.
+        work: Where the split sets are written.
+    """
+    for source in sorted(path for path in sets.iterdir() if path.is_dir()):
+        files = sorted(source.glob("*.csv"))
+        if len(files) == 1:
+            parts = _spans(files[0])
+        else:
+            parts = {held.stem: [(file, -np.inf, np.inf, file == held) for file in files] for held in files}
+        for left_out, runs in parts.items():
+            folder = work / f"{source.name}-{left_out.replace(' ', '-')}"
+            yield Split(source.name, left_out, _described(folder, source.name, runs))
+
+
+def _spans(file: Path) -> dict[str, list[tuple[Path, float, float, bool]]]:
+    """The only recording of a set cut into spans, once for each part that is left out."""
+    rows = np.genfromtxt(file, delimiter=",", names=True)
+    time, t = rows["time_s"], rows["temperature_c"]
+    step = float(np.median(np.diff(time)))
+    start, end = float(time[0]), float(time[-1]) + step
+    turns = turning_points(time, t)
+
+    def cut(*edges: float, held: int) -> list[tuple[Path, float, float, bool]]:
+        return [(file, a, b, k == held) for k, (a, b) in enumerate(pairwise(edges)) if b > a]
+
+    def share(x: float) -> float:
+        return start + x * (end - start)
+
+    if np.ptp(t) < _STILL_C:
+        return {
+            "the end": cut(start, share(_HALVES[1]), end, held=1),
+            "the start": cut(start, share(_HALVES[0]), end, held=0),
+        }
+    if not turns:
+        return {
+            "the first quarter": cut(start, share(_END), end, held=0),
+            "the last quarter": cut(start, share(1.0 - _END), end, held=1),
+            "the middle": cut(start, share(_MIDDLE[0]), share(_MIDDLE[1]), end, held=1),
+        }
+    edges = [start, *turns, end]
+    found = {f"branch {k + 1}": cut(*edges, held=k) for k in range(len(edges) - 1)}
+    low, high = np.quantile(t, [0.0, 1.0])
+    inside = (time > turns[0] - 0.5 * (turns[0] - start)) & (time < turns[-1] + 0.5 * (end - turns[-1]))
+    for name, there in (
+        ("the hot end", t > high - _END * (high - low)),
+        ("the cold end", t < low + _END * (high - low)),
+    ):
+        own = time[there & inside]
+        if len(own):
+            found[name] = cut(start, float(own[0]), float(own[-1]), end, held=1)
+    return found
+
+
+def _described(folder: Path, serial: str, runs: Sequence[tuple[Path, float, float, bool]]) -> Path:
+    """A data set of copies of files, and what of them is the exam."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = [f'schema = 1\nserial = "{serial}"\n']
+    for file, low, high, held in runs:
+        (folder / file.name).write_bytes(file.read_bytes())
+        lines = [f'[[run]]\nfile = "{file.name}"\npower_on_s = "unknown"']
+        lines += [f"{name} = {x!r}" for name, x in (("from_s", low), ("to_s", high)) if np.isfinite(x)]
+        text.append("\n".join([*lines, f'role = "{"exam" if held else "train"}"\n']))
+    (folder / "dataset.toml").write_text("\n".join(text), "utf-8")
+    return folder
+
+
+def judged(split: Split) -> Iterator[Judged]:
+    """Every axis of a split, as `gyrotc fit` fits it."""
+    for axis in axes_of(split.folder):
+        dataset = load(split.folder, axis=axis)
+        train, exam = samples(dataset)
+        fitted = fit_dataset(dataset, FitOptions(average_s=AVERAGE_S))
+        trivial = {}
+        for name in TRIVIAL:
+            trivial[name] = _rms(exam, of_trivial(train, name, exam))
+        t = next((row.t or 0.0 for row in fitted.training.ladder if row.chosen), 0.0)
+        model = fitted.model
+        left = _rms(exam, model.map_dph(exam.temperature_c, exam.slope_c_per_min))
+        yield Judged(split, axis, model.method, t, left, trivial)
+
+
+def of_trivial(train: TrainingData, name: str, exam: TrainingData) -> NDArray[np.float64]:
+    """A trivial correction fitted to training samples, at those of the exam, held at the ends of what it saw, deg/h."""
+    scaling = scaling_of(train)
+    z = scaling.normalise(train.temperature_c, train.slope_c_per_min)
+    weights = solve(design(name, *z), train.bias_dph, train.weight)
+    t = np.clip(exam.temperature_c, *scaling.temperature_c)
+    r = np.clip(exam.slope_c_per_min, *scaling.slope_c_per_min)
+    return np.asarray(design(name, *scaling.normalise(t, r)) @ weights)
+
+
+def samples(dataset: Dataset) -> tuple[TrainingData, TrainingData]:
+    """Training samples and those of the exam, as the front end makes them."""
+    runs = [run for run in dataset.runs if run.role == "train"]
+    front = front_end(runs, FitOptions().block_s)
+    parts: dict[str, list[TrainingData]] = {"train": [], "exam": []}
+    for k, run in enumerate(dataset.runs):
+        parts[run.role].append(samples_of(front.blocks(run), front.block_s, k))
+    return joined(parts["train"]), joined(parts["exam"])
+
+
+def _rms(exam: TrainingData, correction: NDArray[np.float64]) -> float:
+    left = average(replace(exam, bias_dph=exam.bias_dph - correction), AVERAGE_S)
+    return float(np.sqrt(np.average(left.bias_dph**2, weights=left.weight)))
+
+
+def counts(rows: Sequence[Judged]) -> dict[str, Any]:
+    """How often what is emitted is about as good as the best trivial correction, and how often it harms."""
+    ratio = np.array([row.ratio for row in rows])
+    of_constant = np.array([row.of_constant for row in rows])
+    constant = np.array([row.method == "constant" for row in rows])
+    good = ratio <= _GOOD
+    return {
+        "splits": len(rows),
+        "good": int(good.sum()),
+        "constant": int((~good & constant).sum()),
+        "neither": int((~good & ~constant).sum()),
+        "bad_through_richer": int(((ratio > _FAIR) & ~constant).sum()),
+        "worse_than_constant": int((of_constant > _GOOD).sum()),
+        "worst_through_richer": float(ratio[~constant].max(initial=1.0)),
+        "geometric_mean": float(np.exp(np.log(ratio).mean())),
+    }
