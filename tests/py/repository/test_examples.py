@@ -54,6 +54,28 @@ def test_every_example_is_on_the_page() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["filter", "many_serials", "minimal", "rtos", "triad", "two_slots"])
+def test_the_commands_of_a_page_run_and_leave_nothing_to_be_tracked(
+    name: str, gyros: dict[str, Path], tmp_path: Path
+) -> None:
+    """What stands in blocks, else `make`; what they write is ignored by git."""
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    for part in ("examples", "include", "libc"):
+        shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("build", "__pycache__"))
+    shutil.copy(ROOT / ".gitignore", tmp_path)
+    _run("git", "init", "-q", cwd=tmp_path)
+    _run("git", "add", "-A", cwd=tmp_path)
+    page = (EXAMPLES / name / "README.md").read_text("utf-8")
+    blocks = re.findall(r"```\n(.*?)```", page, re.DOTALL) or [
+        f"make GYROTC={Path(sys.executable).with_name('gyrotc')}"
+    ]
+    words = "\n".join(blocks).replace("FLEET", str(gyros["RLG-0001"])).replace("RLG-0042", "RLG-0001")
+    _run("bash", "-ec", words.replace("python3", sys.executable), cwd=tmp_path / "examples" / name)
+    assert _run("git", "ls-files", "--others", "--exclude-standard", cwd=tmp_path) == ""
+
+
+@pytest.mark.slow
 def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
     folder = tmp_path / "examples" / "triad"
     shutil.copytree(EXAMPLES / "triad", folder)
@@ -133,14 +155,6 @@ def test_interrupt_and_task_with_freertos(tmp_path: Path) -> None:
         pytest.skip("FREERTOS names no folder of the FreeRTOS kernel")
     reported = _run("make", "-s", f"FREERTOS={kernel}", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
     assert "320 increments, 5 readings" in reported
-
-
-@pytest.mark.slow
-def test_two_slots_as_its_page_says(tmp_path: Path) -> None:
-    folder = EXAMPLES / "two_slots"
-    sources = [folder / "main.c", folder / "slots.c", EXAMPLES / "minimal" / "gtc_rlg_0042.c", *RUNTIME]
-    _run("gcc", *FLAGS, f"-I{EXAMPLES / 'minimal'}", *sources, "-o", tmp_path / "two_slots")
-    _run(tmp_path / "two_slots")
 
 
 def test_a_filter_in_cpp_integrates_the_corrected_rate(tmp_path: Path) -> None:
