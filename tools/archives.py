@@ -30,11 +30,18 @@ ROOT = version.ROOT
 #: Manual pages that go into the package: those that a user needs without the sources; besides, those of reference.py.
 PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "results.md")
 LIBRARIES = (
-    # Compiled into the core: name, licence, where it comes from.
-    ("Eigen", "MPL-2.0", "pkg:generic/eigen"),
-    ("NLopt", "MIT AND LGPL-2.1-or-later", "pkg:generic/nlopt"),
-    ("nanobind", "BSD-3-Clause", "pkg:pypi/nanobind"),
-    ("robin-map", "MIT", "pkg:generic/robin-map"),
+    # In the wheel: name, licence, where it comes from, how it is there.
+    ("Eigen", "MPL-2.0", "pkg:generic/eigen", "compiled into the core"),
+    (
+        "NLopt",
+        "MIT AND LGPL-2.1-or-later AND BSD-3-Clause",
+        "pkg:generic/nlopt",
+        "a shared library of its own, linked whole with all its algorithms: luksan (LGPL-2.1-or-later), slsqp "
+        "(BSD-3-Clause), and auglag, bobyqa, cdirect, cobyla, crs, direct, esch, isres, mlsl, mma, neldermead, newuoa, "
+        "praxis, and where it was built as C++ ags and stogo (MIT); the core calls L-BFGS of luksan alone (NLOPT_LD_LBFGS)",
+    ),
+    ("nanobind", "BSD-3-Clause", "pkg:pypi/nanobind", "compiled into the core"),
+    ("robin-map", "MIT", "pkg:generic/robin-map", "compiled into the core, a part of nanobind"),
 )
 _IGNORED = shutil.ignore_patterns("__pycache__", "*.so", "build", "*.egg-info", ".mypy_cache", ".ruff_cache")
 
@@ -196,7 +203,7 @@ def _component(name: str, number: str, licence: str, purl: str) -> dict[str, Any
 def sboms(out: Path) -> list[Path]:
     """Bills of materials: of the generator as installed here, and of the C that it emits, which needs nothing."""
     python = [_component(n, v, licence, f"pkg:pypi/{n}@{v}") for n, v, licence in sorted(requirements())]
-    core = [_component(name, "", licence, purl) for name, licence, purl in LIBRARIES]
+    core = [_component(n, "", licence, purl) | {"description": how} for n, licence, purl, how in LIBRARIES]
     files = [
         {
             "type": "file",

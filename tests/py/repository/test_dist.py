@@ -6,6 +6,7 @@ import gzip
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -99,6 +100,17 @@ def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
         assert all(component["licenses"] for component in bom["components"])
     names = {component["name"] for component in generator["components"]}
     assert {"numpy", "scipy", "pyarrow", "pydantic", "NLopt", "Eigen", "nanobind"} <= names
+    (nlopt,) = (c for c in generator["components"] if c["name"] == "NLopt")
+    called = {
+        a
+        for p in (ROOT / "gen" / "core").glob("*.cpp")
+        for a in re.findall(r"NLOPT_[LG][ND]_\w+", p.read_text())
+    }
+    assert called and all(algorithm in nlopt["description"] for algorithm in called)
+    assert len(re.findall(r"NLOPT_\w+", nlopt["description"])) == len(called), "what is called, and no more"
+    texts = (ROOT / "gen" / "licenses" / "NLopt.txt").read_text("utf-8")
+    for term in ("License: MIT", "License: LGPL-2.1+", "License: BSD-3-clause", "Dieter Kraft"):
+        assert term in texts, term
     assert "pytest" not in names, "a tool of developers is no part of the product"
     for component in c["components"]:
         content = (ROOT / component["name"]).read_bytes()
