@@ -1,13 +1,15 @@
 """Every way to install or use gyrotc that this machine allows, tried: `make packages`.
 
-Makes the archives, installs the generator by each way of pip, builds a program with each package of the C library (the
-tests of tests/py/repository/test_packages.py), and weighs what an installation and each extra bring. Prints both
-tables; `--docs docs` keeps the figures in docs/results/summary.json. What the machine lacks is named, not passed.
+Makes the archives, installs the generator by each way of pip and emits C with it (of the wheel a whole build with its
+report), builds a program with each package of the C library (tests of tests/py/repository), and weighs what an
+installation and each extra bring. Prints the tables; `--docs docs` keeps the figures in docs/results/summary.json, and
+`--tree DIR` tries the generator of another tree and keeps them as those of before. What the machine lacks is named.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -18,56 +20,95 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import archives
+import version
 
 import packages
 
-ROOT = archives.ROOT
+ROOT = version.ROOT
 sys.path[:0] = [str(ROOT / "tests" / "py")]
 
 MODEL = ROOT / "examples" / "minimal" / "model.json"
 #: Extras that a user asks for; the others are for developers.
 EXTRAS = ("sign", "sklearn", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros", "mdf")
+#: Tests that use a package as its page says: the way, and its command.
+USES = {
+    "test_cmake_finds_it[lib]": ("CMake, installed", "cmake --install; find_package(gyrotc)"),
+    "test_cmake_finds_it[lib/x86_64-linux-gnu]": ("CMake, lib of Debian", "the same with lib/<triplet>"),
+    "test_a_project_takes_the_sources_in": ("CMake, sources", "FetchContent"),
+    "test_pkg_config_finds_it[lib]": ("pkg-config", "pkg-config --cflags --libs gyrotc"),
+    "test_pkg_config_finds_it[lib/x86_64-linux-gnu]": (
+        "pkg-config, lib of Debian",
+        "the same with lib/<triplet>",
+    ),
+    "test_meson_builds_a_user_of_the_wrap": ("Meson", "dependency('gyrotc') of the wrap"),
+    "test_zephyr_finds_the_module_and_its_options": ("Zephyr, test functions", "CONFIG_GYROTC=y"),
+    "test_esp_idf_takes_the_component": ("ESP-IDF, test functions", "the archive in components"),
+    "test_espressifs_tool_packs_all_sources": ("ESP-IDF, its packer", "compote component pack"),
+    "test_platformio_compiles_what_its_manifest_says": ("PlatformIO, its manifest", "lib_deps"),
+    "test_rust_gives_the_bits_of_c": ("Rust", "cargo test; cargo run"),
+    "test_ada_gives_the_bits_of_c_with_every_contract_checked": ("Ada, files", "gnatmake -gnata"),
+    "test_gprbuild_builds_a_user_of_the_project": ("Ada, project", "gprbuild, with gyrotc.gpr"),
+    "test_a_filter_in_cpp_integrates_the_corrected_rate": ("C++", "#include <gtc.hpp>"),
+    "test_the_commands_of_a_page_run_and_leave_nothing_to_be_tracked[minimal]": (
+        "C, files",
+        "cc main.c gtc_*.c",
+    ),
+    "test_interrupt_and_task_on_the_host": ("POSIX task and interrupt", "make of examples, rtos"),
+    "test_interrupt_and_task_with_freertos": ("FreeRTOS", "make FREERTOS=<kernel>"),
+    "test_the_notebook_draws_a_map": ("notebook", "jupyter lab map.ipynb"),
+}
 
 
-def generator(work: Path, wheel: Path, sdist: Path) -> Iterator[dict[str, Any]]:
+def generator(tree: Path, work: Path, wheel: Path, sdist: Path) -> Iterator[dict[str, Any]]:
     """Installs gyrotc by each way into an environment of its own, and emits C with it."""
-    git = f"git+file://{ROOT}#subdirectory=gen"
+    git = f"git+file://{tree}#subdirectory=gen"
     ways = [
-        ("pip, from the source folder", ["{bin}/pip", "install", "-q", str(ROOT / "gen")]),
-        ("pip, from git", ["{bin}/pip", "install", "-q", git]),
+        ("pip, source folder", ["{bin}/pip", "install", "-q", str(tree / "gen")]),
+        ("pip, git", ["{bin}/pip", "install", "-q", git]),
         ("pip, sdist", ["{bin}/pip", "install", "-q", str(sdist)]),
         ("pip, wheel", ["{bin}/pip", "install", "-q", str(wheel)]),
         (
-            "uv, from the source folder",
-            ["uv", "pip", "install", "-q", "--python", "{bin}/python", str(ROOT / "gen")],
+            "uv, source folder",
+            ["uv", "pip", "install", "-q", "--python", "{bin}/python", str(tree / "gen")],
         ),
     ]
     for number, (name, words) in enumerate(ways):
-        shown = " ".join(words).replace("{bin}/", "").replace(str(ROOT), ".")
+        shown = " ".join(words).replace("{bin}/", "").replace(str(tree), ".")
+        shown = shown.replace(str(wheel), wheel.name).replace(str(sdist), sdist.name)
         if words[0] == "uv" and shutil.which("uv") is None:
             yield {"way": name, "command": shown, "seconds": 0.0, "result": "not tried: uv is not installed"}
             continue
         folder = work / f"way-{number}"
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
         begun = time.monotonic()
-        done = _ran([w.replace("{bin}", str(folder / "bin")) for w in words], work)
-        if not done:
-            done = _ran(
-                [str(folder / "bin" / "gyrotc"), "emit", str(MODEL), "--out", str(folder / "out")], work
-            )
-        yield {
-            "way": name,
-            "command": shown,
-            "seconds": time.monotonic() - begun,
-            "result": done or "emits C",
-        }
+        wrong = _ran([w.replace("{bin}", str(folder / "bin")) for w in words], work)
+        seconds = time.monotonic() - begun
+        whole = name == "pip, wheel"
+        if not wrong:
+            wrong = _builds(folder) if whole else _emits(folder)
+        result = wrong or ("builds, with its report" if whole else "emits C")
+        yield {"way": name, "command": shown, "seconds": seconds, "result": result}
         shutil.rmtree(folder)
+
+
+def _emits(folder: Path) -> str:
+    return _ran([str(folder / "bin" / "gyrotc"), "emit", str(MODEL), "--out", str(folder / "out")], folder)
+
+
+def _builds(folder: Path) -> str:
+    """The main job, from simulated recordings to verified C and a page with pictures."""
+    gyrotc = str(folder / "bin" / "gyrotc")
+    wrong = _ran([gyrotc, "simulate", "paper", "--seed", "1", "--out", "data"], folder)
+    wrong = wrong or _ran([gyrotc, "build", "data", "--out", "result"], folder)
+    if not wrong and "<svg" not in (folder / "result" / "report.html").read_text("utf-8"):
+        return "failed: the report has no picture"
+    return wrong
 
 
 def _ran(command: list[str], work: Path) -> str:
     """Nothing, or the last line of what went wrong."""
-    done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False)
+    clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False, env=clean)
     return "" if done.returncode == 0 else f"failed: {(done.stderr.strip() or 'no message').splitlines()[-1]}"
 
 
@@ -78,13 +119,15 @@ def library(work: Path) -> Iterator[dict[str, Any]]:
     command = [sys.executable, "-m", "pytest", "-q", f"--junitxml={report}", *tests]
     subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
     for case in ElementTree.parse(report).iter("testcase"):
-        skipped, failed = case.find("skipped"), case.find("failure")
-        result = "same bits" if skipped is None and failed is None else "failed"
+        test = str(case.get("name"))
+        skipped, sound = case.find("skipped"), case.find("failure") is None and case.find("error") is None
+        if sound and test not in USES:
+            continue  # a check of files and no way to use them
+        way, words = USES.get(test, (test, f"pytest -k {test}"))
+        result = "same bits" if sound else "failed"
         if skipped is not None:
             result = f"not tried: {str(skipped.get('message')).removeprefix('Skipped: ')}"
-        name = str(case.get("name")).removeprefix("test_").replace("_", " ")
-        seconds = float(case.get("time", "0"))
-        yield {"way": name, "command": f"pytest -k {case.get('name')}", "seconds": seconds, "result": result}
+        yield {"way": way, "command": words, "seconds": float(case.get("time", "0")), "result": result}
 
 
 def weights(work: Path, wheel: Path) -> Iterator[dict[str, Any]]:
@@ -93,9 +136,9 @@ def weights(work: Path, wheel: Path) -> Iterator[dict[str, Any]]:
     for extra in ("", *EXTRAS):
         folder = work / f"weight-{extra}"
         what = f"{wheel}[{extra}]" if extra else str(wheel)
-        reported = _ran([sys.executable, "-m", "pip", "install", "-q", "--target", str(folder), what], work)
-        if reported:
-            yield {"extra": extra or "plain", "mb": 0.0, "packages": 0, "result": reported}
+        wrong = _ran([sys.executable, "-m", "pip", "install", "-q", "--target", str(folder), what], work)
+        if wrong:
+            yield {"extra": extra or "plain", "mb": 0.0, "packages": 0, "result": wrong}
             continue
         have = {path.name: path for path in folder.glob("*.dist-info")}
         new = {name: path for name, path in have.items() if name not in plain}
@@ -116,12 +159,26 @@ def _size(info: Path) -> int:
 
 
 def section(result: dict[str, Any]) -> str:
-    """Both tables."""
+    """All tables."""
     from results import table
 
-    ways = [[w["way"], f"`{w['command']}`", f"{w['seconds']:.1f}", w["result"]] for w in result["ways"]]
-    sizes = [[e["extra"], f"{e['mb']:.0f}", e["packages"]] for e in result["installs"]]
-    return f"{table(('way', 'command', 's ', 'result'), ways)}\n{table(('installation', 'MB ', 'packages '), sizes)}"
+    text = ""
+    for title, found in (("now", result), ("before", result.get("before"))):
+        if found:
+            ways = [
+                [w["way"], f"`{w['command']}`", f"{w['seconds']:.1f}", w["result"]] for w in found["ways"]
+            ]
+            sizes = [[e["extra"], f"{e['mb']:.0f}", e["packages"]] for e in found["installs"]]
+            text += f"{title}\n\n{table(('way', 'command', 's ', 'result'), ways)}\n"
+            text += f"{table(('installation', 'MB ', 'packages '), sizes)}\n"
+    return text
+
+
+def _archives(tree: Path, out: Path) -> tuple[Path, Path]:
+    """The wheel and the sdist that a tree makes."""
+    subprocess.run([sys.executable, tree / "tools" / "archives.py", out], check=True, capture_output=True)
+    (wheel,), (sdist,) = out.glob("gyrotc-*.whl"), out.glob("gyrotc-*.tar.gz")
+    return wheel.resolve(), sdist.resolve()
 
 
 def main() -> int:
@@ -129,19 +186,27 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="tools/ways.py", description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--docs", type=Path)
+    parser.add_argument("--tree", type=Path)
     arguments = parser.parse_args()
-    packages.assemble(arguments.out, list(packages.KINDS))
-    sdist = archives.sdist(arguments.out)
-    wheel = archives.wheel(sdist, arguments.out)
+    tree = (arguments.tree or ROOT).resolve()
+    if arguments.tree is None:
+        packages.assemble(arguments.out, list(packages.KINDS))
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
-        ways = [*generator(work, wheel.resolve(), sdist.resolve()), *library(work)]
-        result = {"ways": ways, "installs": [*weights(work, wheel.resolve())]}
-    print(section(result))
+        wheel, sdist = _archives(tree, work / "archives")
+        ways = list(generator(tree, work, wheel, sdist))
+        ways += [] if arguments.tree else library(work)
+        result: dict[str, Any] = {"ways": ways, "installs": [*weights(work, wheel)]}
+        if arguments.tree is None:
+            for archive in (wheel, sdist):
+                shutil.copy(archive, arguments.out)
     if arguments.docs is not None:
-        from results import write
+        from results import recorded, write
 
-        write(arguments.docs.resolve(), "packages", result, section)
+        earlier = recorded(arguments.docs, "packages") or {}
+        kept = earlier | {"before": result} if arguments.tree else result | {"before": earlier.get("before")}
+        write(arguments.docs.resolve(), "packages", kept, section)
+    print(section(result))
     return int(any(w["result"].startswith("failed") for w in [*ways, *result["installs"]]))
 
 
