@@ -37,8 +37,11 @@ def _copy(out: Path, *paths: Path) -> None:
 
 def esp_idf(out: Path) -> None:
     """A component that needs nothing beside it."""
-    _copy(out, PACKAGES / "esp-idf" / "CMakeLists.txt", PACKAGES / "Kconfig")
-    shutil.copy(PACKAGES / "esp-idf" / "idf_component.yml.in", out / "idf_component.yml")
+    _copy(out, PACKAGES / "Kconfig")
+    for template in (PACKAGES / "esp-idf").glob(
+        "*.in"
+    ):  # so named that no tool takes their folder for a component
+        shutil.copy(template, out / template.stem)
     _copy(out, ROOT / "LICENSE", ROOT / "CHANGELOG.md", ROOT / "libc" / "README.md")
     _runtime(out)
 

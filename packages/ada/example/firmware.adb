@@ -37,8 +37,9 @@ procedure Firmware is
 
    Float_State : Gtc.F32.State;
    Fixed_State : Gtc.Q31.State;
-   Float_Bias  : Gtc.F32.Number;
-   Fixed_Bias  : Gtc.Q31.Number;
+   Snapshot    : Gtc.F32.Snapshot;
+   Float_Bias  : Interfaces.C.C_float;
+   Fixed_Bias  : Interfaces.Integer_32;
    Saved       : Gtc.Saved_State;
    Status      : Gtc.Status;
    Remarks     : Gtc.Status;
@@ -76,4 +77,6 @@ begin
          & Image (Bits (Fixed_Bias)) & " "
          & Ada.Strings.Fixed.Trim (Remarks'Image, Ada.Strings.Left));
    end loop;
+   Gtc.F32.Take (Float_State, Snapshot, Status);
+   Demand (Status = Gtc.E_Absent or else Snapshot.Sigma > 0.0);
 end Firmware;

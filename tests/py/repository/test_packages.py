@@ -272,6 +272,28 @@ def test_esp_idf_takes_the_component(tmp_path: Path, ramp: str, archives: Path) 
     assert _run(_image(component, tmp_path / "image", **chosen)) == ramp
 
 
+def test_only_the_archive_is_a_component_and_it_is_whole(tmp_path: Path) -> None:
+    """Packed by Espressif's tool, the folder of the templates would give an archive without sources."""
+    names = {p.name for p in (PACKAGES / "esp-idf").iterdir()}
+    assert not names & {"CMakeLists.txt", "idf_component.yml"}
+    packages.assemble(tmp_path, ["esp-idf"])
+    component = tmp_path / "esp-idf" / "gyrotc"
+    sources = re.findall(r"libc/\w+\.c", (component / "CMakeLists.txt").read_text())
+    assert len(sources) == 3 and all((component / source).is_file() for source in sources)
+    assert (component / "idf_component.yml").is_file() and (component / "include" / "gtc.h").is_file()
+
+
+@pytest.mark.slow
+def test_espressifs_tool_packs_all_sources(tmp_path: Path) -> None:
+    compote = _need("compote")
+    packages.assemble(tmp_path, ["esp-idf"])
+    _run(compote, "component", "pack", "--name", "gyrotc", cwd=tmp_path / "esp-idf" / "gyrotc")
+    (archive,) = (tmp_path / "esp-idf" / "gyrotc" / "dist").glob("*.tgz")
+    listed = _run("tar", "-tzf", archive)
+    for path in (*(ROOT / "libc").iterdir(), *(ROOT / "include").iterdir()):
+        assert f"{path.parent.name}/{path.name}\n" in listed, path.name
+
+
 @pytest.mark.slow
 def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
     text = (ROOT / "include" / "gtc_config.h").read_text()
@@ -338,15 +360,21 @@ def test_bindings_reserve_the_words_of_a_state(tmp_path: Path) -> None:
     (tmp_path / "size.c").write_text(
         '#include <stddef.h>\n#include <stdio.h>\n#include "gtc.h"\n'
         "int main(void)\n{\n"
-        '    printf("%d", (int)((offsetof(gtc_f32_state_t, window) - sizeof(void *)) / 4));\n    return 0;\n}\n'
+        '    printf("%d %d %d", (int)((offsetof(gtc_f32_state_t, window) - sizeof(void *)) / 4),\n'
+        "           (int)sizeof(gtc_f32_state_t), (int)sizeof(gtc_q31_state_t));\n    return 0;\n}\n"
     )
     _run("gcc", "-std=c99", f"-I{ROOT / 'include'}", "size.c", "-o", "size", cwd=tmp_path)
-    first = int(_run(str(tmp_path / "size"), cwd=tmp_path))
+    first, *sizes = map(int, _run(str(tmp_path / "size"), cwd=tmp_path).split())
     rust = (PACKAGES / "rust" / "src" / "lib.rs").read_text()
     assert re.findall(r"state words (\d+),", rust) == [str(first + 20 + 2 * 4)] * 2
-    for numeric in ("f32", "q31"):
-        ada = (PACKAGES / "ada" / f"gtc-{numeric}.ads").read_text()
-        assert re.findall(r"\(1 \.\. (\d+) \+ Max_Slope_Blocks \+ 2 \* Max_Terms\)", ada) == [str(first)]
+    ada = (PACKAGES / "ada" / "gtc-binding.ads").read_text()
+    assert re.findall(r"\(1 \.\. (\d+) \+ Max_Slope_Blocks \+ 2 \* Max_Terms\)", ada) == [str(first)]
+    assert "(1 .. 1 + (Max_Terms + 1) * Input_Words)" in ada
+    for numeric, size in zip(("f32", "q31"), sizes, strict=True):
+        words = re.search(r"Input_Words => (\d+)", (PACKAGES / "ada" / f"gtc-{numeric}.ads").read_text())
+        assert words is not None
+        room = 8 + 4 * (first + 20 + 2 * 4 + 1 + (4 + 1) * int(words[1]))
+        assert size <= room < size + 16
 
 
 @pytest.mark.slow
@@ -373,6 +401,39 @@ def test_ada_gives_the_bits_of_c_with_every_contract_checked(ramp: str, tmp_path
         objects.append(f"{source.stem}.o")
         _run("gcc", *FLAGS, "-c", source, "-o", objects[-1], cwd=tmp_path)
     _run(gnatmake, "-q", "-gnat2012", "-gnata", "-gnatwae", "firmware.adb", "-largs", *objects, cwd=tmp_path)
+    assert _run(tmp_path / "firmware") == ramp
+
+
+#: A project that takes the binding in as its page says.
+GPR = """
+with "{binding}";
+project Firmware is
+   for Languages use ("Ada", "C");
+   for Source_Dirs use ("{example}", "{minimal}");
+   for Source_Files use ("firmware.adb", "gtc_rlg_0042.c");
+   for Object_Dir use "objects";
+   for Exec_Dir use ".";
+   for Create_Missing_Dirs use "True";
+   for Main use ("firmware.adb");
+   package Compiler is
+      for Switches ("Ada") use ("-gnat2012", "-gnata", "-gnatwae");
+      for Switches ("C") use ("-I{include}");
+   end Compiler;
+end Firmware;
+"""
+
+
+@pytest.mark.slow
+def test_gprbuild_builds_a_user_of_the_project(ramp: str, tmp_path: Path) -> None:
+    _need("gnatmake")
+    gprbuild = _need("gprbuild")
+    ada = PACKAGES / "ada"
+    (tmp_path / "firmware.gpr").write_text(
+        GPR.format(
+            binding=ada / "gyrotc.gpr", example=ada / "example", minimal=MINIMAL, include=ROOT / "include"
+        )
+    )
+    _run(gprbuild, "-q", "-P", "firmware.gpr", f"-XGYROTC_OBJECTS={tmp_path / 'gyrotc'}", cwd=tmp_path)
     assert _run(tmp_path / "firmware") == ramp
 
 
