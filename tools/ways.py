@@ -29,7 +29,20 @@ sys.path[:0] = [str(ROOT / "tests" / "py")]
 
 MODEL = ROOT / "examples" / "minimal" / "model.json"
 #: Extras that a user asks for; the others are for developers.
-EXTRAS = ("sign", "sklearn", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros", "mdf")
+EXTRAS = (
+    "sign",
+    "sklearn",
+    "dask",
+    "hdf5",
+    "tdms",
+    "ulog",
+    "dataflash",
+    "ros",
+    "mdf",
+    "excel",
+    "netcdf",
+    "paper",
+)
 #: Tests that use a package as its page says: the way, and its command.
 USES = {
     "test_cmake_finds_it[lib]": ("CMake, installed", "cmake --install; find_package(gyrotc)"),
@@ -55,7 +68,7 @@ USES = {
     ),
     "test_interrupt_and_task_on_the_host": ("POSIX task and interrupt", "make of examples, rtos"),
     "test_interrupt_and_task_with_freertos": ("FreeRTOS", "make FREERTOS=<kernel>"),
-    "test_the_notebook_draws_a_map": ("notebook", "jupyter lab map.ipynb"),
+    "test_the_notebook_builds_a_result": ("notebook", "jupyter lab map.ipynb"),
 }
 
 
