@@ -38,7 +38,8 @@ LIBRARIES = (
         "pkg:generic/nlopt",
         "a shared library of its own, linked whole with all its algorithms: luksan (LGPL-2.1-or-later), slsqp "
         "(BSD-3-Clause), and auglag, bobyqa, cdirect, cobyla, crs, direct, esch, isres, mlsl, mma, neldermead, newuoa, "
-        "praxis, and where it was built as C++ ags and stogo (MIT); the core calls L-BFGS of luksan alone (NLOPT_LD_LBFGS)",
+        "praxis, and where it was built as C++ ags and stogo (MIT); "
+        "the core calls L-BFGS of luksan alone (NLOPT_LD_LBFGS)",
     ),
     ("nanobind", "BSD-3-Clause", "pkg:pypi/nanobind", "compiled into the core"),
     ("robin-map", "MIT", "pkg:generic/robin-map", "compiled into the core, a part of nanobind"),
