@@ -174,6 +174,10 @@ fleet: setup
 kills: setup
 	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## copies of runs, faults of timing, holding and pairing, and clean sets: which findings name them (20 minutes)
+evidence: setup
+	@$(PYTHON) -m tests.evidence.run $${SET_SEED:+"--seed=$$SET_SEED"}
+
 ## faults planted in gyrotc, and which check or test sees each: docs/results.md
 mutants: setup
 	@$(PYTHON) -m tests.mutants.run --docs docs

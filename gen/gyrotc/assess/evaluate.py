@@ -51,6 +51,7 @@ from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
+from .residuals import residual_findings
 
 __all__ = [
     "ReplayedRun",
@@ -297,6 +298,7 @@ def evaluate(
         result = result.model_copy(update={"left_out": training.left_out})
     result = _with_what_is_known(result, parts, training)
     found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
+    found += residual_findings(result, [(p.run, p.averages) for p in parts])
     return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
 
 

@@ -20,8 +20,10 @@ from ..quality.recorded import (
     counter_findings,
     earth_rate_findings,
     finding,
+    held_findings,
     jump_findings,
     outlier_findings,
+    shared_axes_findings,
     shared_rows_findings,
     sign_findings,
     temperature_findings,
@@ -71,9 +73,11 @@ def findings_of(
         found += _coverage(model)
     found += jump_findings(facts)
     found += counter_findings(facts)
+    found += held_findings(facts)
     found += outlier_findings(facts)
     found += contradiction_findings(facts)
     found += shared_rows_findings(dataset)
+    found += shared_axes_findings(dataset)
     found += sign_findings(facts)
     found += thermometer_findings(dataset)
     found += earth_rate_findings(dataset, facts)

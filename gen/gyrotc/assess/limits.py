@@ -197,7 +197,8 @@ Finding = Literal[
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
     "not_of_its_lot", "prior_does_not_hold",
-    "shared_rows", "sign_reversed",
+    "shared_rows", "shared_axes", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
+    "sign_reversed",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
 

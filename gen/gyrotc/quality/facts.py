@@ -29,6 +29,8 @@ _OUTLIER_SIGMAS = 8.0  # a normal row lies beyond it once in 8e14
 _OUTLIER_ROWS = 10  # a longer departure is a piece of record, no outlier
 # Widths of counters in the processors and FPGAs that read gyros out
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
+_LEAST_HELD = 30  # rates: fewer do not show a rhythm
+_HELD = 0.9  # of them held for as long as the others, to a row: their rhythms need not fit
 _PART = 2**16  # rows that are looked at together
 
 
@@ -82,6 +84,7 @@ class RunFacts:
         outlier: The largest of them.
         wrapped: Where a counter of pulses passed its end: time of the first place, bits of the counter, places.
         stuck_s: Longest stretch of one identical rate.
+        held_rows: For how many rows each rate is held; 1: every row has its own.
         constant: Columns that hold one value only.
         earth: Earth's rate that was taken off, None where there was nothing to take off.
     """
@@ -112,6 +115,7 @@ class RunFacts:
     outlier: Outlier | None
     wrapped: tuple[float, int, int] | None
     stuck_s: float
+    held_rows: int
     constant: tuple[str, ...]
     earth: EarthRate | None
 
@@ -162,6 +166,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         outlier=outlier,
         wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
         stuck_s=_longest_stretch(rate) * run.row_period_s,
+        held_rows=_held(rate),
         constant=_constant(rows, inside, rate),
         earth=run.earth,
     )
@@ -310,6 +315,18 @@ def _longest_stretch(values: FloatArray) -> int:
     if len(values) == 0:
         return 0
     return int(np.diff(np.r_[_changes(values), len(values)]).max())
+
+
+def _held(rate: FloatArray) -> int:
+    """For how many rows each rate is held: a logger that asks oftener than the gyro answers; 1 where none is.
+
+    A coarse rate repeats, too, but never for one number of rows.
+    """
+    lengths = np.diff(_changes(rate[:_PART]))
+    if len(lengths) < _LEAST_HELD:
+        return 1
+    usual = int(np.median(lengths))
+    return usual if usual > 1 and float(np.mean(np.abs(lengths - usual) <= 1)) > _HELD else 1
 
 
 def _constant(rows: Rows, inside: BoolArray, rate: FloatArray) -> tuple[str, ...]:

@@ -21,8 +21,10 @@ from .recorded import (
     copied_channel_findings,
     counter_findings,
     earth_rate_findings,
+    held_findings,
     jump_findings,
     outlier_findings,
+    shared_axes_findings,
     shared_rows_findings,
     sign_findings,
     stuck_temperature_findings,
@@ -57,6 +59,8 @@ _ADVICE = {
     "the same gyro in the same state. gyrotc diagnose looks for turn-on offsets and ageing.",
     "same_recording_twice": "Keep one of the two.",
     "small_rates": 'Declare the unit: [units] rate = "deg/s" in dataset.toml.',
+    "rate_held": "Record at the gyro's own rhythm, or keep every row of it once.",
+    "shared_axes": "Look at the wiring of the channels and at the columns of the logger.",
     "stuck_rate": "Look at the logger and the gyro's data line there; leave the stretch out by exclude.",
     "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --rate-hz R.",
     "time_jumps": "Number the rows instead, gyrotc import FILE --rate-hz R, or cut the file there into two runs by "
@@ -127,6 +131,7 @@ def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
         *_of_time(f, where),
         *(Doubt(one["id"], where, one["text"], one.get("marks", ())) for one in found),
         *_of_counter(f, rows, where),
+        *(Doubt(one["id"], where, one["text"]) for one in held_findings([f])),
         *_of_outliers(run, rows, f, where),
     ]
     return f, warnings
@@ -194,6 +199,8 @@ def warnings_of_data_set(
         yield _of_run(one)
     for shared, one in zip(dataset.shared, shared_rows_findings(dataset), strict=True):
         yield Doubt(one["id"], shared.file, one["text"], shared.marks)
+    for one in shared_axes_findings(dataset):
+        yield Doubt(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
     turned = {one["evidence"]["file"]: one for one in sign_findings(facts)}
     turned |= {one["evidence"]["file"]: one for one in orientation_findings(dataset, earlier)}
     for one in turned.values():

@@ -30,8 +30,10 @@ __all__ = [
     "counter_findings",
     "earth_rate_findings",
     "finding",
+    "held_findings",
     "jump_findings",
     "outlier_findings",
+    "shared_axes_findings",
     "shared_rows_findings",
     "sign_findings",
     "stuck_temperature_findings",
@@ -92,6 +94,22 @@ def counter_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
                 time_s=time_s,
                 bits=bits,
                 places=places,
+            )
+
+
+def held_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Rates that are held for several rows: there are fewer than rows, and their noise is not what it seems."""
+    for f in facts:
+        if f.held_rows > 1:
+            yield finding(
+                "rate_held",
+                f"{_run(f)} holds each rate for {f.held_rows} rows: the gyro answers every "
+                f"{f.held_rows * f.row_period_s:.4g} s, the rows come every {f.row_period_s:.4g} s. Record at the "
+                "gyro's own rhythm, or keep every row of it once.",
+                file=f.file,
+                from_s=f.from_s,
+                held_rows=f.held_rows,
+                row_period_s=f.row_period_s,
             )
 
 
@@ -211,12 +229,28 @@ def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
     """Rows that several training runs, or several exams, hold, or one run twice: they count twice."""
     for shared in dataset.shared:
         rows = shared.rows[1] - shared.rows[0] + 1
+        same = (
+            "are also"
+            if shared.likeness is None
+            else f"have the noise (correlation {shared.likeness:.2f}) of"
+        )
         text = (
-            f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} are also rows {shared.other_rows[0]} to "
-            f"{shared.other_rows[1]} of {_other(shared)}: {rows} rows count twice. Keep one of them; to leave the "
-            f"former out: {exclude_line([shared.span_s], f'also in {shared.other_file}')}"
+            f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} {same} rows {shared.other_rows[0]} to "
+            f"{shared.other_rows[1]} of {_other(shared)}: these {rows} rows would count twice, so the former are left "
+            f"out. To state it: {exclude_line([shared.span_s], f'also in {shared.other_file}')}"
         )
         yield {"id": "shared_rows", "text": text, "evidence": asdict(shared)}
+
+
+def shared_axes_findings(dataset: Dataset) -> Iterator[Finding]:
+    """Axes of a recording that hold the same noise."""
+    for shared in dataset.shared_axes:
+        one, other = shared.axes
+        text = (
+            f"Axes {one} and {other} of {shared.file} hold the same noise (correlation {shared.likeness:.2f}): one of "
+            "them is a copy of the other."
+        )
+        yield {"id": "shared_axes", "text": text, "evidence": asdict(shared)}
 
 
 def _other(shared: SharedRows) -> str:

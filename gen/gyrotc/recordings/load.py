@@ -16,7 +16,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above
 from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
-from .overlap import shared_rows
+from .overlap import counted_once, shared_axes, shared_rows
 from .plausibility import Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
@@ -220,7 +220,13 @@ def load(
     """
     problems = Problems(collect=False)
     dataset = survey(
-        folder, problems, axis=axis, applied=applied, exam_only=exam_only, trust_units=trust_units
+        folder,
+        problems,
+        axis=axis,
+        applied=applied,
+        exam_only=exam_only,
+        trust_units=trust_units,
+        once=True,
     )
     assert dataset is not None
     return dataset
@@ -266,8 +272,12 @@ def survey(
     applied: Applied | None = None,
     exam_only: bool = False,
     trust_units: bool = False,
+    once: bool = False,
 ) -> Dataset | None:
     """As `load`, with problems reported to `problems`.
+
+    Args:
+        once: Leave out rows that another run of the same role has.
 
     Returns:
         The data set of the runs that are in order; None if there is none.
@@ -316,10 +326,13 @@ def survey(
             f"temperature_late_s = {description.temperature_late_s:g}: every rate goes with the temperature that was "
             "recorded so many seconds later"
         )
-    dataset = _dataset(folder, description, axis, tuple(runs), channels, tuple(warnings), trusted_texts)
+    shared = shared_rows(runs, recordings, axis, problems)
+    kept = counted_once(runs, shared) if once else tuple(runs)
+    dataset = _dataset(folder, description, axis, kept, channels, tuple(warnings), trusted_texts)
     return replace(
         dataset,
-        shared=shared_rows(runs, recordings, problems),
+        shared=shared,
+        shared_axes=shared_axes(recordings),
         sketch=sketch([r.fingerprints for r in recordings.values()]),
         curves=curves_of(description, runs_by_entry, recordings),
     )

@@ -14,6 +14,7 @@ from ..common.metrics import median
 from .csv_file import CsvFile
 from .description import Columns, Problems
 from .files import Source
+from .noise_copies import NoisePrint, noise_of
 from .parquet_file import ParquetFile
 from .records import Applied, EarthRate, Mark, Rows
 from .shared_rows import Fingerprints, fingerprints_of
@@ -104,6 +105,7 @@ class Recording:
         units: Conversions to gyrotc's units, by column.
         evidence: What its units can be judged by.
         fingerprints: What its rows can be known again by.
+        noise: What its noise can be known again by, of every axis.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -114,6 +116,7 @@ class Recording:
     units: dict[str, Conversion]
     evidence: Evidence
     fingerprints: Fingerprints
+    noise: tuple[NoisePrint, ...]
     time_s: FloatArray
     n_rows: int
     row_period_s: float
@@ -229,7 +232,9 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence, fingerprints = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+        time, evidence, fingerprints, noise = _checked(
+            file, layout, conversions, pulse_weight_arcsec, problems
+        )
     except InputError as error:
         problems.add(error)
         return None
@@ -240,7 +245,7 @@ def open_recording(
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, conversions, evidence, fingerprints, time, len(time), period)
+    return Recording(file, layout, conversions, evidence, fingerprints, noise, time, len(time), period)
 
 
 def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
@@ -267,8 +272,8 @@ def _checked(
     units: Mapping[str, Conversion],
     pulse_weight_arcsec: float | None,
     problems: Problems,
-) -> tuple[FloatArray, Evidence, Fingerprints]:
-    """Reads all columns and checks them; the times, what the units can be judged by, what rows are known by."""
+) -> tuple[FloatArray, Evidence, Fingerprints, tuple[NoisePrint, ...]]:
+    """Reads all columns and checks them; the times, and what units are judged by and copies are known by."""
     values = file.columns(file.names)
     lines = None
     if values is None:
@@ -302,7 +307,10 @@ def _checked(
     rates = [values[name] for name in layout.axes.values() or [layout.value]]
     evidence = Evidence(len(rates))
     evidence.add(time, values[layout.temperature], rates)
-    return time, evidence, fingerprints_of(time, values[layout.temperature], rates)
+    fingerprints = fingerprints_of(time, values[layout.temperature], rates)
+    if layout.pulses and not found:
+        rates = [rate_of_pulses(time, rates[0], 1.0)]
+    return time, evidence, fingerprints, tuple(noise_of(time, rate) for rate in rates)
 
 
 def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:

@@ -217,6 +217,8 @@ class SharedRows:
         other_file: The other file, or the same.
         other_rows: First and last row in the other file, as `rows`.
         other_span_s: As `span_s`.
+        likeness: Of the noise, where the rows were rounded, scaled, resampled or changed a little; None: they are the
+            same.
     """
 
     file: str
@@ -225,6 +227,7 @@ class SharedRows:
     other_file: str
     other_rows: tuple[int, int]
     other_span_s: tuple[float, float]
+    likeness: float | None = None
 
     @property
     def marks(self) -> tuple[Mark, Mark]:
@@ -233,6 +236,21 @@ class SharedRows:
             Mark(self.file, self.rows, self.span_s),
             Mark(self.other_file, self.other_rows, self.other_span_s),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class SharedAxes:
+    """Two axes of a file that hold the same noise: one of them was recorded, or neither.
+
+    Attributes:
+        file: The file.
+        axes: Their names.
+        likeness: Of their noise, 1: the same.
+    """
+
+    file: str
+    axes: tuple[str, str]
+    likeness: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +310,8 @@ class Dataset:
         units: `[units]` as declared.
         trusted: What the values look like against their units, where the user's word was taken for them.
         sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
-        shared: Rows that runs of one role have in common, or that a run has twice.
+        shared: Rows that runs of one role have in common, or that a run has twice; they count once.
+        shared_axes: Axes that hold the same noise.
         sketch: Hashes of rows by which gyros of a fleet are compared (`shared_rows.sketch`).
         curves: Mean rates over temperature, of every axis of every run.
     """
@@ -312,6 +331,7 @@ class Dataset:
     trusted: tuple[str, ...] = ()
     sources: tuple[dict[str, Any], ...] = ()
     shared: tuple[SharedRows, ...] = ()
+    shared_axes: tuple[SharedAxes, ...] = ()
     sketch: tuple[int, ...] = ()
     curves: tuple[Curve, ...] = ()
 

@@ -14,6 +14,7 @@ from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .release import HeldLimits
 
 __all__ = [
+    "RMS_OVER_FLOOR",
     "AsFound",
     "At",
     "Calibration",
@@ -171,7 +172,8 @@ class ModelSizes(Part):
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
 
 
-_RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, sqrt(1.3^2 - 1)
+RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, sqrt(1.3^2 - 1)
+"""RMS over noise floor above which a result always says that structure is left."""
 _OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
 
 
@@ -225,7 +227,7 @@ class Evaluation(UnitResult):
         """Whether the residual holds more than noise, by its RMS or by a finding: `gyrotc diagnose` is next."""
         judged, floor = self.judged(), self.noise_floor_dph
         rms = judged[1].after.rms_dph if judged else None
-        above = bool(floor) and rms is not None and rms > _RMS_OVER_FLOOR * (floor or 0.0)
+        above = bool(floor) and rms is not None and rms > RMS_OVER_FLOOR * (floor or 0.0)
         return above or any(finding.id in _OF_STRUCTURE for finding in self.findings)
 
 

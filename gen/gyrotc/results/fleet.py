@@ -74,7 +74,14 @@ class CatalogueAnswer(Result):
 
 
 BARRING = frozenset(
-    {"sign_reversed", "axes_exchanged", "copy_of_other", "not_of_its_lot", "does_not_generalise"}
+    {
+        "sign_reversed",
+        "axes_exchanged",
+        "copy_of_other",
+        "not_of_its_lot",
+        "does_not_generalise",
+        "shared_axes",
+    }
 )
 """Findings that say that the recordings are not this gyro's, or that it is not calibrated: no release by itself."""
 

@@ -237,8 +237,8 @@ def test_meta_is_carried_as_json(tmp_path: Path) -> None:
 
 
 def test_without_description_all_files_are_training_runs_in_name_order(tmp_path: Path) -> None:
-    for name in ("b.csv", "a.csv", "C.CSV"):
-        write_csv(tmp_path / "RLG_7.x" / name)
+    for seed, name in enumerate(("b.csv", "a.csv", "C.CSV")):
+        write_csv(tmp_path / "RLG_7.x" / name, columns(seed=seed))
     (tmp_path / "RLG_7.x" / "readme.txt").write_text("notes")
     dataset = load(tmp_path / "RLG_7.x")
     assert dataset.serial == "RLG_7.x"

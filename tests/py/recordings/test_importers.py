@@ -371,8 +371,11 @@ def test_a_person_on_a_terminal_is_asked_for_a_unit(tmp_path: Path) -> None:
 
 
 def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
-    for name in ("a.csv", "b.csv"):
-        (tmp_path / name).write_text(lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}"))
+    for seed, name in enumerate(("a.csv", "b.csv")):  # two runs, not one twice
+        noise = np.random.default_rng(seed).normal(0.0, 0.5, 10_000)
+        (tmp_path / name).write_text(
+            lines(OWN, lambda k, t, r, noise=noise: f"{10 * k},{t},{r + noise[k]}")  # type: ignore[misc]
+        )
     result = tmp_path / "import.json"
     status, _, error = run(
         "import",
