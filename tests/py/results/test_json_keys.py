@@ -18,7 +18,7 @@ from gyrotc.cli.schemas import KINDS, tables
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.results.base import Numbered, checked_result
-from gyrotc.results.evaluation import Apart, At
+from gyrotc.results.evaluation import MapDifference, At
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.results.folder import Marker
 from gyrotc.results.release import HeldLimits, Limit
@@ -255,7 +255,7 @@ def test_a_marker_is_written_by_name_and_says_no_more_than_it_has_to() -> None:
 
 def test_a_result_that_is_no_number_cannot_be_made() -> None:
     with pytest.raises(ValidationError, match="rms_dph"):
-        Apart(
+        MapDifference(
             rms_dph=float("nan"), mean_dph=0.0, max_abs_dph=0.0,
             at=At(temperature_c=0.0, slope_c_per_min=0.0), rms_over_floor=None,
         )  # fmt: skip
