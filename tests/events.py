@@ -28,7 +28,7 @@ from .blind.chamber import Array, draw_unit, expose, steps
 from .blind.noise import Noise, draw
 
 FLOOR_DPH = 7e-4  # of 100-s means
-RUNS, HOURS, STILL_C_PER_MIN = 4, 5.0, 0.1
+RUNS, HOURS, STILL_C_PER_MIN = 4, 8.0, 0.1
 ROWS_S, RESOLUTIONS_C = (1, 10, 60), (0.001, 0.0625, 0.1)
 NEAR_S = 900.0  # of an event that is reported, from the planted one
 WARNINGS = ("sign_reversed", "axes_exchanged", "runs_contradict", "thermometer_changed", "rate_outliers")
@@ -167,7 +167,7 @@ def draw_temperatures(rng: np.random.Generator) -> list[tuple[Array, Array]]:
     for k in range(RUNS):
         legs = [
             (float(rng.uniform(0.7, 4.0)), float(rng.uniform(*((30, 60) if j % 2 else (-40, 0)))), 60.0 * m)
-            for j, m in enumerate(rng.uniform(25.0, 75.0, 8))
+            for j, m in enumerate(rng.uniform(25.0, 150.0, 8))
         ]
         start = float(rng.uniform(-10.0, 30.0))
         programme = steps(start, legs[k % 2 :], round(3600.0 * HOURS))

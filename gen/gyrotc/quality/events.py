@@ -9,7 +9,7 @@ that changed, and a run with few branches does not separate the two; evidence do
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,10 +22,9 @@ from ..recordings.records import Dataset, Exclusion, Rows, Run
 from ..results.diagnosed import Estimate, EventSize, FoundEvent
 from ..target.front_end import samples_per_block
 from ..target.recursions import first_order, play
-from .drifts import Drift, drifts_of
+from .changes import Change, changes_of
 from .facts import facts_of
 from .outliers import departing_rows
-from .steps import Step, steps_of
 from .thermometers import stuck_stretches
 
 __all__ = ["Event", "accepted", "events_of", "evidence_beside_memories"]
@@ -35,7 +34,6 @@ Limits = tuple[float, float, float]
 _BURST_ROWS = 10  # fewer are outliers
 _JOINED = 1.5  # row periods between rows of one burst
 _LOST_S = 60.0  # no rows for longer
-_ONE_PLACE_S = 3600.0  # half of the longest window in which a drift is looked for
 _BLOCK_S = 10.0  # over which the level around a burst is taken
 
 
@@ -77,8 +75,12 @@ class Event:
         )
 
 
-def events_of(dataset: Dataset) -> list[Event]:
-    """Events of the training runs, by run in order of time."""
+def events_of(dataset: Dataset, without: Collection[str] = ()) -> list[Event]:
+    """Events of the training runs, by run in order of time.
+
+    Args:
+        without: Files whose rates are not those of the gyro: changes of the others are not judged against them.
+    """
     runs = [run for run in dataset.runs if run.role == "train"]
     found: list[Event] = []
     departing: list[NDArray[np.int64]] = []
@@ -86,14 +88,13 @@ def events_of(dataset: Dataset) -> list[Event]:
         of_run, wild = _of_rows(number, run)
         found += of_run
         departing.append(wild)
-    judged = _Judged(runs, departing)
-    steps, drifts = _reported_once(steps_of(judged), drifts_of(judged))
+    judged = _Judged(runs, departing, without)
+    changes = changes_of(judged)
     for number, run in enumerate(runs):
-        found += [_drift(run, drift, float(judged[number][0][-1])) for drift in drifts if drift.run == number]
-        its_steps = [step for step in steps if step.run == number]
-        if its_steps:
+        its_changes = [change for change in changes if change.run == number]
+        if its_changes:
             time = judged[number][0]
-            found += _steps(run, its_steps, float(time[0]), float(time[-1]))
+            found += _of_changes(run, its_changes, float(time[0]), float(time[-1]) + run.row_period_s)
     again = {(e.run, e.time_s[1]) for e in found if e.id == "restart"}
     found = [e for e in found if e.id != "dropout" or (e.run, e.time_s[0]) not in again]
     return sorted(found, key=lambda event: (event.run, event.time_s[0]))
@@ -110,8 +111,10 @@ def _of_rows(number: int, run: Run) -> tuple[list[Event], NDArray[np.int64]]:
 class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
     """Time, temperature and rate of the rows of each run that count; one run is in memory at a time."""
 
-    def __init__(self, runs: Sequence[Run], departing: Sequence[NDArray[np.int64]]) -> None:
-        self._runs, self._departing = runs, departing
+    def __init__(
+        self, runs: Sequence[Run], departing: Sequence[NDArray[np.int64]], without: Collection[str]
+    ) -> None:
+        self._runs, self._departing, self._without = runs, departing, without
         self._read: tuple[int, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
     def __len__(self) -> int:
@@ -126,6 +129,7 @@ class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
             good = self._runs[number].in_span(rows.time_s)
             good &= np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
             good[self._departing[number]] = False
+            good &= self._runs[number].file not in self._without
             part = tuple(
                 column if good.all() else column[good]
                 for column in (rows.time_s, rows.temperature_c, rows.rate_dph)
@@ -148,83 +152,76 @@ def accepted(dataset: Dataset, events: Sequence[Event]) -> Dataset:
     return replace(dataset, runs=tuple(map(without, kept)))
 
 
-def _reported_once(steps: Sequence[Step], drifts: Sequence[Drift]) -> tuple[list[Step], list[Drift]]:
-    """Of a step and a drift that are found at about one place, the clearer one."""
-
-    def near(one: Step | Drift, other: Step | Drift) -> bool:
-        return one.run == other.run and abs(one.time_s[0] - other.time_s[0]) < _ONE_PLACE_S
-
-    return (
-        [s for s in steps if all(s.sigmas >= d.sigmas for d in drifts if near(s, d))],
-        [d for d in drifts if all(d.sigmas > s.sigmas for s in steps if near(d, s))],
-    )
-
-
-def _drift(run: Run, drift: Drift, last_s: float) -> Event:
-    out = (drift.time_s[1], last_s + run.row_period_s)
-    text = (
-        f"The rate of {run.file} begins to drift by {drift.slope_dph_per_h[0]:+.3g} deg/h each hour at "
-        f"{drift.time_s[0]:g} s ({drift.sigmas:.1f} times what noise makes there) while the temperature stands still: "
-        f"leave out {_hours(*out)}, and find out what began then."
-    )
-    return Event("ramp", drift.run, run.file, drift.time_s, drift.slope_dph_per_h, "deg/h/h", text, out)
-
-
-def _steps(run: Run, steps: Sequence[Step], first_s: float, last_s: float) -> Iterator[Event]:
-    """Steps that come back, as pairs, and those that last: of these the shorter side is to be left out."""
+def _of_changes(run: Run, changes: Sequence[Change], first_s: float, end_s: float) -> Iterator[Event]:
+    """Steps that come back, as pairs, and what lasts: of that the shorter side is to be left out."""
     k = 0
-    while k < len(steps):
-        one = steps[k]
-        if one.over_gap and not any(
-            gap.from_s <= one.time_s[1] + run.row_period_s and gap.to_s >= one.time_s[2]
-            for gap in run.exclude
-        ):
-            yield _restart(run, one, first_s, last_s)
-            k += 1
-            continue
-        back = steps[k + 1] if k + 1 < len(steps) else None
-        if back is not None and _undoes(one, back):
+    while k < len(changes):
+        one, back = changes[k], changes[k + 1] if k + 1 < len(changes) else None
+        k += 1
+        if one.gap_s > 0.0 and one.kind == "step":
+            if not _excluded(run, one.time_s[1:]):
+                yield _restart(run, one, first_s, end_s)
+        elif back is not None and back.gap_s == 0.0 and _undoes(one, back):
             out = (one.time_s[1], back.time_s[2] + run.row_period_s)
             text = (
-                f"The rate of {run.file} steps by {one.size_dph[0]:+.3g} deg/h at {one.time_s[0]:g} s and comes back "
+                f"The rate of {run.file} steps by {one.size[0]:+.3g} deg/h at {one.time_s[0]:g} s and comes back "
                 f"at {back.time_s[0]:g} s, whatever the temperature is: leave out {_hours(*out)}, and find out what "
                 "happened then."
             )
-            yield Event("step_and_recover", one.run, run.file, one.time_s, one.size_dph, "deg/h", text, out)
-            k += 2
-            continue
-        before = one.time_s[0] - first_s < last_s - one.time_s[0]
-        out = (first_s, one.time_s[2]) if before else (one.time_s[1], last_s + run.row_period_s)
-        text = (
-            f"The rate of {run.file} steps by {one.size_dph[0]:+.3g} deg/h at {one.time_s[0]:g} s "
-            f"({one.sigmas:.1f} times what noise makes there) and stays: leave out {_hours(*out)}, or start a new run "
-            "there."
-        )
-        yield Event("step", one.run, run.file, one.time_s, one.size_dph, "deg/h", text, out)
-        k += 1
+            yield Event("step_and_recover", one.run, run.file, one.time_s, one.size, "deg/h", text, out)
+            k += 1
+        else:
+            yield _lasting(run, one, first_s, end_s)
 
 
-def _restart(run: Run, step: Step, first_s: float, last_s: float) -> Event:
+_EVENTS = {
+    "step": ("step", "deg/h"),
+    "transition": ("transition", "deg/h"),
+    "drift": ("ramp", "deg/h/h"),
+    "gain": ("gain_changed", "times"),
+}
+
+
+def _lasting(run: Run, one: Change, first_s: float, end_s: float) -> Event:
+    before = one.time_s[0] - first_s < end_s - one.time_s[0] and one.kind != "drift"
+    out = (first_s, one.time_s[2]) if before else (one.time_s[1], end_s)
+    at, size, clear = one.time_s[0], one.size[0], f"({one.sigmas:.1f} times what noise makes there)"
+    what = {
+        "step": f"steps by {size:+.3g} deg/h at {at:g} s {clear} and stays",
+        "transition": f"changes by {size:+.3g} deg/h within {one.duration_s:g} s about {at:g} s {clear} and stays",
+        "drift": f"begins to drift by {size:+.3g} deg/h each hour at {at:g} s {clear}",
+        "gain": f"over temperature is from {at:g} s on {size:.3g} times what it was before (95 % {one.size[1]:.3g} ... "
+        f"{one.size[2]:.3g}): its scale changed",
+    }[one.kind]
+    id, unit = _EVENTS[one.kind]
+    text = f"The rate of {run.file} {what}: leave out {_hours(*out)}, or start a new run there."
+    return Event(id, one.run, run.file, one.time_s, one.size, unit, text, out)
+
+
+def _excluded(run: Run, span_s: tuple[float, float]) -> bool:
+    """Whether rows are missing because the description leaves them out."""
+    return any(gap.from_s <= span_s[0] + run.row_period_s and gap.to_s >= span_s[1] for gap in run.exclude)
+
+
+def _restart(run: Run, step: Change, first_s: float, end_s: float) -> Event:
     """Rows that stop and go on at another level."""
     time, back = step.time_s[1:]
-    out = (
-        (first_s, time + run.row_period_s)
-        if back - first_s < last_s - back
-        else (back, last_s + run.row_period_s)
-    )
+    out = (first_s, time + run.row_period_s) if back - first_s < end_s - back else (back, end_s)
     text = (
-        f"{run.file} has no rows for {back - time:g} s from {time:g} s on, and goes on {step.size_dph[0]:+.3g} deg/h "
+        f"{run.file} has no rows for {back - time:g} s from {time:g} s on, and goes on {step.size[0]:+.3g} deg/h "
         f"away ({step.sigmas:.1f} times what noise makes there), as after a power-on: make the rows behind it a run of "
         f"their own (from_s = {back!r}, with its power_on_s), or leave out {_hours(*out)}."
     )
-    return Event("restart", step.run, run.file, (back, time, back), step.size_dph, "deg/h", text, out)
+    return Event("restart", step.run, run.file, (back, time, back), step.size, "deg/h", text, out)
 
 
-def _undoes(one: Step, back: Step) -> bool:
+def _undoes(one: Change, back: Change) -> bool:
     """Whether the second step takes the first one back, by their intervals."""
-    low, high = sorted((-back.size_dph[1], -back.size_dph[2]))
-    own_low, own_high = sorted(one.size_dph[1:])
-    return one.size_dph[0] * back.size_dph[0] < 0.0 and low <= own_high and own_low <= high
+    if {one.kind, back.kind} - {"step", "transition"}:
+        return False
+    low, high = sorted((-back.size[1], -back.size[2]))
+    own_low, own_high = sorted(one.size[1:])
+    return one.size[0] * back.size[0] < 0.0 and low <= own_high and own_low <= high
 
 
 def _hours(from_s: float, to_s: float) -> str:
@@ -278,7 +275,7 @@ def _dropouts(number: int, run: Run, rows: Rows) -> Iterator[Event]:
     time = rows.time_s[run.in_span(rows.time_s)]
     for k in np.flatnonzero(np.diff(time) > max(_LOST_S, 10.0 * run.row_period_s)):
         start, length = float(time[k]), float(time[k + 1] - time[k])
-        if any(gap.from_s <= start + run.row_period_s and gap.to_s >= start + length for gap in run.exclude):
+        if _excluded(run, (start, start + length)):
             continue
         text = f"{run.file} has no rows for {length:g} s from {start:g} s on."
         yield Event("dropout", number, run.file, (start, start, start), (length,) * 3, "s", text, None)

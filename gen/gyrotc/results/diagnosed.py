@@ -218,7 +218,8 @@ class FoundEvent(Part):
     """Something that happened to a recording at a time."""
 
     id: str = Field(
-        description="`step`, `step_and_recover`, `ramp` (a drift that begins), `restart`, `gain_changed`, "
+        description="`step`, `step_and_recover`, `transition`, `ramp` (a drift that begins), `restart`, "
+        "`gain_changed`, "
         "`sign_reversed`, `axes_exchanged`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
     )
     file: str = Field(description="of its run")

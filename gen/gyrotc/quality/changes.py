@@ -1,0 +1,481 @@
+"""Changes of a rate that neither temperature, its rate, nor noise explains: one search in one likelihood (`fits`).
+
+Every place of every run is tried for a step, a transition of a duration, a departure that comes back, and a drift that
+begins. What is clear is fitted, all changes found are placed anew beside one another, those that are not clear any more
+are dropped, and the search goes on in what is left; then the noise is estimated anew beside what was found, and all is
+done once more. The level is controlled over all places of all runs together (Bonferroni): chance makes a change in one
+of two hundred sets. See Basseville and Nikiforov, Detection of Abrupt Changes, 1993, 2.2 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.special import stdtrit
+
+from ..common.arrays import FloatArray
+from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
+from .fits import (
+    LEAST_ENERGY,
+    LONGEST_GAP_S,
+    Cells,
+    Fit,
+    Noise,
+    Rows,
+    cells_of,
+    knots_of,
+    likeliest_noise,
+    maps_of,
+)
+
+__all__ = ["Change", "changes_of"]
+
+Kind = Literal["step", "transition", "drift", "gain"]
+Limits = tuple[float, float, float]
+
+FALSE_ALARMS = 0.005  # sets of which one has a change by chance
+_CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
+_MOST_CELLS = 150_000  # of all runs: longer ones have longer cells
+_STEP_S = 30.0  # what takes no longer is a step
+_DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)
+_TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
+_BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
+_MARGIN = (
+    1.25  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
+)
+_KINDS = 4.0  # kinds of change, as looks: shapes of one kind are nearly one
+_INDEPENDENT = 5.0  # cells to a degree of freedom of a scale from a median of what is correlated
+_LEAST_CELLS = 60  # beside the columns that are fitted: fewer do not show what noise makes
+_MOST = 12  # changes of a run that are fitted: more are what it always does
+_AROUND_S = 240.0  # in which a place is sought anew
+_EDGE = 3  # cells at the ends of a run in which no change can be told from noise
+_HOUR_S = 3600.0  # by definition
+_PLACED_95 = 7.35  # of a likelihood ratio of places: Hansen, Econometrica 68 (2000) 575, table 1
+_LEAST_JUMP = 0.5  # of a step, what its rows have to show by themselves: else it is a transition
+_NEAR_CELLS = 8  # on either side of a step, in which its rows are looked at
+_PLACES = 240  # that are tried around a change
+_PARTS = (0.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of a cell, that a change may begin beside its edge
+_GAIN_S = 1200.0  # from an end of a run, within which the curve does not show a gain
+_GAIN_PLACES = 60  # of a run that are tried for one; then it is placed anew
+_LEAST_GAIN = 0.1  # of a change of gain: smaller ones are what terms and temperatures of runs do to a slope
+_AT_STEP = 4.0  # standard errors of a gain at a step that is known: one in 16,000 by chance
+_LEAST_OTHERS = 2  # of two runs nobody knows which one differs
+_ROUNDS = 3  # in which all changes of a run are placed anew
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of the rate of one run.
+
+    Attributes:
+        run: Number of the run.
+        kind: A step is over within 30 s or one row.
+        time_s: Of a step its first row behind, of a transition its middle, of a drift its beginning; 95 % limits, for
+            a transition with its duration.
+        duration_s: Of a transition, else 0.
+        size: deg/h, of a drift deg/h each hour, of a gain the factor; 95 % limits.
+        sigmas: Size over its standard error.
+        gap_s: Length of the gap in the rows that it falls into, else 0.
+    """
+
+    run: int
+    kind: Kind
+    time_s: Limits
+    duration_s: float
+    size: Limits
+    sigmas: float
+    gap_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _At:
+    """A change as the search has it: beginning (s), duration (s)."""
+
+    run: int
+    kind: Kind
+    begin_s: float
+    duration_s: float = 0.0
+
+    @property
+    def middle_s(self) -> float:
+        return self.begin_s + 0.5 * self.duration_s
+
+    def columns(self, time_s: FloatArray, cell_s: float, curve: FloatArray) -> list[FloatArray]:
+        """What a change of size 1 adds to cells with these means of time; of a gain first the step that goes with it.
+
+        Args:
+            curve: The map along the run, deg/h, that a gain changes.
+        """
+        since = time_s - self.begin_s
+        if self.kind == "gain":
+            behind = np.asarray(since >= 0.0, dtype=np.float64)
+            return [behind, curve * behind]
+        return [self._column(since, cell_s)]
+
+    def _column(self, since: FloatArray, cell_s: float) -> FloatArray:
+        if self.kind == "drift":
+            return np.asarray(np.maximum(since, 0.0) / _HOUR_S)
+        if self.duration_s <= cell_s:
+            return np.asarray(np.clip((since - 0.5 * self.duration_s) / cell_s + 0.5, 0.0, 1.0))
+        return np.asarray(np.clip(since / self.duration_s, 0.0, 1.0))
+
+
+def changes_of(runs: Sequence[Rows]) -> list[Change]:
+    """Changes of all runs, by run in order of time.
+
+    Args:
+        runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
+    """
+    long = [k for k, rows in enumerate(runs) if len(rows[0]) > 4 * _EDGE and np.ptp(rows[2]) > 0.0]
+    span = sum(float(np.ptp(runs[k][0])) for k in long)
+    cell_s = max(_CELL_S, span / _MOST_CELLS)
+    fine = [cells_of(runs[k], cell_s) for k in long]
+    coarse = [cells_of(runs[k], max(_COARSE_S, cell_s)) for k in long]
+    if sum(len(one) for one in coarse) < _LEAST_CELLS:
+        return []
+    knots_c = knots_of(coarse)
+    found: list[_At] = []
+    curves: list[FloatArray] = [np.zeros((2, 1))] * len(fine)
+    for _ in range(2):
+        beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
+        noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside)
+        search = _Search(
+            fine, maps_of(fine, knots_c), noise.scaled(coarse[0].cell_s / fine[0].cell_s), curves
+        )
+        found = search.found(found)
+        if not found:
+            return []
+    changes = (search.change(at, found, runs[long[at.run]]) for at in found)
+    known = [replace(one, run=long[one.run]) for one in changes if one is not None]
+    gains = [one for one in known if one.kind == "gain"]
+    kept = [one for one in known if one in gains or not any(_within(one, gain) for gain in gains)]
+    return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
+
+
+def _within(one: Change, gain: Change) -> bool:
+    """Whether a change is the step that a change of gain makes."""
+    return one.run == gain.run and one.time_s[1] <= gain.time_s[2] and gain.time_s[1] <= one.time_s[2]
+
+
+def _columns(
+    cells: Cells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Columns of the changes of a run; `curves`: times and the map along each run, shape (2, n)."""
+    t = cells.time_s
+    curve = np.interp(t, *curves[run])
+    found = [c for at in changes if at.run == run for c in at.columns(t, cells.cell_s, curve)]
+    return np.column_stack(found) if found else None
+
+
+def _over_s(cells: Cells) -> float:
+    """What takes no longer is a step: two rows that are means may hold it."""
+    return max(_STEP_S, 2.0 * cells.cell_s)
+
+
+class _Search:
+    """Runs with the noise that their changes are judged against."""
+
+    def __init__(
+        self, cells: Sequence[Cells], maps: Sequence[FloatArray], noise: Noise, curves: list[FloatArray]
+    ) -> None:
+        self._cells, self._maps, self._noise, self._curves = cells, maps, noise, curves
+        self._looks = _KINDS * sum(len(one) for one in cells)
+        chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
+        self._limit = _MARGIN * chance
+        self._scale: FloatArray | None = (
+            None  # of each run: what noise makes of a change of size over error 1
+        )
+
+    def found(self, known: Sequence[_At]) -> list[_At]:
+        """All that is clear, placed and fitted beside one another; it begins with what is known."""
+        found = list(known)
+        for run in sorted({at.run for at in known}):
+            self._measure(found)
+            found = self._placed_anew(run, found)
+        for _ in range(_MOST):
+            new = list(self._clearest(found))
+            before = set(found)
+            for gain in [at for at in new if at.kind == "gain"]:  # its own step goes with it
+                found = [
+                    at for at in found if at.run != gain.run or abs(at.middle_s - gain.begin_s) > _AROUND_S
+                ]
+            for run in sorted({at.run for at in new}):
+                found = self._placed_anew(run, found + [at for at in new if at.run == run])
+            if before == set(found):
+                break
+        return found
+
+    def _measure(self, found: Sequence[_At]) -> tuple[Fit, list[tuple[FloatArray, list[_Tried]]]]:
+        """The fit beside what was found, and sizes over errors at all places; the first time also their scale."""
+        fit = self._fit(found)
+        self._curves[:] = [np.stack([one.time_s, fit.curve[k]]) for k, one in enumerate(self._cells)]
+        looked = [_looked(fit, k) for k in range(len(self._cells))]
+        if self._scale is None:
+            shapes = len(looked[0][1])
+            overall = [noise_of(np.concatenate([z[s] for z, _ in looked])) for s in range(shapes)]
+            white = noise_of(np.concatenate(fit.rest))
+            louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in fit.rest]
+            self._scale = np.outer(louder, np.maximum(overall, fit.sigma))
+        return fit, looked
+
+    def _fit(self, changes: Sequence[_At]) -> Fit:
+        columns = [_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)]
+        return Fit.of(self._cells, self._maps, self._noise, columns)
+
+    def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
+        """Of every run the clearest change, if it is clear; of a departure that comes back both steps."""
+        fit, looked = self._measure(found)
+        assert self._scale is not None
+        for k, (z, tried) in enumerate(looked):
+            if sum(at.run == k for at in found) >= _MOST:
+                continue
+            far = np.abs(z) / self._scale[k][:, None]
+            for at in found:
+                if at.run == k:
+                    far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._apart(k)] = 0.0
+            gain = self._gain(fit, k, found)
+            if gain is not None and gain[0] > float(far.max()) ** 2 + self._limit:
+                yield gain[1]
+                continue
+            s, place = np.unravel_index(int(np.argmax(far)), far.shape)
+            if far[s, place] > self._limit:
+                cells = self._cells[k]
+                begin = float(cells.time_s[place]) - 0.5 * cells.cell_s
+                kind, length = tried[s]
+                if kind == "back":
+                    yield _At(k, "step", begin)
+                    yield _At(k, "step", begin + length)
+                elif kind == "drift":
+                    yield _At(k, "drift", begin + 0.5 * cells.cell_s)
+                else:
+                    yield _At(k, "step", begin, length)
+
+    def _differ(self, one: _At, other: _At) -> bool:
+        """Whether two changes of a run are two."""
+        return abs(one.middle_s - other.middle_s) > self._apart(one.run) or {one.kind, other.kind} == {
+            "gain",
+            "drift",
+        }
+
+    def _apart(self, run: int) -> float:
+        """How far two changes lie apart, s: nearer ones are one."""
+        return max(2.0 * _STEP_S, 3.0 * self._cells[run].cell_s)
+
+    def _gain(self, fit: Fit, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
+        """The likeliest change of gain of a run and what it gains with its step; None where none is clear.
+
+        Two other runs at least say what the curve is.
+        """
+        cells = self._cells[run]
+        if len(self._cells) <= _LEAST_OTHERS or any(at.run == run and at.kind == "gain" for at in found):
+            return None
+        edge = round(_GAIN_S / cells.cell_s)
+        every = max(round(0.25 * _GAIN_S / cells.cell_s), (len(cells) - 2 * edge) // _GAIN_PLACES, 1)
+        places = cells.time_s[edge : len(cells) - edge : every].tolist()
+        steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
+        tried = [_At(run, "gain", float(t)) for t in [*places, *steps]]
+        if not places:
+            return None
+        gains = self._gains(fit, tried, [])
+        alone = gains - self._gains(fit, [replace(at, kind="step") for at in tried], [])
+        least = np.full(len(tried), self._limit)
+        least[len(places) :] = _AT_STEP
+        clear = np.where(alone > least**2, gains, 0.0)
+        best = int(np.argmax(clear))
+        if clear[best] == 0.0:
+            return None
+        return (np.inf if best >= len(places) else float(gains[best])), tried[best]
+
+    def _placed_anew(self, run: int, found: list[_At]) -> list[_At]:
+        """All changes of a run, each at its best place beside the others; without those that are not clear then."""
+        others = [at for at in found if at.run != run]
+        fit, own = self._fit(others), [at for at in found if at.run == run]
+        for _ in range(_ROUNDS):
+            before = list(own)
+            for k, at in enumerate(before):
+                own[k] = self._best(at, fit, own[:k] + own[k + 1 :])
+            if before == own:
+                break
+        while own:
+            own = [at for k, at in enumerate(own) if all(self._differ(at, o) for o in own[:k])]
+            gains = [self._alone(fit, at, own[:k] + own[k + 1 :]) for k, at in enumerate(own)]
+            over = [
+                gain - (_AT_STEP if at.kind == "gain" else self._limit) ** 2
+                for gain, at in zip(gains, own, strict=True)
+            ]
+            if min(over) > 0.0:
+                break
+            del own[int(np.argmin(over))]
+        return others + own
+
+    def _best(self, at: _At, fit: Fit, others: Sequence[_At]) -> _At:
+        """The place and duration of the largest likelihood; of those nearly as likely the shortest."""
+        cells = self._cells[at.run]
+        reach = _HOUR_S if at.kind in ("drift", "gain") else max(_AROUND_S, at.duration_s, 3.0 * cells.cell_s)
+        near = cells.time_s[np.abs(cells.time_s - at.middle_s) <= reach]
+        near = near[:: max(len(near) // _PLACES, 1)] - 0.5 * cells.cell_s
+        if at.kind == "gain":
+            tried = [replace(at, begin_s=float(t)) for t in near[:: max(len(near) // _GAIN_PLACES, 1)]]
+            return tried[int(np.argmax(self._gains(fit, tried, others)))]
+        durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
+        shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
+        shapes += [replace(at, kind="step", duration_s=d) for d in durations]
+        best: list[tuple[float, _At]] = []
+        for shape in shapes:
+            tried = [replace(shape, begin_s=float(t) - 0.5 * shape.duration_s) for t in near]
+            gains = self._gains(fit, tried, others)
+            one = tried[int(np.argmax(gains))]
+            tried = [replace(one, begin_s=one.begin_s + d * cells.cell_s) for d in _PARTS]
+            gains = self._gains(fit, tried, others)
+            best.append((float(gains.max()), tried[int(np.argmax(gains))]))
+        most = max(gain for gain, _ in best)
+        return next(one for gain, one in best if gain >= most - CHI2_95_ONE)
+
+    def _gains(self, fit: Fit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
+        """Twice the gain of log-likelihood of each of some changes of one kind and run, beside others of it."""
+        run, beside = tried[0].run, self._of(others, tried[0].run)
+        columns = self._of(tried, run)
+        if tried[0].kind != "gain":
+            return self._gain_of(fit, run, columns, beside)
+        steps = columns[:, ::2]
+        found = self._gain_of(fit, run, steps, beside)
+        for k in range(len(tried)):
+            both = np.column_stack([beside, steps[:, k]])
+            found[k] += self._gain_of(fit, run, columns[:, 2 * k + 1 : 2 * k + 2], both)[0]
+        return found
+
+    def _alone(self, fit: Fit, at: _At, others: Sequence[_At]) -> float:
+        """Twice the gain of log-likelihood of one change; of a gain without its step."""
+        columns = self._of([at], at.run)
+        beside = np.column_stack([self._of(others, at.run), columns[:, :-1]])
+        return float(self._gain_of(fit, at.run, columns[:, -1:], beside)[0])
+
+    def _gain_of(self, fit: Fit, run: int, columns: FloatArray, beside: FloatArray) -> FloatArray:
+        inner, energy = fit.amplitudes(run, columns, beside)
+        return np.asarray(inner**2 / np.maximum(energy, 1e-300)) / self._white(run) ** 2
+
+    def _of(self, changes: Sequence[_At], run: int) -> FloatArray:
+        columns = _columns(self._cells[run], run, changes, self._curves)
+        return np.zeros((len(self._cells[run]), 0)) if columns is None else columns
+
+    def _white(self, run: int) -> float:
+        """Standard deviation of what is white of a run."""
+        assert self._scale is not None
+        return float(self._scale[run][0])
+
+    def change(self, at: _At, found: Sequence[_At], rows: Rows) -> Change | None:
+        """The change with its limits; None where it falls into a gap over which the noise may move as far."""
+        cells, others = self._cells[at.run], [o for o in found if o is not at and o.run == at.run]
+        fit, white = self._fit([o for o in found if o.run != at.run]), self._white(at.run)
+        columns = self._of([at], at.run)
+        beside = np.column_stack([self._of(others, at.run), columns[:, :-1]])
+        inner, energy = (float(v[0]) for v in fit.amplitudes(at.run, columns[:, -1:], beside))
+        size, error = inner / energy, white / float(np.sqrt(energy))
+        kind, duration, gap_s = at.kind, 0.0, self._gap_at(at) if at.kind == "step" else 0.0
+        if gap_s > 0.0:
+            error = float(np.hypot(error, white * np.sqrt(self._noise.level * gap_s / cells.cell_s)))
+            if gap_s > LONGEST_GAP_S or abs(size) < self._limit * error:
+                return None
+            time = _across_gap(at, rows, gap_s + cells.cell_s)
+        elif kind in ("drift", "gain"):
+            time = self._begins(at, fit, others)
+        else:
+            near = rows[2] - np.interp(rows[0], cells.time_s, fit.curve[at.run])
+            time, jump = _placed(at, near, rows[0], _NEAR_CELLS * cells.cell_s)
+            if at.duration_s > _over_s(cells) or jump / size < _LEAST_JUMP:
+                kind, duration = "transition", max(at.duration_s, _NEAR_CELLS * cells.cell_s)
+                half = 0.5 * duration + cells.cell_s
+                time = at.middle_s, at.middle_s - half, at.middle_s + half
+        sigmas = abs(size) / error
+        if kind == "gain":
+            if abs(size) < _LEAST_GAIN:
+                return None
+            size += 1.0
+        limits = size, size - NORMAL_95 * error, size + NORMAL_95 * error
+        return Change(at.run, kind, time, duration, limits, sigmas, gap_s)
+
+    def _gap_at(self, at: _At) -> float:
+        """Length of the gap in the rows that a change lies in, s; 0: none."""
+        t, cell_s = self._cells[at.run].time_s, self._cells[at.run].cell_s
+        gaps = [(float(t[k]), gap) for k, gap in self._cells[at.run].behind_gap]
+        return next((gap for end, gap in gaps if end - gap - cell_s < at.middle_s <= end + cell_s), 0.0)
+
+    def _begins(self, at: _At, fit: Fit, others: Sequence[_At]) -> Limits:
+        """The beginning of a drift with the times that are nearly as likely."""
+        t = self._cells[at.run].time_s
+        near = t[np.abs(t - at.begin_s) < _HOUR_S]
+        gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near], others)
+        likely = near[gains >= gains.max() - CHI2_95_ONE]
+        return float(near[int(np.argmax(gains))]), float(likely[0]), float(likely[-1])
+
+
+def _across_gap(at: _At, rows: Rows, around_s: float) -> Limits:
+    """First row behind the longest gap near a change, and the rows on both sides of it."""
+    first, end = np.searchsorted(rows[0], (at.middle_s - around_s, at.middle_s + around_s))
+    behind = int(first) + int(np.argmax(np.diff(rows[0][first : max(end, first + 2)]))) + 1
+    return float(rows[0][behind]), float(rows[0][behind - 1]), float(rows[0][behind])
+
+
+def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> tuple[Limits, float]:
+    """First row behind a step, the times between which it lies, and its size: where two levels leave least of rows."""
+    first, end = np.searchsorted(time, (at.middle_s - around_s, at.middle_s + around_s))
+    y, t = rate[first:end], time[first:end]
+    n = len(y)
+    inside = np.flatnonzero(np.abs(t - at.middle_s) <= 0.5 * around_s)
+    inside = inside[(inside > 0) & (inside < n)]
+    if len(inside) == 0:
+        return (at.middle_s, at.middle_s - around_s, at.middle_s + around_s), 0.0
+    y = y - y.mean()
+    total = np.concatenate([[0.0], np.cumsum(y)])
+    left = np.array([y @ y - total[k] ** 2 / k - (total[n] - total[k]) ** 2 / (n - k) for k in inside])
+    best = int(np.argmin(left))
+    noise = max(float(left[best]) / max(n - 2, 1), 1e-300)
+    likely = inside[left <= left[best] + _PLACED_95 * noise]
+    k = int(inside[best])
+    jump = float((total[n] - total[k]) / (n - k) - total[k] / k)
+    # One row more on either side: a row that is a mean may hold the step, and bear the time of its end or its start
+    return (float(t[k]), float(t[max(likely[0] - 2, 0)]), float(t[min(likely[-1] + 1, n - 1)])), jump
+
+
+_Tried = tuple[str, float]
+
+
+def _looked(fit: Fit, run: int) -> tuple[FloatArray, list[_Tried]]:
+    """Sizes over errors of changes at every cell of a run, shape (shapes, n), and what the shapes are.
+
+    The filter does not change with time: the inner products of a change at every place are a correlation.
+    """
+    cells = fit.cells[run]
+    n = len(cells)
+    ages = np.arange(0.5, n) * cells.cell_s
+    steps = [fit.white(np.clip(ages / max(d, cells.cell_s) + 0.5 * (d == 0.0), 0.0, 1.0)) for d in _TRIED_S]
+    tried: list[_Tried] = [("step", d) for d in _TRIED_S]
+    shapes = list(steps)
+    for length in _BACK_S:
+        cells_of_length = round(length / cells.cell_s)
+        if 2 <= cells_of_length < n:
+            back = steps[0].copy()
+            back[cells_of_length:] -= steps[0][: n - cells_of_length]
+            shapes.append(back)
+            tried.append(("back", cells_of_length * cells.cell_s))
+    shapes.append(fit.white(np.arange(0.0, n) * cells.cell_s / _HOUR_S))
+    tried.append(("drift", 0.0))
+    size = next_fast_len(2 * n, real=True)
+    beside = np.column_stack([fit.own[run], fit.shared[run]])
+    of_rest, of_beside = rfft(fit.rest[run], size), rfft(beside, size, axis=0)
+    found = np.zeros((len(shapes), n))
+    for k, shape in enumerate(shapes):
+        h = np.conj(rfft(shape, size))
+        inner = irfft(of_rest * h, size)[:n]
+        held = irfft(of_beside * h[:, None], size, axis=0)[:n]
+        energy = np.cumsum(shape**2)[::-1]
+        left = energy - np.sum(held**2, axis=1)
+        good = left > LEAST_ENERGY * energy
+        good[:_EDGE] = False
+        good[n - _EDGE - round(tried[k][1] / cells.cell_s) :] = False
+        found[k, good] = inner[good] / np.sqrt(left[good])
+    return found, tried

@@ -1,0 +1,250 @@
+"""Rates of all runs as one regression with coloured noise: what a change is judged against.
+
+A rate is a smooth function of temperature and its rate that all runs share, a level, a trend and a warm-up of each
+run, and noise: white, with a level and a slope that walk (a local linear trend; Harvey, Forecasting, Structural Time
+Series Models and the Kalman Filter, 1989, 2.3). Its steady Kalman filter is the recursive filter by which rates and
+columns become white; least squares of what it leaves is generalised least squares. The two walks are those of the
+largest likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.linalg import solve_discrete_are
+from scipy.signal import lfilter
+
+from ..common.arrays import FloatArray
+from ..common.statistics import cell_means, orthonormal, running_mean
+
+__all__ = ["Cells", "Fit", "Noise", "Rows", "cells_of", "knots_of", "likeliest_noise", "maps_of"]
+
+Rows = tuple[FloatArray, FloatArray, FloatArray]
+"""Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
+
+_KNOTS_C = (5.0, 2.5, 1.25)  # between knots of the map: finer ones only where the recordings say so
+_LEAST_SPAN_C = 1.0  # the temperature moves less: a level and a trend say all of it
+_SLOPE_S = 300.0  # over which dT/dt is taken: a resolution of 0.1 C makes 0.01 C/min of it
+_WARM_UP_S = (300.0, 1000.0, 3000.0)  # time constants of a level that settles after power-on
+_GAP_CELLS = 3.0  # without rows: the next cell comes behind a gap
+_LEVELS = 10.0 ** np.arange(-7.0, 0.5)  # variance of the level's walk over the white one, in a coarse cell
+_SLOPES = 10.0 ** np.arange(-13.0, -2.0, 1.5)  # of the slope's walk; at the lowest it moves nothing in a day
+_START = (4, 2)  # where the search over both begins: it ends at the same place from others
+_LEAST_SLOPE = 1e-14  # below it the equation of the filter has no solution in float64
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Means of one run.
+
+    Attributes:
+        time_s, temperature_c, rate_dph: Shape (n,) each; the time is the mean of the rows' times.
+        cell_s: Length of a cell.
+        behind_gap: First cells behind a gap, and how long the gaps are, s.
+    """
+
+    time_s: FloatArray
+    temperature_c: FloatArray
+    rate_dph: FloatArray
+    cell_s: float
+    behind_gap: tuple[tuple[int, float], ...]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+def cells_of(rows: Rows, cell_s: float) -> Cells:
+    """Means over cells of at least one row."""
+    length = max(float(np.median(np.diff(rows[0]))), cell_s)
+    t, x, y = cell_means(length, *rows)
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > _GAP_CELLS * length)
+    return Cells(t, x, y, length, tuple((int(k) + 1, float(steps[k])) for k in gaps))
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """White noise of variance 1 with walks of a level and its slope: variances of their steps from cell to cell."""
+
+    level: float
+    slope: float
+
+    def scaled(self, cells: float) -> Noise:
+        """The same in cells that are so many times shorter."""
+        return Noise(self.level / cells**2, self.slope / cells**4)
+
+    def filter(self) -> tuple[FloatArray, FloatArray, float]:
+        """Coefficients of the filter that makes it white, and the variance of what comes out."""
+        return _filter(self.level, self.slope)
+
+
+@lru_cache(maxsize=256)
+def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
+    moves = np.array([[1.0, 1.0], [0.0, 1.0]])
+    p = solve_discrete_are(
+        moves.T, np.array([[1.0], [0.0]]), np.diag([level, max(slope, _LEAST_SLOPE)]), np.eye(1)
+    )
+    variance = float(p[0, 0]) + 1.0
+    gain = moves @ p[:, 0] / variance
+    return np.array([1.0, -2.0, 1.0]), np.array([1.0, gain[0] - 2.0, 1.0 - gain[0] + gain[1]]), variance
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Runs, made white and fitted.
+
+    Attributes:
+        cells: Of the runs.
+        noise: Whose filter made them white.
+        own: Orthonormal columns of each run, white: its level, trend and changes, shape (n, k).
+        shared: Columns of the map beside them, orthonormal over all runs together, shape (n, p).
+        rest: What of the white rates is left, shape (n,).
+        sigma: Standard deviation of the white part of a cell, deg/h.
+    """
+
+    cells: tuple[Cells, ...]
+    noise: Noise
+    own: tuple[FloatArray, ...]
+    shared: tuple[FloatArray, ...]
+    rest: tuple[FloatArray, ...]
+    sigma: float
+    log_likelihood: float
+    curve: tuple[FloatArray, ...]
+
+    @staticmethod
+    def of(
+        cells: Sequence[Cells],
+        maps: Sequence[FloatArray],
+        noise: Noise,
+        changes: Sequence[FloatArray | None],
+    ) -> Fit:
+        """Fits all runs.
+
+        Args:
+            maps: Columns of the map at the cells of each run (`maps_of`).
+            changes: Columns of what changes in each run, shape (n, k) each; None: nothing.
+        """
+        b, a, variance = noise.filter()
+        own, white, rates = [], [], []
+        for one, of_map, change in zip(cells, maps, changes, strict=True):
+            n = len(one)
+            columns: list[FloatArray] = [np.ones(n), np.arange(n) / n]
+            columns += [np.exp((one.time_s[0] - one.time_s) / tau) for tau in _WARM_UP_S]
+            columns += [] if change is None else list(change.T)
+            columns += [
+                np.asarray(np.arange(n) >= k, dtype=np.float64)
+                for k, gap in one.behind_gap
+                if gap > LONGEST_GAP_S
+            ]
+            q = orthonormal(lfilter(b, a, np.column_stack(columns), axis=0))
+            own.append(q)
+            both = lfilter(b, a, np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]), axis=0)
+            both -= q @ (q.T @ both)
+            white.append(both[:, :-1])
+            rates.append(both[:, -1])
+        ends = np.cumsum([len(one) for one in cells])[:-1]
+        stacked, y = np.concatenate(white), np.concatenate(rates)
+        shared = orthonormal(stacked)
+        amplitudes = shared.T @ y
+        rest = y - shared @ amplitudes
+        free = max(len(y) - shared.shape[1] - sum(q.shape[1] for q in own), 1)
+        left = max(float(rest @ rest) / free, 1e-300)
+        by_column = (
+            np.linalg.lstsq(shared.T @ stacked, amplitudes, rcond=None)[0] if shared.size else amplitudes
+        )
+        return Fit(
+            tuple(cells),
+            noise,
+            tuple(own),
+            tuple(np.split(shared, ends)),
+            tuple(np.split(rest, ends)),
+            float(np.sqrt(left / variance)),
+            -0.5 * len(y) * float(np.log(left)),
+            tuple(of_map @ by_column if shared.size else np.zeros(len(of_map)) for of_map in maps),
+        )
+
+    def white(self, columns: FloatArray) -> FloatArray:
+        """Columns of one run through the filter."""
+        b, a, _ = self.noise.filter()
+        return np.asarray(lfilter(b, a, columns, axis=0))
+
+    def amplitudes(self, run: int, columns: FloatArray, beside: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of each column the inner product with the rates and its energy, both beside all else that is fitted.
+
+        Args:
+            columns: Of the run, not yet white, shape (n, k).
+            beside: Further columns of the run that are fitted with each, shape (n, j).
+        """
+        d, o = self.white(columns), self.white(beside)
+        held_d, held_o = (np.concatenate([self.own[run].T @ v, self.shared[run].T @ v]) for v in (d, o))
+        inner, raw = d.T @ self.rest[run], np.sum(d * d, axis=0)
+        energy = raw - np.sum(held_d * held_d, axis=0)
+        if o.shape[1]:
+            of_both, of_beside = d.T @ o - held_d.T @ held_o, o.T @ o - held_o.T @ held_o
+            solved = np.linalg.lstsq(
+                of_beside, np.column_stack([of_both.T, o.T @ self.rest[run]]), rcond=None
+            )[0]
+            inner = inner - of_both @ solved[:, -1]
+            energy = energy - np.sum(of_both.T * solved[:, :-1], axis=0)
+        return inner, np.maximum(energy, LEAST_ENERGY * raw)
+
+
+LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
+LEAST_ENERGY = 1e-3  # of a change's own, below which what is fitted beside it holds it
+
+
+def maps_of(cells: Sequence[Cells], knots_c: float) -> list[FloatArray]:
+    """Columns of a map over temperature and its rate at the cells of each run, shape (n, p)."""
+    low = min(float(one.temperature_c.min()) for one in cells)
+    high = max(float(one.temperature_c.max()) for one in cells)
+    if high - low < _LEAST_SPAN_C:
+        return [np.zeros((len(one), 0)) for one in cells]
+    inner = np.linspace(low, high, max(int(np.ceil((high - low) / knots_c)), 1) + 1)
+    knots = np.r_[[low] * 3, inner, [high] * 3]
+    found = []
+    for one in cells:
+        x = np.clip(one.temperature_c, low, high)
+        pieces = BSpline.design_matrix(x, knots, 3).toarray()[:, 1:]  # with the first they add up to a level
+        slope = running_mean(np.gradient(one.temperature_c, one.time_s), max(round(_SLOPE_S / one.cell_s), 1))
+        r, u = 60.0 * slope, (x - 0.5 * (low + high)) / (high - low)
+        found.append(np.column_stack([pieces, r, r * u, r * u * u, r * np.abs(r), r * r]))
+    return found
+
+
+def knots_of(cells: Sequence[Cells]) -> float:
+    """Distance of the map's knots, C, by Schwarz's criterion (BIC): a bend that all passages show is no change."""
+    chosen, least = _KNOTS_C[0], np.inf
+    for knots_c in _KNOTS_C:
+        maps = maps_of(cells, knots_c)
+        _, likelihood = likeliest_noise(cells, maps, [None] * len(cells))
+        n = sum(len(one) for one in cells)
+        criterion = maps[0].shape[1] * float(np.log(n)) - 2.0 * likelihood
+        if criterion > least or 2 * maps[0].shape[1] > n:
+            break
+        chosen, least = knots_c, criterion
+    return chosen
+
+
+def likeliest_noise(
+    cells: Sequence[Cells], maps: Sequence[FloatArray], changes: Sequence[FloatArray | None]
+) -> tuple[Noise, float]:
+    """The walks of the largest likelihood beside changes that are known (as for `Fit.of`), and its logarithm."""
+    known: dict[tuple[int, int], float] = {}
+
+    def likelihood(at: tuple[int, int]) -> float:
+        if at not in known:
+            noise = Noise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]))
+            known[at] = Fit.of(cells, maps, noise, changes).log_likelihood
+        return known[at]
+
+    best, last = _START, (-1, -1)
+    while best != last:
+        last = best
+        around = [(last[0] + i, last[1] + j) for i in (0, -1, 1) for j in (0, -1, 1)]
+        inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
+        best = max(inside, key=likelihood)
+    return Noise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]])), known[best]
