@@ -281,6 +281,7 @@ class Limits(_Part):
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     product: str = ""
+    display: Literal["deg/h", "deg/s", "mdps", "arcsec/s"] = "deg/h"  # unit of rates on pages
     decision_rule: DecisionRule = "guard_band"
     at_most: AtMost = AtMost()
     at_least: AtLeast = AtLeast()
@@ -344,6 +345,7 @@ def held_against(
         limits=checks,
         verdict=worst_of(check.verdict for check in checks),
         decision_rule=limits.decision_rule,
+        display=limits.display,
     )
 
 

@@ -220,6 +220,14 @@ def _targets_begun(incomplete: str) -> list[str]:
 
 
 AnyAverageOption = Annotated[float | None, _of_build("average_s")]
+DisplayOption = Annotated[
+    str | None,
+    typer.Option(
+        "--display",
+        help="Unit of rates on page and terminal: deg/h, deg/s, mdps or arcsec/s; default: that of the limits file.",
+        autocompletion=completing(("deg/h", "deg/s", "mdps", "arcsec/s")),
+    ),
+]
 SeedOption = Annotated[int, _of_build("seed")]
 NumericOption = Annotated[
     str | None,

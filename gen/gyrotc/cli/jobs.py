@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..common.errors import CheckFailed, InputError
+from ..pages.display import NATIVE, displayed, rate_unit, shown
 from ..train.options import BuildOptions
 from .base import (
     BUILD,
@@ -20,6 +21,7 @@ from .base import (
     AppliedOption,
     AxisOption,
     DatasetArg,
+    DisplayOption,
     JsonOption,
     LotOption,
     NumericOption,
@@ -145,7 +147,7 @@ def _gain_lines(gain: GainOnUnseen) -> Iterator[str]:
         "" if share is None else f"; {share:.0%} of the removable error ({gain.low:.0%} ... {gain.high:.0%})"
     )
     yield (
-        f"  RMS on runs not fitted to: {gain.exam_rms_before_dph:.4g} -> {gain.exam_rms_after_dph:.4g} deg/h, "
+        f"  RMS on runs not fitted to: {gain.exam_rms_before_dph:.4g} -> {gain.exam_rms_after_dph:.4g} {rate_unit()}, "
         f"95 % {removed.low:.2g} ... {removed.high:.2g} less{part}"
     )
     angle = gain.angle_1h_removed_arcsec
@@ -183,6 +185,7 @@ def build(
     any_serial: Annotated[
         bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
     ] = False,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -208,6 +211,7 @@ def build(
             prior=prior,
             ageing_dph=ageing,
             any_serial=any_serial,
+            display=display,
             progress=say,
         )
     if len(results) == 1:
@@ -217,7 +221,8 @@ def build(
     for result in results:
         if result.model.axis:
             tell(f"axis {result.model.axis}")
-        _print_built(result)
+        with displayed(display or (result.limits.display if result.limits else "") or NATIVE):
+            _print_built(result)
     tell(f"report: {out / 'report.html'}")
     if any(result.evaluation.structure_left and not result.diagnosis for result in results):
         tell(f"next, as the residual is more than noise: gyrotc diagnose {shlex.quote(str(dataset))}")
@@ -229,19 +234,20 @@ def build(
 
 
 def _print_built(result: Built) -> None:
-    show(evaluation_table(result.evaluation))
+    evaluation = shown(result.evaluation)
+    show(evaluation_table(evaluation))
     if verbose() or result.verification.failed:
         show(verify_table(result.verification))
     for line in (
         verified_line(result.verification),
         *not_installed_lines(result.verification),
-        *training_lines(result.training),
+        *training_lines(shown(result.training)),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
-        *(extension_lines(result.diagnosis) if result.diagnosis else ()),
-        *(limit_lines(result.limits) if result.limits else ()),
-        *(change_lines(result.changes) if result.changes else ()),
-        *(f"finding {finding.id}: {finding.text}" for finding in result.evaluation.findings),
-        summary(result.evaluation),
+        *(extension_lines(shown(result.diagnosis)) if result.diagnosis else ()),
+        *(limit_lines(shown(result.limits)) if result.limits else ()),
+        *(change_lines(shown(result.changes)) if result.changes else ()),
+        *(f"finding {finding.id}: {finding.text}" for finding in evaluation.findings),
+        summary(evaluation),
     ):
         tell(line)
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
+from ..pages.display import rate_unit
+
 if TYPE_CHECKING:
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
     from ..results.release import HeldLimits
@@ -21,7 +23,7 @@ def _e(value: float | None, digits: int = 2) -> str:
 
 
 def evaluation_table(result: Evaluation) -> RichTable:
-    title = f"{result.serial}: means over {result.average_s:g} s, deg/h"
+    title = f"{result.serial}: means over {result.average_s:g} s, {rate_unit()}"
     table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("run", "role", "environment"):
         table.add_column(name, no_wrap=True)
@@ -53,7 +55,7 @@ def training_lines(training: Training) -> Iterator[str]:
         tried = (
             f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.ladder if r.left_out_rms_dph is not None
         )
-        yield f"  left-out RMS, deg/h: {', '.join(tried)}"
+        yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
     yield from _channel_lines(training)
     yield from _lot_lines(training)
 
@@ -68,7 +70,7 @@ def _lot_lines(training: Training) -> Iterator[str]:
             if not cell.within:
                 (t0, t1), (r0, r1) = cell.temperature_c, cell.slope_c_per_min
                 yield (
-                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {cell.found_dph:+.2g} deg/h, "
+                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {cell.found_dph:+.2g} {rate_unit()}, "
                     f"limit {cell.limit_dph:.2g}"
                 )
 
@@ -87,19 +89,17 @@ def _channel_lines(training: Training) -> Iterator[str]:
             yield f"channel {tried.name}: {tried.verdict}: {tried.reason}"
             continue
         before, after = tried.left_out_rms_before_dph, tried.left_out_rms_after_dph
-        slope = (
-            f"{tried.slope_dph_per_unit:.4g} deg/h per unit{'' if tried.shape == 'line' else ' on average'}"
-        )
+        slope = f"{tried.slope_dph_per_unit:.4g} {rate_unit()} per unit{'' if tried.shape == 'line' else ' on average'}"
         yield (
             f"channel {tried.name}: taken{_SHAPES[tried.shape or 'line']}, {slope}; left-out RMS {before:.4g} -> "
-            f"{after:.4g} deg/h, {tried.share_of_variance:.0%} of the variance of the bias"
+            f"{after:.4g} {rate_unit()}, {tried.share_of_variance:.0%} of the variance of the bias"
         )
 
 
 def prediction_line(training: Training) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
     ratio = training.predicted_rms_ratio
-    floor = f"noise floor {training.noise_floor_dph:.3g} deg/h"
+    floor = f"noise floor {training.noise_floor_dph:.3g} {rate_unit()}"
     if ratio is None:
         return f"{floor}; no prediction of RMS over it: {training.prediction_withheld}"
     return f"{floor}; predicted RMS over it: {ratio:.4f}"
@@ -160,7 +160,7 @@ def verify_notes(result: Verification) -> Iterator[str]:
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (
-            f"{error.numeric}: worst error {error.worst_dph:.2e} deg/h of {error.inputs_visited} inputs "
+            f"{error.numeric}: worst error {error.worst_dph:.2e} {rate_unit()} of {error.inputs_visited} inputs "
             f"visited; the bound is {error.bound_dph:.2e}"
             + (" and is EXCEEDED" if error.worst_dph > error.bound_dph else "")
         )
@@ -239,7 +239,9 @@ def summary(result: Evaluation) -> str:
         text += f", about the mean {part.before.std_dph / part.after.std_dph:.2f}"
     floor, rms = result.noise_floor_dph, part.after.rms_dph
     if floor and rms is not None:
-        text += f"; RMS {rms:.3e} deg/h = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
+        text += (
+            f"; RMS {rms:.3e} {rate_unit()} = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
+        )
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 
@@ -291,7 +293,7 @@ def change_lines(changes: Changes) -> Iterator[str]:
             more = "more than" if moved.significant else "no more than"
             share += f", {more} the uncertainty of both maps gives (U = {moved.expanded_uncertainty_dph:.2g})"
         yield (
-            f"against the earlier result: maps {moved.rms_dph:.3e} deg/h RMS difference{share}, at most "
+            f"against the earlier result: maps {moved.rms_dph:.3e} {rate_unit()} RMS difference{share}, at most "
             f"{moved.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
     yield from _as_found_lines(changes)
@@ -314,7 +316,7 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
             yield f"  as found: not known ({changes.as_found_missing})"
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
-    yield f"  as found: RMS {_e(found.figures.after.rms_dph)} deg/h with the earlier correction{verdict}"
+    yield f"  as found: RMS {_e(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
 
 
 def _plain(value: Any) -> str:

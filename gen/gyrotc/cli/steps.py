@@ -23,6 +23,7 @@ from .base import (
     AxisOption,
     DatasetArg,
     DirArg,
+    DisplayOption,
     JsonOption,
     LotOption,
     NumericOption,
@@ -305,7 +306,7 @@ def evaluate(
 
 
 @app.command()
-def report(folder: DirArg) -> None:
+def report(folder: DirArg, display: DisplayOption = None) -> None:
     """Write DIR/report.html from what build, diagnose or plan left in DIR.
 
     Example: gyrotc report result
@@ -319,5 +320,5 @@ def report(folder: DirArg) -> None:
         if is_diagnosis(folder):
             path = write_diagnosis_page(folder)
         else:
-            path = write_plan_page(folder) if is_plan(folder) else write_report(folder)
+            path = write_plan_page(folder) if is_plan(folder) else write_report(folder, display)
     tell(f"report: {path}")

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
+from ..pages.display import NATIVE
 from ..recordings.load import asked_axes
 from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
@@ -61,6 +62,11 @@ class Fleet:
     options: FitOptions
     numerics: tuple[str, ...] | None
     limits: Limits | None
+
+    @property
+    def display(self) -> str:
+        """Unit of rates on the page: that of the limits, else deg/h."""
+        return self.limits.display if self.limits else NATIVE
 
 
 @dataclass(frozen=True, slots=True)

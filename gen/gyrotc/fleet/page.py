@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 from .. import __version__
 from ..common.texts import csv_cell
+from ..pages.display import NATIVE, displayed, shown
 from ..pages.fleet_plots import curves_of_units, rms_of_units, why_outlier
 from ..pages.report import page_environment
 from ..results.fleet import FleetEntry, FleetSummary, FleetUnit
@@ -55,8 +56,11 @@ def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
     )
 
 
-def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
+def write_summary(out: Path, entries: Sequence[FleetEntry], display: str = NATIVE) -> FleetSummary:
     """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns what the first says.
+
+    Args:
+        display: Unit of rates on the page.
 
     Raises:
         InputError: There are files of these names that gyrotc did not write.
@@ -64,25 +68,27 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
     summary = summary_of(entries)
     outliers = {reason.name for reason in summary.reasons} | {outlier.name for outlier in summary.outliers}
     known = {entry.name: entry for entry in entries if entry.facts}
-    pictures = {
-        reason.name: why_outlier(known, reason)
-        for reason in summary.reasons[:_PICTURES]
-        if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
-    }
-    page = (
-        page_environment()
-        .get_template("fleet.html.j2")
-        .render(
-            summary=summary,
-            outliers=outliers,
-            picture=rms_of_units([e for e in entries if e.after_rms_dph], outliers),
-            curves=curves_of_units(entries, outliers),
-            pictures=pictures,
-            links={entry.name: _link(out, entry.name) for entry in summary.serials},
-            verdicts=Counter(entry.verdict for entry in summary.serials),
-            barred=sum(bool(entry.barred) for entry in summary.serials),
+    with displayed(display):
+        visible = shown(summary)
+        pictures = {
+            reason.name: why_outlier(known, reason)
+            for reason in summary.reasons[:_PICTURES]
+            if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
+        }
+        page = (
+            page_environment()
+            .get_template("fleet.html.j2")
+            .render(
+                summary=visible,
+                outliers=outliers,
+                picture=rms_of_units([e for e in entries if e.after_rms_dph], outliers),
+                curves=curves_of_units(entries, outliers),
+                pictures=pictures,
+                links={entry.name: _link(out, entry.name) for entry in summary.serials},
+                verdicts=Counter(entry.verdict for entry in visible.serials),
+                barred=sum(bool(entry.barred) for entry in visible.serials),
+            )
         )
-    )
     texts = (json_text(summary.content()), _table(summary.serials), page)
     with result_folder(out, "fleet", entries=SUMMARY) as stage:
         for name, text in zip(SUMMARY, texts, strict=True):

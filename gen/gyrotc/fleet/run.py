@@ -341,7 +341,7 @@ def gather(
             known = made_before(task.keyed())
             entries.append(known.as_kept() if known else _unfinished(task, _NO_RESULT))
             say(entries[-1])
-        found = _summed(place, entries, releases)
+        found = _summed(fleet, place, entries, releases)
         enter(place, found, tag)
         return found
     finally:
@@ -389,8 +389,9 @@ def _run(
     entries = _done_already(tasks, say)
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
-        write_summary(out, [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)])
-    return _summed(out, _worked(tasks, entries, jobs, cluster, say), releases)
+        so_far = [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)]
+        write_summary(out, so_far, fleet.display)
+    return _summed(fleet, out, _worked(tasks, entries, jobs, cluster, say), releases)
 
 
 def _done_already(tasks: list[Task], say: Done) -> dict[int, FleetEntry]:
@@ -416,7 +417,9 @@ def _worked(
     return [entries[number] for number in range(len(tasks))]
 
 
-def _summed(out: Path, entries: Sequence[FleetEntry], releases: Mapping[str, str] | None) -> list[FleetEntry]:
+def _summed(
+    fleet: Fleet, out: Path, entries: Sequence[FleetEntry], releases: Mapping[str, str] | None
+) -> list[FleetEntry]:
     """Writes the summary; the entries as it tells them."""
     why = releases or {}
     found = [
@@ -425,7 +428,7 @@ def _summed(out: Path, entries: Sequence[FleetEntry], releases: Mapping[str, str
         else entry
         for entry in _one_of_each_serial(entries)
     ]
-    write_summary(out, found)
+    write_summary(out, found, fleet.display)
     return found
 
 

@@ -30,10 +30,10 @@ AXES = ("x", "y", "z")
 _HOST = "host-gcc-O2"
 
 
-def join_axes(folder: Path, axes: Sequence[str]) -> None:
+def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> None:
     """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
 
-    Proves that all tables link and pass their self-tests in one image.
+    `display`: as of `build`. Proves that all tables link and pass their self-tests in one image.
 
     Raises:
         CheckFailed: The image does not link, or a table does not pass its self-test in it.
@@ -45,7 +45,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         write_own(c / name, data)
     _run_together(c, [m.id for m in models.values()])
-    write_atomically(folder / "report.html", axes_page(folder, axes))
+    write_atomically(folder / "report.html", axes_page(folder, axes, display))
 
 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:

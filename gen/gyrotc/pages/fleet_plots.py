@@ -10,6 +10,7 @@ from markupsafe import Markup
 from ..common.arrays import FloatArray
 from ..results.fleet import Facts, FleetEntry, Reason, ResidualSeries
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
+from .display import in_unit, rate_unit
 
 __all__ = ["curves_of_units", "rms_of_units", "why_outlier"]
 
@@ -27,12 +28,12 @@ def rms_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup | 
     place = np.arange(1, len(ordered) + 1)
     ringed = [k for k, entry in enumerate(ordered) if entry.name in outliers]
     size = 5.0 if len(ordered) < _SMALL_FLEET else 2.5
-    panel = Panel(x="gyros, in the order of what remains", y="RMS, deg/h", y_log=True, whole_x=True)
+    panel = Panel(x="gyros, in the order of what remains", y=f"RMS, {rate_unit()}", y_log=True, whole_x=True)
     for figures, color, label in (
         ([entry.before_rms_dph for entry in ordered], BEFORE, "before"),
         ([entry.after_rms_dph for entry in ordered], AFTER, "after"),
     ):
-        values = np.array(figures, dtype=np.float64)
+        values = in_unit(np.array(figures, dtype=np.float64))
         panel.dots(place, values, color, label, size=size)
         if ringed:
             panel.dots(place[ringed], values[ringed], ACCENT, "outlier", size=11.0, hollow=True)
@@ -47,7 +48,9 @@ def curves_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup
         if len(members) < 2:
             continue
         plain = [e for e in members if e.name not in outliers]
-        panel = Panel(x="temperature, C", y="bias, deg/h", title=f"axis {axis}" if axis else "", zoom=True)
+        panel = Panel(
+            x="temperature, C", y=f"bias, {rate_unit()}", title=f"axis {axis}" if axis else "", zoom=True
+        )
         for k, entry in enumerate(plain[:: -(-len(plain) // _MOST_CURVES) or 1]):
             label = "the others" if k == 0 else ""
             panel.line(_centers(entry), _curve(entry), COVERED, label, width=0.8, title=entry.name)
@@ -75,16 +78,16 @@ def why_outlier(known: Mapping[str, FleetEntry], reason: Reason) -> Markup:
 
 
 def _over_time(series: ResidualSeries, reason: Reason) -> Panel:
-    panel = Panel(x="time, h", y="compensated, deg/h")
+    panel = Panel(x="time, h", y=f"compensated, {rate_unit()}")
     time = np.array(series.time_s)
-    panel.line((time - time[0]) / 3600.0, np.array(series.rate_dph), AFTER, series.file, width=1.0)
+    panel.line((time - time[0]) / 3600.0, in_unit(series.rate_dph), AFTER, series.file, width=1.0)
     if reason.time_s is not None and reason.file == series.file:
         panel.vertical(reason.time_s / 3600.0, BEFORE, "step", dash="5 3", width=1.2)
     return panel
 
 
 def _over_temperature(known: Mapping[str, FleetEntry], entry: FleetEntry) -> Panel:
-    panel = Panel(x="temperature, C", y="bias, deg/h")
+    panel = Panel(x="temperature, C", y=f"bias, {rate_unit()}")
     rows = np.array([_curve(e) for e in known.values() if e.axis == entry.axis and e.facts])
     t = _centers(entry)
     seen = np.isfinite(rows).any(axis=0)
@@ -101,7 +104,7 @@ def _centers(entry: FleetEntry) -> FloatArray:
 
 
 def _curve(entry: FleetEntry) -> FloatArray:
-    return np.array([np.nan if v is None else v for v in _facts(entry).curve])
+    return in_unit([np.nan if v is None else v for v in _facts(entry).curve])
 
 
 def _facts(entry: FleetEntry) -> Facts:

@@ -17,6 +17,7 @@ from ..model import Model
 from ..results.evaluation import Calibration
 from ..results.training import Training
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
+from .display import in_unit, rate_unit
 
 __all__ = [
     "bias_over_time", "calibrations_over_time", "curve_by_size", "map_with_centers", "prior_and_posterior",
@@ -41,16 +42,16 @@ def bias_over_time(
         left_out_s: Times of rows that were left out of training, for each run, s; drawn as marks above.
     """
     marks = [*left_out_s, *[()] * (len(runs) - len(left_out_s))]
-    rates = np.concatenate([np.concatenate((a.before_dph, a.after_dph, [0.0])) for _, _, a in runs])
+    rates = in_unit(np.concatenate([np.r_[a.before_dph, a.after_dph, 0.0] for _, _, a in runs]))
     span = (float(rates.min()), float(rates.max()))
     pictures = []
     for k, ((label, role, a), times) in enumerate(zip(runs, marks, strict=True)):
-        panel = Panel(x="time, h", y="bias, deg/h", title=f"{label} ({role})", y_range=span)
+        panel = Panel(x="time, h", y=f"bias, {rate_unit()}", title=f"{label} ({role})", y_range=span)
         first = a.time_s[0] if a.time_s.size else 0.0
         hours = (a.time_s - first) / 3600.0
         panel.horizontal(0.0)
-        panel.line(hours, a.before_dph, BEFORE, "" if k else "measured", width=1.0)
-        panel.line(hours, a.after_dph, AFTER, "" if k else "compensated", width=1.0)
+        panel.line(hours, in_unit(a.before_dph), BEFORE, "" if k else "measured", width=1.0)
+        panel.line(hours, in_unit(a.after_dph), AFTER, "" if k else "compensated", width=1.0)
         if len(times) and a.time_s.size:
             panel.tops((np.array(times) - first) / 3600.0)
         pictures.append(drawing([panel], width=THIRD, height=110.0))
@@ -67,18 +68,18 @@ def map_with_centers(model: Model) -> Markup | None:
     surface = Panel(
         x="temperature, C", y="dT/dt, C/min", title="dots: centers (rings: beyond); hatched: not trained"
     )
-    surface.image(model.map_dph(tt, rr), (t0, t1), (r0, r1), "bias, deg/h", hidden)
+    surface.image(in_unit(model.map_dph(tt, rr)), (t0, t1), (r0, r1), f"bias, {rate_unit()}", hidden)
     centers = np.array([c for network in model.networks for c in network.centers]).reshape(-1, 2)
     places = np.clip(centers, (t0, r0), (t1, r1))
     within = np.all(places == centers, axis=1)
     for of, hollow in ((within, False), (~within, True)):
         surface.dots(places[of, 0], places[of, 1], ACCENT, size=7.0, hollow=hollow)
-    cuts = Panel(x="temperature, C", y="bias, deg/h", title="cuts through the map")
+    cuts = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="cuts through the map")
     for rate, dash, color in zip(
         np.linspace(r0, r1, 3), ("5 3", "", "1.5 2.5"), (AFTER, COVERED, BEFORE), strict=True
     ):
         label = f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−")  # + 0.0: not "-0.00"
-        cuts.line(t, model.map_dph(t, np.full_like(t, rate)), color, label, dash=dash, width=1.4)
+        cuts.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, label, dash=dash, width=1.4)
     return side_by_side(
         drawing([surface], width=HALF, height=240.0), drawing([cuts], width=HALF, height=220.0)
     )
@@ -119,7 +120,9 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
     named = dated and len(at) <= _MOST_NAMED
     ticks = [(t, str(one.date)[:10]) for t, one in zip(at, history, strict=True)] if named else None
     words = "" if named else "days since the first calibration" if dated else "number of the calibration"
-    left = Panel(x=words, y="RMS of what remains, deg/h", y_range=(0.0, None), x_ticks=ticks, whole_x=True)
+    left = Panel(
+        x=words, y=f"RMS of what remains, {rate_unit()}", y_range=(0.0, None), x_ticks=ticks, whole_x=True
+    )
     for label, color, values in (
         ("as found: the correction before", BEFORE, [one.as_found_rms_dph for one in history]),
         ("as left: the new one", AFTER, [one.as_left_rms_dph for one in history]),
@@ -128,7 +131,7 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
         if known.size:
             left.line(known[:, 0], known[:, 1], color, label)
             left.dots(known[:, 0], known[:, 1], color, size=6.0)
-    right = Panel(x=words, y="mean of the map, deg/h", x_ticks=ticks, whole_x=True)
+    right = Panel(x=words, y=f"mean of the map, {rate_unit()}", x_ticks=ticks, whole_x=True)
     _moved(right, at, history)
     return side_by_side(drawing([left], width=HALF), drawing([right], width=HALF))
 
@@ -172,7 +175,7 @@ def prior_and_posterior(training: Training) -> Markup | None:
     if curve is None:
         return None
     t = np.array(curve.temperature_c)
-    panel = Panel(x="temperature, C", y="bias at rest, deg/h")
+    panel = Panel(x="temperature, C", y=f"bias at rest, {rate_unit()}")
     for mean, sigma, color, label in (
         (curve.prior_dph, curve.prior_sigma_dph, COVERED, name),
         (curve.posterior_dph, curve.posterior_sigma_dph, AFTER, "with this unit's own runs"),

@@ -24,6 +24,7 @@ from ..results.evaluation import EvaluatedRun
 from ..results.training import LeftOutRows, Training
 from ..store.files import write_atomically
 from ..store.folder import result_folder
+from .display import displayed, rate_unit
 from .plots import (
     bias_over_time,
     calibrations_over_time,
@@ -52,28 +53,36 @@ _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are 
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, display: str | None = None) -> Path:
     """Writes `folder/report.html` from what stands in the folder; returns its path.
 
+    Args:
+        display: Unit of rates; None: that of the limits, else deg/h.
+
     Raises:
-        InputError: `model.json` or `evaluate.json` is missing or broken.
+        InputError: `model.json` or `evaluate.json` is missing or broken, or the unit is not known.
     """
     unit = unit_in(folder)
-    with page_from(folder):
+    with displayed(display or unit.display), page_from(folder):
+        unit = unit.shown()
         pictures = _pictures(folder, unit)
         template = page_environment().get_template("report.html.j2")
         text = template.render(unit=unit, pictures=pictures, left_out=_left_out(unit.training), **vars(unit))
     return write_page(folder, text)
 
 
-def axes_page(folder: Path, axes: Sequence[str]) -> str:
+def axes_page(folder: Path, axes: Sequence[str], display: str | None = None) -> str:
     """The page of a unit with several axes, each in a folder of its name: those that failed first.
+
+    Args:
+        display: As of `write_report`.
 
     Raises:
         InputError: A result of an axis is missing or broken.
     """
     units = [unit_in(folder / axis) for axis in axes]
-    with page_from(folder):
+    with displayed(display or units[0].display), page_from(folder):
+        units = [unit.shown() for unit in units]
         ordered = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
         pictures = {u.model.axis: thermal_picture(folder / str(u.model.axis), u) for u in units}
         worst = ordered[0].verdict
@@ -104,6 +113,7 @@ def page_environment() -> jinja2.Environment:
         words=words, candidate=words_of_candidate, limit_words=limit_words, bound_words=bound_words,
         measured_words=measured_words,
     )  # fmt: skip
+    environment.globals["rate"] = rate_unit
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
     return environment
 

@@ -9,16 +9,31 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 
-__all__ = ["Scale", "power", "scale_of"]
+__all__ = ["Scale", "is_plain", "power", "scale_of", "significant"]
 
 _ROUND = (1.0, 2.0, 5.0, 10.0)
-_FEW_DECADES = 1.5  # up to which a logarithmic axis has numbers between its powers of ten
 _PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
 
 
 def power(exponent: int) -> str:
     """A power of ten: 10⁻⁴."""
     return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def is_plain(exponent: int) -> bool:
+    """Whether a number of this power of ten is written without one: 0.01 to 99999, on axes, in tables, in sentences."""
+    return _PLAIN[0] < exponent < _PLAIN[1]
+
+
+def significant(value: float, digits: int) -> str:
+    """A number with so many significant digits, those before the point whole: 1303, 2764.2, 0.0215, 7.00·10⁻⁴."""
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if is_plain(exponent):
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+    mantissa, _, exact = f"{value:.{digits - 1}e}".partition("e")
+    return f"{mantissa}·{power(int(exact))}".replace("-", "−")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +54,7 @@ class Scale:
         if self.linear_to or largest == 0.0:
             return 0
         found = math.floor(math.log10(largest))
-        return 0 if _PLAIN[0] < found < _PLAIN[1] else found
+        return 0 if is_plain(found) else found
 
     def _stretched(self, values: FloatArray) -> FloatArray:
         if not self.linear_to:
@@ -73,7 +88,7 @@ class Scale:
     def _powers(self, most: int) -> list[tuple[float, str]]:
         a, b = math.log10(self.low), math.log10(self.high)
         decades = range(math.ceil(a - 1e-9), math.floor(b + 1e-9) + 1)
-        if b - a > _FEW_DECADES:
+        if len(decades) > 2:
             every = max(math.ceil(len(decades) / most), 1)
             return [(10.0**k, _plain(10.0**k)) for k in decades if k % every == 0]
         numbers = [f * 10.0**k for k in range(math.floor(a), math.ceil(b) + 1) for f in _ROUND[:3]]
@@ -99,7 +114,7 @@ def _minus(text: str) -> str:
 
 def _plain(value: float) -> str:
     exponent = math.floor(math.log10(value) + 1e-9)
-    if _PLAIN[0] < exponent < _PLAIN[1]:
+    if is_plain(exponent):
         return f"{value:g}"
     mantissa = round(value / 10.0**exponent)
     return power(exponent) if mantissa == 1 else f"{mantissa}·{power(exponent)}"

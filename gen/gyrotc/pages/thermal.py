@@ -12,6 +12,7 @@ from ..common.metrics import Averages
 from ..model import Model
 from ..results.training import NoiseTerms
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
+from .display import in_unit, rate_unit
 from .words import sci
 
 __all__ = ["MOVING_C_PER_MIN", "allan_deviation", "bias_against_temperature", "slopes", "sorted_by_rate"]
@@ -49,16 +50,16 @@ def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup |
     there = [a for a in runs if a.time_s.size]
     if not there:
         return None
-    t, before, after = (
-        np.concatenate([getattr(a, name) for a in there])
-        for name in ("temperature_c", "before_dph", "after_dph")
+    t = np.concatenate([a.temperature_c for a in there])
+    before, after = (
+        in_unit(np.concatenate([getattr(a, name) for a in there])) for name in ("before_dph", "after_dph")
     )
     slope = np.concatenate([slopes(a) for a in there])
     kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
-    first = Panel(x="temperature, C", y="bias, deg/h", title="measured, and the map")
-    second = Panel(x="temperature, C", y="bias, deg/h", title="before and after, on one scale")
-    third = Panel(x="temperature, C", y="residual, deg/h", title="what remains, over temperature")
-    fourth = Panel(x="dT/dt, C/min", y="residual, deg/h", title="what remains, over dT/dt")
+    first = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="measured, and the map")
+    second = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="before and after, on one scale")
+    third = Panel(x="temperature, C", y=f"residual, {rate_unit()}", title="what remains, over temperature")
+    fourth = Panel(x="dT/dt, C/min", y=f"residual, {rate_unit()}", title="what remains, over dT/dt")
     second.dots(t, before, COVERED, "before", size=_DOT)
     for panel in (second, third, fourth):
         panel.horizontal(0.0)
@@ -77,9 +78,10 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
     """The map at the median rate of heating and of cooling, and at rest with its band of U."""
     t0, t1 = model.envelope.temperature_c
     t = np.linspace(t0, t1, 160) if t1 > t0 else np.array([t0 - 0.5, t0 + 0.5])
-    rest = model.map_dph(t, np.zeros_like(t))
+    rest = in_unit(model.map_dph(t, np.zeros_like(t)))
     sigma = _sigma_at_rest(model, t)
     if sigma is not None:
+        sigma = in_unit(sigma)
         panel.band(
             t, rest - _COVERAGE * sigma, rest + _COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2"
         )
@@ -88,7 +90,9 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
         if label != "held":
             rate = float(np.median(slope[of]))
             words = f"map at {rate:+.2g} C/min".replace("-", "−")
-            panel.line(t, model.map_dph(t, np.full_like(t, rate)), color, words, dash="5 3", width=1.6)
+            panel.line(
+                t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, words, dash="5 3", width=1.6
+            )
 
 
 def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
@@ -130,7 +134,7 @@ def allan_deviation(noise: NoiseTerms) -> Markup | None:
     tau, value, freedom = (
         np.array([getattr(p, name) for p in points]) for name in ("tau_s", "deviation_dph", "freedom")
     )
-    panel = Panel(x="averaging time, s", y="Allan deviation, deg/h", x_log=True, y_log=True)
+    panel = Panel(x="averaging time, s", y=f"Allan deviation, {rate_unit()}", x_log=True, y_log=True)
     spread = value / np.sqrt(2.0 * freedom)
     low, high = np.maximum(value - spread, 0.1 * value), value + spread
     panel.y_range = (float(low.min()) / 1.5, float(high.max()) * 1.5)
@@ -138,13 +142,13 @@ def allan_deviation(noise: NoiseTerms) -> Markup | None:
     n, b = noise.arw_deg_per_sqrt_h, noise.bias_instability_dph
     k, q = noise.rate_random_walk_dph_per_sqrt_h, noise.quantisation_arcsec
     if n:
-        panel.line(at, 60.0 * n / np.sqrt(at), BEFORE, f"N = {sci(n)} deg/√h", dash="5 3")
+        panel.line(at, in_unit(60.0 * n / np.sqrt(at)), BEFORE, f"N = {sci(n)} deg/√h", dash="5 3")
     if b:
-        panel.horizontal(b * _FLOOR_OVER_B, COVERED, f"B = {sci(b)} deg/h", dash="5 3", width=1.2)
+        panel.horizontal(b * _FLOOR_OVER_B, COVERED, f"B = {sci(b)} {rate_unit()}", dash="5 3", width=1.2)
     if k:
-        panel.line(at, k * np.sqrt(at / 3600.0 / 3.0), ACCENT, f"K = {sci(k)} deg/h/√h", dash="2 3")
+        panel.line(at, k * np.sqrt(at / 3600.0 / 3.0), ACCENT, f"K = {sci(k)} {rate_unit()}/√h", dash="2 3")
     if q:
-        panel.line(at, _TAU_OVER_Q * q / at, COVERED, f"Q = {sci(q)} arcsec", dash="2 3")
+        panel.line(at, in_unit(_TAU_OVER_Q * q / at), COVERED, f"Q = {sci(q)} arcsec", dash="2 3")
     panel.errors(tau, low, high, AFTER)
     panel.line(tau, value, AFTER, "compensated training records")
     panel.dots(tau, value, AFTER, size=6.0)

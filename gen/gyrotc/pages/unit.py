@@ -13,6 +13,7 @@ from ..results.evaluation import Changes, Evaluation, Pooled
 from ..results.release import Budget, HeldLimits, Limit, Verdict
 from ..results.training import CandidateModel, Manifest, Training
 from ..results.verification import Verification
+from .display import NATIVE, shown
 from .words import limit_words, plain, words
 
 __all__ = ["UnitResults", "unit_in"]
@@ -73,6 +74,18 @@ class UnitResults:
         judged = evaluation.judged()
         self.judged = judged[1] if judged else None
         self.judged_on = _JUDGED_ON[judged[0]] if judged else "nothing"
+
+    @property
+    def display(self) -> str:
+        """Unit of rates that the limits of the product ask for, else deg/h."""
+        return (self.limits.display if self.limits else "") or NATIVE
+
+    def shown(self) -> UnitResults:
+        """The same with every rate in the unit in which rates are shown; the model stays in deg/h."""
+        names = (
+            "evaluation", "training", "verification", "manifest", "diagnosis", "limits", "changes", "budget",
+        )  # fmt: skip
+        return UnitResults(self.model, **{name: shown(getattr(self, name)) for name in names})
 
     @property
     def decision(self) -> Verdict | None:

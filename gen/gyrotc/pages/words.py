@@ -6,7 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 from ..results.release import Limit
-from .scales import power
+from .display import NATIVE, rate_unit
+from .scales import is_plain, power, significant
 
 __all__ = [
     "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",
@@ -84,7 +85,7 @@ def words(key: str) -> str:
     for end, unit in _UNITS:
         stem = key.removesuffix(end)
         if stem != key and stem:
-            return f"{_STEMS.get(stem, stem.replace('_', ' '))}, {unit}"
+            return f"{_STEMS.get(stem, stem.replace('_', ' '))}, {unit.replace(NATIVE, rate_unit())}"
     return _STEMS.get(key, key.replace("_", " "))
 
 
@@ -99,15 +100,8 @@ def words_of_candidate(id: str) -> str:
 
 
 def sci(value: float | None, digits: int = 2) -> str:
-    """A number with its power of ten, as the trade writes it: 7.00e-04 → 7.00·10⁻⁴."""
-    if value is None:
-        return "–"
-    if value == 0.0:
-        return "0"
-    if 0.01 <= abs(value) < 1e5:
-        return f"{value:.{digits + 1}g}" if abs(value) < 1e3 else f"{value:,.0f}"
-    mantissa, exponent = f"{value:.{digits}e}".split("e")
-    return f"{mantissa}·{power(int(exponent))}"
+    """A number with one more significant digit than that: 0.0123, 1303, 7.00·10⁻⁴; an en dash where there is none."""
+    return "–" if value is None else significant(value, digits + 1)
 
 
 class Digits(NamedTuple):
@@ -120,7 +114,7 @@ class Digits(NamedTuple):
     @property
     def page(self) -> str:
         """(7.21 ± 0.25)·10⁻⁴."""
-        text = f"{self.value} ± {self.spread}"
+        text = f"{self.value} ± {self.spread}".replace("-", "−")
         return text if self.exponent == 0 else f"({text})·{power(self.exponent)}"
 
     def decimal(self, mantissa: str) -> str:
@@ -131,7 +125,7 @@ class Digits(NamedTuple):
 def digits_of(value: float, expanded: float) -> Digits:
     """A figure to the digit that its expanded uncertainty, to two digits and rounded up, says something of."""
     exponent = math.floor(math.log10(max(abs(value), expanded)))
-    if -3 < exponent < 4:
+    if is_plain(exponent):
         exponent = 0
     scaled, spread = value / 10.0**exponent, expanded / 10.0**exponent
     digits = max(0, 1 - math.floor(math.log10(spread)))
@@ -164,7 +158,7 @@ def plain(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return sci(value, 3) if value != round(value) or abs(value) >= 1e6 else f"{value:g}"
+        return sci(value, 3) if value != round(value) or abs(value) >= 1e6 else f"{value:g}".replace("-", "−")
     return "–" if value is None else str(value)
 
 

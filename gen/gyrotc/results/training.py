@@ -22,6 +22,7 @@ __all__ = [
     "Manifest",
     "MapChange",
     "MapMeans",
+    "NoiseLimits",
     "NoiseTerms",
     "Outliers",
     "SpanLeftOut",
@@ -118,14 +119,26 @@ class AllanPoint(Part):
     freedom: _Length = Field(description="number of independent differences, about")
 
 
+class NoiseLimits(Part):
+    """What terms of noise that the record does not resolve are below, with 95 %; null: resolved, or not known."""
+
+    quantisation_arcsec: Figure = Field(default=None, description="Q, arcsec")
+    arw_deg_per_sqrt_h: Figure = Field(default=None, description="angle random walk N, deg/√h")
+    bias_instability_dph: Figure = Field(default=None, description="B, deg/h")
+    rate_random_walk_dph_per_sqrt_h: Figure = Field(default=None, description="K, deg/h/√h")
+
+
 class NoiseTerms(Part):
-    """Noise that remains after compensation (IEEE Std 647); null where the record is too short."""
+    """Noise that remains after compensation (IEEE Std 647, 952); 0: not resolved, null: the record is too short."""
 
     quantisation_arcsec: Figure = Field(description="Q, arcsec")
     arw_deg_per_sqrt_h: Figure = Field(description="angle random walk N, deg/√h")
     bias_instability_dph: Figure = Field(description="B, deg/h")
     rate_random_walk_dph_per_sqrt_h: Figure = Field(description="K, deg/h/√h")
     allan: tuple[AllanPoint, ...] = Field(description="at octaves of the block")
+    below: NoiseLimits = Field(
+        default=NoiseLimits(), description="what terms that are not resolved are below, with 95 %"
+    )
 
 
 class BiasPlane(Part):

@@ -18,7 +18,7 @@ from scipy.special import chdtrc
 
 from ..common.arrays import FloatArray
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
-from ..results.training import AllanPoint, BiasPlane, NoiseTerms
+from ..results.training import AllanPoint, BiasPlane, NoiseLimits, NoiseTerms
 from .data import TrainingData, average
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
+_NORMAL_95 = 1.645  # one-sided 95 % of a normal distribution
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
 _LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
 _S_PER_H = 3600.0  # s in an hour
@@ -78,7 +79,8 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
 
     Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
-    not show is 0; all are None where the record is too short.
+    not show is 0, and `below` is what it is less than, with 95 %; all are None where the record is too short.
+    Neighbouring points share differences, so that their scatter is taken for more independent than it is.
 
     Args:
         residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
@@ -104,8 +106,30 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
         )
         scale = shapes.max(axis=0)
         squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
-        terms = dict(zip(names, (float(v) for v in np.sqrt(squares / scale)), strict=True))
-    return NoiseTerms(**terms, allan=tuple(points))
+        spread = _spread(weight[:, None] * shapes / scale, squares > 0.0)
+        resolved = squares > _NORMAL_95 * spread
+        terms = dict(
+            zip(names, (float(v) for v in np.sqrt(np.where(resolved, squares, 0.0) / scale)), strict=True)
+        )
+        most = np.sqrt((squares + _NORMAL_95 * spread) / scale)
+        below = {name: float(v) for name, v, known in zip(names, most, resolved, strict=True) if not known}
+    return NoiseTerms(**terms, allan=tuple(points), below=NoiseLimits(**below))
+
+
+def _spread(design: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
+    """Standard uncertainty of each coefficient beside those that are used, itself among them; shape (columns,).
+
+    Args:
+        design: Columns over the standard uncertainty of each row, shape (rows, columns).
+        used: Columns that a fit has kept.
+    """
+    found = np.zeros(design.shape[1])
+    for k in range(design.shape[1]):
+        kept = np.flatnonzero(used | (np.arange(design.shape[1]) == k))
+        part = design[:, kept]
+        inverse = np.linalg.pinv(part.T @ part)
+        found[k] = np.sqrt(inverse[np.searchsorted(kept, k), np.searchsorted(kept, k)])
+    return found
 
 
 def sensitivities(

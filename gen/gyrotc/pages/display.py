@@ -1,0 +1,121 @@
+"""The unit in which pages and terminals show rates. Results and files keep deg/h; what people read changes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel
+
+from ..common.errors import InputError
+from ..results.fleet import FleetOutlier
+from ..results.release import Contribution, Instrument, Limit
+from .scales import significant
+
+__all__ = ["DISPLAYS", "NATIVE", "check_display", "displayed", "in_unit", "rate_unit", "shown", "shown_text"]
+
+NATIVE = "deg/h"
+DISPLAYS = {NATIVE: 1.0, "deg/s": 1.0 / 3600.0, "mdps": 1.0 / 3.6, "arcsec/s": 1.0}
+"""Units by name, and how many of one are 1 deg/h: an hour has 3600 s, a degree 3600 arcsec, mdps is 1e-3 deg/s."""
+
+_CURRENT: ContextVar[str] = ContextVar("display", default=NATIVE)
+_RATE = re.compile(r"_dph(_per_\w+)?$")
+_NUMBER = r"[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?"
+_STATED = re.compile(rf"(?<![\w.])({_NUMBER}(?: (?:\.\.\.|…|->|→|±|\+-|and|to) {_NUMBER})*) deg/h(?![/\w√²])")
+_NO_RATES = ("freedom", "degrees_of_freedom", "coverage_factor", "p_value", "sigmas")  # beside a rate
+_OF_LIMIT = (
+    "measured", "bound", "standard_uncertainty", "expanded_uncertainty", "guard_band", "acceptance_limit",
+)  # fmt: skip
+
+T = TypeVar("T")
+
+
+def check_display(name: str | None) -> None:
+    """Refuses a unit that is not known; None is the default.
+
+    Raises:
+        InputError: It is none of `DISPLAYS`.
+    """
+    if name is not None and name not in DISPLAYS:
+        raise InputError("--display", repr(name), ", ".join(DISPLAYS))
+
+
+@contextmanager
+def displayed(name: str) -> Iterator[None]:
+    """Within it rates are shown in this unit.
+
+    Raises:
+        InputError: It is none of `DISPLAYS`.
+    """
+    check_display(name)
+    token = _CURRENT.set(name)
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+
+
+def rate_unit() -> str:
+    """Name of the unit in which rates are shown."""
+    return _CURRENT.get()
+
+
+def in_unit(values_dph: ArrayLike) -> NDArray[np.float64]:
+    """Rates in deg/h in the unit in which they are shown; any shape."""
+    return np.asarray(values_dph, dtype=np.float64) * DISPLAYS[rate_unit()]
+
+
+def shown(part: T) -> T:
+    """A result with its rates, known by the ends of their names, in the unit in which they are shown."""
+    return part if rate_unit() == NATIVE else _shown(part, rate=False)
+
+
+def shown_text(text: str) -> str:
+    """A sentence with its rates in the unit in which they are shown, with as many digits as they have."""
+    if rate_unit() == NATIVE or NATIVE not in text:
+        return text
+    return _STATED.sub(lambda found: re.sub(_NUMBER, _converted, found[1]) + f" {rate_unit()}", text)
+
+
+def _converted(found: re.Match[str]) -> str:
+    number = found[0].replace(",", "")
+    digits = len(re.sub(r"^[+-]?[0.]*|[.]|e.*$", "", number)) or 1
+    sign = "+" if number.startswith("+") else ""
+    return sign + significant(float(number) * DISPLAYS[rate_unit()], digits)
+
+
+def _shown(value: Any, *, rate: bool) -> Any:
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, float):
+        return value * DISPLAYS[rate_unit()] if rate else value
+    if isinstance(value, str):
+        return shown_text(value)
+    if isinstance(value, tuple | list):
+        return type(value)(_shown(one, rate=rate) for one in value)
+    if isinstance(value, Mapping):
+        return {key: _shown(one, rate=rate or bool(_RATE.search(str(key)))) for key, one in value.items()}
+    return _shown_object(value, rate=rate) if isinstance(value, BaseModel) else value
+
+
+def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
+    rates = {
+        name for name in type(part).model_fields if _RATE.search(name) or (rate and name not in _NO_RATES)
+    }
+    if isinstance(part, Limit) and _RATE.search(part.limit):
+        rates |= set(_OF_LIMIT)
+    elif isinstance(part, FleetOutlier) and _RATE.search(part.figure):
+        rates |= {"value", "median"}
+    elif isinstance(part, Instrument) and part.quantity == "rate":
+        rates.add("expanded_uncertainty")
+    elif isinstance(part, Contribution):
+        rates.add("standard_uncertainty" if part.unit == NATIVE else "sensitivity")
+    update = {name: _shown(getattr(part, name), rate=name in rates) for name in type(part).model_fields}
+    if isinstance(part, Contribution) and part.unit == NATIVE:
+        update["unit"] = rate_unit()
+    return part.model_copy(update={k: v for k, v in update.items() if v is not getattr(part, k)})
