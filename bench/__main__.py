@@ -119,6 +119,13 @@ def _growth(docs: Path) -> None:
     write(docs, "growth", growth(_say), section)
 
 
+def _formats(docs: Path) -> None:
+    """From a file of ten formats to the report."""
+    from .formats import formats, section
+
+    write(docs, "formats", formats(_say), section)
+
+
 _PARTS = {"training": _training, "runtime": _runtime, "growth": _growth}
 _ALONE = {
     "raw": _raw,
@@ -127,6 +134,7 @@ _ALONE = {
     "sizes": _sizes,
     "bounds": _bounds,
     "fleet": _fleet,
+    "formats": _formats,
     "lot": _lot,
     "lot-speed": _lot_speed,
     "lot-unrelated": _lot_unrelated,

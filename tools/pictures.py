@@ -18,16 +18,18 @@ _PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_off
 
 
 def main(work: Path, docs: Path = ROOT / "docs") -> None:
-    """Writes the pictures of `work/unit` on a screen and, dark, on a phone, of `work/diagnosis`, of a lot."""
+    """Writes the pictures of `work/unit` on a screen and, dark, on a phone, of `work/diagnosis`, of a lot and its curves."""
     fleet = _fleet(work / "lot", work / "fleet")
     with tempfile.TemporaryDirectory(prefix="gyrotc-pictures-") as profile, browser(Path(profile)) as tab:
-        for page, name, width, height, dark in (
-            (work / "unit" / "report.html", "report.png", 1120, 1240, False),
-            (work / "unit" / "report.html", "report-phone.png", _PHONE, 844, True),
-            (work / "diagnosis" / "report.html", "diagnosis.png", 1120, 1020, False),
-            (fleet, "fleet.png", 1120, 940, False),
+        for page, name, width, height, dark, above in (
+            (work / "unit" / "report.html", "report.png", 1120, 1240, False, "html"),
+            (work / "unit" / "report.html", "report-phone.png", _PHONE, 844, True, "h2 + figure"),
+            (work / "diagnosis" / "report.html", "diagnosis.png", 1120, 1020, False, "html"),
+            (fleet, "fleet.png", 1120, 940, False, "html"),
+            (fleet, "fleet-curves.png", 1120, 620, True, "h2:has(+ figure)"),
         ):
             tab.open(page, width=width, height=height, dark=dark)
+            tab.value(f"document.querySelector('{above}').scrollIntoView()")
             tab.picture(docs / name, whole=False)
 
 
@@ -37,7 +39,7 @@ def _fleet(data: Path, out: Path) -> Path:
     for fault, unit in zip(_PLANTED, lot.units[::2], strict=True):
         lot.plant(fault, unit)
     lot.write(data)
-    (data / "fleet.toml").write_text('schema = 1\ndatasets = ["IMU-*"]\naxis = "all"\nnumeric = ["f32"]\n')
+    (data / "fleet.toml").write_text('schema = 1\ndatasets = ["IMU-*"]\nnumeric = ["f32"]\n')
     program = Path(sys.executable).with_name("gyrotc")
     subprocess.run([program, "-q", "fleet", data / "fleet.toml", "--out", out], check=True)
     return out / "fleet.html"
