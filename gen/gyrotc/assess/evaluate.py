@@ -30,6 +30,7 @@ from ..common.metrics import Averages, average, statistics, time_statistics
 from ..common.texts import file_stem
 from ..model import Model, load_model
 from ..quality.facts import RunFacts, facts_of
+from ..quality.outliers import departing_rows
 from ..recordings.records import Dataset, Rows, Run
 from ..results.base import read_result
 from ..results.evaluation import (
@@ -224,13 +225,18 @@ class ReplayedRun:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A run, its averaged samples, the steps that differ from the reference, plain facts, squares of its 1 sigma."""
+    """A run, its averaged samples, the steps that differ from the reference, plain facts, squares of its 1 sigma.
+
+    `robust`: The samples without rows that are outliers, and how many rows these are.
+    """
 
     run: Run
     averages: Averages
     mismatches: int | None
     facts: RunFacts
     squares: tuple[float, int]
+    robust: Averages
+    outlier_rows: int
 
 
 def evaluate(
@@ -401,9 +407,22 @@ def _one_run(
     if trace is not None:
         each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
         _write_trace(trace / trace_name(run, all_runs), rows, replayed, span, each)
+    wild = departing_rows(rows, run, max(round(model.block_s / run.row_period_s), 1))
+    robust = averages
+    if wild.size:
+        kept = replayed.scored.copy()
+        kept[wild] = False
+        robust = average(
+            rows.time_s[span],
+            rows.temperature_c[span],
+            rows.rate_dph[span],
+            (rows.rate_dph - replayed.bias_dph)[span],
+            scored=kept[span],
+            average_s=average_s,
+        )
     plain = (replayed.status[span] == 0) & replayed.scored[span]
     squares = squares_of(None if replayed.sigma_dph is None else replayed.sigma_dph[span][plain])
-    return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares)
+    return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares, robust, int(wild.size))
 
 
 def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
@@ -447,6 +466,13 @@ def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:
     return [np.add.reduceat(np.where(used, values, 0.0), starts) / count for values in columns]
 
 
+def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:
+    """Figures of several runs without rows that are outliers; None where there are none."""
+    if not any(part.outlier_rows for part in parts):
+        return None
+    return Statistics(**statistics(np.concatenate([part.robust.after_dph for part in parts])))
+
+
 def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
     run, a = part.run, part.averages
     entry = EvaluatedRun(
@@ -457,6 +483,9 @@ def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
         before=Statistics(**statistics(a.before_dph)),
         after=RunStatistics(**statistics(a.after_dph), **time_statistics(a, average_s)),
     )
+    if part.outlier_rows:
+        robust = {"outlier_rows": part.outlier_rows, "without_outliers": _without_outliers([part])}
+        entry = entry.model_copy(update=robust)
     if run.from_s is None and run.to_s is None:
         return entry
     return entry.model_copy(update={"from_s": run.from_s, "to_s": run.to_s})
@@ -489,6 +518,7 @@ def _result(
         runs=tuple(_evaluated(p, average_s) for p in parts),
         train=Pooled.of(train) if train else None,
         exam=Pooled.of(exam) if exam else None,
+        without_outliers=_without_outliers([p for p in parts if p.run.role == ("exam" if exam else "train")]),
         findings=(),
         model=ModelSizes(
             method=model.method,

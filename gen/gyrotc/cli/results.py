@@ -242,6 +242,10 @@ def summary(result: Evaluation) -> str:
         text += (
             f"; RMS {rms:.3e} {rate_unit()} = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
         )
+    if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
+        role = "exam" if result.exam else "train"
+        rows = sum(run.outlier_rows for run in result.runs if run.role == role)
+        text += f"; {robust.rms_dph:.3e} without {rows} rows that are outliers"
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 

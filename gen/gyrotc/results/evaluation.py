@@ -142,6 +142,10 @@ class EvaluatedRun(Part):
     samples: Count = Field(description="means over `average_s`")
     before: Statistics = Field(description="before compensation")
     after: RunStatistics = Field(description="after compensation")
+    outlier_rows: Count = Field(default=0, description="rows that are spikes or parts of bursts")
+    without_outliers: Statistics | None = Field(
+        default=None, description="after compensation, without these rows; null: there are none"
+    )
 
 
 class FigureUncertainty(Part):
@@ -212,6 +216,12 @@ class Evaluation(UnitResult):
         default=None,
         description="of the figures that the model is judged by, by the names of limits; without those that the "
         "recordings are too short for",
+    )
+
+    without_outliers: Statistics | None = Field(
+        default=None,
+        description="of all exam runs, else of all training runs, after compensation without rows that are spikes or "
+        "parts of bursts; null: there are none",
     )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:
