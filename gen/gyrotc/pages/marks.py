@@ -66,7 +66,7 @@ def _ring(x: float, y: float, color: str, size: float) -> str:
 
 def text_svg(x: float, y: float, text: str, *, anchor: str = "start", more: str = "") -> str:
     where = "" if anchor == "start" else f' text-anchor="{anchor}"'
-    return f'<text x="{x:.1f}" y="{y:.1f}"{where}{more}>{escape(text)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}"{where}{more}>{escape(text, quote=False)}</text>'
 
 
 def mark_svg(mark: Mark, box: Box, xs: Scale, ys: Scale) -> str:
@@ -77,7 +77,7 @@ def mark_svg(mark: Mark, box: Box, xs: Scale, ys: Scale) -> str:
     stroke = f'class="s-{mark.color}" stroke-width="{mark.width:g}"{_dash(mark)} vector-effect="non-scaling-stroke"'
     match mark.kind:
         case "line":
-            title = f"<title>{escape(picture_text(mark.title))}</title>" if mark.title else ""
+            title = f"<title>{escape(picture_text(mark.title), quote=False)}</title>" if mark.title else ""
             return f'<path {stroke} d="{_path(*_thinned(x, y))}">{title}</path>'
         case "dots":
             return _dotted(_points(x, y), mark.color, mark.width)
