@@ -96,6 +96,7 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
         "rate_random_walk_dph_per_sqrt_h",
     )
     terms: dict[str, float | None] = dict.fromkeys(names)
+    below: dict[str, float] = {}
     if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
         tau = np.array([p.tau_s for p in points])
         square = np.array([p.deviation_dph for p in points]) ** 2
