@@ -26,7 +26,7 @@ def main(work: Path, docs: Path = ROOT / "docs") -> None:
             (work / "unit" / "report.html", "report-phone.png", _PHONE, 844, True, "h2 + figure"),
             (work / "diagnosis" / "report.html", "diagnosis.png", 1120, 1020, False, "html"),
             (fleet, "fleet.png", 1120, 940, False, "html"),
-            (fleet, "fleet-curves.png", 1120, 620, True, "h2:has(+ figure)"),
+            (fleet, "fleet-curves.png", 1120, 830, True, "h2:has(+ figure)"),
         ):
             tab.open(page, width=width, height=height, dark=dark)
             tab.value(f"document.querySelector('{above}').scrollIntoView()")

@@ -120,7 +120,7 @@ def _events(runs: Sequence[RunSeries], events: Sequence[FoundEvent]) -> Markup |
     shown = [run for run in runs if run.file in files][:_MOST_PANELS]
     if not shown:
         return None
-    panels = _panels(len(shown), "h on the file's clock", "rate less its mean, deg/h")
+    panels = _panels(len(shown), "h on the file's clock", "rate − mean, deg/h")
     for panel, run in zip(panels, shown, strict=True):
         panel.title = run.name
         panel.line(np.array(run.hours) + run.first_s / 3600.0, np.array(run.rate_dph), BEFORE)
@@ -131,7 +131,7 @@ def _events(runs: Sequence[RunSeries], events: Sequence[FoundEvent]) -> Markup |
 
 def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
     """Half-hour means of every run's residual over the band of the simulated ones, and the fitted causes."""
-    panels = _panels(len(runs), "h since the first row", "residual of the static map, deg/h")
+    panels = _panels(len(runs), "h since the first row", "residual, deg/h")
     for panel, run in zip(panels, runs, strict=True):
         panel.title = " ".join(dict.fromkeys((run.name, run.environment)))
         panel.band(run.hours, run.simulated_low_dph, run.simulated_high_dph, COVERED, "simulated, 95 %")
@@ -143,7 +143,7 @@ def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
 
 def _cycle_over_time(runs: Sequence[RunSeries]) -> Markup:
     """Block means of what a map of T alone leaves, and the states' part of it; temperature below."""
-    upper = Panel(y="residual of a map of T, deg/h")
+    upper = Panel(y="residual, deg/h")
     lower = Panel(x="time, min", y="temperature, C")
     at = 0.0
     for run in runs:
@@ -258,7 +258,7 @@ def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:
     """Half-hour means on the scored runs: model without the causes, and with them."""
     smooth_s = min(_SMOOTH_S, min(len(run.hours) for run in scored) * average_s / 16.0)
     width = max(round(smooth_s / average_s), 1)
-    panels = _panels(len(scored), "time, h", "compensated rate, deg/h")
+    panels = _panels(len(scored), "time, h", "remains, deg/h")
     for panel, run in zip(panels, scored, strict=True):
         panel.horizontal(0.0)
         panel.line(run.hours, _smooth(run.before_dph, width), BEFORE, "without")

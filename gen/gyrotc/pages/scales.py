@@ -11,7 +11,7 @@ from ..common.arrays import FloatArray
 
 __all__ = ["Scale", "is_plain", "power", "scale_of", "significant"]
 
-_ROUND = (1.0, 2.0, 5.0, 10.0)
+_ROUND = (1.0, 2.0, 5.0, 10.0, 20.0)
 _PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
 
 
@@ -77,7 +77,7 @@ class Scale:
             return self._powers(most)
         if self.linear_to:
             return self._both(most)
-        step = _step(self.high - self.low, most)
+        step = _step(self.low, self.high, most)
         if self.whole:
             step = max(round(step), 1.0)
         first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
@@ -95,16 +95,20 @@ class Scale:
         return [(v, _plain(v)) for v in numbers if self.low * (1 - 1e-9) <= v <= self.high * (1 + 1e-9)]
 
     def _both(self, most: int) -> list[tuple[float, str]]:
-        step = _step(self.linear_to, max(most // 2, 2))
+        step = _step(0.0, self.linear_to, max(most // 2, 2))
         inner = [k * step for k in range(int(self.linear_to / step + 1e-9) + 1)]
         decades = range(math.ceil(math.log10(self.linear_to) + 1e-9), math.floor(math.log10(self.high)) + 1)
         return [(v, f"{v:g}") for v in (*inner, *(10.0**k for k in decades)) if self.low <= v <= self.high]
 
 
-def _step(length: float, most: int) -> float:
-    rough = length / most
-    unit = 10.0 ** math.floor(math.log10(rough))
-    return next(f * unit for f in _ROUND if f * unit >= rough * (1.0 - 1e-9))
+def _step(low: float, high: float, most: int) -> float:
+    """The least round step of which at most one more than `most` lie in a range."""
+    unit = 10.0 ** math.floor(math.log10((high - low) / (most + 1)))
+    return next(
+        f * unit
+        for f in _ROUND
+        if math.floor(high / (f * unit) + 1e-9) - math.ceil(low / (f * unit) - 1e-9) <= most
+    )
 
 
 def _minus(text: str) -> str:

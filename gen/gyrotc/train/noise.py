@@ -32,7 +32,9 @@ __all__ = [
 ]
 
 _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
-_NORMAL_95 = 1.645  # one-sided 95 % of a normal distribution
+_ROUNDS = 3  # the first weights each point by what it is, which favours those that came out small
+_LEAST_EXPECTED = 0.1  # of a point: bounds the weight of one that no term explains
+_COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
 _LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
 _S_PER_H = 3600.0  # s in an hour
@@ -78,8 +80,8 @@ def _differences(rates: FloatArray, factor: int) -> FloatArray:
 def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
 
-    Each square of an Allan deviation is weighted by its own scatter, 2 σ⁴ / freedom. A term that the record does
-    not show is 0, and `below` is what it is less than, with 95 %; all are None where the record is too short.
+    Each square of an Allan deviation is weighted by its scatter, 2 σ⁴ / freedom, σ that of the terms found before. A term that the record does
+    not show is 0, and `below` is what it is less than (k = 2); all are None where the record is too short.
     Neighbouring points share differences, so that their scatter is taken for more independent than it is.
 
     Args:
@@ -100,19 +102,23 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
         tau = np.array([p.tau_s for p in points])
         square = np.array([p.deviation_dph for p in points]) ** 2
-        weight = np.sqrt(np.array([p.freedom for p in points]) / 2.0) / square
+        freedom = np.array([p.freedom for p in points])
         # 1 arcsec/s is 1 deg/h, so that Q in arcsec goes with τ in s, and N, K with τ in h.
         shapes = np.stack(
             [3.0 / tau**2, _S_PER_H / tau, np.full(len(tau), _FLICKER), tau / _S_PER_H / 3.0], axis=1
         )
         scale = shapes.max(axis=0)
-        squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
+        expected = square
+        for _ in range(_ROUNDS):
+            weight = np.sqrt(freedom / 2.0) / expected
+            squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
+            expected = np.maximum(shapes / scale @ squares, _LEAST_EXPECTED * square)
         spread = _spread(weight[:, None] * shapes / scale, squares > 0.0)
-        resolved = squares > _NORMAL_95 * spread
+        resolved = squares > _COVERAGE * spread
         terms = dict(
             zip(names, (float(v) for v in np.sqrt(np.where(resolved, squares, 0.0) / scale)), strict=True)
         )
-        most = np.sqrt((squares + _NORMAL_95 * spread) / scale)
+        most = np.sqrt((squares + _COVERAGE * spread) / scale)
         below = {name: float(v) for name, v, known in zip(names, most, resolved, strict=True) if not known}
     return NoiseTerms(**terms, allan=tuple(points), below=NoiseLimits(**below))
 
