@@ -18,7 +18,7 @@ _PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_off
 
 
 def main(work: Path, docs: Path = ROOT / "docs") -> None:
-    """Writes the pictures of `work/unit` on a screen and, dark, on a phone, of `work/diagnosis`, of a lot and its curves."""
+    """Writes the pictures of `work/unit` on a screen and, dark, on a phone, of `work/diagnosis`, of a lot."""
     fleet = _fleet(work / "lot", work / "fleet")
     with tempfile.TemporaryDirectory(prefix="gyrotc-pictures-") as profile, browser(Path(profile)) as tab:
         for page, name, width, height, dark, above in (

@@ -120,7 +120,7 @@ class AllanPoint(Part):
 
 
 class NoiseLimits(Part):
-    """What terms of noise that the record does not resolve are below (k = 2, about 95 %); null: resolved, or not known."""
+    """What terms of noise that are not resolved are below (k = 2, about 95 %); null: resolved, or not known."""
 
     quantisation_arcsec: Figure = Field(default=None, description="Q, arcsec")
     arw_deg_per_sqrt_h: Figure = Field(default=None, description="angle random walk N, deg/√h")

@@ -80,9 +80,9 @@ def _differences(rates: FloatArray, factor: int) -> FloatArray:
 def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
 
-    Each square of an Allan deviation is weighted by its scatter, 2 σ⁴ / freedom, σ that of the terms found before. A term that the record does
-    not show is 0, and `below` is what it is less than (k = 2); all are None where the record is too short.
-    Neighbouring points share differences, so that their scatter is taken for more independent than it is.
+    Each square of an Allan deviation is weighted by its scatter, 2 σ⁴ / freedom, σ that of the terms found before.
+    A term that the record does not show is 0, and `below` is what it is less than (k = 2); all are None where the
+    record is too short. Neighbouring points share differences, so that the scatter of terms is a little too small.
 
     Args:
         residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
