@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, ValidationError
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.inputs import refuse_above
+from ..common.inputs import refuse_above, refused
 from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
 from .overlap import counted_once, shared_axes, shared_rows
 from .plausibility import Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
@@ -367,7 +367,11 @@ def _description(folder: Path, problems: Problems) -> Description | None:
         expected = f"{error.message()}, or a {FILE} that gives the serial"
         problems.add(InputError(where, repr(serial), expected))
         serial = "unknown"
-    runs = tuple(RunEntry(file=name, power_on_s="unknown") for name in files)
+    try:
+        runs = tuple(RunEntry(file=name, power_on_s="unknown") for name in files)
+    except ValidationError as error:  # a name that no description could hold
+        problems.add(refused(error, lambda _: f"{folder}, name of a recording"))
+        return None
     return Description(serial=serial, run=runs)
 
 
