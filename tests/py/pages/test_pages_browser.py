@@ -104,6 +104,66 @@ def test_a_phone_scrolls_down_only(name: str, pages: dict[str, Path], tab: Brows
     assert tab.value("document.documentElement.scrollWidth") == 390
 
 
+_CUT = """[...document.querySelectorAll('svg text')].filter(t => {
+  const box = t.getBoundingClientRect(), whole = t.ownerSVGElement.getBoundingClientRect();
+  return box.width && (box.left < whole.left - 1 || box.right > whole.right + 1 || box.top < whole.top - 1 ||
+    box.bottom > whole.bottom + 1);
+}).map(t => t.textContent)"""  # words of pictures that do not lie within them
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("width", [390, 1200])
+def test_no_word_of_a_picture_is_cut_off(name: str, width: int, pages: dict[str, Path], tab: Browser) -> None:
+    tab.open(pages[name], width=width)
+    assert tab.value("document.querySelectorAll('svg text').length") > 10
+    assert tab.value(_CUT) == []
+
+
+@pytest.mark.parametrize("name", ["unit", "fleet"])
+def test_on_a_phone_verdicts_and_reasons_are_whole(name: str, pages: dict[str, Path], tab: Browser) -> None:
+    tab.open(pages[name], width=390, height=800)
+    cells = "[...document.querySelectorAll('.stack td')].filter(e => e.getClientRects().length)"
+    assert tab.value(cells + ".length") > 10
+    assert tab.value(cells + ".filter(e => e.getBoundingClientRect().right > 390).length") == 0
+
+
+def test_lines_of_pictures_are_seen_on_a_dark_screen(pages: dict[str, Path], tab: Browser) -> None:
+    strokes = "[...document.querySelectorAll('svg .s-accent')].map(e => getComputedStyle(e).stroke)"
+    found = {}
+    for dark in (False, True):
+        tab.open(pages["unit"], dark=dark)
+        found[dark] = {sum(map(int, re.findall(r"\d+", one)[:3])) for one in tab.value(strokes)}
+    assert max(found[False]) < 200 and min(found[True]) > 600
+
+
+def test_a_part_of_a_fleets_picture_is_enlarged_and_comes_back(pages: dict[str, Path], tab: Browser) -> None:
+    tab.open(pages["fleet"])
+    svg = "document.querySelector('svg:has(.zoom)')"
+    texts = f"[...{svg}.querySelectorAll('.numbers text')].filter(e => e.getClientRects().length)"
+    numbers = texts + ".map(e => e.textContent)"
+    tab.value(f"{svg}.scrollIntoView()")
+    whole = tab.value(numbers)
+    box = tab.value(
+        f"(() => {{ const b = {svg}.getBoundingClientRect(); return [b.left, b.top, b.width, b.height] }})()"
+    )
+    x, y, w, h = box
+    for kind, px, py in (("mousePressed", 0.4, 0.4), ("mouseMoved", 0.6, 0.6), ("mouseReleased", 0.6, 0.6)):
+        tab.call(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x + px * w,
+            y=y + py * h,
+            button="left",
+            buttons=1,
+            clickCount=1,
+        )
+    near = tab.value(numbers)
+    span = [float(t.replace("−", "-")) for t in near]
+    assert near != whole and len(near) >= 4 and span == [float(f"{v:g}") for v in span]
+    tab.value(f"{svg}.dispatchEvent(new KeyboardEvent('keydown', {{key: 'Escape'}}))")
+    assert tab.value(numbers) == whole and tab.console == []
+
+
 @pytest.mark.parametrize("name", PAGES)
 def test_landmarks_headings_and_names(name: str, pages: dict[str, Path], tab: Browser) -> None:
     tab.open(pages[name])
