@@ -11,7 +11,13 @@ from ..common.arrays import FloatArray
 
 __all__ = ["Scale", "is_plain", "power", "scale_of", "significant"]
 
-_ROUND = (1.0, 2.0, 5.0, 10.0, 20.0)
+_ROUND = (
+    1.0,
+    2.0,
+    5.0,
+    10.0,
+    20.0,
+)  # steps whose multiples people read at a glance; 10 begins the next decade
 _PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
 
 
