@@ -311,14 +311,17 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
 
     Example: gyrotc report result
     """
+    from ..jobs.axes import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.plan import is_plan, write_plan_page
-    from ..pages.report import write_report
+    from ..pages.report import axes_page, write_page, write_report
 
     with progress() as say:
         say("drawing")
         if is_diagnosis(folder):
             path = write_diagnosis_page(folder)
+        elif axes := axes_in(folder):
+            path = write_page(folder, axes_page(folder, axes, display))
         else:
             path = write_plan_page(folder) if is_plan(folder) else write_report(folder, display)
     tell(f"report: {path}")
