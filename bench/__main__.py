@@ -112,6 +112,13 @@ def _lot_unrelated(docs: Path) -> None:
     write_unrelated(docs)
 
 
+def _recalibration(docs: Path) -> None:
+    """Units that come back, changed in five ways or not at all."""
+    from .recalibration import write_recalibration
+
+    write_recalibration(docs, _say)
+
+
 def _growth(docs: Path) -> None:
     """How the cost of commands grows with rows, runs, centers and units."""
     from .growth import growth, section
@@ -137,6 +144,7 @@ _ALONE = {
     "formats": _formats,
     "lot": _lot,
     "lot-speed": _lot_speed,
+    "recalibration": _recalibration,
     "lot-unrelated": _lot_unrelated,
 }
 

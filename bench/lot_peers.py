@@ -1,4 +1,4 @@
-"""Beside a lot: simple ways to use one, the most that a test could see, a check run of an earlier model."""
+"""Beside a lot: simple ways to use one, the most that a test could see."""
 
 from __future__ import annotations
 
@@ -12,17 +12,14 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from .lot_prior import Exam
-from gyrotc.lot.earlier import held, posterior_of_means, stated_sigma_dph, widened
 from gyrotc.lot.learn import FALSE_ALARM, sums_of
 from gyrotc.lot.use import LotPrior
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.evidence import fit_process
 from gyrotc.train.means import unit_means
-from gyrotc.train.methods import fit
-from gyrotc.train.uncertainty import uncertainty
 from scipy.stats import norm
 
-__all__ = ["best_power", "peers", "recalibrated", "seen"]
+__all__ = ["best_power", "peers", "seen"]
 
 Floats = NDArray[np.float64]
 _CELL_C, _CELL_C_PER_MIN = 2.0, 0.2
@@ -138,10 +135,6 @@ def _cells(unit: UnitMeans) -> tuple[Floats, Floats]:
     return found, np.asarray(np.bincount(index.ravel(), unit.count * unit.bias_dph) / weight)
 
 
-_EARLIER = 5  # runs of the earlier calibration; the check run is of the last
-_SIZE = 1.0  # of planted changes, over the noise of a mean of 50 s: the least that one run should see
-
-
 def seen(data: TrainingData) -> UnitMeans:
     """Means of samples, as a fit has them."""
     samples = cleaned(data)
@@ -166,45 +159,3 @@ def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:
         distance = float(np.sqrt(max(away @ reported @ away, 0.0)))
         powers.append(float(norm.sf(norm.isf(FALSE_ALARM) - distance)))
     return min(powers)
-
-
-def recalibrated(units: Sequence[tuple[TrainingData, TrainingData]]) -> dict[str, Any]:
-    """p-values of check runs of units that have not changed, and which planted changes were named.
-
-    Args:
-        units: All runs of each, and a short run that is part of the last.
-    """
-    found: dict[str, Any] = {"unchanged": [], "named": {}}
-    for whole, short in units:
-        early = cleaned(whole.select(whole.run < _EARLIER))
-        scaling = scaling_of(early)
-        means = unit_means(early, scaling, fit_process(early, scaling))[0]
-        fitted = fit(early, method="auto")
-        table = uncertainty(early, fitted)
-        envelope, between = (scaling.temperature_c, scaling.slope_c_per_min), table["rules"]["between_dph"]
-        stated = stated_sigma_dph(np.array(table["rows"]), envelope, between, means)
-        known = posterior_of_means(means, envelope, between, stated)
-        prior = widened(known, 0.0, "none", "", None).alone()
-        run = seen(short)
-        found["unchanged"].append(held(prior, run).p_value)
-        for kind, change in _changes(run).items():
-            moved = UnitMeans(
-                run.temperature_c, run.slope_c_per_min, run.bias_dph + change, run.count, run.sigma_dph
-            )
-            reported = held(prior, moved).change
-            right = reported is not None and reported.kind == kind
-            if right and kind == "local":
-                right = reported.temperature_c[0] - 10.0 <= 20.0 <= reported.temperature_c[1] + 10.0
-            row = found["named"].setdefault(kind, {"seen": [], "right": []})
-            row["seen"].append(reported is not None)
-            row["right"].append(right)
-    return found
-
-
-def _changes(run: UnitMeans) -> dict[str, Floats]:
-    t, size = run.temperature_c, _SIZE * run.sigma_dph
-    return {
-        "offset": np.full(len(t), size),
-        "slope": 2.0 * size * (t - 20.0) / 100.0,
-        "local": 3.0 * size * np.exp(-0.5 * ((t - 20.0) / 6.0) ** 2),
-    }

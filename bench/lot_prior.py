@@ -37,7 +37,7 @@ from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray
 from results import recorded, write
 
-from .lot_peers import best_power, peers, recalibrated, seen
+from .lot_peers import best_power, peers, seen
 
 __all__ = [
     "CASES",
@@ -118,11 +118,10 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     before = time.process_time()
     prior = learnt(taught)
     learnt_s = time.process_time() - before
-    rows, checks = [], []
+    rows = []
     for k, (data, exam) in enumerate(recordings_of(own[_UNITS:], exam=True)):
         assert exam is not None
         rows.append(_unit(data, exam, prior, taught, longer=k < _WITH_MORE))
-        checks.append((data, programmes(data)[0][1]))
         print(f"{case.name}: unit {k + 1} of {_UNSEEN}, {time.process_time() - started:.0f} s", flush=True)
     refused: dict[str, list[bool]] = {"2.5 h": [], "8 h": [], "six runs": []}
     powers = []
@@ -145,7 +144,6 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
         "units": rows,
         "unrelated_refused": {name: float(np.mean(r)) for name, r in refused.items() if r},
         "best_power": float(np.mean(powers)) if powers else None,
-        "recalibration": recalibrated(checks) if case.unrelated else None,
         "cpu_s": time.process_time() - started,
     }
 
@@ -293,7 +291,6 @@ def quoted(case: dict[str, Any]) -> dict[str, Any]:
         "coverage": np.mean([row["coverage"] for row in short], axis=0).tolist(),
         "refused": float(np.mean([not row["accepted"] for row in short])),
         "longer": {name: _medians([u[name] for u in units if name in u]) for name in longer},
-        "recalibration": _checked(case["recalibration"]) if case.get("recalibration") else None,
     }
 
 
@@ -305,19 +302,6 @@ def _spread(found: Sequence[Sequence[float]]) -> list[float]:
 def _medians(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {"units": len(rows)} | {
         way: np.median([row[way] for row in rows], axis=0).tolist() for way in ("lot", "mrbf")
-    }
-
-
-def _checked(checked: dict[str, Any]) -> dict[str, Any]:
-    """Of check runs of 2.5 h against earlier models of five runs."""
-    p = np.array(checked["unchanged"])
-    return {
-        "units": len(p),
-        "reported": [float(np.mean(p < level)) for level in (0.01, 0.05)],
-        "named": {
-            kind: [float(np.mean(row[key])) for key in ("seen", "right")]
-            for kind, row in checked["named"].items()
-        },
     }
 
 
@@ -351,20 +335,7 @@ def _case(case: dict[str, Any]) -> str:
         most = case["best_power"]
         beside = f" A test that knew each unrelated unit's map would refuse {most:.1%} from 2.5 h." if most else ""
         lines.append(f"Unrelated units (another lot's) refused: {reported}.{beside}")
-    if case["recalibration"]:
-        lines += ["", _recalibration(case["recalibration"])]
     return "\n".join(lines)
-
-
-def _recalibration(checked: dict[str, Any]) -> str:
-    named = ", ".join(
-        f"{kind} seen {seen:.0%}, named right {right:.0%}" for kind, (seen, right) in checked["named"].items()
-    )
-    return (
-        f"Recalibration: a check run of 2.5 h against the model of the five runs before it, {checked['units']} units. "
-        f"Not changed: {checked['reported'][0]:.1%} reported to have changed at 1 %, {checked['reported'][1]:.1%} at 5 %. Planted "
-        f"changes (offset of one sigma of 50-s means, slope of two over 100 C, a bump of three with 6 C): {named}."
-    )
 
 
 def _coverage(draws: dict[str, list[dict[str, Any]]]) -> str:

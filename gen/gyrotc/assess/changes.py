@@ -30,7 +30,7 @@ from ..results.evaluation import (
     NameChanges,
     TextChange,
 )
-from ..results.training import Manifest
+from ..results.training import Manifest, Training
 from ..results.verification import Verification
 from .evaluate import evaluate
 from .limits import Limits, held_against
@@ -163,17 +163,19 @@ def changes_since(
     evaluation: Evaluation,
     manifest: Manifest,
     *,
+    training: Training | None = None,
     dataset: Dataset | None = None,
     limits: Limits | None = None,
 ) -> Changes:
     """What is different from an earlier result.
 
     Args:
+        training: Of the new result: where it was made with the earlier model, it says how far the map has moved.
         dataset: The new recordings, to say how the unit was found.
         limits: Limits of the product, which hold for the state as found as well.
     """
     old = earlier.model
-    moved = _map(old, model, _of_means(earlier.evaluation, evaluation))
+    moved = _moved(old, model, training) or _map(old, model, _of_means(earlier.evaluation, evaluation))
     found, missing = (None, "not asked for")
     if dataset is not None:
         found, missing = as_found(earlier, dataset, limits, evaluation.average_s)
@@ -243,6 +245,15 @@ def _of_means(*evaluations: Evaluation | None) -> float | None:
             return None
         variance += known.standard**2
     return float(np.sqrt(variance))
+
+
+def _moved(old: Model, new: Model, training: Training | None) -> MapDifference | None:
+    """The move that a recalibration has found; the uncertainties of its two maps are not independent."""
+    use = training.prior if training else None
+    if use is None or not use.accepted or use.model_hash != old.hash:
+        return None
+    floor = new.noise_floor_dph
+    return use.moved.model_copy(update={"rms_over_floor": use.moved.rms_dph / floor if floor else None})
 
 
 def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None:

@@ -224,8 +224,11 @@ def build(
         with displayed(display or (result.limits.display if result.limits else "") or NATIVE):
             _print_built(result)
     tell(f"report: {out / 'report.html'}")
-    if any(result.evaluation.structure_left and not result.diagnosis for result in results):
-        tell(f"next, as the residual is more than noise: gyrotc diagnose {shlex.quote(str(dataset))}")
+    why = [r.evaluation.residual_words for r in results if not r.diagnosis and r.evaluation.structure_left]
+    if why:
+        tell(
+            f"next, as the residual is more than noise ({why[0]}): gyrotc diagnose {shlex.quote(str(dataset))}"
+        )
     failures = [
         (f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures
     ]

@@ -47,9 +47,12 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
 def training_lines(training: Training) -> Iterator[str]:
     """What training did: spans, the correction chosen, channels, and what came from a lot or an earlier model."""
     if spans := training.spans:
-        yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
-        for s in spans:
-            yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
+        if spans[0].kind == "run":
+            yield f"no run for the exam: {len(spans)} training runs, each left out in turn"
+        else:
+            yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
+            for s in spans:
+                yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
     if training.ladder:
         yield f"correction {training.method}: {training.reason}"
         tried = (
@@ -294,8 +297,8 @@ def change_lines(changes: Changes) -> Iterator[str]:
         moved, at = changes.map, changes.map.at
         share = f" = {moved.rms_over_floor:.2g} x noise floor" if moved.rms_over_floor else ""
         if moved.expanded_uncertainty_dph is not None:
-            more = "more than" if moved.significant else "no more than"
-            share += f", {more} the uncertainty of both maps gives (U = {moved.expanded_uncertainty_dph:.2g})"
+            more = "significant: more than" if moved.significant else "not significant: no more than"
+            share += f", {more} U = {moved.expanded_uncertainty_dph:.2g}"
         yield (
             f"against the earlier result: maps {moved.rms_dph:.3e} {rate_unit()} RMS difference{share}, at most "
             f"{moved.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"

@@ -281,7 +281,7 @@ def _entry_of(
         error_bound_dph=built.verification.error_bound_dph,
         findings=tuple(finding.id for finding in built.evaluation.findings),
         model_hash=built.model.hash,
-        verdict=built.decision,
+        verdict=built.unit.decision,
         limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
         limits_held=len(held.limits) if held and held.limits else None,
         expanded_uncertainty_dph=_expanded(built.evaluation),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -26,7 +26,7 @@ from ..recordings.load import asked_axes, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
-from ..results.release import HeldLimits, Verdict
+from ..results.release import HeldLimits
 from ..results.training import Manifest, Training
 from ..results.verification import Verification
 from ..store.files import json_text, write_atomically
@@ -49,9 +49,8 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 class Built:
     """What `build` made: the model and the JSON objects of its stages.
 
-    `refused` names the arithmetics that were refused, with the reason; `failures` are the checks that failed (none:
-    exit 0); with `extend` what was diagnosed, with `limits` and `previous` the objects of
-    `limits.json` and `changes.json`.
+    `refused` names the arithmetics that were refused, with the reason; with `extend` what was diagnosed, with `limits`
+    and `previous` the objects of `limits.json` and `changes.json`.
     """
 
     model: Model
@@ -59,15 +58,20 @@ class Built:
     evaluation: Evaluation
     verification: Verification
     refused: dict[str, str]
-    failures: tuple[str, ...]
     diagnosis: Diagnosed | None = None
     limits: HeldLimits | None = None
     changes: Changes | None = None
 
     @property
-    def decision(self) -> Verdict | None:
-        """The decision of the unit, as every page and certificate of its folder states it."""
-        unit = UnitResults(
+    def failures(self) -> tuple[str, ...]:
+        """The checks that failed, those of the limits among them; none: exit 0."""
+        limits = self.limits.limits if self.limits else ()
+        return (*self.unit.failures, *(f"limit {check.failure()}" for check in limits if not check.met))
+
+    @property
+    def unit(self) -> UnitResults:
+        """What every page and certificate of its folder states."""
+        return UnitResults(
             self.model,
             self.evaluation,
             self.training,
@@ -78,7 +82,6 @@ class Built:
             self.changes,
             None,
         )
-        return unit.decision
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +234,13 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     changes = None
     if earlier:
         changes = changes_since(
-            earlier, fitted.model, evaluation, manifest, dataset=dataset, limits=order.limits
+            earlier,
+            fitted.model,
+            evaluation,
+            manifest,
+            training=fitted.training,
+            dataset=dataset,
+            limits=order.limits,
         )
         _write(work / "changes.json", changes.content())
     budget = budget_of(
@@ -247,7 +256,6 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         evaluation,
         verification,
         emission.refused,
-        tuple(_failures(evaluation, verification, held)),
         diagnosis,
         held,
         changes,
@@ -269,27 +277,6 @@ def _extended(
 
 def _of_axis(axis: str, say: Progress) -> Progress:
     return lambda text: say(f"{axis}: {text}")
-
-
-def _failures(evaluation: Evaluation, verification: Verification, held: HeldLimits | None) -> Iterator[str]:
-    for entry in verification.targets:
-        if entry.status == "fail":
-            reason = entry.error or f"{entry.mismatches} of {entry.vectors} vectors differ"
-            yield f"{entry.name} {entry.numeric}: {reason}"
-    for file in verification.emitted:
-        if file.status == "fail":
-            yield f"{file.file}: {file.verdict}"
-    for error in verification.errors:
-        if error.status == "fail":
-            yield (
-                f"{error.numeric}: {error.worst_dph:.3g} deg/h from the model, above the proven bound of "
-                f"{error.bound_dph:.3g}"
-            )
-    if evaluation.mismatches:
-        yield f"{evaluation.mismatches} steps of the recordings differ from the reference"
-    for check in held.limits if held else ():
-        if not check.met:
-            yield f"limit {check.failure()}"
 
 
 def _write(path: Path, result: dict[str, Any]) -> None:

@@ -16,7 +16,7 @@ from ..results.verification import Verification
 from .display import NATIVE, shown
 from .words import limit_words, plain, words
 
-__all__ = ["UnitResults", "unit_in"]
+__all__ = ["UnitResults", "failed_checks", "unit_in"]
 
 _JUDGED_ON = {
     "exam": "exam runs, never seen in training",
@@ -101,8 +101,8 @@ class UnitResults:
 
     @property
     def failures(self) -> list[str]:
-        """Checks that failed beside the limits."""
-        return list(_failures(self.verification, self.evaluation))
+        """Checks that failed beside the limits, for every page, certificate and terminal."""
+        return list(failed_checks(self.verification, self.evaluation))
 
     @property
     def held(self) -> list[Limit]:
@@ -183,17 +183,22 @@ def _ratio(judged: Pooled | None, figure: str) -> float | None:
     return before / after if before is not None and after else None
 
 
-def _failures(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:
+def failed_checks(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:
+    """What failed of the proof, in words."""
     if verification:
         for target in verification.targets:
             if target.status == "fail":
-                yield f"{target.name}, {target.numeric}: does not answer as the reference does"
+                reason = target.error or f"{target.mismatches} of {target.vectors} vectors differ"
+                yield f"{target.name}, {target.numeric}: {reason}"
         for file in verification.emitted:
             if file.status == "fail":
                 yield f"{file.file}: {file.verdict}"
         for error in verification.errors:
             if error.status == "fail":
-                yield f"{error.numeric}: farther from the model than the proven bound"
+                yield (
+                    f"{error.numeric}: {error.worst_dph:.3g} deg/h from the model, above the proven bound of "
+                    f"{error.bound_dph:.3g}"
+                )
     if evaluation.mismatches:
         yield f"{evaluation.mismatches} steps of the recordings differ from the reference"
 

@@ -35,6 +35,7 @@ __all__ = [
     "Pooled",
     "Published",
     "RangeChange",
+    "ResidualTest",
     "RunStatistics",
     "Statistics",
     "TextChange",
@@ -178,7 +179,32 @@ class ModelSizes(Part):
 
 RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, sqrt(1.3^2 - 1)
 """RMS over noise floor above which a result always says that structure is left."""
-_OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
+
+
+class ResidualTest(Part):
+    """What remains of the judged runs, held against white noise of the same runs."""
+
+    autocorrelation: float = Field(description="mean over the first `lags` lags of means over `average_s`")
+    autocorrelation_limit: float = Field(description="three standard deviations above what white noise has")
+    lags: Count = Field(description="number of lags")
+    rms_over_floor: Amount = Field(description="RMS over the noise floor")
+    rms_over_floor_limit: Amount = Field(
+        description="three standard deviations above what white noise has, the floor estimated from as many means"
+    )
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """In which of the two the residual is more than white noise, in words."""
+        both = (
+            ("autocorrelation", self.autocorrelation, self.autocorrelation_limit),
+            ("RMS over the noise floor", self.rms_over_floor, self.rms_over_floor_limit),
+        )
+        return tuple(
+            f"{name} {found:.2f}, white noise up to {most:.2f}" for name, found, most in both if found > most
+        )
+
+
+_OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise", "residual_above_noise"})
 
 
 class Evaluation(UnitResult):
@@ -218,6 +244,9 @@ class Evaluation(UnitResult):
         "recordings are too short for",
     )
 
+    residual: ResidualTest | None = Field(
+        default=None, description="of the runs that the model is judged by; null where they are too short"
+    )
     without_outliers: Statistics | None = Field(
         default=None,
         description="of all exam runs, else of all training runs, after compensation without rows that are spikes or "
@@ -234,11 +263,17 @@ class Evaluation(UnitResult):
 
     @property
     def structure_left(self) -> bool:
-        """Whether the residual holds more than noise, by its RMS or by a finding: `gyrotc diagnose` is next."""
-        judged, floor = self.judged(), self.noise_floor_dph
-        rms = judged[1].after.rms_dph if judged else None
-        above = bool(floor) and rms is not None and rms > RMS_OVER_FLOOR * (floor or 0.0)
-        return above or any(finding.id in _OF_STRUCTURE for finding in self.findings)
+        """Whether the residual holds more than noise, by its test or by a finding: `gyrotc diagnose` is next."""
+        return bool(self.residual and self.residual.reasons) or any(
+            f.id in _OF_STRUCTURE for f in self.findings
+        )
+
+    @property
+    def residual_words(self) -> str:
+        """Why `gyrotc diagnose` is next; empty where it is not."""
+        reasons = self.residual.reasons if self.residual else ()
+        named = [f.id.replace("_", " ") for f in self.findings if f.id in _OF_STRUCTURE]
+        return "; ".join((*reasons, *named))
 
 
 class FigureChange(Part):
@@ -304,9 +339,9 @@ class MapDifference(Part):
     rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null where that is not known")
     expanded_uncertainty_dph: Amount | None = Field(
         default=None,
-        description="U (k = 2) of `rms_dph`: twice the RMS that the uncertainties of both maps give "
-        "(`uncertainty_dph` of the models; without it those of the means of what remains) although the gyro has not "
-        "changed; null where that is not known",
+        description="U (k = 2) of `rms_dph`: twice the RMS by which the map moves although the gyro has not changed. "
+        "With `--prior` by the noise of the new recordings and the earlier map's sigma; else by the uncertainties of "
+        "both maps (`uncertainty_dph`; without it those of the means of what remains). Null where that is not known",
     )
     significant: bool | None = Field(
         default=None, description="whether `rms_dph` is more than that; null where it is not known"

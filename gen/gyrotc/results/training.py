@@ -6,14 +6,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .base import Amount, Count, Figure, Part, Share, UnitResult
-from .evaluation import FoundIn, Pooled
+from .base import Amount, Count, Figure, Part, UnitResult
+from .evaluation import FoundIn, MapDifference, Pooled
 from .lot import KnownMap, LotUse, UnitCurve
 
 __all__ = [
     "AllanPoint",
     "BiasPlane",
     "CandidateModel",
+    "ChangeKind",
     "ChannelTried",
     "CheckedCell",
     "DeclaredUnits",
@@ -27,6 +28,7 @@ __all__ = [
     "Outliers",
     "SpanLeftOut",
     "Training",
+    "TriedChange",
 ]
 
 
@@ -45,8 +47,26 @@ class CheckedCell(Part):
     within: bool = Field(description="whether it is")
 
 
+ChangeKind = Literal["unchanged", "offset", "slope", "full"]
+
+
+class TriedChange(Part):
+    """What may have become of the map since the earlier model, and what the check run says of it."""
+
+    kind: ChangeKind = Field(
+        description="as it was, moved by an offset, by an offset and a slope over T and dT/dt, or changed in its shape"
+    )
+    log10_odds: float = Field(description="evidence for it against that for the map as it was, power of ten")
+    moved_rms_dph: Amount = Field(
+        description="how far the map then moves over the earlier envelope, RMS, deg/h"
+    )
+    expanded_uncertainty_dph: Amount = Field(
+        description="U (k = 2): twice the RMS that noise and the earlier model's sigma give although nothing changed"
+    )
+
+
 class MapChange(Part):
-    """The change of the map that explains best why the earlier model does not hold."""
+    """The change of the map: what it is, where, and how large."""
 
     kind: Literal["offset", "slope", "rate", "local"] = Field(
         description="the same everywhere, in proportion to T, in proportion to dT/dt, or in a region"
@@ -67,17 +87,19 @@ class EarlierUse(Part):
     date: str | None = Field(description="of the earlier calibration; null: it states none")
     ageing_dph: Amount = Field(description="how far the bias may have moved since, 1 sigma, deg/h")
     ageing_from: str = Field(description="where that comes from")
-    p_value: Share = Field(
-        description="probability that a unit that has not changed lies as far away as this one"
+    chosen: ChangeKind = Field(
+        description="what became of the map: the best supported of `tried` of those by which it moves by more than U "
+        "where it has changed, and by no more than U and ageing give where not"
     )
-    false_alarm: Share = Field(
-        description="share of unchanged units of which it is said that they have changed"
+    tried: tuple[TriedChange, ...] = Field(description="all that were tried, that which was chosen first")
+    moved: MapDifference = Field(
+        description="how far the map has moved over the earlier envelope; U holds the noise of the run and the earlier "
+        "model's sigma, not the ageing"
     )
-    confirmed: bool = Field(description="whether the check run confirms the earlier model")
     accepted: bool = Field(
         description="whether the table is made from both; else from the new recordings alone"
     )
-    change: MapChange | None = Field(description="what changed; null: nothing was seen")
+    change: MapChange | None = Field(description="what changed; null: nothing")
     cells: tuple[CheckedCell, ...] = Field(description="the check run in parts, T ascending")
     own_share: Figure = Field(
         description="of the variance that the earlier model leaves after ageing, mean over where corrections are "
@@ -105,8 +127,8 @@ class SpanLeftOut(Part):
     file: str = Field(description="as in `dataset.toml`")
     from_s: float = Field(description="its start, s")
     to_s: float = Field(description="its end, s")
-    kind: Literal["branch", "part"] = Field(
-        description="a branch of a cycle, or a part of a run without branches"
+    kind: Literal["branch", "part", "run"] = Field(
+        description="a branch of a cycle, a part of a run without branches, or a whole run"
     )
     guard_s: Amount = Field(description="what was left out on either side of it besides, s")
 

@@ -36,6 +36,7 @@ __all__ = [
     "training_spans",
     "turning_points",
     "unseen_log_likelihood",
+    "whole_runs",
 ]
 
 LIKELIER = 3.0  # of log-likelihoods on unseen means: twenty to one for what is richer
@@ -77,6 +78,7 @@ def unseen_log_likelihood(square: FloatArray, means: FloatArray, white: float) -
     return -0.5 * float(means @ square) / white**2
 
 
+_MOST_RUNS = 12  # left out whole, each a fit: the RMS over twelve is known to a tenth
 _ENOUGH_RUNS = 3  # docs/recordings.md: fewer are cut into spans
 _EQUAL_PARTS = 5  # docs/training.md, section 2: of a single run without turning points
 _SHORTEST_BRANCH_S = 300.0  # docs/recordings.md: branches of at least five minutes
@@ -105,7 +107,7 @@ class Span:
     Attributes:
         run: Index of the run among the training runs.
         file: Its file.
-        kind: "branch" between two turning points of the temperature, or "part" of equal length.
+        kind: "branch" between two turning points of the temperature, "part" of equal length, or the whole "run".
         guard_s: Samples this near outside are not trained on while the span is left out, s.
     """
 
@@ -113,7 +115,7 @@ class Span:
     file: str
     from_s: float
     to_s: float
-    kind: Literal["branch", "part"]
+    kind: Literal["branch", "part", "run"]
     guard_s: float
 
     def contains(
@@ -207,6 +209,22 @@ def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
         if mine.any():
             spans += _cut(index, run.file, samples.time_s[mine], samples.temperature_c[mine])
     return tuple(spans)
+
+
+def whole_runs(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
+    """Whole training runs to be left out in turn; of many runs some of them, evenly chosen.
+
+    Args:
+        runs: The training runs, in the order of `samples.run`.
+        samples: Samples of these runs.
+    """
+    some = np.unique(np.linspace(0, len(runs) - 1, min(len(runs), _MOST_RUNS)).round().astype(int)).tolist()
+    mine = {index: samples.time_s[samples.run == index] for index in some}
+    return tuple(
+        Span(index, runs[index].file, float(time[0]), float(time[-1]) + runs[index].row_period_s, "run", 0.0)
+        for index, time in mine.items()
+        if time.size
+    )
 
 
 def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -> list[Span]:

@@ -25,7 +25,7 @@ from ..recordings.records import Dataset, Run, joined_runs
 from ..results.evaluation import FoundIn, Pooled
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
-from .cross_validation import Span, training_spans
+from .cross_validation import Span, training_spans, whole_runs
 from .data import TrainingData, cleaned, joined, scaling_of
 from .evidence import TrainingFailed
 from .guards import AGREE_S, longest_same_s, stuck_after_s
@@ -170,6 +170,8 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
     spans = training_spans(stretches, data)
+    if not spans and not any(run.role == "exam" for run in dataset.runs):
+        spans = whole_runs(stretches, data)  # what the correction is judged by
     use = fitted.lot or fitted.prior
     again = replace(options, method=fitted.method, prior=options.prior if use and use.accepted else None)
     left_out = _left_out(data, spans, again, say) if spans else None

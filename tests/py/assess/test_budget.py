@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.assess.budget import budget_of, combined
-from gyrotc.assess.evaluate import figure_uncertainties
 from gyrotc.assess.limits import (
     Limits,
     coverage_factor,
@@ -19,6 +18,7 @@ from gyrotc.assess.limits import (
     load_limits,
     worst_of,
 )
+from gyrotc.assess.uncertainties import figure_uncertainties
 from gyrotc.common.errors import InputError
 from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.jobs.build import build_into

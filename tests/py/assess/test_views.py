@@ -22,7 +22,7 @@ from gyrotc.model import Model
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
 from gyrotc.recordings.records import Dataset
-from gyrotc.results.evaluation import Evaluation, FigureUncertainty, FoundIn, Pooled, Statistics
+from gyrotc.results.evaluation import Evaluation, FigureUncertainty, FoundIn, Pooled, ResidualTest, Statistics
 from gyrotc.results.release import HeldLimits
 from gyrotc.results.training import Training
 from test_limits import EVALUATION, VERIFICATION
@@ -127,8 +127,7 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
     for number in range(draws):
         evaluation, held = drawn(rng, model)
         limits = held if rng.random() < 0.8 else None
-        failures = () if not evaluation.mismatches else ("a check",)
-        one = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, failures, limits=limits)
+        one = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=limits)
         task = unit.Task(
             Unit(Path(f"u{number}"), None),
             "d",
@@ -174,14 +173,22 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
 
 @pytest.mark.parametrize(
     ("over_floor", "finding", "left"),
-    [(1.29, "run_outlier", False), (1.31, "run_outlier", True), (1.0, "does_not_generalise", True)],
+    [(1.04, "run_outlier", False), (1.06, "run_outlier", True), (1.0, "does_not_generalise", True)],
 )
 def test_structure_that_is_left_leads_to_a_diagnosis(
     over_floor: float, finding: str, left: bool, model_dict: dict[str, Any]
 ) -> None:
     found = (FoundIn(id=finding, text="", evidence={}),)
-    evaluation = EVALUATION.model_copy(update={"exam": pooled(1e-3 * over_floor), "findings": found})
+    residual = ResidualTest(
+        autocorrelation=0.0,
+        autocorrelation_limit=0.03,
+        lags=10,
+        rms_over_floor=over_floor,
+        rms_over_floor_limit=1.05,
+    )
+    evaluation = EVALUATION.model_copy(update={"residual": residual, "findings": found})
     assert evaluation.structure_left == left
+    assert bool(evaluation.residual_words) == left
     shown = UnitResults(
         Model.from_dict(model_dict), evaluation, None, VERIFICATION, None, None, None, None, None
     )

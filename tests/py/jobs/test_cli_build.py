@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, HOST, Command
 from gyrotc.assess.evaluate import evaluate
-from gyrotc.jobs.build import _failures
 from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
+from gyrotc.pages.unit import failed_checks
 from gyrotc.recordings.load import load
 from gyrotc.results.verification import MapError
 from gyrotc.simulate.campaign import simulate
@@ -285,7 +285,7 @@ def test_a_proven_bound_that_is_exceeded_fails_a_build() -> None:
     """`verify` counted it as failed, `build` went on with exit status 0."""
     exceeded = MapError(numeric="q31", status="fail", bound_dph=1e-7, worst_dph=2e-7, inputs_visited=1)
     verification = SimpleNamespace(targets=(), emitted=(), errors=(exceeded,))
-    [failure] = _failures(SimpleNamespace(mismatches=0), verification, None)
+    [failure] = failed_checks(verification, SimpleNamespace(mismatches=0))
     assert "q31" in failure and "2e-07" in failure and "1e-07" in failure
 
 

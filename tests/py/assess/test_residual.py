@@ -1,0 +1,82 @@
+"""What a build says of its own residual: white noise passes, slow structure and spikes are told apart from it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import HOST, run_here
+from gyrotc.assess.residual import residual_test
+from gyrotc.results.evaluation import ResidualTest
+from numpy.typing import NDArray
+from recordings import write_csv
+
+Floats = NDArray[np.float64]
+SEED = 7
+LENGTHS = (200, 150, 250)
+
+
+def judged(series: list[Floats], floor: float = 1.0) -> ResidualTest:
+    rms = float(np.sqrt(np.mean(np.concatenate(series) ** 2)))
+    found = residual_test(series, rms, floor, [x.size for x in series])
+    assert found is not None
+    return found
+
+
+def test_white_noise_passes() -> None:
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    drawn = [judged([rng.normal(size=n) for n in LENGTHS]) for _ in range(200)]
+    assert sum(bool(one.reasons) for one in drawn) <= 4, "two figures at three sigma: one clean build in 350"
+
+
+@pytest.mark.parametrize(("name", "size"), [("slow", 0.4), ("slow", 1.0), ("offset", 0.4), ("steep", 0.5)])
+def test_structure_below_the_noise_is_seen(name: str, size: float) -> None:
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    shape = {
+        "slow": lambda u, k: np.sqrt(2.0) * np.sin(2.0 * np.pi * 2.0 * u + k),
+        "offset": lambda u, k: np.full(u.size, (1.0, -1.0, 1.0)[k]),  # of each power-on its own
+        "steep": lambda u, k: np.sqrt(3.0) * (2.0 * u - 1.0),
+    }[name]
+    series = [rng.normal(size=n) + size * shape(np.linspace(0.0, 1.0, n), k) for k, n in enumerate(LENGTHS)]
+    assert judged(series).reasons
+
+
+def test_short_runs_are_not_judged() -> None:
+    assert residual_test([np.zeros(12)], 1.0, 1.0, [12]) is None
+    assert residual_test([np.ones(100)], 1.0, None, [100]) is None
+    assert residual_test([], None, 1.0, []) is None
+
+
+def recorded(folder: Path, spikes: int = 0) -> Path:
+    """Four runs without an exam; the last has spikes."""
+    rng = np.random.default_rng(SEED)
+    text = 'schema = 1\nserial = "G1"\nearth_rate = "removed"\n'
+    for k in range(4):
+        time = np.arange(0.0, 7200.0, 5.0)
+        t = 10.0 + 20.0 * np.sin(2.0 * np.pi * (time / 7200.0 + 0.2 * k))
+        rate = 0.01 + 2e-4 * t + 2e-3 * rng.normal(size=time.size)
+        if k == 3 and spikes:
+            rate[rng.choice(time.size, spikes, replace=False)] += 5.0
+        write_csv(folder / f"{k}.csv", {"time_s": time, "temperature_c": t, "rate_dph": rate})
+        text += f'[[run]]\nfile = "{k}.csv"\n'
+    (folder / "dataset.toml").write_text(text)
+    return folder
+
+
+def test_runs_without_an_exam_are_judged_by_each_left_out_and_without_their_spikes(tmp_path: Path) -> None:
+    text = run_here("build", recorded(tmp_path / "d", 12), *HOST, "--out", tmp_path / "r", "--block-s", "50")
+    result = json.loads((tmp_path / "r" / "evaluate.json").read_text())
+    left_out = result["left_out"]
+    assert result["exam"] is None and left_out["samples"] > 200
+    assert left_out["after"]["rms_dph"] < 1e-3, "training has left the spikes out"
+    usual = result["without_outliers"]["rms_dph"]
+    assert usual < 1e-3 < result["train"]["after"]["rms_dph"]
+    assert "4 training runs, each left out in turn" in text and "without 12 rows that are outliers" in text
+    assert f"on spans left out {left_out['improvement']:.2f}" in text
+    page = (tmp_path / "r" / "report.html").read_text()
+    assert "left out" in page and "beside white noise of the same runs" in page
+    assert "gyrotc diagnose" not in text, "nothing but noise and spikes is left"
