@@ -209,7 +209,7 @@ class Result:
     @property
     def decision(self) -> str | None:
         """PASS, CONDITIONAL PASS or FAIL; None without limits where nothing failed."""
-        return self.built.decision
+        return self.built.unit.decision
 
     @property
     def _unit(self) -> UnitResults:
