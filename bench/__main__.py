@@ -76,6 +76,13 @@ def _sizes(docs: Path) -> None:
     write(docs, "sizes", sizes(), section)
 
 
+def _costs(docs: Path) -> None:
+    """What each option of the runtime costs, for `gtc_config.h`."""
+    from .costs import write as write_costs
+
+    write_costs()
+
+
 def _bounds(docs: Path) -> None:
     """Static bounds on instructions, beside what an emulator counts."""
     from .bounds import bounds, section
@@ -139,6 +146,7 @@ _ALONE = {
     "sigma": _sigma,
     "faults": _faults,
     "sizes": _sizes,
+    "costs": _costs,
     "bounds": _bounds,
     "fleet": _fleet,
     "formats": _formats,

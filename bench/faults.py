@@ -1,7 +1,7 @@
 """What the runtime says of itself when something fails: true bias less correction, in units of sigma, and the status.
 
 Each fault begins half an hour into an exam run of simulated gyros with a supply voltage among their inputs; the compiled
-runtime gets a sample a second. `python -m bench docs --only faults`; docs/results.md has the table.
+runtime gets a sample a second, and so did the recordings. `python -m bench docs --only faults`; docs/results.md has the table.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def unit(seed: int, numeric: Numeric = "f32") -> Unit:
     with tempfile.TemporaryDirectory() as place:
         plan = Path(place) / "plan.toml"
         plan.write_text(_PLAN, "utf-8")
-        simulate(plan, seed=seed, out=Path(place) / "data", format="parquet")
+        simulate(plan, seed=seed, out=Path(place) / "data", format="parquet", row_s=_PERIOD_S)
         model = fit_dataset(load(Path(place) / "data"), FitOptions(channels=True)).model
         record = list(campaign(with_noise(read(plan)[1], "paper"), seed))[-1]
     part = slice(_FROM, _FROM + _LENGTH_S)

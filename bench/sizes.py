@@ -13,21 +13,22 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
+from gyrotc.tables.config import SWITCHES
 from gyrotc.tables.emit import emit_texts, quantise_all
 from results import table as markdown
 
-__all__ = ["CORES", "PROGRAMS", "Program", "section", "size", "sizes"]
+__all__ = ["COMPILER", "CORES", "LEVELS", "LINKED", "MODEL", "PROGRAMS", "Program", "section", "size", "sizes"]
 
 ROOT = Path(__file__).resolve().parents[1]
-_MODEL = ROOT / "examples" / "nav_loop" / "filter_model.json"  # of a simulated gyro, with uncertainties
+MODEL = ROOT / "examples" / "nav_loop" / "filter_model.json"  # of a simulated gyro, with uncertainties
 CORES = {
     "Cortex-M0": ("-mcpu=cortex-m0",),
     "Cortex-M4F": ("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
     "Cortex-M7": ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
 }
 LEVELS = ("-Os", "-O2")
-_COMPILER = ("arm-none-eabi-gcc", "-std=c99", "-ffp-contract=off", "-mthumb", "-ffunction-sections", "-fdata-sections", "-fno-tree-loop-distribute-patterns")
-_LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
+COMPILER = ("arm-none-eabi-gcc", "-std=c99", "-ffp-contract=off", "-mthumb", "-ffunction-sections", "-fdata-sections", "-fno-tree-loop-distribute-patterns")
+LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
 
 _MAIN = """#include "gtc_{id}.h"
 gtc_f32_state_t state;
@@ -114,17 +115,22 @@ int main(void)
 
 @dataclass(frozen=True)
 class Program:
-    """Functions that are called beside init, sample and bias; options: as the table needs, or the defaults."""
+    """Functions that are called beside init, sample and bias; options: as the table needs, or the defaults.
+
+    `is_least`: table and runtime without the parts that a product may leave out.
+    """
 
     name: str
     calls: tuple[str, ...] = ()
     is_fitted: bool = True
+    is_least: bool = False
     text: str = _MAIN
 
 
 PROGRAMS = (
     Program("init, sample, bias; default options", is_fitted=False),
     Program("init, sample, bias"),
+    Program("init, sample, bias; all else left out", is_least=True),
     Program("with check", ("check",)),
     Program("with check and snapshot", ("check", "snapshot")),
     Program("with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")),
@@ -140,15 +146,18 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
     Raises:
         subprocess.CalledProcessError: It does not compile.
     """
-    model = load_model(_MODEL)
+    model = load_model(MODEL)
+    if program.is_least:
+        model = model.model_copy(update={"left_out": tuple(SWITCHES)})
     for name, data in emit_texts(model, quantise_all(model, None)).items():
         (folder / name).write_bytes(data)
     calls = "\n".join(f"    status = {_CALLS[name].format(symbol=model.symbol)};" for name in program.calls)
     text = program.text.format(id=model.id, symbol=model.symbol, calls=calls)
     (folder / "program.c").write_text(text, encoding="ascii")
-    fitted = (f"-DGTC_MAX_SLOPE_BLOCKS={model.slope_blocks}", "-DGTC_MAX_TERMS=0") if program.is_fitted else ()
+    if not program.is_fitted:
+        (folder / "gtc_config.h").write_text("")
     sources = ["program.c", *(("gtc.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
-    command = [*_COMPILER, *CORES[core], level, *fitted, *sources, *_LINKED, "-o", "program.elf"]
+    command = [*COMPILER, *CORES[core], level, *sources, *LINKED, "-o", "program.elf"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     reported = subprocess.run(
         ["arm-none-eabi-size", "program.elf"], cwd=folder, check=True, capture_output=True, text=True
@@ -166,15 +175,15 @@ def sizes() -> dict[str, Any]:
                 f"{core} {level}": size(program, core, level, Path(folder)) for core in CORES for level in LEVELS
             }
             rows.append({"name": program.name, **found})
-    version = subprocess.run([_COMPILER[0], "-dumpversion"], check=True, capture_output=True, text=True).stdout
-    return {"centers": len(load_model(_MODEL).networks[0].centers), "compiler": version.strip(), "rows": rows}
+    version = subprocess.run([COMPILER[0], "-dumpversion"], check=True, capture_output=True, text=True).stdout
+    return {"centers": len(load_model(MODEL).networks[0].centers), "compiler": version.strip(), "rows": rows}
 
 
 _HEAD = """## Sizes: flash and RAM of whole programs (`python -m bench docs --only sizes`)
 
 A table of {centers} Gaussians in float32 with its uncertainties, coverage and known answers; arm-none-eabi-gcc {compiler}.
 Flash is all that is linked: code, constants, table, helpers of the compiler. RAM is the state and what the program
-hands over. Options are those that the header of the table names, unless the row says otherwise; what is not called
+hands over. Options are those of `gtc_config.h`, unless the row says otherwise; what is not called
 is not linked (`-ffunction-sections -fdata-sections -Wl,--gc-sections`). Bytes, flash / RAM:
 """
 

@@ -83,19 +83,19 @@ typedef struct {
 } gtc_q31_snapshot_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (38 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (13 * GTC_MAX_TERMS))
+#define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (13 * GTC_MAX_TERMS) + (14 * GTC_WITH_UNCERTAINTY))
 
 /* Bytes on a Cortex-M4F at -O2, the larger of arm-none-eabi-gcc 12.2 and 14.2, rounded up: code with all that it
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
  * the compiler that is installed; docs/results.md of gyrotc has other targets.
  *               f32 code  stack   q31 code  stack
- *   check           4460    450       3630    470
- *   open            2760    500       2540    520
+ *   check           4510    450       3690    470
+ *   open            2800    500       2580    520
  *   init             550     70        570     70
- *   sample          6230    310       6660    470
+ *   sample          6230    320       6700    470
  *   bias              90      0         90     10
- *   snapshot        1270     50       2030    140
- *   rezero          1720     60       2960    170
+ *   snapshot        1320     50       2250    140
+ *   rezero          1790     60       3070    180
  *   save            1420     80       1320    100
  *   restore         2270    620       2200    690 */
 
@@ -147,7 +147,7 @@ GTC_MUST_CHECK int gtc_f32_bias(const gtc_f32_state_t *state, float *bias);
 GTC_MUST_CHECK int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias);
 
 /* The correction with 1 sigma, the correlation time of its error, status and age: for the bias state of a filter, a
- * first-order process with variance sigma^2. Sigma grows while the correction is held, the slope is not known,
+ * first-order process with variance sigma^2. Sigma grows while the correction is held, with readings missing from its block, the slope is not known,
  * inputs lie outside envelope or training data, a channel is lost or limited, and until terms have forgotten the time
  * before the start (docs/design.md). It excludes the noise of the rate. Where it grows at once, add
  * sigma_new^2 - sigma_old^2 to the filter's variance (examples/nav_loop).

@@ -39,6 +39,44 @@
 #define GTC_OPEN_TERMS 0
 #endif
 
+/* Parts of the runtime: 1 is there, 0 is not compiled, and a table that needs it is refused. `gyrotc emit` writes a
+ * gtc_config.h with what a table needs, and what each of them costs. */
+
+/* The uncertainty of a correction: gtc_<n>_snapshot(), gtc_<n>_rezero(). Without it a table's words of it are not read. */
+#ifndef GTC_WITH_UNCERTAINTY
+#define GTC_WITH_UNCERTAINTY 1
+#endif
+
+/* gtc_<n>_rezero(), which needs the uncertainty. */
+#ifndef GTC_WITH_REZERO
+#define GTC_WITH_REZERO GTC_WITH_UNCERTAINTY
+#endif
+
+/* Where training data was: GTC_UNCOVERED. */
+#ifndef GTC_WITH_COVERAGE
+#define GTC_WITH_COVERAGE 1
+#endif
+
+/* Known answers of a table in gtc_<n>_check(). Without it those of a table are not asked. */
+#ifndef GTC_WITH_PROBES
+#define GTC_WITH_PROBES 1
+#endif
+
+/* gtc_<n>_open(). */
+#ifndef GTC_WITH_IMAGE
+#define GTC_WITH_IMAGE 1
+#endif
+
+/* gtc_<n>_save() and gtc_<n>_restore(). */
+#ifndef GTC_WITH_SAVE
+#define GTC_WITH_SAVE 1
+#endif
+
+/* Any time in gtc_<n>_sample(). 0: only the sample period, GTC_E_ARG for another time; NULL is then one missed sample. */
+#ifndef GTC_WITH_TIME
+#define GTC_WITH_TIME 1
+#endif
+
 /* 1: multiply 32 x 32 -> 64 bits in 16-bit halves. The bits are the same; it is faster on cores
  * without a long multiply (Cortex-M0, AVR) and slower on all others. */
 #ifndef GTC_HALF_MULTIPLY
@@ -88,6 +126,10 @@
 #endif
 #if (GTC_MAX_TERMS < 0) || (GTC_MAX_TERMS > 8)
 #error "GTC_MAX_TERMS must lie in 0 ... 8"
+#endif
+
+#if GTC_WITH_REZERO && !GTC_WITH_UNCERTAINTY
+#error "GTC_WITH_REZERO needs GTC_WITH_UNCERTAINTY"
 #endif
 
 /* Places for terms in tables and states: C has no arrays without any. */

@@ -13,7 +13,11 @@
  * gtc_f32_init_20blocks_4terms to the linker), so that units which were compiled with different ones do not
  * link: "undefined reference to gtc_f32_init_20blocks_1terms" says what the unit was compiled with.
  * MISRA 20.10: a name is made of the options. */
+#if GTC_WITH_UNCERTAINTY
 #define GTC_LINKED_AS(name, b, t) name##_##b##blocks_##t##terms
+#else
+#define GTC_LINKED_AS(name, b, t) name##_##b##blocks_##t##terms_plain
+#endif
 #define GTC_LINKED_WITH(name, b, t) GTC_LINKED_AS(name, b, t)
 #define GTC_LINKED(name) GTC_LINKED_WITH(name, GTC_MAX_SLOPE_BLOCKS, GTC_MAX_TERMS)
 #define gtc_f32_init GTC_LINKED(gtc_f32_init)
@@ -21,6 +25,7 @@
 #define gtc_f32_restore GTC_LINKED(gtc_f32_restore)
 #define gtc_q31_restore GTC_LINKED(gtc_q31_restore)
 
+#if GTC_WITH_UNCERTAINTY
 /* What the uncertainty of a correction is computed from. */
 typedef struct {
     float input[2];             /* of the map: C, C/block */
@@ -33,6 +38,7 @@ typedef struct {
     uint_least32_t terms_since; /* blocks since init when the terms began */
     uint_least32_t terms_known; /* one bit a term: its memory was retained, or its channel is read */
     uint_least32_t slope_known; /* 0: there was no correction yet, 1: nothing is known of the slope, 2: `slope` is */
+    uint_least32_t missing;     /* samples of the block that the correction was made of */
 } gtc_f32_uncertainty_t;
 
 typedef struct {
@@ -46,7 +52,9 @@ typedef struct {
     uint_least32_t terms_since;
     uint_least32_t terms_known;
     uint_least32_t slope_known;
+    uint_least32_t missing;
 } gtc_q31_uncertainty_t;
+#endif
 
 /* State of one channel of a table: temperature or auxiliary. */
 typedef struct {
@@ -95,9 +103,11 @@ typedef struct {
     uint_least32_t off_blocks;     /* blocks without power before it */
     uint_least32_t late_us;        /* from the slot of the last sample to the last call, modulo 2^32 */
     uint_least32_t unused;         /* calls in a row whose time had not moved on */
+#if GTC_WITH_UNCERTAINTY
     float shift;                   /* of the constant, deg/h: gtc_f32_rezero() */
     float shift_sigma;             /* 1 sigma of the constant with it, deg/h */
     gtc_f32_uncertainty_t uncertainty;
+#endif
     float window[GTC_MAX_SLOPE_BLOCKS];        /* block means, newest first, C */
     float term[GTC_TERM_SLOTS][2];              /* states of the terms */
     gtc_f32_input_t input[GTC_MAX_TERMS + 1];  /* temperature, auxiliary channels */
@@ -116,9 +126,11 @@ typedef struct {
     uint_least32_t off_blocks;
     uint_least32_t late_us;
     uint_least32_t unused;
+#if GTC_WITH_UNCERTAINTY
     int_least32_t shift;
     int_least32_t shift_sigma;
     gtc_q31_uncertainty_t uncertainty;
+#endif
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS]; /* 2^-16 C */
     int_least32_t term[GTC_TERM_SLOTS][2];
     gtc_q31_input_t input[GTC_MAX_TERMS + 1];

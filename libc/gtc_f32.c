@@ -74,6 +74,7 @@ static int FN(sums_fit)(const gtc_word_t *network, const gtc_word_t *centers)
     return 1;
 }
 
+#if GTC_WITH_SAVE
 /* ---- wide numbers as words of a saved state ---------------------------------------------- */
 
 static void FN(to_words)(float x, gtc_word_t words[2])
@@ -103,6 +104,8 @@ static int FN(is_fraction)(float x)
 {
     return (FN(is_missing)(x) || (FN(bits)(x) == 0U)) ? 1 : 0;
 }
+
+#endif
 
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
@@ -218,11 +221,13 @@ int gtc_f32_check(const gtc_f32_table_t *table)
     return FN(run_check)(table);
 }
 
+#if GTC_WITH_IMAGE
 int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words, uint_least32_t n_words,
                  uint_least32_t expected_id)
 {
     return FN(run_open)(table, words, n_words, expected_id);
 }
+#endif
 
 int gtc_f32_map(const gtc_f32_table_t *table, float temp, float slope, float *bias)
 {
@@ -244,24 +249,32 @@ int gtc_f32_bias(const gtc_f32_state_t *state, float *bias)
     return FN(run_bias)(state, bias);
 }
 
+#if GTC_WITH_SAVE
 int gtc_f32_save(const gtc_f32_state_t *state, gtc_word_t words[GTC_SAVE_WORDS])
 {
     return FN(run_save)(state, words);
 }
+#endif
 
+#if GTC_WITH_SAVE
 int gtc_f32_restore(gtc_f32_state_t *state, const gtc_f32_table_t *table,
                     uint_least32_t period_us, const gtc_word_t words[GTC_SAVE_WORDS],
                     uint_least32_t off_blocks)
 {
     return FN(run_restore)(state, table, period_us, words, off_blocks);
 }
+#endif
 
+#if GTC_WITH_UNCERTAINTY
 int gtc_f32_snapshot(const gtc_f32_state_t *state, gtc_f32_snapshot_t *snapshot)
 {
     return FN(run_snapshot)(state, snapshot);
 }
+#endif
 
+#if GTC_WITH_REZERO
 int gtc_f32_rezero(gtc_f32_state_t *state, float mean_rate, uint_least32_t seconds)
 {
     return FN(run_rezero)(state, mean_rate, seconds);
 }
+#endif

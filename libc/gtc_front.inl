@@ -33,10 +33,12 @@ static void FN(set_correction)(STATE *state, WIDE bias, int_least32_t status)
     int_least32_t remarks = status;
     NUM limited = FN(within_authority)(state->table, bias, &remarks);
 
+#if GTC_WITH_UNCERTAINTY
     state->uncertainty.unshifted = limited;
     if ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO)) {
         limited = FN(within_authority)(state->table, FN(add)(limited, state->shift), &remarks);
     }
+#endif
     state->bias = limited;
     state->status = remarks;
 }
@@ -71,7 +73,7 @@ static void FN(correct)(STATE *state, NUM temp, NUM within, NUM slope, int_least
     effect.temp = temp;
     effect.slope = slope;
     effect.added = NUM_ZERO;
-    effect.terms_known = state->uncertainty.terms_known;
+    effect.terms_known = FN(terms_known)(state);
     effect.edge_effect = NUM_ZERO;
     effect.remarks = remarks;
     for (i = 0U; i < FN(n_terms)(table); i++) {
@@ -113,11 +115,10 @@ static void FN(restart)(STATE *state, NUM x, int is_first)
 
     state->filled = 0U;
     state->window_valid = 0U;
-    state->uncertainty.first_temp = x;
     if (is_first == 0) {
         FN(reset_terms)(state);
     }
-    FN(uncertainty_begin)(state, within);
+    FN(uncertainty_begin)(state, x, within);
     for (i = 0U; i < FN(n_terms)(table); i++) {
         FN(code_of)(table, i)->begin(state, i, within);
     }
@@ -339,9 +340,11 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
 
 /* ---- blocks -------------------------------------------------------------------------------------- */
 
+/* Readings that make a mean: half of a block, or two, which agree, as each was accepted after the one before it. How far
+ * the mean may lie from that of the whole block, its uncertainty says. */
 static int FN(is_enough)(const STATE *state, const INPUT *in)
 {
-    return ((2U * in->valid) >= state->samples_per_block) ? 1 : 0;
+    return ((in->valid >= 2U) || ((2U * in->valid) >= state->samples_per_block)) ? 1 : 0;
 }
 
 /* The running block of a channel ends. Returns 1 if it has enough readings; then the mean is theirs. When it is
@@ -409,6 +412,8 @@ static void FN(pass)(STATE *state, uint_least32_t blocks)
  * so terms and map see where the slope brings the mean by then. */
 static void FN(close)(STATE *state)
 {
+    const uint_least32_t missing = state->samples_per_block - state->input[0].valid;
+
     FN(pass)(state, 1U);
     FN(close_channels)(state);
     if (FN(end_block)(state, &state->input[0], state->table->guards) != 0) {
@@ -417,6 +422,7 @@ static void FN(close)(STATE *state)
         NUM slope;
         int_least32_t remarks;
 
+        FN(uncertainty_block)(state, missing);
         FN(push)(state, 1U);
         remarks = FN(window_slope)(state, &slope);
         temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
@@ -443,16 +449,6 @@ static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t pe
         off = period_us - rest;
     }
     return ((n <= MAX_SAMPLES_PER_BLOCK) && (off <= (table->block_us / PERIOD_PARTS))) ? n : 0U;
-}
-
-/* 1 if a table is of this layout and within the options of this build, so that no array of a state is too short for it.
- * Its other words are those that gtc_<n>_check() or gtc_<n>_open() found sound. */
-static int FN(fits_build)(const TABLE *table)
-{
-    return ((table->layout == GTC_TABLE_LAYOUT) && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
-            && (table->n_terms <= (uint_least32_t)GTC_MAX_TERMS)
-            && (table->n_channels <= ((uint_least32_t)GTC_MAX_TERMS + 1U))
-            && ((GTC_WITH_BANK != 0) || (table->n_networks == 1U))) ? 1 : 0;
 }
 
 /* GTC_OK, or why a state cannot be started. */
@@ -562,6 +558,13 @@ static int FN(take)(STATE *state, const NUM *channels)
     return (int)state->status | remark;
 }
 
+/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
+static int FN(has_times)(const STATE *state)
+{
+    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
+}
+
+#if GTC_WITH_TIME
 /* 1 if every channel has been missing for so long that only time passes any more. */
 static int FN(all_lost)(const STATE *state)
 {
@@ -636,12 +639,6 @@ static int FN(not_used)(STATE *state)
     return FN(pass_over)(state, 1U);
 }
 
-/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
-static int FN(has_times)(const STATE *state)
-{
-    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
-}
-
 /* Times are put on a grid of sample periods, from the start on, so that no error of them adds up. */
 static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *channels)
 {
@@ -667,6 +664,26 @@ static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *ch
     (void)FN(pass_over)(state, n - 1U);
     return FN(take)(state, channels);
 }
+
+#else
+/* Samples come each period. */
+static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *channels)
+{
+    NUM missing[GTC_MAX_TERMS + 1];
+    uint_least32_t c;
+
+    if ((state == NULL) || (FN(has_times)(state) == 0) || (elapsed_us != state->period_us)) {
+        return GTC_E_ARG;
+    }
+    if (channels != NULL) {
+        return FN(take)(state, channels);
+    }
+    for (c = 0U; c <= (uint_least32_t)GTC_MAX_TERMS; c++) {
+        missing[c] = FN(missing)();
+    }
+    return FN(take)(state, missing);
+}
+#endif
 
 static int FN(run_bias)(const STATE *state, NUM *bias)
 {

@@ -56,6 +56,7 @@ static NUM FN(within_authority)(const TABLE *table, WIDE bias, int_least32_t *re
     return FN(saturate)(bias, MEMBER(table->authority[0]), MEMBER(table->authority[1]), remarks);
 }
 
+#if GTC_WITH_COVERAGE
 /* 1 if there was training data where the inputs lie, or no map says where it was. */
 static int FN(is_covered)(const TABLE *table, const POINT *in)
 {
@@ -71,6 +72,8 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
     rest = table->coverage[index >> 5].bits >> (index & 31U);
     return ((rest & 1U) != 0U) ? 1 : 0;
 }
+
+#endif
 
 /* The network, or what several make together. */
 GTC_IN_LOOP NUM FN(result)(const TABLE *table, const POINT *in)
@@ -96,9 +99,11 @@ GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
     if (remarks < 0) {
         return GTC_E_ARG;
     }
+#if GTC_WITH_COVERAGE
     if (!FN(is_covered)(table, &in)) {
         remarks |= GTC_UNCOVERED;
     }
+#endif
     *bias = FN(within_authority)(table, FN(result)(table, &in), &remarks);
     return (int)remarks;
 }

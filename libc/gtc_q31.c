@@ -88,6 +88,7 @@ static int FN(sums_fit)(const gtc_word_t *network, const gtc_word_t *centers)
     return ((fit != 0) && (sum <= LARGEST_SUM)) ? 1 : 0;
 }
 
+#if GTC_WITH_SAVE
 /* ---- wide numbers as words of a saved state ---------------------------------------------- */
 
 static void FN(to_words)(int_least64_t x, gtc_word_t words[2])
@@ -102,6 +103,8 @@ static int_least64_t FN(from_words)(const gtc_word_t words[2])
 {
     return ((int_least64_t)words[1].integer * 4294967296) + (int_least64_t)words[0].bits;
 }
+
+#endif
 
 /* ---- narrow widths ------------------------------------------------------------------------------- */
 
@@ -126,6 +129,7 @@ FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_
     return sum;
 }
 
+#if GTC_WITH_SAVE
 /* The mean of the running block lies in the range. */
 static int FN(sum_fits)(const INPUT *in, int_least32_t low, int_least32_t high)
 {
@@ -141,6 +145,8 @@ static int FN(is_fraction)(int_least32_t x)
 {
     return (FN(is_missing)(x) || ((x >= 0) && (x <= 65535))) ? 1 : 0;
 }
+
+#endif
 
 /* ---- the algorithm ----------------------------------------------------------------------- */
 
@@ -188,11 +194,13 @@ int gtc_q31_check(const gtc_q31_table_t *table)
     return FN(run_check)(table);
 }
 
+#if GTC_WITH_IMAGE
 int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words, uint_least32_t n_words,
                  uint_least32_t expected_id)
 {
     return FN(run_open)(table, words, n_words, expected_id);
 }
+#endif
 
 int gtc_q31_map(const gtc_q31_table_t *table, int_least32_t temp, int_least32_t slope, int_least32_t *bias)
 {
@@ -214,24 +222,32 @@ int gtc_q31_bias(const gtc_q31_state_t *state, int_least32_t *bias)
     return FN(run_bias)(state, bias);
 }
 
+#if GTC_WITH_SAVE
 int gtc_q31_save(const gtc_q31_state_t *state, gtc_word_t words[GTC_SAVE_WORDS])
 {
     return FN(run_save)(state, words);
 }
+#endif
 
+#if GTC_WITH_SAVE
 int gtc_q31_restore(gtc_q31_state_t *state, const gtc_q31_table_t *table,
                     uint_least32_t period_us, const gtc_word_t words[GTC_SAVE_WORDS],
                     uint_least32_t off_blocks)
 {
     return FN(run_restore)(state, table, period_us, words, off_blocks);
 }
+#endif
 
+#if GTC_WITH_UNCERTAINTY
 int gtc_q31_snapshot(const gtc_q31_state_t *state, gtc_q31_snapshot_t *snapshot)
 {
     return FN(run_snapshot)(state, snapshot);
 }
+#endif
 
+#if GTC_WITH_REZERO
 int gtc_q31_rezero(gtc_q31_state_t *state, int_least32_t mean_rate, uint_least32_t seconds)
 {
     return FN(run_rezero)(state, mean_rate, seconds);
 }
+#endif

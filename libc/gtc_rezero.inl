@@ -11,11 +11,12 @@
  * SPDX-License-Identifier: MIT
  */
 
+#if GTC_WITH_UNCERTAINTY
 static int FN(run_snapshot)(const STATE *state, SNAPSHOT *snapshot)
 {
     int status;
 
-    if ((state == NULL) || (snapshot == NULL) || (state->table == NULL)) {
+    if ((state == NULL) || (snapshot == NULL) || (FN(has_times)(state) == 0)) {
         return GTC_E_ARG;
     }
     if (!FN(has_sigma)(state->table)) {
@@ -28,7 +29,9 @@ static int FN(run_snapshot)(const STATE *state, SNAPSHOT *snapshot)
     snapshot->status = (int_least32_t)status;
     return status;
 }
+#endif
 
+#if GTC_WITH_REZERO
 /* Of a measurement and what it is compared with, in standard deviations: a rest is wrong once in 16,000. */
 #define GATE 4U
 
@@ -83,7 +86,7 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
 {
     int status = GTC_OK;
 
-    if ((state == NULL) || (state->table == NULL)) {
+    if ((state == NULL) || (FN(has_times)(state) == 0)) {
         return GTC_E_ARG;
     }
     if (seconds == 0U) {
@@ -99,3 +102,4 @@ static int FN(run_rezero)(STATE *state, NUM mean_rate, uint_least32_t seconds)
     }
     return status;
 }
+#endif

@@ -6,12 +6,13 @@
  * SPDX-License-Identifier: MIT
  */
 
+#if GTC_WITH_SAVE
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545334UL
+#define SAVE_MAGIC 0x47545335UL
 
 /* What another build may have otherwise. */
 #define SAVE_OPTIONS \
-    (ARITHMETIC + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
+    (ARITHMETIC + (128UL * (uint_least32_t)GTC_WITH_UNCERTAINTY) + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
 
 /* Words before the state: magic, options, CRC of the table. */
 #define SAVE_HEAD 3U
@@ -158,6 +159,7 @@ static void FN(carry_term)(FN(cursor_t) *at, STATE *state, uint_least32_t i)
     }
 }
 
+#if GTC_WITH_UNCERTAINTY
 /* What the uncertainty is computed from, and the shift of the constant. */
 static void FN(carry_uncertainty)(FN(cursor_t) *at, STATE *state)
 {
@@ -174,9 +176,12 @@ static void FN(carry_uncertainty)(FN(cursor_t) *at, STATE *state)
     FN(carry_bits)(at, &state->uncertainty.terms_since);
     FN(carry_bits)(at, &state->uncertainty.terms_known);
     FN(carry_bits)(at, &state->uncertainty.slope_known);
+    FN(carry_count)(at, &state->uncertainty.missing, MAX_SAMPLES_PER_BLOCK);
     FN(carry)(at, &state->shift, -most, most);
     FN(carry_number)(at, &state->shift_sigma);
 }
+
+#endif
 
 /* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written.
  * Returns 1 if it is sound. */
@@ -192,7 +197,9 @@ static int FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
     for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
         FN(carry_term)(&at, state, i);
     }
+#if GTC_WITH_UNCERTAINTY
     FN(carry_uncertainty)(&at, state);
+#endif
     return at.is_sound;
 }
 
@@ -285,3 +292,4 @@ static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t peri
     }
     return status;
 }
+#endif

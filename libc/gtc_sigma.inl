@@ -19,12 +19,6 @@
 #define RULE_NOISE 9U       /* deg/h of a mean of the rate over 1 s */
 #define RULE_CORRELATION 10U /* s */
 
-/* 1 if a table says how uncertain its corrections are: two grids, rules, and a word for each term. */
-static int FN(has_sigma)(const TABLE *table)
-{
-    return (table->n_sigma != 0U) ? 1 : 0;
-}
-
 /* A table's words of uncertainty are all there, or none. */
 static int FN(sigma_fits)(const TABLE *table)
 {
@@ -32,6 +26,13 @@ static int FN(sigma_fits)(const TABLE *table)
     const uint_least32_t whole = (2U * cells) + GTC_SIGMA_RULES + table->n_terms;
 
     return ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole))) ? 1 : 0;
+}
+
+#if GTC_WITH_UNCERTAINTY
+/* 1 if a table says how uncertain its corrections are: two grids, rules, and a word for each term. */
+static int FN(has_sigma)(const TABLE *table)
+{
+    return (table->n_sigma != 0U) ? 1 : 0;
 }
 
 static NUM FN(rule)(const TABLE *table, uint_least32_t k)
@@ -54,10 +55,16 @@ static void FN(uncertainty_clear)(volatile STATE *state)
     state->uncertainty.terms_since = 0U;
     state->uncertainty.terms_known = 0U;
     state->uncertainty.slope_known = 0U;
+    state->uncertainty.missing = 0U;
 }
 
-/* The terms begin at x: those whose memory was retained know where they were. */
-static void FN(uncertainty_begin)(STATE *state, NUM x)
+static uint_least32_t FN(terms_known)(const STATE *state)
+{
+    return state->uncertainty.terms_known;
+}
+
+/* The terms begin at x, the first temperature within the envelope: those whose memory was retained know where they were. */
+static void FN(uncertainty_begin)(STATE *state, NUM first, NUM x)
 {
     uint_least32_t i;
 
@@ -67,9 +74,17 @@ static void FN(uncertainty_begin)(STATE *state, NUM x)
             state->uncertainty.terms_known |= (uint_least32_t)1U << i;
         }
     }
+    state->uncertainty.first_temp = first;
+    state->uncertainty.missing = 0U;
     state->uncertainty.terms_since = state->elapsed;
     state->uncertainty.lowest = x;
     state->uncertainty.highest = x;
+}
+
+/* The mean of a block is that of its readings; so many are missing. */
+static void FN(uncertainty_block)(STATE *state, uint_least32_t missing)
+{
+    state->uncertainty.missing = missing;
 }
 
 /* A block ends, of which the terms see this temperature. */
@@ -126,19 +141,28 @@ static SQUARE FN(variance_of_map)(const STATE *state)
     return FN(squared)(ELEMENT(table->sigma[index]));
 }
 
-/* Of an input that went on while the correction was held. */
+/* What x, of a block, comes to in the blocks for which the correction is held, and in the part of the last one without
+ * readings: its mean is that of the other part. */
+static WIDE FN(without_readings)(const STATE *state, WIDE x)
+{
+    const uint_least32_t samples = state->samples_per_block;
+    const uint_least32_t missing = (state->uncertainty.missing < samples) ? state->uncertainty.missing : samples;
+
+    return FN(add)(FN(scaled)(state->input[0].held_blocks, x), FN(quotient)(FN(scaled)(missing, x), samples));
+}
+
+/* Of an input that went on while nothing was read. */
 static SQUARE FN(variance_of_age)(const STATE *state)
 {
-    const uint_least32_t age = state->input[0].held_blocks;
     WIDE moved;
     SQUARE square;
 
-    if (age == 0U) {
+    if ((state->input[0].held_blocks == 0U) && (state->uncertainty.missing == 0U)) {
         return NO_SQUARE;
     }
     moved = FN(factor)(FN(scaled_difference)(state->uncertainty.slope, NUM_ZERO, FN(rule)(state->table, RULE_HOLD)));
-    square = FN(squared)(FN(scaled)(age, moved));
-    return FN(plus)(square, FN(squared)(FN(scaled)(age, FN(rule)(state->table, RULE_REST))));
+    square = FN(squared)(FN(without_readings)(state, moved));
+    return FN(plus)(square, FN(squared)(FN(without_readings)(state, FN(rule)(state->table, RULE_REST))));
 }
 
 /* Of a slope that the correction does not have yet. */
@@ -233,3 +257,46 @@ static SQUARE FN(variance_of_constant)(const STATE *state)
 {
     return FN(square_or)(FN(squared)(state->shift_sigma), FN(squared)(FN(rule)(state->table, RULE_BETWEEN)));
 }
+#else
+static void FN(uncertainty_clear)(const volatile STATE *state)
+{
+    (void)state;
+}
+
+static void FN(uncertainty_begin)(const STATE *state, NUM first, NUM x)
+{
+    (void)state;
+    (void)first;
+    (void)x;
+}
+
+static void FN(uncertainty_block)(const STATE *state, uint_least32_t missing)
+{
+    (void)state;
+    (void)missing;
+}
+
+static void FN(uncertainty_step)(const STATE *state, NUM x)
+{
+    (void)state;
+    (void)x;
+}
+
+static void FN(uncertainty_input)(const STATE *state, const EFFECT *effect, NUM slope)
+{
+    (void)state;
+    (void)effect;
+    (void)slope;
+}
+
+static uint_least32_t FN(terms_known)(const STATE *state)
+{
+    (void)state;
+    return 0U;
+}
+
+static void FN(rezero_clear)(const STATE *state)
+{
+    (void)state;
+}
+#endif

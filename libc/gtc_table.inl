@@ -124,6 +124,17 @@ static void FN(numbers)(const TABLE *table, gtc_word_t found[N_NUMBERS])
     }
 }
 
+/* 1 if a table is of this layout and within the options of this build, so that no array of a state is too short for it.
+ * Its other words are those that gtc_<n>_check() or gtc_<n>_open() found sound. */
+static int FN(fits_build)(const TABLE *table)
+{
+    return ((table->layout == GTC_TABLE_LAYOUT) && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
+            && (table->n_terms <= (uint_least32_t)GTC_MAX_TERMS)
+            && (table->n_channels <= ((uint_least32_t)GTC_MAX_TERMS + 1U))
+            && ((GTC_WITH_COVERAGE != 0) || (table->coverage == NULL))
+            && ((GTC_WITH_BANK != 0) || (table->n_networks == 1U))) ? 1 : 0;
+}
+
 /* Whole numbers in their ranges, from number `first` of their list on. */
 static int FN(wholes_fit)(const TABLE *table, uint_least32_t first)
 {
@@ -145,11 +156,6 @@ static int FN(centers_fit)(const TABLE *table)
     uint_least32_t n = 0U;
     uint_least32_t i;
 
-#if !GTC_WITH_BANK
-    if (table->n_networks != 1U) {
-        return 0;
-    }
-#endif
     for (i = 0U; i < n_networks; i++) {
         const uint_least32_t own = table->networks[i * GTC_NETWORK_WORDS].bits;
 
@@ -199,7 +205,7 @@ static int FN(terms_fit)(const TABLE *table)
 /* 1 if the table is of this layout and its counts say where its arrays end, else 0. */
 static int FN(is_readable)(const TABLE *table)
 {
-    return ((table->layout == GTC_TABLE_LAYOUT) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
+    return (FN(fits_build)(table) && FN(wholes_fit)(table, FIRST_COUNT) && FN(arrays_fit)(table)
             && FN(grids_fit)(table) && FN(terms_fit)(table) && FN(centers_fit)(table)) ? 1 : 0;
 }
 
@@ -357,6 +363,7 @@ static uint_least32_t FN(crc)(const TABLE *table)
     return crc ^ GTC_CRC_FINAL;
 }
 
+#if GTC_WITH_PROBES
 /* 1 if the map gives the known answers of the table. */
 static int FN(probes_agree)(const TABLE *table)
 {
@@ -375,6 +382,8 @@ static int FN(probes_agree)(const TABLE *table)
     return 1;
 }
 
+#endif
+
 static int FN(run_check)(const TABLE *table)
 {
     int status = GTC_OK;
@@ -389,14 +398,17 @@ static int FN(run_check)(const TABLE *table)
         status = GTC_E_IMAGE;
     } else if (!FN(is_usable)(table)) {
         status = GTC_E_LAYOUT;
+#if GTC_WITH_PROBES
     } else if (!FN(probes_agree)(table)) {
         status = GTC_E_SELF_TEST;
+#endif
     } else {
         /* all is well */
     }
     return status;
 }
 
+#if GTC_WITH_IMAGE
 /* ---- a table from an image ----------------------------------------------------------------------- */
 
 /* Words before the arrays, with the magic; and the CRC behind them. */
@@ -558,3 +570,4 @@ static int FN(run_open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_
     FN(read_image)(table, words);
     return GTC_OK;
 }
+#endif

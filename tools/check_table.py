@@ -38,7 +38,7 @@ TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary
 CLAMPED, UNCOVERED = 2, 4
 MARGIN = 0.25  # of the range of corrections, granted at either end: the header says so
 LARGEST_BOUND = 0.01  # of the noise floor, beyond which a format is refused: docs/numerics.md, section 4
-TAKEN_ID = re.compile(r"e|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
+TAKEN_ID = re.compile(r"e|angle|crc|config|table|private|(f32|q31)(_\w+)?|(num|save|selftest)_(f32|q31)")
 
 Pair = tuple[float, float]
 
@@ -67,6 +67,12 @@ class Model:
         self.checksum = self.raw.pop("checksum", None)  # of all other fields: the hash
         canonical = json.dumps(self.raw, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
         self.hash = hashlib.sha256(canonical.encode("ascii")).hexdigest()
+        left_out = set(self.raw.get("left_out", ()))
+        for part, field in (("coverage", "coverage"), ("uncertainty", "uncertainty_dph")):
+            if part in left_out:
+                self.raw[field] = None
+        if left_out & {"rezero", "uncertainty"}:
+            self.raw["rezero_dph"] = 0.0
         self.per_block = self.raw["block_s"] / 60.0
         self.t_range = self.raw["envelope"]["temperature_c"]
         self.r_range = self.raw["envelope"]["slope_c_per_min"]

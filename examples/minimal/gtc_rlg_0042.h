@@ -10,7 +10,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         676 bytes of read-only data, 224 of them parameters; |error| <= 1.16e-07 deg/h against the model (terms excluded)
  * q31:         676 bytes of read-only data, 224 of them parameters; |error| <= 1.24e-06 deg/h against the model (terms excluded)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 dcfdd3e112ccad432a2d62c8b3766cf7ca205f064fedcb87e6932911ea1c901c
@@ -34,7 +34,7 @@ extern "C" {
 #define GTC_RLG_0042_SLOPE_MAX_C_PER_MIN (2.356364F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_RLG_0042_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_RLG_0042_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_RLG_0042_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_RLG_0042_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_RLG_0042_AUTHORITY_MIN_DPH (0.00000000F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_RLG_0042_AUTHORITY_MAX_DPH (0.00946235238F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_RLG_0042_N_CHANNELS 1 /* numbers of a sample */

@@ -10,7 +10,7 @@
  * Valid:       -32.75 ... 67.98 C, -2.360 ... 2.355 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         920 bytes of read-only data, 104 of them parameters; |error| <= 1.23e-08 deg/h against the model (terms excluded)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out . --numeric f32
  * Model:       sha256 7d7f521155691e1ad07a89071ee00c9c1df2362b8a2ea0efb56daf7212558c21
@@ -34,9 +34,9 @@ extern "C" {
 #define GTC_SIM_0003_SLOPE_MAX_C_PER_MIN (2.355200F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_SIM_0003_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_SIM_0003_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_SIM_0003_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
-#define GTC_SIM_0003_AUTHORITY_MIN_DPH (0.00000000F) /* no correction lies below it, deg/h: margin 25% of the range */
-#define GTC_SIM_0003_AUTHORITY_MAX_DPH (0.00887281820F) /* no correction lies above it, deg/h: margin 25% of the range */
+#define GTC_SIM_0003_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
+#define GTC_SIM_0003_AUTHORITY_MIN_DPH (0.00000000F) /* no correction lies below it, deg/h: margin 25% of range */
+#define GTC_SIM_0003_AUTHORITY_MAX_DPH (0.00887281820F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_SIM_0003_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_SIM_0003_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_SIM_0003_F32_TABLE_BYTES 920UL /* read-only data, with pointers of 32 bits */

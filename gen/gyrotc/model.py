@@ -48,6 +48,7 @@ __all__ = [
     "Model",
     "Network",
     "Rules",
+    "RuntimePart",
     "Scale",
     "Term",
     "Uncertainty",
@@ -63,7 +64,7 @@ _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
 _TAKEN_ID = re.compile(
-    r"e|crc|config|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
+    r"e|angle|crc|config|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
 )
 
 Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
@@ -272,6 +273,10 @@ class DataFile(_Frozen):
     role: Literal["train", "exam"]
 
 
+#: Parts of tables and runtime that a product may leave out: docs/limits.md.
+RuntimePart = Literal["uncertainty", "rezero", "coverage", "known_answers", "image", "saved_state", "time"]
+
+
 class Model(_Frozen):
     """Everything that is known of one axis of one serial. See docs/FORMAT.md for every field."""
 
@@ -291,6 +296,7 @@ class Model(_Frozen):
     effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = None
     rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
     q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
+    left_out: tuple[RuntimePart, ...] = ()
     hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
     agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
@@ -441,6 +447,17 @@ class Model(_Frozen):
             share = share + weight
         return np.asarray(np.where(share > 0.0, total / np.where(share > 0.0, share, 1.0), self.fallback_dph))
 
+    def for_tables(self) -> Model:
+        """The model without what its tables leave out."""
+        changes: dict[str, Any] = {}
+        if "coverage" in self.left_out:
+            changes["coverage"] = None
+        if "uncertainty" in self.left_out:
+            changes["uncertainty_dph"] = None
+        if {"rezero", "uncertainty"} & set(self.left_out):
+            changes["rezero_dph"] = 0.0
+        return self.model_copy(update=changes) if changes else self
+
     def zeroed_at(self, temperature_c: float) -> Model:
         """The same model with the constant shifted so that the map is 0 at this temperature and slope 0."""
         offset = float(self.map_dph(temperature_c, 0.0))
@@ -462,6 +479,8 @@ class Model(_Frozen):
         content = self.model_dump(mode="json", by_alias=True)
         if self.q31_bias_frac_bits is None:  # a model without a stated unit has no such field
             del content["q31_bias_frac_bits"]
+        if not self.left_out:
+            del content["left_out"]
         return content
 
     def to_json(self) -> str:

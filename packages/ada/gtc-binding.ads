@@ -100,7 +100,7 @@ private
    --  Room for a state of C, whose first member is the table's address; a word more where 64 bits are aligned.
    type Contents is limited record
       Of_Table : System.Address := System.Null_Address;
-      Numbers  : Words (1 .. 24 + Max_Slope_Blocks + 2 * Max_Terms);
+      Numbers  : Words (1 .. 25 + Max_Slope_Blocks + 2 * Max_Terms);
       Inputs   : Words (1 .. 1 + (Max_Terms + 1) * Input_Words);
    end record
    with Convention => C;

@@ -35,7 +35,7 @@ is
    subtype Word is Interfaces.Unsigned_32;
    type Words is array (Positive range <>) of Word with Convention => C;
 
-   subtype Saved_State is Words (1 .. 38 + Max_Slope_Blocks + 15 * Max_Terms);
+   subtype Saved_State is Words (1 .. 39 + Max_Slope_Blocks + 15 * Max_Terms);
 
    --  Longest sample period that any table takes: a block is shorter than 2^32 microseconds.
    subtype Period is Interfaces.Unsigned_32 range 1 .. Interfaces.Unsigned_32'Last;

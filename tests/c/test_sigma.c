@@ -561,8 +561,54 @@ TEST(a_state_without_uncertainties_is_kept_over_a_time_without_power)
     CHECK_INT(GTC_HELD, status_of(&state));
 }
 
+/* Of ten samples a second four arrive: blocks count, none is held, and the correction is less certain on a ramp. */
+TEST(blocks_with_few_readings_count_with_their_uncertainty)
+{
+    static const int arrives[10] = {1, 0, 0, 1, 0, 1, 0, 0, 1, 0};
+    state_t whole = started();
+    state_t lossy = started();
+    num_t sigma = 0;
+    int k;
+
+    CHECK_INT(GTC_OK, FN(init)(&whole, &TABLE, 100000UL));
+    CHECK_INT(GTC_OK, FN(init)(&lossy, &TABLE, 100000UL));
+    for (k = 0; k < 1201; k++) {
+        const num_t temp = C(15.0) + ((num_t)(k / 4) * C(0.0078125));
+
+        CHECK(feed_one(&whole, &temp) >= 0);
+        CHECK(FN(sample)(&lossy, 100000UL, (arrives[k % 10] != 0) ? &temp : NULL) >= 0);
+        if (k > 500) {
+            CHECK_INT(GTC_OK, status_of(&lossy));
+        }
+    }
+    CHECK_INT(60, lossy.uncertainty.missing);
+    CHECK_INT(0, whole.uncertainty.missing);
+    sigma = snapshot_of(&whole).sigma;
+    CHECK(snapshot_of(&lossy).sigma > sigma);
+    /* Two readings are a mean, one is none. */
+    for (k = 0; k < 201; k++) {
+        const num_t temp = C(17.34375);
+
+        CHECK(FN(sample)(&lossy, 100000UL, (((k % 100) == 3) || ((k % 200) == 4)) ? &temp : NULL) >= 0);
+        if (k == 100) {
+            CHECK_INT(97, lossy.uncertainty.missing); /* with the one that was read above */
+        }
+    }
+    CHECK((status_of(&lossy) & GTC_HELD) != 0);
+    lossy.uncertainty.missing = 0xFFFFFFFFUL; /* something else wrote there */
+    CHECK(snapshot_of(&lossy).sigma > sigma);
+    lossy.samples_per_block = 0U;
+    {
+        snapshot_t none;
+
+        CHECK_INT(GTC_E_ARG, FN(snapshot)(&lossy, &none));
+        CHECK_INT(GTC_E_ARG, FN(rezero)(&lossy, 0, 60U));
+    }
+}
+
 int main(void)
 {
+    RUN(blocks_with_few_readings_count_with_their_uncertainty);
     RUN(sigma_while_warming_grows_with_the_slope);
     RUN(sigma_grows_below_the_envelope_too);
     RUN(terms_whose_past_is_not_known_say_so_until_they_have_forgotten_it);

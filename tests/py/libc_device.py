@@ -16,7 +16,7 @@ from gyrotc.target.table import Table, Words
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 
-OPTIONS = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4, "GTC_TERM_SLOTS": 4}
+OPTIONS = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4, "GTC_TERM_SLOTS": 4, "GTC_WITH_UNCERTAINTY": 1}
 
 
 def _save_words() -> int:

@@ -85,6 +85,7 @@ def amalgamated(root: Path, folder: Path) -> Path:
         "root, out = map(Path, sys.argv[1:])\n"
         "for name, text in zip(('gtc.h', 'gtc.c'), amalgamate(root / 'include', root / 'libc')):\n"
         "    (out / name).write_text(text, encoding='ascii')\n"
+        "(out / 'gtc_config.h').touch()\n"  # every option at its default
     )
     subprocess.run([sys.executable, "-c", script, str(root), str(folder)], check=True)
     return folder / "gtc.c"

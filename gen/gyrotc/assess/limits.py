@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, timedelta
 from pathlib import Path
 from statistics import NormalDist
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from scipy.special import stdtrit
@@ -23,7 +23,7 @@ from scipy.special import stdtrit
 from .. import __version__
 from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
-from ..model import Model
+from ..model import Model, RuntimePart
 from ..results.evaluation import Evaluation, FigureUncertainty
 from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict
 from ..results.verification import Verification
@@ -267,6 +267,20 @@ class Required(_Part):
     ] = ()  # bit for bit, in all their arithmetics
     no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
+    # Parts of tables and runtime; what is false is left out.
+    uncertainty: bool = True
+    rezero: bool = True
+    coverage: bool = True
+    known_answers: bool = True
+    image: bool = True
+    saved_state: bool = True
+    time: bool = True
+
+    @property
+    def left_out(self) -> tuple[RuntimePart, ...]:
+        """Parts that the product does not need. A re-zero weighs uncertainties: it goes with them."""
+        parts: tuple[RuntimePart, ...] = get_args(RuntimePart)
+        return tuple(p for p in parts if not getattr(self, p) or (p == "rezero" and not self.uncertainty))
 
 
 class Recalibration(_Part):

@@ -53,6 +53,7 @@ from .results import (
 
 if TYPE_CHECKING:
     from ..jobs.build import Built
+    from ..model import Model
     from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
 
 _RARE = 0.01  # the familywise level of the search: rarer statistics are reported
@@ -236,6 +237,17 @@ def build(
         raise CheckFailed("; ".join(failures))
 
 
+def _left_out(model: Model) -> Iterator[str]:
+    """What the runtime does not do, as nobody asked for it or the recordings do not show it."""
+    if model.left_out:
+        yield f"not needed, left out of tables and runtime: {', '.join(model.left_out)}"
+    if not model.stuck_s:
+        yield (
+            "a stuck thermometer is not looked for: the rows do not show for how long its readings stay the same "
+            "(guards.temperature_c.stuck_s of a limits file states it)"
+        )
+
+
 def _print_built(result: Built) -> None:
     evaluation = shown(result.evaluation)
     show(evaluation_table(evaluation))
@@ -246,6 +258,7 @@ def _print_built(result: Built) -> None:
         *not_installed_lines(result.verification),
         *training_lines(shown(result.training)),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
+        *_left_out(result.model),
         *(extension_lines(shown(result.diagnosis)) if result.diagnosis else ()),
         *(limit_lines(shown(result.limits)) if result.limits else ()),
         *(change_lines(shown(result.changes)) if result.changes else ()),

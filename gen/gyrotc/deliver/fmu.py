@@ -62,7 +62,7 @@ def fmu(folder: Path, models: Sequence[Model]) -> tuple[bytes, list[str]]:
 
 
 def _sources(c: Path, models: Sequence[Model]) -> dict[str, bytes]:
-    names = ["gtc.h", "gtc.c", *(f"gtc_{m.id}.{end}" for m in models for end in ("h", "c"))]
+    names = ["gtc.h", "gtc_config.h", "gtc.c", *(f"gtc_{m.id}.{end}" for m in models for end in ("h", "c"))]
     sources = {name: (c / name).read_bytes() for name in names}
     if any(b"gtc_f32_table_t" not in sources[f"gtc_{m.id}.h"] for m in models):
         raise CheckFailed("a table has no float32, which a unit of co-simulation computes in")

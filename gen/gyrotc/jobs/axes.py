@@ -15,6 +15,7 @@ from ..results.verification import JointVerification, Verification
 from ..store.files import write_atomically, write_own
 from ..store.scratch import scratch_folder
 from ..tables.amalgamate import ARITHMETICS, amalgamate
+from ..tables.config import config_text
 from ..tables.emit import emitted_tables
 from ..tables.record import RECORD, joint_record_text
 from ..tables.text import example_period_us, example_samples
@@ -67,12 +68,11 @@ def joint_texts(
         numeric: The arithmetic that `main.c` uses.
     """
     headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
-    runtime = amalgamate(  # with the arithmetics of all axes, and with banks if one has them
-        *runtime_folders(),
-        numerics=tuple(n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers),
-        bank=any(len(m.networks) > 1 for m in models.values()),
+    runtime = amalgamate(  # with the arithmetics of all axes
+        *runtime_folders(), numerics=tuple(n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers)
     )
     texts = {n: t.encode("ascii") for n, t in zip(("gtc.h", "gtc.c"), runtime, strict=True)}
+    texts["gtc_config.h"] = config_text(list(models.values()))
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}

@@ -204,7 +204,10 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     fitted = fitted or fit_dataset(dataset, options, progress=say)
     if order.limits:
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
-        model = model.model_copy(update={"q31_bias_frac_bits": order.limits.q31_bias_frac_bits})
+        left_out = order.limits.needs.left_out
+        model = model.model_copy(
+            update={"q31_bias_frac_bits": order.limits.q31_bias_frac_bits, "left_out": left_out}
+        )
         fitted = replace(fitted, model=model)
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training.content())

@@ -17,6 +17,7 @@ _HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc_angle.h",
 ARITHMETICS = ("f32", "q31")
 _INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
 _DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
+_CONFIG = "#include GTC_CONFIG_HEADER\n#endif\n"
 # REUSE-IgnoreStart
 _LICENCE = " * SPDX-License-Identifier: MIT"
 # REUSE-IgnoreEnd
@@ -24,18 +25,18 @@ _LICENCE = " * SPDX-License-Identifier: MIT"
 
 @functools.cache
 def amalgamate(
-    include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS, bank: bool = False
+    include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS
 ) -> tuple[str, str]:
     """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
+
+    `gtc.h` includes a `gtc_config.h` beside it, with the options of the tables (`tables.config`).
 
     Args:
         include_dir, libc_dir: As `common.runtime.runtime_folders` gives them.
         numerics: The arithmetics that `gtc.c` holds; `gtc.h` declares all.
-        bank: Banks of networks are compiled in by default (GTC_WITH_BANK 1).
     """
     header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
-    if bank:
-        header = header.replace("#define GTC_WITH_BANK 0", "#define GTC_WITH_BANK 1")
+    header = header.replace(_CONFIG, _CONFIG + '#include "gtc_config.h"\n', 1)
     seen: set[str] = set()
     parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
     parts.append("".join(_expanded(libc_dir / "gtc_crc.c", libc_dir, seen)))

@@ -27,6 +27,7 @@ from ..store.folder import result_folder
 from ..target.history import answers
 from ..target.table import LAYOUT, Table
 from .amalgamate import amalgamate
+from .config import config_text, needs_of
 from .error_bounds import MARGIN, channel_error_dph
 from .quantise import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text
@@ -180,11 +181,10 @@ def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
     options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
     vectors = _vectors(made)
     texts = _from_templates(model, emission, options, vectors)
-    header, source = amalgamate(
-        *runtime_folders(), numerics=tuple(sorted(numerics)), bank=len(model.networks) > 1
-    )
+    header, source = amalgamate(*runtime_folders(), numerics=tuple(sorted(numerics)))
     texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
     texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
+    texts["gtc_config.h"] = config_text([model])
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
@@ -215,7 +215,8 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(model, emission)),
-        "needs": _needs(model, emission.tables[numerics[0]]),
+        "needs": needs_of([model]),
+        "left_out": ", ".join(part.replace("_", " ") for part in model.left_out),
         "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
         **example_values(model),
@@ -250,12 +251,6 @@ def _facts(model: Model) -> Iterator[str]:
 def _valid(model: Model) -> str:
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     return f"{t0:.2f} ... {t1:.2f} C, {r0:.3f} ... {r1:.3f} C/min"
-
-
-def _needs(model: Model, table: Table) -> dict[str, int]:
-    """The least options of the runtime that hold a table."""
-    terms = max(len(model.terms), table.n_channels - 1)
-    return {"slope_blocks": table.slope_blocks, "terms": terms, "bank": int(len(model.networks) > 1)}
 
 
 def _sizes(model: Model, emission: Emission) -> Iterator[str]:
@@ -313,9 +308,7 @@ def _time_macros(model: Model) -> Iterator[dict[str, str]]:
     yield _macro("PERIOD_MIN_US", c_code(f"{shortest}UL"), "shortest sample period, microseconds")
     yield _macro("PERIOD_MAX_US", c_code(f"{longest}UL"), "longest sample period")
     stuck = f"{round(model.stuck_s * 1e6)}UL"
-    comment = (
-        "a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck"
-    )
+    comment = "a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same"
     yield _macro("STUCK_US", c_code(stuck), comment)
 
 

@@ -59,7 +59,7 @@ _ARRAY_COMMENTS = {
     "centers": "T: center, gain; slope: center, gain; weight",
     "serial": "four characters of the serial a word, the first one lowest",
     "guards": "low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback",
-    "terms": "kind, channel + 65536 * number of the stand-in among the networks, parameters",
+    "terms": "kind, channel + 65536 * number of the fallback model among the networks, parameters",
     "coverage": "one bit for each cell of T (fastest) and slope, low bit first",
     "sigma": "1 sigma of the compensated bias, a row for each cell of slope",
     "probes": "known answers: T, slope, bias, status",

@@ -248,7 +248,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
     yield ramp(span, t1, -step, noise=200)
     yield ramp(window // 2, t0 - step * 8, 0, noise=5)
     yield ramp(span // 2, t0, step, noise=40)
-    for missing in (1, n // 2, n // 2 + 1, n, 3 * n):
+    for missing in (1, n // 2, n // 2 + 1, n - 2, n - 1, n, 3 * n):
         yield bits(missing, "missing")
         yield ramp(window // 2, t, noise=40)
     yield Segment("MISSED", 5, 0, 0, 0, zero)
@@ -264,8 +264,8 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
     yield Segment("MISSED", n * (model.hold_blocks + 3), 0, 0, 0, zero)
     yield ramp(window, t, noise=40)
     if any(t.channel for t in model.terms):
-        # Fewer than half of a block's samples, half of them, and blocks without any.
-        for alone in (n // 2 + 1, n // 2, 2 * n + 3):
+        # Fewer than half of a block's samples, half of them, two, one, and blocks without any.
+        for alone in (n // 2 + 1, n // 2, n - 2, n - 1, 2 * n + 3):
             yield replace(ramp(alone, t, noise=40), kind="ALONE")
             yield ramp(3 * n - alone % n, t, noise=40)
     if model.stand_ins:

@@ -57,10 +57,10 @@ class Steps:
     `believed[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the
     same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
     before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
-    GTC_WARMING or 0. Where `kind` is not MAP, temperature,
-    slope and remarks are those of the last map, 0 where there was none. Before the first one the correction is
-    0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete; its missing end counts
-    as not valid).
+    GTC_WARMING or 0; `missing`: samples without a reading in the block that it was made of. Where `kind` is not
+    MAP, temperature, slope, remarks and `missing` are those of the last map, 0 where there was none. Before the
+    first one the correction is 0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete;
+    its missing end counts as not valid).
     """
 
     believed: NDArray[np.bool_]
@@ -70,6 +70,7 @@ class Steps:
     slope: Numbers
     remarks: NDArray[np.int32]
     is_restart: NDArray[np.bool_]
+    missing: NDArray[np.int64]
     valid: NDArray[np.bool_]
     mean: Numbers
 
@@ -135,17 +136,18 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     """Follows samples x, shape (n,), from the start of a state on."""
     verdict, fallback = _believed(arithmetic, x, settings)
     x = settings.guard.limited(x)
-    valid, mean = _block_means(arithmetic, x, verdict, settings.samples_per_block)
+    valid, mean, count = _block_means(arithmetic, x, verdict, settings.samples_per_block)
     restarts = np.flatnonzero(verdict == RESTART)
     # A block closes when the next sample arrives.
     n_closed = max(0, x.size - 1) // settings.samples_per_block
-    closings = _closings(arithmetic, valid[:n_closed], mean, fallback, restarts, settings)
+    closings = _closings(arithmetic, valid[:n_closed], mean, count, fallback, restarts, settings)
     starts = _Corrections(
         at=restarts,
         kind=np.zeros(restarts.size, dtype=np.int8),
         temperature=x[restarts],
         slope=np.zeros_like(x[restarts]),
         remarks=np.full(restarts.size, WARMING, dtype=np.int32),
+        missing=np.zeros(restarts.size, dtype=np.int64),
     )
     # Stable: a block closes before the sample that opens the next one is judged.
     order = np.argsort(np.concatenate([closings.at, starts.at]), kind="stable")
@@ -159,6 +161,7 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
         slope=np.concatenate([closings.slope, starts.slope])[made],
         remarks=np.concatenate([closings.remarks, starts.remarks])[made],
         is_restart=order >= closings.at.size,
+        missing=np.concatenate([closings.missing, starts.missing])[made],
         valid=valid,
         mean=mean,
     )
@@ -171,25 +174,26 @@ class _Corrections:
     temperature: Numbers
     slope: Numbers
     remarks: NDArray[np.int32]
+    missing: NDArray[np.int64]
 
 
 def _block_means(
     arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
-) -> tuple[NDArray[np.bool_], Numbers]:
-    """Which blocks are valid, and their means (0 where no sample was accepted)."""
+) -> tuple[NDArray[np.bool_], Numbers, NDArray[np.int64]]:
+    """Which blocks are valid, their means (0 where no sample was accepted), and how many were."""
     used = _used(verdict, n)
     step = n * max(1, _PART // n)
     parts = [
         _means(arithmetic, x[start : start + step], used[start : start + step], n)
         for start in range(0, max(x.size, 1), step)
     ]
-    valid, mean = zip(*parts, strict=True)
-    return np.concatenate(valid), np.concatenate(mean)
+    valid, mean, count = zip(*parts, strict=True)
+    return np.concatenate(valid), np.concatenate(mean), np.concatenate(count)
 
 
 def _means(
     arithmetic: Arithmetic, x: Numbers, used: NDArray[np.bool_], n: int
-) -> tuple[NDArray[np.bool_], Numbers]:
+) -> tuple[NDArray[np.bool_], Numbers, NDArray[np.int64]]:
     """`_block_means` of a part that begins with a block."""
     blocks = -(-x.size // n)
     if blocks == 1:
@@ -203,7 +207,12 @@ def _means(
     base = values[np.arange(blocks), np.argmax(there, axis=1)]
     d = np.where(there, values - base[:, None], values.dtype.type(0))
     mean = arithmetic.mean(base, arithmetic.running_sum(d), np.maximum(count, 1))
-    return 2 * count >= whole, mean
+    return _is_enough(count, whole), mean, count
+
+
+def _is_enough(count: NDArray[np.integer], n: int) -> NDArray[np.bool_]:
+    """Readings that make a mean: half of a block, or two, which agree."""
+    return np.asarray((2 * count >= n) | (count >= 2))
 
 
 def _believed(
@@ -232,7 +241,7 @@ def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
     blocks = max(1, -(-verdict.size // n))
     whole = used.size // n * n
     count = np.count_nonzero(used[:whole].reshape(-1, n), axis=1)
-    valid = 2 * np.append(count, np.count_nonzero(used[whole:]))[:blocks] >= n
+    valid = _is_enough(np.append(count, np.count_nonzero(used[whole:]))[:blocks], n)
     restarted = np.zeros(blocks, dtype=np.bool_)
     restarted[np.flatnonzero(verdict == RESTART) // n] = True
     fallback = np.zeros(blocks, dtype=np.bool_)
@@ -258,6 +267,7 @@ def _closings(
     arithmetic: Arithmetic,
     valid: NDArray[np.bool_],
     mean: Numbers,
+    count: NDArray[np.int64],
     fallback: NDArray[np.bool_],
     restarts: NDArray[np.int64],
     settings: Settings,
@@ -288,6 +298,7 @@ def _closings(
         temperature=np.concatenate([none.astype(mean.dtype), mean[blocks]]),
         slope=np.concatenate([none.astype(slope.dtype), slope]),
         remarks=np.concatenate([none, np.where(good & warming, WARMING, 0)]).astype(np.int32),
+        missing=np.concatenate([none, n - count[blocks]]).astype(np.int64),
     )
 
 

@@ -133,7 +133,7 @@ def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_
                 shown = replace(shown, stand_in=_stand_in(table, number, outcome, shown, led))
         recursion.apply(course, shown, outcome)
     status, bits = _corrections(table, led, outcome)
-    found = evidence_of(table, steps, course, outcome, status)
+    found = evidence_of(table, steps, course, outcome, status, samples_per_block)
     return _Followed(
         stream,
         steps,

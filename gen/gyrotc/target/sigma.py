@@ -52,6 +52,10 @@ class Squares:
         """k x, x of magnitude 2^30 at most in fixed point."""
         return np.asarray(np.asarray(k).astype(np.float32) * x)
 
+    def part(self, k: NDArray[np.int64], n: int, x: Any) -> Numbers:
+        """k x / n"""
+        return np.asarray(self.times(k, x) / np.float32(n))
+
     def limited(self, x: Numbers) -> Numbers:
         return x
 
@@ -103,6 +107,10 @@ class _Q31(Squares):
 
     def times(self, k: NDArray[np.int64], x: Any) -> Numbers:
         return np.asarray(np.asarray(k, dtype=np.int64) * x)
+
+    def part(self, k: NDArray[np.int64], n: int, x: Any) -> Numbers:
+        product = self.times(k, x)
+        return np.asarray(np.sign(product) * ((np.abs(product) + n // 2) // n))
 
     def limited(self, x: Numbers) -> Numbers:
         return np.asarray(np.clip(x, -_PART, _PART))
@@ -157,6 +165,8 @@ class SigmaEvidence:
         at, slope: Where the map was asked last.
         drift, sure: Slope as far as it is known, and whether it is.
         age: Blocks for which the correction is held.
+        missing: Samples without a reading in the block that it was made of.
+        samples: In a block.
         since: Blocks since the terms began.
         low, high: Of the temperatures that they saw since then.
         away: Of each term that reads a channel, where that is held, lost or beyond its range.
@@ -169,6 +179,8 @@ class SigmaEvidence:
     drift: Numbers
     sure: NDArray[np.bool_]
     age: IntArray
+    missing: IntArray
+    samples: int
     since: IntArray
     low: Numbers
     high: Numbers
@@ -180,7 +192,7 @@ class SigmaEvidence:
 
 
 def evidence_of(
-    table: Table, steps: Steps, course: Course, outcome: TermOutcome, status: NDArray[np.int32]
+    table: Table, steps: Steps, course: Course, outcome: TermOutcome, status: NDArray[np.int32], samples: int
 ) -> SigmaEvidence:
     """The evidence of every correction of a history.
 
@@ -189,6 +201,7 @@ def evidence_of(
         steps: The corrections, at the temperatures of their blocks.
         course, outcome: The corrections as the terms see them, and what these make of them.
         status: Of every correction.
+        samples: In a block.
     """
     n = steps.kind.size
     index = np.arange(n)
@@ -208,6 +221,8 @@ def evidence_of(
         drift=drift[made],
         sure=sure[made],
         age=np.where(np.cumsum(is_made) > 0, age, 0),
+        missing=np.where(np.cumsum(is_made) > 0, steps.missing[made], 0),
+        samples=samples,
         since=course.elapsed - course.elapsed[began],
         low=_extremes(np.minimum, course, steps.is_restart),
         high=_extremes(np.maximum, course, steps.is_restart),
@@ -283,8 +298,13 @@ def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
 def _of_age(table: Table, evidence: SigmaEvidence) -> Numbers:
     do, rules = SQUARES[table.numeric], _rules(table)
     moved = do.limited(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.HOLD]))
-    gone = do.squared(do.times(evidence.age, moved))
-    return np.asarray(gone + do.squared(do.times(evidence.age, rules[Rule.REST])))
+    gone = do.squared(_without_readings(do, evidence, moved))
+    return np.asarray(do.plus(gone, do.squared(_without_readings(do, evidence, rules[Rule.REST]))))
+
+
+def _without_readings(do: Squares, evidence: SigmaEvidence, x: Any) -> Numbers:
+    """What x, of a block, comes to while the correction is held, and in what its block lacks of readings."""
+    return np.asarray(do.times(evidence.age, x) + do.part(evidence.missing, evidence.samples, x))
 
 
 def _of_start(table: Table, evidence: SigmaEvidence) -> Numbers:

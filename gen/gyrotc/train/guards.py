@@ -76,10 +76,18 @@ _STEPS = 2.0  # times the largest change between two rows
 _STUCK = 20.0  # times the longest that a reading stayed the same
 # Below two minutes a chamber at rest would count as stuck; above 2000 s a flight would be over before it is reported.
 _SHORTEST_STUCK_S, _LONGEST_STUCK_S = 120.0, 2000.0
+# A target reads a thermometer once a second or more often; a longer row is a mean or one of many readings, which repeat
+# less than those that the target sees: a coarse sensor at rest would count as stuck.
+_LONGEST_READING_S = 1.5
 
 
 def longest_same_s(readings: NDArray[Any], period_s: float) -> float:
-    """The longest time for which readings in a row were the same, s; missing ones count as others."""
+    """The longest time for which readings in a row were the same, s; missing ones count as others.
+
+    Infinite where rows are too long to be single readings: they do not show it.
+    """
+    if period_s > _LONGEST_READING_S:
+        return float("inf")
     if readings.size == 0:
         return 0.0
     starts = np.flatnonzero(np.concatenate([[True], readings[1:] != readings[:-1]]))
@@ -87,7 +95,7 @@ def longest_same_s(readings: NDArray[Any], period_s: float) -> float:
 
 
 def stuck_after_s(longest_s: float) -> float:
-    """Time after which a reading that stays the same is stuck, s; 0 where the sensor is too coarse to tell."""
+    """Time after which a reading that stays the same is stuck, s; 0 where the sensor is too coarse, or rows too long, to tell."""
     after = max(_STUCK * longest_s, _SHORTEST_STUCK_S)
     return after if after <= _LONGEST_STUCK_S else 0.0
 

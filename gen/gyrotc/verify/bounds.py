@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -34,7 +34,7 @@ from .flow import (
     parse_flows,
     totals,
 )
-from .sizes import PUBLIC, TERM_CODES, linked_name
+from .sizes import TERM_CODES, functions_of, linked_name
 from .toolchain import Object, Target, compile_objects, disassembly, link, symbols
 
 __all__ = ["Paths", "Program", "instruction_bounds"]
@@ -370,29 +370,33 @@ def instruction_bounds(
     linked = [target.flags, target.link, target.script, target.bare]
     asked = [runtime.name, linked, [[numeric, asdict(known)] for numeric, known in counts.items()]]
     name = f"{digest_of(asked)}.bounds" if runtime.name else ""
-    found = cache.kept(name, lambda data: _checked(json.loads(data), counts)) if name else None
+    functions = functions_of((c_folder / "gtc_config.h").read_text("ascii"))
+    found = cache.kept(name, lambda data: _checked(json.loads(data), counts, functions)) if name else None
     if found is None:
-        found = _bounds(target, c_folder, counts, symbol, runtime, work)
+        found = _bounds(target, c_folder, counts, functions, symbol, runtime, work)
         if name:
             cache.keep(name, canonical_json(found))
     return found
 
 
-def _checked(found: Bounds, counts: Mapping[str, Counts]) -> Bounds | None:
+def _checked(found: Bounds, counts: Mapping[str, Counts], functions: Sequence[str]) -> Bounds | None:
     numbers = [n for of_one in found.values() for n in of_one.values()]
-    sound = set(found) <= set(counts) and all(set(of_one) == set(PUBLIC) for of_one in found.values())
+    sound = set(found) <= set(counts) and all(set(of_one) == set(functions) for of_one in found.values())
     return found if sound and all(type(n) is int and n > 0 for n in numbers) else None
 
 
 def _bounds(
-    target: Target, c_folder: Path, counts: Mapping[str, Counts], symbol: str, runtime: Object, work: Path
-) -> Bounds:
-    program = _linked(target, c_folder, list(counts), symbol, runtime, work)
+    target: Target, c_folder: Path, counts: Mapping[str, Counts], functions: Sequence[str], symbol: str,
+    runtime: Object, work: Path,
+) -> Bounds:  # fmt: skip
+    named = [f"(void *)gtc_{n}_{f}" for n in counts for f in functions]
+    named += [f"&gtc_{symbol}_{n}" for n in counts]
+    program = _linked(target, c_folder, named, symbol, runtime, work)
     flows = parse_flows("\n".join(disassembly(target, program)), "gtc.c")
     linked = symbols(target, program)
     addresses = {s.name: s.address & ~1 for s in linked}
     lines = (c_folder / "gtc.c").read_text("ascii").splitlines()
-    headers = "\n".join((c_folder / name).read_text("ascii") for name in ("gtc.h", "gtc.c"))
+    headers = "\n".join((c_folder / name).read_text("ascii") for name in ("gtc.h", "gtc.c", "gtc_config.h"))
     macros = {name: int(number) for name, number in _MACRO.findall(headers)}
     macros["GTC_TERM_SLOTS"] = max(macros["GTC_MAX_TERMS"], 1)
     macros["GTC_SAVE_WORDS"] = next(s.size // 4 for s in linked if s.name == "gtc_bound_saved")
@@ -403,19 +407,17 @@ def _bounds(
         of_table = Program(flows, addresses, LoopText(lines, macros, known))
         found[numeric] = {
             f: _bound(of_table, numeric, f, addresses[str(linked_name(addresses, numeric, f))])
-            for f in PUBLIC
+            for f in functions
         }
     return found
 
 
 def _linked(
-    target: Target, c_folder: Path, numerics: list[str], symbol: str, runtime: Object, work: Path
+    target: Target, c_folder: Path, named: Sequence[str], symbol: str, runtime: Object, work: Path
 ) -> Path:
-    """A program with every public function and the tables."""
+    """A program with the functions and tables that are named."""
     source = work / "bound.c"
-    names = [f"&gtc_{symbol}_{n}" for n in numerics]
-    names += [f"(void *)gtc_{n}_{f}" for n in numerics for f in PUBLIC]
-    rows = "\n".join(f"    {name}," for name in names)
+    rows = "\n".join(f"    {name}," for name in named)
     write_own(source, _ALL.format(symbol=symbol, rows=rows))
     lax = target.model_copy(update={"flags": (*target.flags, "-Wno-pedantic")})  # functions as addresses
     objects = compile_objects(lax, [c_folder / f"gtc_{symbol}.c", source], work, include=c_folder)

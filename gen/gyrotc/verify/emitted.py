@@ -204,6 +204,7 @@ _TABLE_C = (
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
     r"\}};",
 )
+_CONFIG_H = ("#ifndef GTC_[A-Z_]{{1,32}}", "#define GTC_[A-Z_]{{1,32}}(?: [0-9]{{1,2}})?")
 _TABLE_H = (
     "#(?:ifndef|define) GTC_{SYMBOL}_H_INCLUDED",
     '#include "gtc.h"',
@@ -236,6 +237,7 @@ def table_files(model: Model) -> dict[str, Check]:
     return {
         "gtc.h": lambda data: _runtime(data, 0),
         "gtc.c": lambda data: _runtime(data, 1),
+        "gtc_config.h": _grammar(_CONFIG_H, model),
         f"gtc_{model.id}.h": _grammar(_TABLE_H, model),
         f"gtc_{model.id}.c": _grammar(_TABLE_C, model),
     }
@@ -280,9 +282,7 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
 
 def _runtime(data: bytes, part: int) -> str | None:
     held = (ARITHMETICS, *((n,) for n in ARITHMETICS))
-    ours = (
-        amalgamate(*runtime_folders(), numerics=n, bank=bank)[part] for n in held for bank in (False, True)
-    )
+    ours = (amalgamate(*runtime_folders(), numerics=n)[part] for n in held)
     return None if data in (text.encode("ascii") for text in ours) else "is not the runtime of this gyrotc"
 
 

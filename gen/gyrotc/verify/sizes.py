@@ -23,7 +23,10 @@ from ..target.table import Table
 from .emitted import checked_sources, table_files
 from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
 
-__all__ = ["PUBLIC", "TERM_CODES", "Footprint", "Graph", "footprint", "function_costs", "parse_graph"]
+__all__ = [
+    "PUBLIC", "TERM_CODES", "Footprint", "Graph", "footprint", "function_costs", "functions_of", "linked_name",
+    "parse_graph",
+]  # fmt: skip
 
 _TARGETS = ("cortex-m4f", "host-gcc-O2")  # the first that can be built here
 _STATE = "footprint_state"
@@ -78,6 +81,17 @@ PUBLIC = (
     "check", "open", "map", "init", "sample", "bias", "snapshot", "rezero", "angle", "save", "restore",
 )  # fmt: skip
 """Every function that gtc.h and what it includes declare, without its prefix."""
+_SWITCHED = {
+    "open": "GTC_WITH_IMAGE", "save": "GTC_WITH_SAVE", "restore": "GTC_WITH_SAVE",
+    "snapshot": "GTC_WITH_UNCERTAINTY", "rezero": "GTC_WITH_REZERO",
+}  # fmt: skip
+
+
+def functions_of(config: str) -> tuple[str, ...]:
+    """Those of PUBLIC that a runtime with this `gtc_config.h` has."""
+    return tuple(f for f in PUBLIC if f"#define {_SWITCHED.get(f)} 0\n" not in config)
+
+
 _NODE = re.compile(
     r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
 )
@@ -166,7 +180,7 @@ def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
 
 def linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:
     """The name by which a public function is linked; None where it is not among them."""
-    linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms)?$")
+    linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms(?:_plain)?)?$")
     return next(filter(linked.match, names), None)
 
 

@@ -14,7 +14,7 @@
 pub type Word = u32;
 
 /// Words of a saved state, `GTC_SAVE_WORDS`.
-pub const SAVE_WORDS: usize = 38 + MAX_SLOPE_BLOCKS + 15 * MAX_TERMS;
+pub const SAVE_WORDS: usize = 39 + MAX_SLOPE_BLOCKS + 15 * MAX_TERMS;
 
 const MAX_SLOPE_BLOCKS: usize = 20;
 const MAX_TERMS: usize = 4;
@@ -358,7 +358,7 @@ struct FixedInput {
 arithmetic! {
     /// float32: C, C per block, deg/h; increments in arcsec over seconds.
     float32, number f32, age f32, interval f32,
-    state words 52, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
+    state words 53, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
     "gtc_f32_check" "gtc_f32_open"
     "gtc_f32_init_20blocks_4terms" "gtc_f32_sample"
     "gtc_f32_bias" "gtc_f32_snapshot"
@@ -369,7 +369,7 @@ arithmetic! {
 arithmetic! {
     /// Fixed point: 2^-16 C, 2^-16 C per block, 2^-`bias_frac_bits` deg/h; increments over microseconds.
     q31, number i32, age i32, interval i32,
-    state words 52, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
+    state words 53, input crate::FixedInput, inputs MAX_TERMS + 1, angle i64,
     "gtc_q31_check" "gtc_q31_open"
     "gtc_q31_init_20blocks_4terms" "gtc_q31_sample"
     "gtc_q31_bias" "gtc_q31_snapshot"

@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         552 bytes of read-only data, 84 of them parameters; |error| <= 5.94e-06 deg/h against the model (terms excluded)
  * q31:         552 bytes of read-only data, 84 of them parameters; |error| <= 9.72e-05 deg/h against the model (terms excluded)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=0 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 1b449dd90d9843007d772275ca4f61d4dabfde0f854247f2db208404e9715e4f
@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_1_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_1_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_1_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_1_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_1_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_TEST_1_AUTHORITY_MIN_DPH (-2.01713252F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_1_AUTHORITY_MAX_DPH (1.63987398F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_1_N_CHANNELS 1 /* numbers of a sample */

@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         676 bytes of read-only data, 168 of them parameters; |error| <= 1.72e-05 deg/h against the model (terms excluded)
  * q31:         676 bytes of read-only data, 168 of them parameters; |error| <= 1.33e-03 deg/h against the model (terms excluded)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=0 -DGTC_WITH_BANK=1 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 f5d6b8c8dd72ef0d4317fc40534deed61797bf0d6e2268a4588ebc5adfdfb741
@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_B_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_B_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_B_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_B_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_B_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_TEST_B_AUTHORITY_MIN_DPH (-4.31673837F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_B_AUTHORITY_MAX_DPH (6.18734455F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_B_N_CHANNELS 1 /* numbers of a sample */

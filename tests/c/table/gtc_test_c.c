@@ -47,7 +47,7 @@ static const gtc_word_t f32_guards[16] = {
     V(9.0F), V(15.0F), V(2.0F), V(0.0F), B(0x0UL), B(0x0UL), B(0x4UL), V(12.5F), /* supply_v */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t f32_terms[16] = {
     B(0x6UL), B(0x1UL), V(0.125F), V(19.2179585F), V(11.0F), V(0.25F), V(13.0F), V(-0.0625F), /* auxiliary_curve */
     B(0x7UL), B(0x1UL), V(0.0625F), V(12.0F), V(0.03125F), V(15.0F), V(0.0F), V(0.0F), /* auxiliary_product */
@@ -151,7 +151,7 @@ static const gtc_word_t q31_guards[16] = {
     B(0x00090000UL), B(0x000f0000UL), B(0x00020000UL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x4UL), B(0x000c8000UL), /* supply_v */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t q31_terms[16] = {
     B(0x6UL), B(0x1UL), B(0x00200000UL), B(0x0266f984UL), B(0x000b0000UL), B(0x00400000UL), B(0x000d0000UL), B(0xfff00000UL), /* auxiliary_curve */
     B(0x7UL), B(0x1UL), B(0x00100000UL), B(0x000c0000UL), B(0x00080000UL), B(0x000f0000UL), B(0x00000000UL), B(0x00000000UL), /* auxiliary_product */

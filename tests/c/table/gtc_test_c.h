@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         680 bytes of read-only data, 132 of them parameters; |error| <= 5.51e-06 deg/h against the model (terms excluded, curves and products of channels: 3.74e-06)
  * q31:         680 bytes of read-only data, 132 of them parameters; |error| <= 9.38e-05 deg/h against the model (terms excluded, curves and products of channels: 2.17e-05)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 4c32da67ac31e58cc72a06b76fef5ea5c9930215ae810dd1868e2ce94d4363dc
@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_C_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_C_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_C_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_C_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_C_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_TEST_C_AUTHORITY_MIN_DPH (-9.18306351F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_C_AUTHORITY_MAX_DPH (9.26056099F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_C_N_CHANNELS 2 /* numbers of a sample */

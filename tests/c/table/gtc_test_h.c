@@ -45,7 +45,7 @@ static const gtc_word_t f32_guards[8] = {
     V(-90.0F), V(200.0F), V(0.5F), V(1.00000001e-07F), B(0x0UL), B(0x1c9c380UL), B(0x2UL), V(0.0F), /* temperature_c */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t f32_terms[16] = {
     B(0x4UL), B(0x0UL), V(0.125F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* path_length_periodicity */
     B(0x1UL), B(0x0UL), V(0.221199214F), V(0.566574216F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* thermal_gradient */
@@ -134,7 +134,7 @@ static const gtc_word_t q31_guards[8] = {
     B(0xffa60000UL), B(0x00c80000UL), B(0x00008000UL), B(0x0001ad7fUL), B(0x0UL), B(0x1c9c380UL), B(0x2UL), B(0x00000000UL), /* temperature_c */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t q31_terms[16] = {
     B(0x4UL), B(0x0UL), B(0x20000000UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* path_length_periodicity */
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00910b02UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* thermal_gradient */

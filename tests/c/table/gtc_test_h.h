@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         560 bytes of read-only data, 112 of them parameters; |error| <= 3.86e-05 deg/h against the model (terms excluded)
  * q31:         560 bytes of read-only data, 112 of them parameters; |error| <= 6.70e-04 deg/h against the model (terms excluded)
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 a6ca9f40548225b74f2d1e43b12ab312cbd0dace3692ad95ebd7989de54d7c23
@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_H_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_H_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_H_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_H_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_H_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_TEST_H_AUTHORITY_MIN_DPH (-70.3042145F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_H_AUTHORITY_MAX_DPH (69.7087097F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_H_N_CHANNELS 1 /* numbers of a sample */

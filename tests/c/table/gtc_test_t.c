@@ -49,7 +49,7 @@ static const gtc_word_t f32_guards[16] = {
     V(9.0F), V(15.0F), V(2.0F), V(0.0F), B(0x0UL), B(0x0UL), B(0x4UL), V(12.5F), /* supply_v */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t f32_terms[32] = {
     B(0x1UL), B(0x0UL), V(0.221199214F), V(0.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), /* cavity_lag */
     B(0x2UL), B(0x0UL), V(2.0F), V(0.25F), V(0.0F), V(0.0F), V(0.0F), V(0.0F), /* hysteresis */
@@ -162,7 +162,7 @@ static const gtc_word_t q31_guards[16] = {
     B(0x00090000UL), B(0x000f0000UL), B(0x00020000UL), B(0x00000000UL), B(0x0UL), B(0x0UL), B(0x4UL), B(0x000c8000UL), /* supply_v */
 };
 
-/* kind, channel + 65536 * number of the stand-in among the networks, parameters */
+/* kind, channel + 65536 * number of the fallback model among the networks, parameters */
 static const gtc_word_t q31_terms[32] = {
     B(0x1UL), B(0x0UL), B(0x1c504185UL), B(0x00000000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* cavity_lag */
     B(0x2UL), B(0x0UL), B(0x00020000UL), B(0x00400000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), B(0x00000000UL), /* hysteresis */

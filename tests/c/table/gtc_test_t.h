@@ -9,7 +9,7 @@
  * f32 fallback models: 32 of these parameters are added for channels that are lost; of each |error| <= 1.26e-06 deg/h
  * q31:         804 bytes of read-only data, 212 of them parameters; |error| <= 9.38e-05 deg/h against the model (terms excluded)
  * q31 fallback models: 32 of these parameters are added for channels that are lost; of each |error| <= 1.93e-05 deg/h
- * Options:     -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=4 for all units: the smallest runtime that holds it
+ * Options:     gtc_config.h: the smallest runtime that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 c24b36fa44754e0c385adc70f5397d3585ed4feec00487c7e3320198c869d125
@@ -33,7 +33,7 @@ extern "C" {
 #define GTC_TEST_T_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_T_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_T_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_T_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings show none that is stuck */
+#define GTC_TEST_T_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
 #define GTC_TEST_T_AUTHORITY_MIN_DPH (-4.02148485F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_T_AUTHORITY_MAX_DPH (3.66148233F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_T_N_CHANNELS 2 /* numbers of a sample */

@@ -208,7 +208,8 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert "not met" in (tmp_path / "one" / "report.html").read_text()
 
     guards = "[guards.temperature_c]\nrange = [-55.0, 85.0]\nstuck_s = 700.0\n"
-    product.write_text("schema = 1\nq31_bias_frac_bits = 30\n[at_most]\ntable_bytes = 300\n" + guards)
+    needs = "[needs]\nimage = false\nuncertainty = false\n"
+    product.write_text("schema = 1\nq31_bias_frac_bits = 30\n[at_most]\ntable_bytes = 300\n" + needs + guards)
     recording(tmp_path / "second", "RLG-1", shift=0.01)
     done = gyrotc(*build, tmp_path / "second", "--out", tmp_path / "two", "--previous", tmp_path / "one")
     assert done.returncode == 0, done.stderr
@@ -222,6 +223,11 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert "maps 1.000e-02 deg/h RMS difference" in done.stdout
     assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     assert json.loads((tmp_path / "two" / "model.json").read_text())["q31_bias_frac_bits"] == 30
+    assert "left out of tables and runtime: uncertainty, rezero, image" in done.stderr + done.stdout
+    assert json.loads((tmp_path / "two" / "model.json").read_text())["left_out"] == [
+        "uncertainty", "rezero", "image"
+    ]  # fmt: skip
+    assert "#define GTC_WITH_IMAGE 0" in (tmp_path / "two" / "c" / "gtc_config.h").read_text()
     found = changes["as_found"]
     assert found["judged_on"] == "train" and found["limits"]["met"] is True
     assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import subprocess
+import sys
 import zlib
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.model import Guard, Model, Term, load_model
+from gyrotc.tables.config import COSTS, SWITCHES, config_text
 from gyrotc.tables.emit import emit, emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.f32 import gauss
@@ -149,6 +152,57 @@ def test_zero_at_emits_a_table_that_is_zero_there_and_verifies(tmp_path: Path, g
     assert "--zero-at 20" in (tmp_path / "c" / "gtc_rlg_0042.h").read_text()
     verified = gyrotc("verify", tmp_path, "--target", "host-gcc-O2")
     assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+LEFT_OUT = ("uncertainty", "rezero", "coverage", "known_answers", "image", "saved_state", "time")
+
+
+def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(
+    tmp_path: Path, gyrotc: Command
+) -> None:
+    """The map stays, bit for bit; the header names what is missing, and the small runtime passes every vector."""
+    whole = load_model(ROOT / "examples" / "nav_loop" / "filter_model.json")
+    assert whole.coverage is not None and whole.uncertainty_dph is not None
+    model = whole.model_copy(update={"left_out": LEFT_OUT})
+    tables = quantise_all(model, None).tables
+    for numeric, table in quantise_all(whole, None).tables.items():
+        small = tables[numeric]
+        assert (small.coverage.size, small.sigma.size, small.probes.size, small.rezero) == (0, 0, 0, 0)
+        assert np.array_equal(small.centers, table.centers) and small.authority != ()
+    model.save(tmp_path / "model.json")
+    emit(model, tmp_path)
+    config = (tmp_path / "c" / "gtc_config.h").read_text()
+    for part in LEFT_OUT:
+        assert f"#define {SWITCHES[part]} 0\n" in config, part
+    assert f"#define GTC_MAX_SLOPE_BLOCKS {model.slope_blocks}\n" in config
+    header = (tmp_path / "c" / "gtc_sim_0003.h").read_text()
+    assert " * Left out:    uncertainty, rezero, coverage, known answers, image, saved state, time" in header
+    done = gyrotc("verify", tmp_path, "--target", "host-gcc-O2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    checked = subprocess.run(
+        [sys.executable, str(ROOT / "tools" / "check_table.py"), str(tmp_path)],
+        capture_output=True,
+        check=False,
+    )
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_the_options_of_several_tables_are_those_of_all(tmp_path: Path) -> None:
+    one, other = random_model(3), random_model(4).model_copy(update={"left_out": ("image", "time")})
+    both = config_text([one, other]).decode()
+    assert "#define GTC_WITH_IMAGE 1\n" in both
+    assert f"#define GTC_MAX_SLOPE_BLOCKS {max(one.slope_blocks, other.slope_blocks)}\n" in both
+    assert "#define GTC_WITH_TIME 0\n" in config_text([other]).decode()
+
+
+def test_the_costs_of_options_are_those_of_all_three_cores() -> None:
+    """Flash, RAM and stack of every option, for M0, M4F and M7 at -Os and -O2: `python -m bench docs --only costs`."""
+    costs = json.loads(COSTS.read_text())
+    assert costs["columns"] == [f"M{core} {level}" for core in ("0", "4F", "7") for level in ("-Os", "-O2")]
+    assert {"GTC_MAX_SLOPE_BLOCKS", "GTC_MAX_TERMS", "GTC_WITH_BANK", *SWITCHES.values()} == {
+        row["option"] for row in costs["rows"]
+    }
+    assert all(len(row["cells"]) == 6 and row["cells"][0][1] >= 0 for row in costs["rows"])
 
 
 def test_a_serial_cannot_break_out_of_its_comment(model_dict: dict[str, Any]) -> None:

@@ -161,12 +161,19 @@ def test_the_size_that_was_taken() -> None:
 
 def test_the_longest_stretch_of_one_reading_is_found() -> None:
     readings = np.array([1.0, 1.0, np.nan, np.nan, np.nan, 2.0, 2.0, 2.0, 3.0])
-    assert longest_same_s(readings, 10.0) == 30.0
-    assert longest_same_s(readings[:0], 10.0) == 0.0
+    assert longest_same_s(readings, 1.0) == 3.0
+    assert longest_same_s(readings[:0], 1.0) == 0.0
+    assert longest_same_s(readings, 10.0) == float("inf"), "rows of 10 s are no single readings"
 
 
 def test_a_coarse_sensor_is_never_taken_for_stuck() -> None:
-    assert [stuck_after_s(s) for s in (0.01, 10.0, 100.0, 101.0)] == [120.0, 200.0, 2000.0, 0.0]
+    assert [stuck_after_s(s) for s in (0.01, 10.0, 100.0, 101.0, float("inf"))] == [
+        120.0,
+        200.0,
+        2000.0,
+        0.0,
+        0.0,
+    ]
 
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])

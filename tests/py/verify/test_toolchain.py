@@ -245,8 +245,9 @@ def test_a_target_shows_the_same_with_kept_objects(
 
 
 def test_bounds_of_other_functions_or_tables_are_not_taken() -> None:
-    found = {"f32": dict.fromkeys(bounds.PUBLIC, 5)}
-    assert bounds._checked(found, {"f32": None}) == found  # type: ignore[dict-item]
-    assert bounds._checked(found, {}) is None
-    assert bounds._checked({"f32": {"map": 5}}, {"f32": None}) is None  # type: ignore[dict-item]
-    assert bounds._checked({"f32": dict.fromkeys(bounds.PUBLIC, -1)}, {"f32": None}) is None  # type: ignore[dict-item]
+    functions = ("map", "bias")
+    found = {"f32": dict.fromkeys(functions, 5)}
+    assert bounds._checked(found, {"f32": None}, functions) == found  # type: ignore[dict-item]
+    assert bounds._checked(found, {}, functions) is None
+    assert bounds._checked({"f32": {"map": 5}}, {"f32": None}, functions) is None  # type: ignore[dict-item]
+    assert bounds._checked({"f32": dict.fromkeys(functions, -1)}, {"f32": None}, functions) is None  # type: ignore[dict-item]

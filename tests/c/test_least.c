@@ -1,0 +1,69 @@
+/* test_least.c - a build without any of the parts that can be left out: the same corrections, and no more. */
+#include "test_num.h"
+
+/* The test table as `emit` writes it where coverage is left out. */
+static table_t without_coverage(void)
+{
+    table_t table = TABLE;
+
+    table.coverage = NULL;
+    table.coverage_cells[0] = 0U;
+    table.coverage_cells[1] = 0U;
+    return table;
+}
+
+TEST(a_table_with_coverage_is_refused)
+{
+    state_t state;
+
+    CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &TABLE, PERIOD));
+    CHECK_INT(GTC_E_LAYOUT, FN(check)(&TABLE));
+}
+
+TEST(the_correction_is_that_of_the_whole_runtime)
+{
+    const table_t table = without_coverage();
+    state_t state;
+    num_t temp = C(15.0);
+    num_t bias = 0;
+    num_t map = 0;
+
+    CHECK_INT(GTC_E_IMAGE, FN(check)(&table)); /* all but the checksum, which is of the whole table */
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_WARMING, ramp(&state, &temp, C(0.015625), (int)N * 4));
+    CHECK_INT(GTC_OK, feed(&state, temp, 1));
+    CHECK_INT(GTC_OK, FN(bias)(&state, &bias));
+    CHECK_INT(GTC_OK, FN(map)(&table, C(15.0 + (0.015625 * 13.5)), C(0.0625), &map));
+    CHECK(same(map, bias));
+    CHECK_INT(GTC_CLAMPED, FN(map)(&table, C(95.0), 0, &map));
+}
+
+TEST(a_call_is_a_period_and_null_is_a_missed_sample)
+{
+    const table_t table = without_coverage();
+    const num_t temp = C(15.0);
+    state_t state;
+
+    memset(&state, 0, sizeof state);
+    CHECK_INT(GTC_E_ARG, FN(sample)(NULL, PERIOD, &temp));
+    CHECK_INT(GTC_E_ARG, FN(sample)(&state, PERIOD, &temp));
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_E_ARG, FN(sample)(&state, 2UL * PERIOD, &temp));
+    CHECK_INT(GTC_WARMING, FN(sample)(&state, PERIOD, &temp));
+    CHECK_INT(GTC_WARMING | GTC_HELD, FN(sample)(&state, PERIOD, NULL));
+    CHECK_INT(2, state.position);
+}
+
+TEST(a_state_is_small)
+{
+    CHECK(sizeof(state_t) <= (200U + sizeof(void *) + (GTC_MAX_SLOPE_BLOCKS * sizeof(num_t))));
+}
+
+int main(void)
+{
+    RUN(a_table_with_coverage_is_refused);
+    RUN(the_correction_is_that_of_the_whole_runtime);
+    RUN(a_call_is_a_period_and_null_is_a_missed_sample);
+    RUN(a_state_is_small);
+    return test_end();
+}
