@@ -34,7 +34,7 @@ extern "C" {
 #define GTC_SIM_0003_SLOPE_MAX_C_PER_MIN (2.355200F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_SIM_0003_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_SIM_0003_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_SIM_0003_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
+#define GTC_SIM_0003_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show after what time */
 #define GTC_SIM_0003_AUTHORITY_MIN_DPH (0.00000000F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_SIM_0003_AUTHORITY_MAX_DPH (0.00887281820F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_SIM_0003_N_CHANNELS 1 /* numbers of a sample */

@@ -308,7 +308,7 @@ def _time_macros(model: Model) -> Iterator[dict[str, str]]:
     yield _macro("PERIOD_MIN_US", c_code(f"{shortest}UL"), "shortest sample period, microseconds")
     yield _macro("PERIOD_MAX_US", c_code(f"{longest}UL"), "longest sample period")
     stuck = f"{round(model.stuck_s * 1e6)}UL"
-    comment = "a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same"
+    comment = "a temperature that stays the same so long is none; 0: never, the recordings do not show after what time"
     yield _macro("STUCK_US", c_code(stuck), comment)
 
 

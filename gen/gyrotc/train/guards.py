@@ -95,7 +95,7 @@ def longest_same_s(readings: NDArray[Any], period_s: float) -> float:
 
 
 def stuck_after_s(longest_s: float) -> float:
-    """Time after which a reading that stays the same is stuck, s; 0 where the sensor is too coarse, or rows too long, to tell."""
+    """Time after which a reading that stays the same is stuck, s; 0 where sensor or rows are too coarse to tell."""
     after = max(_STUCK * longest_s, _SHORTEST_STUCK_S)
     return after if after <= _LONGEST_STUCK_S else 0.0
 

@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_1_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_1_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_1_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_1_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
+#define GTC_TEST_1_STUCK_US 30000000UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show after what time */
 #define GTC_TEST_1_AUTHORITY_MIN_DPH (-2.01713252F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_1_AUTHORITY_MAX_DPH (1.63987398F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_1_N_CHANNELS 1 /* numbers of a sample */

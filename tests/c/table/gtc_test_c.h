@@ -31,7 +31,7 @@ extern "C" {
 #define GTC_TEST_C_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_C_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_C_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_C_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
+#define GTC_TEST_C_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show after what time */
 #define GTC_TEST_C_AUTHORITY_MIN_DPH (-9.18306351F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_C_AUTHORITY_MAX_DPH (9.26056099F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_C_N_CHANNELS 2 /* numbers of a sample */

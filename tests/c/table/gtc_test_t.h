@@ -33,7 +33,7 @@ extern "C" {
 #define GTC_TEST_T_SLOPE_MAX_C_PER_MIN (3.000000F) /* envelope: beyond it GTC_CLAMPED */
 #define GTC_TEST_T_PERIOD_MIN_US 10UL /* shortest sample period, microseconds */
 #define GTC_TEST_T_PERIOD_MAX_US 10010000UL /* longest sample period */
-#define GTC_TEST_T_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show for how long readings stay the same */
+#define GTC_TEST_T_STUCK_US 0UL /* a temperature that stays the same so long is none; 0: never, the recordings do not show after what time */
 #define GTC_TEST_T_AUTHORITY_MIN_DPH (-4.02148485F) /* no correction lies below it, deg/h: margin 25% of range */
 #define GTC_TEST_T_AUTHORITY_MAX_DPH (3.66148233F) /* no correction lies above it, deg/h: margin 25% of range */
 #define GTC_TEST_T_N_CHANNELS 2 /* numbers of a sample */
