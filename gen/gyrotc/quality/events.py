@@ -34,6 +34,7 @@ Limits = tuple[float, float, float]
 _BURST_ROWS = 10  # fewer are outliers
 _JOINED = 1.5  # row periods between rows of one burst
 _LOST_S = 60.0  # no rows for longer
+_JUMP_S = 120.0  # about a place at which a thermometer moves as nowhere else: two cells of a minute
 _BLOCK_S = 10.0  # over which the level around a burst is taken
 
 
@@ -104,8 +105,14 @@ def _of_rows(number: int, run: Run) -> tuple[list[Event], NDArray[np.int64]]:
     """Events that a run's rows show by themselves, and its rows that are spikes or parts of bursts."""
     rows = run.rows()
     wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
-    found = (_bursts(number, run, rows, wild), _thermometer(number, run, rows), _dropouts(number, run, rows))
-    return [event for events in found for event in events], wild
+    of_thermometer = list(_thermometer(number, run, rows))
+    found = [*_bursts(number, run, rows, wild), *of_thermometer, *_dropouts(number, run, rows)]
+    lost = [np.zeros(0, dtype=np.int64)]
+    for event in of_thermometer:  # what a rate does is not judged where its temperature is not known
+        if event.leave_out is not None:
+            low, high = np.searchsorted(rows.time_s, event.leave_out)
+            lost.append(np.arange(low, high))
+    return found, np.union1d(wild, np.concatenate(lost))
 
 
 class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
@@ -250,13 +257,19 @@ def _bursts(number: int, run: Run, rows: Rows, wild: NDArray[np.int64]) -> Itera
 def _thermometer(number: int, run: Run, rows: Rows) -> Iterator[Event]:
     """Jumps of the temperature, and stretches in which it stands still."""
     for jump in facts_of(run, rows).jumps:
-        size = jump.to_c - jump.from_c
+        size, at, end = jump.to_c - jump.from_c, jump.time_s, float(rows.time_s[-1]) + run.row_period_s
         text = (
             f"The temperature of {run.file} jumps from {jump.from_c:.2f} to {jump.to_c:.2f} C at {jump.time_s:g} s, "
             "faster than a gyro can: look at the sensor's contact."
         )
-        at = jump.time_s
-        yield Event("thermometer_jump", number, run.file, (at, at, at), (size, size, size), "C", text, None)
+        limits, out = (at, at, at), None
+        if jump.lasting:
+            limits, out = (at, at - _JUMP_S, at + _JUMP_S), (at - _JUMP_S, end)
+            text = (
+                f"The temperature of {run.file} moves from {jump.from_c:.2f} to {jump.to_c:.2f} C about {at:g} s, as "
+                "nowhere else in the run: the thermometer shifted or lost contact. Leave out what lies behind."
+            )
+        yield Event("thermometer_jump", number, run.file, limits, (size, size, size), "C", text, out)
     inside = run.in_span(rows.time_s)
     time, temperature = rows.time_s[inside], rows.temperature_c[inside]
     for first, rows_still in stuck_stretches(time, temperature, run.row_period_s):

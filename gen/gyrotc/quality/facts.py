@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
+from ..common.statistics import cell_means
 from ..recordings.records import EarthRate, Rows, Run
 
-__all__ = ["Jump", "Outlier", "RunFacts", "facts_of"]
+__all__ = ["Jump", "Outlier", "RunFacts", "displaced", "facts_of"]
 
 _GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
@@ -23,6 +24,14 @@ _JUMP_SIGMAS = 10.0  # no normal deviation reaches it
 _WAVERING = 0.9  # of departures: more are no jumps
 _WAVERING_SIGMAS = NormalDist().inv_cdf(0.5 + _WAVERING / 2.0)
 _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
+_LEAST_CELLS = 60  # of a run, beside which a place is told from the others
+_ELSEWHERE_S = 900.0  # from a place: beyond it the temperature has forgotten it
+_AS_NOWHERE = 2.0  # times what the temperature does anywhere else in the run
+_DISPLACED_SIGMAS = 6.0  # of the same: once in 5e8 places
+_LEAST_C = 0.3  # class B thermometers may differ by so much (IEC 60751)
+_BESIDE_CELLS = 6  # on either side of such a place, which a parabola follows
+_RATHER = 4.0  # ratio of squares: a jump has to leave half of what a corner leaves
+_EVEN = 1.2  # of seven cells in a row: longer ones hold a gap
 _HOLD_S = 10.0  # longest time for which a slow thermometer is thought to hold its value
 _MAX_JUMPS = 20  # that are listed: enough to see a pattern
 _OUTLIER_SIGMAS = 8.0  # a normal row lies beyond it once in 8e14
@@ -41,6 +50,7 @@ class Jump:
     time_s: float
     from_c: float
     to_c: float
+    lasting: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +164,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         missing_rows=missing,
         temperature_c=(low_c, high_c),
         temperature_step_c=resolution,
-        jumps=_jumps(time, temperature, resolution),
+        jumps=_jumps(time, temperature, resolution) or displaced(time, temperature, resolution),
         slopes_c_per_min=slopes,
         temperatures_c=cells_t,
         rates_dph=cells_rate,
@@ -240,6 +250,55 @@ def _jumps(time: FloatArray, temperature: FloatArray, resolution: float) -> tupl
     return tuple(
         Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS]
     )
+
+
+def displaced(time: FloatArray, temperature: FloatArray, resolution: float) -> tuple[Jump, ...]:
+    """The one place of a run, if any, at which the temperature moves as nowhere else within two minutes.
+
+    What it moves by over two cells is compared with the cells around. A block of glass bends alike at every corner of a
+    programme; a thermometer that comes off, or shifts, does so once.
+    """
+    t, x = cell_means(_CELL_S, time, temperature)
+    if len(t) < _LEAST_CELLS:
+        return ()
+    inner, outer = x[4:-2] - x[2:-4], 0.5 * (x[2:-4] - x[:-6] + x[6:] - x[4:-2])
+    even = t[6:] - t[:-6] < 6.0 * _EVEN * median(np.diff(t))
+    beside = np.where(even, inner - outer, 0.0)
+    size = np.abs(beside)
+    k = int(np.argmax(size))
+    elsewhere = np.abs(t[3:-3] - t[k + 3]) > _ELSEWHERE_S
+    if not elsewhere.any():
+        return ()
+    least = _AS_NOWHERE * float(size[elsewhere].max())
+    noise = MAD_TO_SIGMA * median(size[elsewhere])
+    if size[k] < max(least, _DISPLACED_SIGMAS * noise, 2.0 * resolution, _LEAST_C):
+        return ()
+    at = k + 3
+    near = np.abs(np.arange(len(t)) - at) <= _BESIDE_CELLS
+    if not _jumps_rather_than_bends((t[near] - t[at]) / _CELL_S, x[near]):
+        return ()
+    return (Jump(float(t[at]), float(x[at - 1]), float(x[at + 1]), lasting=True),)
+
+
+def _jumps_rather_than_bends(u: FloatArray, x: FloatArray) -> bool:
+    """Whether temperatures around u = 0 jump there, and go on as they like, far rather than they turn a corner.
+
+    The cell of the jump and the next, in which a thermometer still settles, are left out.
+    """
+    used = (u < -0.5) | (u > 1.5)
+    u, x = u[used], x[used]
+
+    def left(*columns: FloatArray) -> float:
+        all_ = np.column_stack([np.ones_like(u), u, u * u, *columns])
+        rest = x - all_ @ np.linalg.lstsq(all_, x, rcond=None)[0]
+        return float(rest @ rest)
+
+    def corner_at(at: float) -> FloatArray:
+        since = u - at  # a mean over the cell that holds the corner rounds it
+        return np.where(np.abs(since) < 0.5, 0.5 * (since + 0.5) ** 2, np.maximum(since, 0.0))
+
+    corner = min(left(corner_at(at)) for at in np.arange(-3.0, 4.0, 0.02).tolist())
+    return corner > _RATHER * left(np.asarray(u > 0.0, dtype=np.float64), np.maximum(u, 0.0))
 
 
 def _departures(step: FloatArray) -> FloatArray:

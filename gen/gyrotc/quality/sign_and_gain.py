@@ -8,7 +8,7 @@ hysteresis one branch is the curve of the others with a factor.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..common.arrays import FloatArray
 from ..common.statistics import cell_means
 from ..recordings.records import Curve, Dataset, Run, joined_runs
 from .events import Event, events_of, evidence_beside_memories
-from .facts import facts_of
+from .facts import RunFacts, facts_of
 from .orientation import orientation_findings
 from .recorded import sign_findings
 
@@ -100,26 +100,55 @@ _ALIKE = (
 )
 
 
+_UNITS = (1e3, 180.0 / np.pi, 3600.0)  # between units of a rate that are taken for one another
+_OF_UNIT = (
+    1.15  # ratio to such a factor: its neighbours lie 17 times away, and noise differs little between runs
+)
+_NOISE_ALIKE = 1.1  # ratio of the noises of the other runs, largest to smallest, for the noise to be evidence
+
+
 def turned_runs(dataset: Dataset) -> list[Event]:
     """One event at most for each training run; the whole run is left out."""
     training = [run for run in dataset.runs if run.role == "train"]
     found: dict[str, tuple[str, str, tuple[float, float, float]]] = {}
-    files = {run.file for run in training}
+    files = [run.file for run in training]
+    facts = [facts_of(run, run.rows()) for run in training]
+    louder = [_noise_ratio(facts, k) for k in range(len(facts))]
     curves = [curve for curve in dataset.curves if curve.file in files]
-    for file, factor, low, high in _gains(curves, dataset.axis):
-        if not another_gain_throughout(training, [run.file for run in training].index(file)):
+    for file, factor, low, high in _gains(curves, dataset.axis, dict(zip(files, louder, strict=True))):
+        if not another_gain_throughout(training, files.index(file)):
             continue
         text = (
             f"The rates of {file} are those of the other runs times {factor:.3g} (95 % {low:.3g} ... {high:.3g}): its "
             "scale was another one. Mend it, or take the run out of dataset.toml."
         )
         found[file] = ("gain_changed", text, (factor, low, high))
-    facts = [facts_of(run, run.rows()) for run in training]
+    for file, ratio in zip(files, louder, strict=True):
+        unit = next((f for u in _UNITS for f in (u, 1.0 / u) if 1.0 / _OF_UNIT < ratio / f < _OF_UNIT), None)
+        if unit is not None:
+            text = (
+                f"The noise of {file} is that of the other runs times {ratio:.3g}: its rates have another unit (a "
+                f"factor of {unit:.6g}). State it, or take the run out of dataset.toml."
+            )
+            found[file] = ("unit_changed", text, (unit, unit, unit))
     for finding in (*sign_findings(facts), *orientation_findings(dataset)):
         file = str(finding["evidence"]["file"])
         if file in files:
             found[file] = (str(finding["id"]), str(finding["text"]), (-1.0, -1.0, -1.0))
     return [_run_event(dataset, file, *one) for file, one in found.items()]
+
+
+def _noise_ratio(facts: Sequence[RunFacts], number: int) -> float:
+    """Noise of a run's rows over that of the others; 1 where two others at least do not agree on theirs."""
+    own = facts[number]
+    others = [
+        f.noise_dph
+        for k, f in enumerate(facts)
+        if k != number and abs(f.row_period_s / own.row_period_s - 1.0) < 0.01 and f.noise_dph > 0.0
+    ]
+    if len(others) < _LEAST_OTHERS or max(others) > _NOISE_ALIKE * min(others):
+        return 1.0
+    return own.noise_dph / float(np.median(others))
 
 
 def _run_event(dataset: Dataset, file: str, id: str, text: str, factor: tuple[float, float, float]) -> Event:
@@ -130,14 +159,27 @@ def _run_event(dataset: Dataset, file: str, id: str, text: str, factor: tuple[fl
     return Event(id, number, file, (first, first, first), factor, "times", text, (first, last), True)
 
 
-def _gains(curves: Sequence[Curve], axis: str | None) -> Iterator[tuple[str, float, float, float]]:
-    """Files with another gain: factor and its 95 % limits."""
+def _gains(
+    curves: Sequence[Curve], axis: str | None, louder: Mapping[str, float]
+) -> Iterator[tuple[str, float, float, float]]:
+    """Files with another gain: factor and its 95 % limits.
+
+    Args:
+        louder: Of each file the noise over that of the others. A scale changes both: where the noise says the same
+            factor, the curve need not be clear of what the other runs' own factors are.
+    """
     if len(curves) <= _LEAST_OTHERS:
         return
     series = [_series(curve, axis) for curve in curves]
     for k, curve in enumerate(curves):
         own = _factor(series[k], [s for j, s in enumerate(series) if j != k])
         if own is None or abs(own[0] - 1.0) < _LEAST_CHANGE or own[0] <= 0.0:
+            continue
+        if (
+            abs(louder[curve.file] - 1.0) > _LEAST_CHANGE
+            and abs(own[0] / louder[curve.file] - 1.0) < _LEAST_CHANGE
+        ):
+            yield curve.file, own[0], own[0] - own[1], own[0] + own[1]
             continue
         among = []
         for i in range(len(curves)):

@@ -219,7 +219,7 @@ class FoundEvent(Part):
 
     id: str = Field(
         description="`step`, `step_and_recover`, `transition`, `ramp` (a drift that begins), `restart`, "
-        "`gain_changed`, "
+        "`gain_changed`, `unit_changed`, "
         "`sign_reversed`, `axes_exchanged`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
     )
     file: str = Field(description="of its run")

@@ -12,6 +12,7 @@ from gyrotc.quality import changes as changes_module
 from gyrotc.quality.changes import Change, changes_of
 from gyrotc.quality.check import check
 from gyrotc.quality.events import Event, accepted, events_of
+from gyrotc.quality.facts import displaced
 from gyrotc.quality.outliers import departing
 from gyrotc.quality.sign_and_gain import another_gain_throughout, turned_runs
 from gyrotc.quality.thermometers import stuck_stretches, thermometer_findings
@@ -517,3 +518,35 @@ def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged:
         rows = np.round(values.reshape(-1, 10).mean(axis=1), 4) if averaged else values[9::10]
         found = stuck_stretches(time[9::10], rows, 10.0)
         assert [first for first, _ in found] == pytest.approx(expected, abs=1), found
+
+
+def lagged(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Temperature of a block in a case that follows a programme of ramps within ten minutes."""
+    programme = np.interp(time / 3600.0, [0, 1, 1.5, 3, 4, 5, 6, 8], [20, 20, 50, 50, -10, -10, 30, 30])
+    lag = np.exp(-np.arange(0.0, 3600.0, 10.0) / 600.0)
+    past = np.r_[np.full(lag.size, programme[0]), programme]
+    return np.convolve(past, lag / lag.sum())[lag.size : past.size]
+
+
+@pytest.mark.parametrize(("size", "settles_s"), [(1.5, 0.0), (-4.0, 40.0), (0.0, 0.0)])
+def test_a_thermometer_that_shifts_or_comes_off_is_named_with_what_lies_behind(
+    size: float, settles_s: float
+) -> None:
+    """A coarse converter, rows of ten seconds: what it does as nowhere else in the run."""
+    rng = np.random.default_rng(SEED + 7)
+    time, at = np.arange(0.0, 3600.0 * HOURS, 10.0), 10_000.0
+    since = np.maximum(time - at, 0.0)
+    moved = size * (-np.expm1(-since / settles_s) if settles_s else 1.0 * (since > 0.0))
+    read = 0.0625 * np.round((lagged(time) + moved) / 0.0625 + 0.2 * rng.standard_normal(time.size))
+    found = displaced(time, read, 0.0625)
+    assert len(found) == (size != 0.0), found
+    assert all(abs(jump.time_s - at) <= 120.0 and jump.lasting for jump in found)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 57.29578])
+def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: float) -> None:
+    def in_unit(columns: EventColumns) -> None:
+        columns["rate_dph"] = factor * columns["rate_dph"]
+
+    dataset = load(ramps(tmp_path, in_unit), trust_units=True)
+    assert [(e.id, e.file) for e in turned_runs(dataset)] == [("unit_changed", "2.csv")]

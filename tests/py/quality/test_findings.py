@@ -119,7 +119,7 @@ def _jump(table: Columns, size: float) -> Columns:
 
 
 def test_jumps_of_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    for size, found in ((0.0, False), (0.5, False), (-3.0, True), (10.0, True)):
+    for size, found in ((0.0, False), (0.2, False), (0.5, True), (-3.0, True), (10.0, True)):
         reported = ids(dataset_of(tmp_path / "R", _jump(columns(600), size)), model_dict, result_of())
         assert reported == ({"jump_in_temperature"} if found else set())
 
