@@ -29,7 +29,7 @@
 #define NUM float
 #define WIDE float
 #define NUM_ZERO 0.0F
-#define NUM_MOST 0x1.fffffep+127F
+#define NUM_MOST 0x1.fffffep+127F /* the largest number */
 #define LIMIT_ZERO 0.0F
 #define NUM_PLAUSIBLE_MIN (-90.0F) /* C */
 #define NUM_PLAUSIBLE_MAX 200.0F

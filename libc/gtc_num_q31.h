@@ -26,7 +26,7 @@
 #define NUM int_least32_t
 #define WIDE int_least64_t
 #define NUM_ZERO 0
-#define NUM_MOST 2147483647
+#define NUM_MOST 2147483647 /* the largest word */
 #define LIMIT_ZERO 0U
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)

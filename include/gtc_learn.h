@@ -1,0 +1,128 @@
+/* gtc_learn.h - learning in service: a shift of the table's correction from rests of the vehicle, with its uncertainty.
+ *
+ * Optional: copy gtc_learn.c and gtc_learn.h beside the other files. One state belongs to one axis; its numbers are
+ * float32 whatever arithmetic the table has (a rest comes once in minutes). The bias of the gyro is taken as
+ *
+ *   b(T, t) = table(T, dT/dt) + m(T) + d + e (T - T0) + w exp(-t/tw) + f(T, t)
+ *
+ * with m on knots over the envelope, kept over power-offs and ageing; d, e, w drawn anew at each power-on; and f a
+ * Gaussian process of T (Matern 3/2) that is forgotten in time. A rest is a Kalman update of these 13 states. Between
+ * rests nothing is computed: a shift follows from the state of the last one.
+ *
+ *   boot     gtc_learn_restore() of the kept words, or gtc_learn_start(); then gtc_learn_power_on()
+ *   rest     gtc_learn_rest(): the mean rate of a stop, Earth's rate and the table's bias taken off
+ *   always   gtc_learn_shift(): compensated = measured - bias - shift
+ *   sometimes and at power-off   gtc_learn_save()
+ *
+ * The shift never leaves the prior's authority, whatever the state holds.
+ *
+ * SPDX-License-Identifier: MIT
+ */
+#ifndef GTC_LEARN_H_INCLUDED
+#define GTC_LEARN_H_INCLUDED
+
+#include "gtc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define GTC_LEARN_KNOTS 8U          /* more gain nothing on simulated gyros (make service) */
+#define GTC_LEARN_STATES 13U        /* the knots, d, e, w, f, df/dT */
+#define GTC_LEARN_KNOT_PAIRS 36U    /* packed rows of a symmetric matrix: (0,0), (1,0), (1,1), (2,0), ... */
+#define GTC_LEARN_PAIRS 91U
+#define GTC_LEARN_KEPT_WORDS 48     /* of gtc_learn_save() */
+
+#define GTC_DISAGREES 64 /* rests contradicted what was learned at several power-ons, and were accepted. Report the gyro */
+
+/* What is known of the type of gyro before it learns: constant, written by the generator for one table. */
+typedef struct {
+    uint_least32_t id;          /* of the table, GTC_<ID>_ID */
+    float low_c;                /* knot k lies at low_c + k / per_knot */
+    float per_knot;             /* 1 / C */
+    float center_c;             /* T0 */
+    float authority_dph;        /* |shift| is at most this */
+    float offset_var;           /* variances of d, e, w, f at power-on, (deg/h)^2, of e per C^2 */
+    float slope_var;
+    float warm_var;
+    float memory_var;
+    float memory_per_c;         /* sqrt(3) / length of f along T, 1/C */
+    float forget_per_s;         /* 1 / time in which f is forgotten, 1/s */
+    float warm_per_s;           /* 1 / tw, 1/s */
+    float off_h;                /* time without power where the caller knows none, h */
+    float noise_var;            /* variance of a mean over 1 s of rest, (deg/h)^2 */
+    float noisy;                /* a measured variance of the mean may be this many times what noise_var says */
+    float span_c;               /* T may change by this in a rest, C */
+    float settle_s;             /* rests before this time since power-on are refused */
+    float gate;                 /* innovations up to gate sigma are accepted, */
+    float open_gate;            /* up to open_gate sigma with f opened; equal: none are */
+    uint_least32_t agreeing;    /* so many refused rests that agree are accepted (0: never), */
+    uint_least32_t power_ons;   /* if they come from so many power-ons, 1 or more */
+    float map_var[GTC_LEARN_KNOT_PAIRS];    /* of the knots, (deg/h)^2 */
+    float ageing_var[GTC_LEARN_KNOT_PAIRS]; /* added to it each hour */
+} gtc_learn_prior_t;
+
+/* The state of an axis: 444 bytes. */
+typedef struct {
+    float x[GTC_LEARN_STATES];
+    float p[GTC_LEARN_PAIRS];    /* covariance of x, packed rows */
+    float time_s;                /* of the last rest, since power-on */
+    float temp_c;
+    float refused_dph;           /* innovation of the last refused rest */
+    float hours;                 /* in service, with and without power */
+    uint_least32_t power_ons;
+    uint_least32_t first_refused; /* power-on at which the agreeing refused rests began */
+    uint_least32_t refused;       /* how many agree */
+} gtc_learn_state_t;
+
+/* A stop of the vehicle. */
+typedef struct {
+    float time_s;       /* end of it, since power-on */
+    float temp_c;       /* mean temperature */
+    float span_c;       /* largest less smallest temperature */
+    float rate_dph;     /* mean rate less Earth's rate less the table's bias */
+    float duration_s;
+    float mean_var;     /* variance of the mean as the samples scatter, (deg/h)^2; 0: not known */
+    float earth_var;    /* variance of the Earth rate that was taken off, (deg/h)^2; NaN: not known, the rest is refused */
+    int_least32_t sure; /* not 0: other sensors, too, say that the vehicle stands: an innovation beyond the gate is accepted */
+} gtc_learn_stop_t;
+
+/* What is to be added to the table's bias, and 1 sigma of what is then wrong. */
+typedef struct {
+    float dph;
+    float sigma_dph;
+} gtc_learn_shift_t;
+
+/* A gyro that has learned nothing. Returns 0 or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_learn_start(gtc_learn_state_t *state, const gtc_learn_prior_t *prior);
+
+/* After each switching on. off_h: hours without power; NaN: not known. Returns 0 or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_learn_power_on(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, float off_h,
+                                      float temp_c);
+
+/* Learns from a rest. Returns 0, GTC_DISAGREES, GTC_E_REST (refused: too early, temperature or scatter too large, Earth's
+ * rate not known, beyond the authority, or beyond the gate; nothing is learned) or GTC_E_ARG. Cost: about 350
+ * multiplications, 1 division. */
+GTC_MUST_CHECK int gtc_learn_rest(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
+                                  const gtc_learn_stop_t *stop);
+
+/* The shift at an instant and a temperature, the same after each rest. Sigma is at most that of a gyro that has
+ * aged as long and learned nothing. Returns 0 or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_learn_shift(const gtc_learn_state_t *state, const gtc_learn_prior_t *prior, float time_s,
+                                   float temp_c, gtc_learn_shift_t *shift);
+
+/* What is kept over power-off, with the table's id and a CRC. Keep two copies: a torn one is refused.
+ * Returns 0 or GTC_E_ARG. */
+GTC_MUST_CHECK int gtc_learn_save(const gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
+                                  uint_least32_t words[GTC_LEARN_KEPT_WORDS]);
+
+/* Takes it back. Returns 0, GTC_E_ARG, GTC_E_IMAGE (torn, or no covariance) or GTC_E_ID (another table's). Nothing is
+ * written then. */
+GTC_MUST_CHECK int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
+                                     const uint_least32_t words[GTC_LEARN_KEPT_WORDS]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
