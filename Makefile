@@ -131,6 +131,11 @@ bench:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
+## learning in service beside re-zero, Android's and ArduPilot's (minutes; DATA=FOLDER: power-ons of a measured gyro)
+service: setup
+	@tools/setup.sh test
+	@$(PYTHON) -m bench.service docs $${DATA:+--recordings "$$DATA"}
+
 ## a CSV file of 2 GB through gyrotc import, pandas, polars and pyarrow (in build/bench): docs/results.md
 bench-import:
 	@tools/setup.sh test
@@ -233,4 +238,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean

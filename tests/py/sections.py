@@ -19,7 +19,7 @@ import self_test_page  # noqa: E402
 import targets_page  # noqa: E402
 from results import recorded  # noqa: E402
 
-from bench import bounds, budget, faults, fleet, growth, importing, lot_prior, runtime, sigma, sizes  # noqa: E402
+from bench import bounds, budget, faults, fleet, growth, importing, lot_prior, runtime, service, sigma, sizes  # noqa: E402
 from bench import page as bench_page  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
@@ -38,6 +38,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "budget": budget.section,
     "sigma": sigma.section,
     "faults": faults.section,
+    "service": service.section,
     "blind": blind.section,
     "blind-other": other.section,
     "lot": fleet.lot_section,

@@ -38,6 +38,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "prove": _RUNTIME,
     "runtime": _RUNTIME,
     "self-test": _RUNTIME,
+    "service": ("libc/gtc_learn.c", "gen/gyrotc/target/learning.py", "gen/gyrotc/lot/service.py"),
     "sigma": ("gen/gyrotc/train/uncertainty.py", *_RUNTIME),
     "signals": _TRAIN,
     "sizes": _RUNTIME,

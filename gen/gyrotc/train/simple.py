@@ -30,7 +30,7 @@ __all__ = [
 
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
-_POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))
+_POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
 """How many of `powers_of` each has."""
 _DEPENDENT = 1e-8

@@ -23,7 +23,7 @@ _CREATE, _ADD_RULE, _RESTRICT = 444, 445, 446  # system calls, the same on every
 _VERSION = 1  # flag of _CREATE: only asks for the version
 _PATH_BENEATH = 1  # kind of a rule: what lies in a folder, or is a file
 _NO_NEW_PRIVILEGES, _DEATH_SIGNAL = 38, 1  # PR_SET_NO_NEW_PRIVS, PR_SET_PDEATHSIG of prctl
-_READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3
+_READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3  # LANDLOCK_ACCESS_FS_READ_FILE, READ_DIR
 _RIGHTS = {1: 13, 2: 14, 3: 15, 5: 16}  # rights to files that a version knows: bits 0 to n - 1
 _OPEN_FILES = 64  # a bag of several files has a few open at once
 
