@@ -131,6 +131,10 @@ def catalogue(
         typer.Option("--export", metavar="SERIAL", help="Write the complete result of this gyro to --out."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for --export.")] = None,
+    withdrawn: Annotated[
+        str | None,
+        typer.Option("--withdraw", metavar="HASH", help="Mark the model of this hash as withdrawn."),
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
@@ -140,9 +144,14 @@ def catalogue(
 
     Example: gyrotc catalogue fleet RLG-0042 --on 2026-09-01
     """
-    from ..fleet.catalogue import catalogued, export
+    from ..fleet.catalogue import catalogued, export, withdraw
 
     asked = _day(day)
+    if withdrawn is not None:
+        if exported is not None or serial is not None:
+            raise InputError("--withdraw", "goes with no serial", "--withdraw HASH alone")
+        tell(f"{place}: {withdraw(place, withdrawn)} calibrations withdrawn")
+        return
     if exported is not None:
         if out is None or serial is not None:
             raise InputError("--export", "goes with --out and no other serial", "--export SERIAL --out DIR")

@@ -20,7 +20,7 @@ from ..jobs.release import unit_of
 from ..model import DataFile, Model, load_model
 from ..results.base import read_optional
 from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry, FleetSummary
-from ..store.files import check_own, open_or_create, write_own
+from ..store.files import check_own, digest_of, open_or_create, write_own
 from ..store.folder import kept_by_hash, result_folder
 from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
 from ..tables.emit import image_of
@@ -28,7 +28,7 @@ from ..tables.quantise import NUMERICS, quantise
 from ..verify.emitted import left_out_of, made_again, texts_again
 from .unit import ENTRY, PAYLOADS
 
-__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter", "export"]
+__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter", "export", "withdraw"]
 
 CATALOGUE = "catalogue"
 _FILE = "catalogue.sqlite"
@@ -58,6 +58,7 @@ CREATE TABLE calibration (
   after_rms_dph REAL,
   expanded_dph  REAL,                     -- U of the compensated bias
   folder        TEXT NOT NULL,
+  row_sha256    TEXT NOT NULL DEFAULT '', -- over the columns above, its recordings and the row before of this axis
   UNIQUE (serial, axis, input_sha256, model_hash)
 );
 CREATE TABLE recording (
@@ -66,6 +67,12 @@ CREATE TABLE recording (
   role        TEXT NOT NULL,
   sha256      TEXT NOT NULL,
   PRIMARY KEY (calibration, file, role, sha256)
+) WITHOUT ROWID;
+CREATE TABLE newest (
+  serial TEXT NOT NULL,
+  axis   TEXT NOT NULL,
+  sha256 TEXT NOT NULL,                   -- row_sha256 of the row that was entered last
+  PRIMARY KEY (serial, axis)
 ) WITHOUT ROWID;
 CREATE INDEX of_serial ON calibration (serial, axis, valid_from);
 """
@@ -219,10 +226,82 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
         if unit.budget:
             row |= {"valid_until": unit.budget.valid_until, "expanded_dph": unit.budget.expanded_dph}
     places = ", ".join(f":{name}" for name in row)
+    serial = entry.serial or ""
+    _check_rows(base, out / CATALOGUE / _FILE, serial)
     number = base.execute(f"INSERT INTO calibration ({', '.join(row)}) VALUES ({places})", row).lastrowid
     files = {(number, d.file, d.role, d.sha256) for d in data}
     base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", sorted(files))
+    _hash_rows(base, serial)
     return 1
+
+
+def _hashes(base: sqlite3.Connection, serial: str) -> Iterator[tuple[int, str, str, str]]:
+    """Of each row of a gyro in order: id, axis, the hash that it states, and the one that it should state.
+
+    Each goes on from that of the row before: a row that was changed, taken away or moved shows in all after it.
+    """
+    last: dict[str, str] = {}
+    for *columns, stated in base.execute("SELECT * FROM calibration WHERE serial = ? ORDER BY id", (serial,)):
+        number, axis = columns[0], columns[2]
+        files = base.execute(
+            "SELECT file, role, sha256 FROM recording WHERE calibration = ? ORDER BY 1, 2, 3", (number,)
+        )
+        last[axis] = digest_of([columns, [list(file) for file in files], last.get(axis, "")])
+        yield number, axis, stated, last[axis]
+
+
+def _hash_rows(base: sqlite3.Connection, serial: str) -> None:
+    """Enters the hashes of a gyro's rows anew."""
+    for number, axis, _, hash_ in list(_hashes(base, serial)):
+        base.execute("UPDATE calibration SET row_sha256 = ? WHERE id = ?", (hash_, number))
+        base.execute("INSERT OR REPLACE INTO newest VALUES (?, ?, ?)", (serial, axis, hash_))
+
+
+def _check_rows(base: sqlite3.Connection, path: Path, serial: str) -> None:
+    """Refuses rows of a gyro that are not as they were entered: a hash finds an edit, not who makes it again, too.
+
+    Raises:
+        InputError: They are not.
+    """
+    newest = {}
+    for _, axis, stated, hash_ in _hashes(base, serial):
+        if stated != hash_:
+            raise InputError(str(path), f"a row of {serial} is not as it was entered", _EXPECTED)
+        newest[axis] = hash_
+    if newest != dict(base.execute("SELECT axis, sha256 FROM newest WHERE serial = ?", (serial,)).fetchall()):
+        raise InputError(str(path), f"rows of {serial} are missing, or are not its own", _EXPECTED)
+
+
+def withdraw(place: Path, model_hash: str) -> int:
+    """Marks the calibrations of a model as withdrawn; returns how many there are.
+
+    Args:
+        place: A fleet's folder, or the catalogue's file.
+
+    Raises:
+        InputError: There is no catalogue, it is damaged, or no calibration of this model is in it.
+    """
+    path = _file_of(place)
+    with _opened(path) as base, base:
+        of_model = "SELECT DISTINCT serial FROM calibration WHERE model_hash = ?"
+        serials = [serial for (serial,) in base.execute(of_model, (model_hash,)).fetchall()]
+        for serial in serials:
+            _check_rows(base, path, serial)
+        count = base.execute(
+            "UPDATE calibration SET tag = 'withdrawn' WHERE model_hash = ?", (model_hash,)
+        ).rowcount
+        for serial in serials:
+            _hash_rows(base, serial)
+    if not count:
+        raise InputError("--withdraw", repr(model_hash), "the hash of a model in this catalogue")
+    return count
+
+
+def _file_of(place: Path) -> Path:
+    path = place if place.is_file() else place / CATALOGUE / _FILE
+    if not path.is_file():
+        raise InputError(str(place), "has no catalogue", "the --out of gyrotc fleet")
+    return path
 
 
 def _image(folder: Path, model: Model) -> Path:
@@ -239,9 +318,7 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
     Raises:
         InputError: There is no catalogue, or it is damaged.
     """
-    path = place if place.is_file() else place / CATALOGUE / _FILE
-    if not path.is_file():
-        raise InputError(str(place), "has no catalogue", "the --out of gyrotc fleet")
+    path = _file_of(place)
     query = _CARRIED if serial else f"SELECT * FROM calibration ORDER BY id DESC LIMIT {_MOST_ROWS}"
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
@@ -249,6 +326,8 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
             _check_schema(base, path)
             base.row_factory = sqlite3.Row
             rows = base.execute(query, {"serial": serial, "day": day}).fetchall()
+            for one in {serial} if serial else {row["serial"] for row in rows}:
+                _check_rows(base, path, one)
             found = tuple(_entry(base, row) for row in rows)
             for one in found if serial else ():
                 _check_payloads(path.parent / Path(PAYLOADS).name, one)

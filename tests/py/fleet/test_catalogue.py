@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.catalogue import SCHEMA, catalogued, enter, export
+from gyrotc.fleet.catalogue import SCHEMA, _hash_rows, catalogued, enter, export, withdraw
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.results.base import read_result
@@ -129,14 +129,51 @@ def test_the_documented_sql_answers_the_same_and_its_tables_are_those_of_the_fil
     assert one.recordings[0].sha256 in rows[0][-1]
 
 
-def test_a_withdrawn_table_may_not_be_carried(fleet: Path, tmp_path: Path) -> None:
+def test_a_withdrawn_table_may_not_be_carried(fleet: Path, tmp_path: Path, gyrotc: Command) -> None:
     copy = shutil.copytree(fleet / "catalogue", tmp_path / "catalogue") / "catalogue.sqlite"
-    with sqlite3.connect(copy) as base:
-        base.execute("UPDATE calibration SET tag = 'withdrawn' WHERE status = 'done'")
-    assert catalogued(copy, "RLG-1", "2026-08-31").found == ()
-    with sqlite3.connect(copy) as base:  # the failed one withdrawn, the first one governs again
-        base.execute("UPDATE calibration SET tag = CASE status WHEN 'done' THEN '' ELSE 'withdrawn' END")
+    models = {one.status: one.model_hash for one in catalogued(copy, None, None).found}
+    assert withdraw(copy, models["failed"] or "") == 1  # then the first one is valid again
     assert len(catalogued(copy, "RLG-1", "2026-09-02").found) == 1
+    assert gyrotc("catalogue", copy, "--withdraw", models["done"] or "").returncode == 0
+    assert catalogued(copy, "RLG-1", "2026-08-31").found == ()
+    assert gyrotc("catalogue", copy, "--withdraw", "0" * 64).returncode == 2
+
+
+CELLS = {
+    "calibration": (
+        "id", "serial", "axis", "valid_from", "valid_until", "tag", "status", "verdict", "model_hash", "image_sha256",
+        "model_sha256", "input_sha256", "after_rms_dph", "expanded_dph", "folder", "row_sha256",
+    ),
+    "recording": ("calibration", "file", "role", "sha256"),
+    "newest": ("serial", "axis", "sha256"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("table", CELLS)
+def test_every_cell_of_a_gyros_rows_is_guarded(table: str, fleet: Path, tmp_path: Path) -> None:
+    """Before: a failed calibration whose serial, day, status or tag was edited let the one before it fly."""
+    place = shutil.copytree(fleet / "catalogue", tmp_path / "catalogue") / "catalogue.sqlite"
+    before = place.read_bytes()
+    with sqlite3.connect(place) as base:
+        assert [row[1] for row in base.execute(f"PRAGMA table_info({table})")] == [*CELLS[table]]
+        rows = base.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
+    for row in range(rows):
+        first, second = CELLS[table][:2]
+        where = f"({first}, {second}) IN (SELECT {first}, {second} FROM {table} LIMIT 1 OFFSET {row})"
+        for cell in CELLS[table]:
+            number = cell in ("id", "calibration") or cell.endswith("_dph")
+            changed = f"coalesce({cell}, 0) + 7" if number else f"coalesce({cell}, '') || '1'"
+            for what in (
+                f"UPDATE {table} SET {cell} = {changed} WHERE {where}",
+                f"DELETE FROM {table} WHERE {where}",
+            ):
+                place.write_bytes(before)
+                with sqlite3.connect(place) as base:
+                    assert base.execute(what).rowcount == 1
+                with pytest.raises(InputError, match="RLG-1"):
+                    catalogued(place, "RLG-1", "2026-09-02")
+    place.write_bytes(before)
+    catalogued(place, "RLG-1", "2026-09-02")
 
 
 @pytest.mark.parametrize("change", ["flip", "missing", "another"])
@@ -155,6 +192,7 @@ def test_a_payload_that_is_not_what_its_row_says_is_refused(
     else:
         with sqlite3.connect(place / "catalogue.sqlite") as base:
             base.execute("UPDATE calibration SET serial = 'RLG-9'")
+            _hash_rows(base, "RLG-9")  # as who knows of the hashes makes them again
     done = gyrotc(
         "catalogue",
         place / "catalogue.sqlite",
@@ -243,6 +281,7 @@ def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(
         image = one.model_sha256
     with sqlite3.connect(place / "catalogue.sqlite") as base:
         base.execute("UPDATE calibration SET image_sha256 = ? WHERE serial = 'RLG-1'", (image,))
+        _hash_rows(base, "RLG-1")
     with pytest.raises(InputError, match=f"{image}: is not the image that"):
         catalogued(place / "catalogue.sqlite", "RLG-1", day)
 
