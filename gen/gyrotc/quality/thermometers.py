@@ -34,6 +34,7 @@ _STUCK_ROWS = 10  # where half of the rows differ from the one before, as many a
 _OFTEN = 0.5  # of the rows differ from the one before: else repeating is what the thermometer does
 _LONGER = 4.0  # than what else repeats in the run; holds of one programme, in which a converter waits, differ by less
 _MOST = 5  # stuck stretches of a run that are distinguished from a thermometer that often repeats
+_ONE_STEP = 1.5  # steps of the converter: a temperature that is held between two of them goes on by one
 _RELEASE = 3.0  # times the steps that rows make on ramps: the temperature went on meanwhile
 _ON_RAMPS = 0.95  # quantile of the steps
 
@@ -42,8 +43,8 @@ def stuck_stretches(time: FloatArray, temperature: FloatArray, period_s: float) 
     """First row and number of rows of the stretches in which a thermometer was stuck.
 
     A coarse converter, or a logger that averages one, repeats a reading for as long as a chamber holds. So a stretch
-    counts only where it is far longer than all others of a run that seldom repeats, or where it ends with a step that
-    no ramp of the run makes from row to row.
+    counts only where it is far longer than all others of a run that seldom repeats and ends with more than one step of
+    the converter, or where it ends with a step that no ramp of the run makes from row to row.
     """
     starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
     lengths = np.diff(np.r_[starts, len(temperature)])
@@ -57,10 +58,12 @@ def stuck_stretches(time: FloatArray, temperature: FloatArray, period_s: float) 
     least = longest[apart[-1]] if rare else np.inf
     steps = np.abs(np.diff(temperature[starts]))
     release = _RELEASE * float(np.quantile(steps, _ON_RAMPS))
+    moved = np.r_[steps, np.inf]  # behind each stretch
+    one_step = _ONE_STEP * float(steps.min())
     return [
         (int(starts[k]), int(lengths[k]))
         for k in long
-        if lengths[k] >= least or (k < len(steps) and steps[k] > release)
+        if (lengths[k] >= least and moved[k] > one_step) or (k < len(steps) and steps[k] > release)
     ]
 
 
