@@ -104,18 +104,18 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         return Diagnosis(not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if is_single_cycle(records) else None
+    named = analysis.attribution.causes if holds(analysis.attribution) else ()
+    states = named if cycle is None else cycle.able
+    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
     if cycle is not None:
+        cycle = replace(cycle, preferred=bool(extension.shipped))
         analysis = replace(
             analysis,
             attribution=cycle.attribution(analysis.attribution),
             separations=tuple({} for _ in cycle.causes),
             extended=None,
         )
-        causes = cycle.causes
-    else:
-        causes = analysis.attribution.causes if holds(analysis.attribution) else ()
-    states = causes if cycle is None else cycle.states
-    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
+    causes = named if cycle is None else cycle.causes
     extended, training = _extended_model(dataset, extension, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)

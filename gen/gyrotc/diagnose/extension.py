@@ -115,9 +115,10 @@ class Refitting:
         self.train = play_runs(dataset, self.runs, self.front)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
         self.average_s = options.average_s
-        self._fits: list[tuple[list[Effect], bool, Fit]] = []
+        self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
         self.arguments: dict[str, Any] = {
             "method": map_method(options.method),
+            "power_on": power_ons(self.runs),
             "seed": options.seed,
             "centers": options.centers,
             "rho": options.rho,
@@ -125,19 +126,25 @@ class Refitting:
             # Beside effects the map of a single cycle is one of T alone, which no lot knows.
             "prior": None if single_cycle else options.prior,
         }
+        self.plain = {"method": options.method, "prior": options.prior}
 
     def fit(
         self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None
     ) -> Fit:
-        """The map beside the effects (`beside`: as if there were any); fits on all samples are cached."""
+        """The map beside the effects (`beside`: as if there were any), without any what would be emitted.
+
+        Fits on all samples are cached.
+        """
         whole = kept is None or all(m.all() for m in kept)
-        rate = not (self.single_cycle and (bool(effects) if beside is None else beside))
-        for fitted_beside, with_rate, fitted in self._fits:
-            if whole and fitted_beside == list(effects) and with_rate == rate:
+        with_map = bool(effects) if beside is None else beside
+        rate = not (self.single_cycle and with_map)
+        for fitted_beside, with_rate, of_map, fitted in self._fits:
+            if whole and fitted_beside == list(effects) and (with_rate, of_map) == (rate, with_map):
                 return fitted
-        fitted = fit_extended(self.train, effects, self.arguments, None if whole else kept, rate=rate)
+        arguments = self.arguments if with_map else self.arguments | self.plain
+        fitted = fit_extended(self.train, effects, arguments, None if whole else kept, rate=rate)
         if whole:
-            self._fits.append((list(effects), rate, fitted))
+            self._fits.append((list(effects), rate, with_map, fitted))
         return fitted
 
     def everything(self) -> list[BoolArray]:
@@ -240,16 +247,16 @@ def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     best = _ladder(refitting, [])
     rung = best.chosen()
     shipped: list[Effect] = []
-    before, last = best.rms_of(rung), None
+    before, after = best.rms_of(rung), None
     together = refitting.single_cycle
     for tried in [able] if together and able else [able[: k + 1] for k in range(len(able))]:
         new = tried if together else [*shipped, tried[-1]]
         name = f"{len(new)} states"
-        with_them = best.with_richer(name, _ladder(refitting, new))
-        last = with_them.rms_of(name)
-        if with_them.chosen() == name:
-            shipped, best = new, with_them
-    return Shipping(shipped, rung, best.stretches(), before, last)
+        beside = best.with_states(name, _ladder(refitting, new))
+        after = beside.rms_of(name)
+        if beside.chosen() == name:
+            shipped, best = new, beside
+    return Shipping(shipped, rung, best.stretches(), before, after)
 
 
 def _ladder(refitting: Refitting, effects: Sequence[Effect]) -> Ladder:

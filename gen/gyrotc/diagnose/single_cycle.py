@@ -255,6 +255,7 @@ class Cycle:
         p_value: The p-value of the chosen states together.
         residual: What the map of T alone leaves, deg/h, shape (N,).
         explained: The chosen states' part of it, shape (N,).
+        preferred: Whether branches that were left out prefer the states to every correction without memory.
     """
 
     tried: tuple[Tried, ...]
@@ -267,11 +268,22 @@ class Cycle:
     p_value: float
     residual: FloatArray
     explained: FloatArray
+    preferred: bool = False
+
+    @property
+    def able(self) -> tuple[Refined, ...]:
+        """The states, where they are better than the map of T and than any static dT/dt."""
+        return self.states if self.chosen is not None and self.lead > 0.0 else ()
 
     @property
     def causes(self) -> tuple[Refined, ...]:
-        """The states, where they are named: clearly better than the map of T and than any static dT/dt."""
-        return self.states if self.chosen is not None and self.lead >= EQUIVALENT else ()
+        """The states, where they are named: clearly better than these, or better and preferred by unseen branches."""
+        return self.able if self.chosen is not None and (self.preferred or self.lead >= EQUIVALENT) else ()
+
+    @property
+    def rate_would_do(self) -> bool:
+        """Whether a static dT/dt explains the recordings as well, so that unseen branches alone name the states."""
+        return bool(self.causes) and self.lead < EQUIVALENT
 
     @property
     def lead(self) -> float:

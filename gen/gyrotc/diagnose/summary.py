@@ -109,12 +109,14 @@ def sentence_of(
     extended: ExtendedModel | None,
     undecided: str,
     wide: WideMemory | None = None,
+    rivals: Sequence[str] = (),
 ) -> str:
     """The finding in one to three sentences.
 
     Args:
         undecided: Why a single cycle cannot tell of memory.
         wide: The form of hysteresis that is among the causes, where it is more than one play.
+        rivals: What explains the recordings as well and is no cause.
     """
     why = f" about memory of the temperature: {undecided}" if undecided else ""
     causes = [c for c in found if c.family != "noise"]
@@ -126,7 +128,7 @@ def sentence_of(
     text = {
         "consistent": "Nothing was found beyond the static map and the declared noise.",
         "explained": f"{names}.",
-        "ambiguous": f"{names}, or equally well: {', '.join(_rivals(causes))}.",
+        "ambiguous": f"{names}, or equally well: {', '.join([*_rivals(causes), *rivals])}.",
         "partial": f"{names}, and structure remains that no cause explains.",
         "noise_differs": f"{noise}.",
         "unexplained": "There is structure that no cause of the catalogue explains.",
@@ -261,7 +263,7 @@ def result_of(
     """
     verdict = verdict_of(analysis.attribution, analysis.noise)
     if cycle is not None and causes:
-        verdict = "ambiguous" if cycle.rivals else "partial"
+        verdict = "ambiguous" if cycle.rivals or cycle.rate_would_do else "partial"
     elif cycle is not None and cycle.not_testable:
         verdict = "not_testable"
     listed = tuple(_cause(analysis, extension, k) for k in range(len(causes)))
@@ -288,7 +290,14 @@ def result_of(
         single_cycle=None if cycle is None else _single_cycle(cycle, extension),
         shipping=extension.crossed.result(),
         unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
-        text=sentence_of(verdict, listed, extended, undecided, analysis.attribution.wide if causes else None),
+        text=sentence_of(
+            verdict,
+            listed,
+            extended,
+            undecided,
+            analysis.attribution.wide if causes else None,
+            ["a static dependence on dT/dt"] if cycle is not None and cycle.rate_would_do else [],
+        ),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
         next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),

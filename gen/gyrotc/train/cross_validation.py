@@ -57,10 +57,10 @@ def t_statistic(gains: FloatArray) -> tuple[float, int]:
     return float(gains.mean()) / max(error, 1e-12), len(gains) - 1
 
 
-def surely_above_0(gains: FloatArray, tried: int = 1) -> bool:
+def surely_above_0(gains: FloatArray, tried: int = 1, significance: float = _SIGNIFICANCE) -> bool:
     """Whether the mean is above 0 by a t test, one-sided, at 2.5 % for all that are `tried` alike (Bonferroni)."""
     t, freedom = t_statistic(gains)
-    return freedom > 0 and bool(t > stdtrit(freedom, 1.0 - _SIGNIFICANCE / tried))
+    return freedom > 0 and bool(t > stdtrit(freedom, 1.0 - significance / tried))
 
 
 def unseen_log_likelihood(square: FloatArray, means: FloatArray, white: float) -> float | None:

@@ -56,6 +56,7 @@ _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
 _SIMPLE = (*_FEW_COLUMNS, "mixed")
 RUNGS = ("nothing", *_SIMPLE, "mrbf")
 """From the simplest to the richest."""
+_OF_NETWORK, _OF_STATES = 0.025, 0.05  # of the t test: states that a verdict names have evidence of their own
 _LEAST = 0.02  # share of RMS by which the network has to be better: what "no worse than trivial" allows (docs/real.md)
 _MUCH = 0.10  # share of RMS by which the constant has to be beaten where the t test is silent
 _UNDECIDED = 1.0  # t of the gain over a constant below which it is a coin (docs/training.md, section 2)
@@ -92,11 +93,10 @@ class Ladder:
             return next(n for n, found in noise.items() if found >= max(noise.values()) - LIKELIER)
         mean = {n: float(self._score(n).mean()) for n in able if n in _SIMPLE}
         name = next(n for n, score in mean.items() if score <= min(mean.values()) + _LEAST)
-        if "mrbf" in able:
-            gains = self._score(name) - self._score("mrbf")
-            name = "mrbf" if gains.mean() > _LEAST and surely_above_0(gains) else name
-        for states in (n for n in able if n not in RUNGS):
-            name = states if self._beats(states, name) else name
+        for richer in (n for n in able if n not in _SIMPLE):
+            gains = self._score(name) - self._score(richer)
+            level = _OF_NETWORK if richer == "mrbf" else _OF_STATES
+            name = richer if gains.mean() > _LEAST and surely_above_0(gains, significance=level) else name
         return name if self.beats_constant(name) else "constant"
 
     def _rms(self, name: str) -> FloatArray:
@@ -107,21 +107,17 @@ class Ladder:
         return np.asarray(0.5 * np.log(self._rms(name) ** 2 + self.noise_dph**2))
 
     def beats_constant(self, name: str) -> bool:
-        """Whether a candidate is better than a constant on pieces that it has not seen."""
-        return name not in ("nothing", "constant") and self._beats(name, "constant")
-
-    def _beats(self, name: str, other: str) -> bool:
-        """By 10 % with t of at least 1, or surely."""
-        gains = self._score(other) - self._score(name)
+        """Whether a candidate is better than a constant on unseen pieces: by 10 % with t of at least 1, or surely."""
+        gains = self._score("constant") - self._score(name)
         much = gains.mean() >= _MUCH and t_statistic(gains)[0] >= _UNDECIDED
-        return bool(much or surely_above_0(gains))
+        return name not in ("nothing", "constant") and bool(much or surely_above_0(gains))
 
     def gain(self, name: str) -> tuple[float, int]:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
         return t_statistic(self._score("constant") - self._score(name))
 
-    def with_richer(self, name: str, other: Ladder) -> Ladder:
-        """Besides, the network of another ladder beside states, which have evidence of their own."""
+    def with_states(self, name: str, other: Ladder) -> Ladder:
+        """Besides, the network of another ladder over the same pieces, beside states that a verdict names."""
         added = other.rms_dph[:, [other.rungs.index("mrbf")]]
         return replace(self, rms_dph=np.hstack([self.rms_dph, added]), rungs=(*self.rungs, name))
 

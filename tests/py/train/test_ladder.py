@@ -124,8 +124,8 @@ def test_states_are_one_candidate_more() -> None:
     plain = ladder(constant=constant, cubic=[x / 10.0 for x in constant])
     better = ladder(constant=constant, mrbf=[x / 20.0 for x in constant])
     alike = ladder(constant=constant, mrbf=[80.0, 112.0, 99.0, 96.0])
-    assert plain.with_richer("states", better).chosen() == "states"
-    assert plain.with_richer("states", alike).chosen() == "cubic"
+    assert plain.with_states("states", better).chosen() == "states"
+    assert plain.with_states("states", alike).chosen() == "cubic"
 
 
 def test_a_mixed_model_is_the_most_probable_map_of_a_linear_mixed_model() -> None:
