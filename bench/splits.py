@@ -147,7 +147,7 @@ def _described(folder: Path, serial: str, runs: Sequence[tuple[Path, float, floa
     for file, low, high, held in runs:
         (folder / file.name).write_bytes(file.read_bytes())
         lines = [f'[[run]]\nfile = "{file.name}"\npower_on_s = "unknown"']
-        lines += [f"{name} = {x!r}" for name, x in (("from_s", low), ("to_s", high)) if np.isfinite(x)]
+        lines += [f"{name} = {float(x)!r}" for name, x in (("from_s", low), ("to_s", high)) if np.isfinite(x)]
         text.append("\n".join([*lines, f'role = "{"exam" if held else "train"}"\n']))
     (folder / "dataset.toml").write_text("\n".join(text), "utf-8")
     return folder

@@ -82,7 +82,7 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     if result.unexplained:
         yield f"unexplained: {unexplained_text(result.unexplained)}"
     if result.physical and result.extended is None:
-        yield "no extension is shipped: none has a gain on runs it was not fitted to"
+        yield _not_shipped(result)
     limits = [_limit_text(c) for c in result.considered if c.detection_limit]
     if limits:
         yield "what could still hide below its detection limit:"
@@ -106,12 +106,25 @@ def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
     yield f"diagnosis: {diagnosis.verdict.replace('_', ' ')}: {diagnosis.text}"
     extended = diagnosis.extended
     if extended is None:
-        yield "nothing added: no cause was named that gains on runs it was not fitted to"
+        yield _not_shipped(diagnosis)
         return
     added = ", ".join(extended.terms) or "a finer map"
     without = f" (without: {diagnosis.baseline.centers})" if diagnosis.baseline else ""
     yield f"added: {added}; {extended.centers} centers{without}"
     yield from _gain_lines(extended.gain)
+
+
+def _not_shipped(result: Diagnosed) -> str:
+    """Why no extension is, chosen from what unseen runs say of the causes."""
+    gains = [cause.gain.shown for cause in result.physical if cause.gain is not None]
+    if not gains:
+        return "no extension is shipped: no cause was named"
+    if "gain" in gains:
+        return (
+            "no extension is shipped: the runs above gain, but pieces of the training history left out in turn do not "
+            "agree that it holds"
+        )
+    return "no extension is shipped: no cause is shown to gain on runs it was not fitted to"
 
 
 def _limit_text(considered: ConsideredCause) -> str:

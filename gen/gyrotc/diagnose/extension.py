@@ -344,7 +344,7 @@ def extend(
         chain = [chain[0], *(chain[-1] for _ in effects)]
     floor = floor_of([*chain[-1], *refitting.on_training(effects)])
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
-    steps = [gain_of(a, b, floor, options.average_s) for a, b in pairs]
+    steps = [gain_of(a, b, floor, options.average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     return Extension(

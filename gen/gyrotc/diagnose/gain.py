@@ -1,8 +1,8 @@
 """The gain of an extension on runs that its choice has not seen, with intervals.
 
-Share of removable excess: (before² − after²)/(before² − floor²), RMS of means over `average_s`. Intervals
-come from drawing half-hours (for the angle: hours) of the scored runs again, a paired bootstrap; where there
-are few half-hours, twelfths of all.
+Share of removable excess: (before² − after²)/(without any cause² − floor²), RMS of means over `average_s`, so that
+shares of causes that were added one after the other have one total. Intervals come from drawing half-hours (for the
+angle: hours) of the scored runs again, a paired bootstrap; where there are few half-hours, twelfths of all.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ class Gain:
         return GainOnUnseen(
             exam_rms_before_dph=self.rms_before,
             exam_rms_after_dph=self.rms_after,
-            share_of_excess_removed=self.share,
-            low=self.low,
-            high=self.high,
+            share_of_excess_removed=_at_most_all(self.share),
+            low=_at_most_all(self.low),
+            high=_at_most_all(self.high),
             rms_removed_dph=_with_limits(self.rms_before - self.rms_after, self.rms_removed),
             angle_1h_removed_arcsec=angle,
             angle_1h_before_arcsec=self.angle_before,
@@ -73,6 +73,11 @@ class Gain:
             rms_30min_before_dph=self.half_hour_before,
             rms_30min_after_dph=self.half_hour_after,
         )
+
+
+def _at_most_all(share: float | None) -> float | None:
+    """A share; what is left may by chance be less than the floor."""
+    return None if share is None else min(share, 1.0)
 
 
 def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
@@ -88,9 +93,18 @@ def floor_of(runs: Sequence[Averages]) -> float:
 
 
 def gain_of(
-    before: Sequence[Averages], after: Sequence[Averages], floor: float, average_s: float, seed: int = 1
+    before: Sequence[Averages],
+    after: Sequence[Averages],
+    floor: float,
+    average_s: float,
+    seed: int = 1,
+    *,
+    whole_dph: float | None = None,
 ) -> Gain:
-    """Compares two sets of residuals on the same samples."""
+    """Compares two sets of residuals on the same samples.
+
+    `whole_dph`: RMS without any cause, of which shares are taken; None: `before` is without any.
+    """
     b2, a2, weight = _pieces(before, after, average_s)
     total = weight.sum()
     rms_b, rms_a = float(np.sqrt(b2.sum() / total)), float(np.sqrt(a2.sum() / total))
@@ -99,7 +113,7 @@ def gain_of(
     n = weight[drawn].sum(axis=1)
     diff = (b2 - a2)[drawn].sum(axis=1) / n
     removed = np.sqrt(b2[drawn].sum(axis=1) / n) - np.sqrt(a2[drawn].sum(axis=1) / n)
-    excess = rms_b**2 - floor**2
+    excess = (rms_b if whole_dph is None else whole_dph) ** 2 - floor**2
     share = low = high = None
     if excess > 0.02 * floor**2:
         shares = diff / excess

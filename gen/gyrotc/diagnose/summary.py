@@ -18,6 +18,7 @@ from ..results.diagnosed import (
     DiagnosisVerdict,
     Estimate,
     ExtendedModel,
+    GainOnUnseen,
     NamedCause,
     StaticRate,
     Statistic,
@@ -51,8 +52,6 @@ __all__ = [
     "verdict_of",
 ]
 
-_WHOLE = 0.995  # a share of the removable error that shows as 100 %
-
 VERDICTS: dict[DiagnosisVerdict, str] = {
     "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
     "explained": "The causes listed account for what the simulation gets wrong.",
@@ -66,7 +65,7 @@ VERDICTS: dict[DiagnosisVerdict, str] = {
 _STEPS: dict[DiagnosisVerdict, str] = {
     "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
     " profile.",
-    "explained": "Build with the extension (gyrotc build --extend), or mend the cause and record again.",
+    "explained": "Mend the cause and record again.",
     "partial": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded input."
     " Record supply, discharge current, pressure and magnetic field beside the rate.",
     "noise_differs": "Declare the noise that was measured ([noise] of dataset.toml), or find out why it differs;"
@@ -78,7 +77,11 @@ _STEPS: dict[DiagnosisVerdict, str] = {
 
 
 def next_steps(
-    verdict: DiagnosisVerdict, causes: Sequence[NamedCause], untestable: Sequence[str], *, shipped: bool
+    verdict: DiagnosisVerdict,
+    causes: Sequence[NamedCause],
+    untestable: Sequence[str],
+    *,
+    gain: GainOnUnseen | None,
 ) -> list[str]:
     """Sentences, the most telling first.
 
@@ -86,10 +89,14 @@ def next_steps(
         verdict: One of `VERDICTS`.
         causes: Causes and kinds of noise that were found.
         untestable: Ids of the causes that these recordings cannot test.
-        shipped: Whether an extension is.
+        gain: Of the extension that is shipped; None: none is.
     """
     steps = [f"To separate them: {c.separate_by}." for c in causes if c.separate_by]
-    if verdict == "explained" and not shipped:
+    if gain is not None and gain.shown == "gain":
+        steps.append("Build with the extension (gyrotc build --extend).")
+    elif gain is not None:
+        steps.append("Build without the extension: runs that were not fitted to show no gain of it.")
+    if verdict == "explained" and gain is None:
         remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
         steps.append(f"Against it: {'; '.join(remedies)}.")
     elif verdict != "ambiguous":
@@ -135,11 +142,7 @@ def sentence_of(
         "not_testable": f"The recordings cannot decide{why}.",
     }[verdict]
     text += f" Here {wide.text}." if wide is not None else ""
-    share = extended.gain.share_of_excess_removed if extended is not None else None
-    if share is None:
-        return text
-    amount = "all" if share >= _WHOLE else f"{share:.0%}"
-    return f"{text} On unseen runs the extension removes {amount} of the removable error."
+    return text if extended is None else f"{text} {extended.gain.text}"
 
 
 def shows_as(cause: str, wide: WideMemory | None) -> str:
@@ -243,7 +246,7 @@ def not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> Diagno
         unexplained=None,
         text=text,
         meaning=VERDICTS["not_testable"],
-        next=tuple(next_steps("not_testable", [], [], shipped=False)),
+        next=tuple(next_steps("not_testable", [], [], gain=None)),
     )
 
 
@@ -300,7 +303,9 @@ def result_of(
         ),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
-        next=tuple(next_steps(verdict, listed, list(untestable), shipped=extended is not None)),
+        next=tuple(
+            next_steps(verdict, listed, list(untestable), gain=None if extended is None else extended.gain)
+        ),
     )
 
 

@@ -49,10 +49,17 @@ class Estimate(Part):
     high: Figure = Field(description="upper end; null where there is no interval")
 
 
+_WHOLE = 0.995  # a share of the removable error that shows as 100 %
+
+
+def _amount(share: float) -> str:
+    return "all" if share >= _WHOLE else f"{share:.0%}"
+
+
 class GainOnUnseen(Part):
     """What causes gain on runs that they were not fitted to."""
 
-    exam_rms_before_dph: float = Field(description="RMS of the static map, deg/h")
+    exam_rms_before_dph: float = Field(description="RMS of what would be emitted without them, deg/h")
     exam_rms_after_dph: float = Field(description="RMS with the causes, deg/h")
     share_of_excess_removed: Figure = Field(
         description="share of the removable error that is removed; null where next to nothing is removable"
@@ -67,6 +74,26 @@ class GainOnUnseen(Part):
     angle_1h_after_arcsec: Figure = Field(description="with the causes, arcsec")
     rms_30min_before_dph: Figure = Field(description="RMS of means over 30 minutes, of the static map, deg/h")
     rms_30min_after_dph: Figure = Field(description="the same with the causes, deg/h")
+
+    @property
+    def shown(self) -> Literal["gain", "loss", "undecided"]:
+        """What the 95 % interval of the difference of RMS says."""
+        low, high = self.rms_removed_dph.low, self.rms_removed_dph.high
+        if low is not None and low > 0.0:
+            return "gain"
+        return "loss" if high is not None and high < 0.0 else "undecided"
+
+    @property
+    def text(self) -> str:
+        """What unseen runs say of it, in a sentence."""
+        rms = f"RMS {self.exam_rms_before_dph:.4g} -> {self.exam_rms_after_dph:.4g} deg/h"
+        if self.shown == "loss":
+            return f"On unseen runs the extension does harm: {rms}."
+        if self.shown == "undecided":
+            return f"On unseen runs no gain is shown: {rms}."
+        share = self.share_of_excess_removed
+        amount = "" if share is None else f", {_amount(share)} of the removable error"
+        return f"On unseen runs the extension gains: {rms}{amount}."
 
 
 class WithoutRate(GainOnUnseen):

@@ -38,13 +38,15 @@ from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.signature_bank import direction_of
 from gyrotc.diagnose.single_cycle import CycleFits
 from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis, proportional_map, replaced_map
-from gyrotc.diagnose.summary import VERDICTS, holds, looks_like, next_steps, verdict_of
+from gyrotc.diagnose.summary import VERDICTS, holds, looks_like, next_steps, sentence_of, verdict_of
 from gyrotc.recordings.load import load
 from gyrotc.results.diagnosed import (
     ConsideredCause,
     Diagnosed,
     DiagnosisVerdict,
     Estimate,
+    ExtendedModel,
+    GainOnUnseen,
     NamedCause,
     Unexplained,
 )
@@ -561,7 +563,7 @@ def result(verdict: DiagnosisVerdict) -> Diagnosed:
         gyrotc_version="0.1.0", serial="G1", axis=None, verdict=verdict, block_s=10.0, average_s=100.0,
         noise_floor_dph=1e-3, discrepancies=(), causes=causes, baseline=None, extended=None, considered=considered,
         missing=(), estimated_noise=None, measured_on="exam", single_cycle=None, shipping=None, unexplained=None,
-        text="Finding.", meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], shipped=False)),
+        text="Finding.", meaning=VERDICTS[verdict], next=tuple(next_steps(verdict, causes, ["ageing"], gain=None)),
     )  # fmt: skip
 
 
@@ -574,14 +576,57 @@ def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> N
 
 
 def test_an_ambiguous_verdict_names_the_experiment() -> None:
-    steps = next_steps("ambiguous", result("ambiguous").causes, [], shipped=True)
+    steps = next_steps("ambiguous", result("ambiguous").causes, [], gain=None)
     assert steps == ["To separate them: holds from both sides."]
 
 
 def test_what_no_table_holds_has_its_own_remedy() -> None:
     causes = result("explained").causes
-    assert next_steps("explained", causes, [], shipped=False) == ["Against it: one play operator."]
-    assert "build --extend" in next_steps("explained", causes, [], shipped=True)[0]
+    assert next_steps("explained", causes, [], gain=None) == ["Against it: one play operator."]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown", "said", "step"),
+    [
+        (1.0, 3.0, "gain", "gains: RMS 9 -> 7 deg/h, 40% of the removable error", "gyrotc build --extend"),
+        (-1.0, 3.0, "undecided", "no gain is shown: RMS 9 -> 7 deg/h", "Build without the extension"),
+        (-3.0, -1.0, "loss", "does harm: RMS 9 -> 7 deg/h", "Build without the extension"),
+    ],
+)
+def test_what_is_said_of_a_gain_follows_its_interval(
+    low: float, high: float, shown: str, said: str, step: str
+) -> None:
+    """Both ways: nothing is advised that unseen runs speak against, and a gain is never called none."""
+    gain = gain_on_unseen(low, high)
+    assert gain.shown == shown
+    causes = result("explained").causes
+    extended = ExtendedModel(
+        exam_rms_dph=7.0, centers=4, terms=("hysteresis",), model=None, gain=gain, rate_left_out=None,
+        forward_in_time=None,
+    )  # fmt: skip
+    assert said in sentence_of("explained", causes, extended, "")
+    steps = next_steps("explained", causes, [], gain=gain)
+    assert step in steps[0]
+    assert ("--extend" in " ".join(steps)) == (shown == "gain")
+
+
+@pytest.mark.parametrize(
+    ("low", "said"), [(1.0, "left out in turn do not agree"), (-1.0, "no cause is shown to gain")]
+)
+def test_why_nothing_is_shipped_follows_the_gain_of_the_causes(low: float, said: str) -> None:
+    found = result("explained")
+    [cause] = found.causes
+    causes = (cause.model_copy(update={"gain": gain_on_unseen(low, 3.0)}),)
+    text = "\n".join(diagnosis_lines(found.model_copy(update={"causes": causes})))
+    assert said in text
+
+
+def gain_on_unseen(low: float, high: float) -> GainOnUnseen:
+    return GainOnUnseen(
+        exam_rms_before_dph=9.0, exam_rms_after_dph=7.0, share_of_excess_removed=0.4, low=0.1, high=0.6,
+        rms_removed_dph=Estimate(value=2.0, low=low, high=high), angle_1h_removed_arcsec=None,
+        angle_1h_before_arcsec=None, angle_1h_after_arcsec=None, rms_30min_before_dph=None, rms_30min_after_dph=None,
+    )  # fmt: skip
 
 
 def test_structure_without_a_name_is_described() -> None:
