@@ -102,11 +102,15 @@ def detect(search: Search, held: Held) -> list[Found]:
     columns = search.joined.columns
     projections = [project(search, search.views[k], held) for k in search.allowed]
     own = np.array([score(p, columns, p.a).joined() for p in projections])
-    fits = [
-        _refitted(p, columns, search.views[k], search.y.size)
-        for k, p in zip(search.allowed, projections, strict=True)
-    ]
-    behind = np.max(fits, axis=0) - np.array(fits)
+    fits = np.array(
+        [
+            _refitted(p, columns, search.views[k], search.y.size)
+            for k, p in zip(search.allowed, projections, strict=True)
+        ]
+    )
+    exhausted = np.isnan(fits).any(axis=0)
+    fits[:, exhausted] = 0.0
+    behind = fits.max(axis=0) - fits
     weight = np.exp(-behind)
     weight /= weight.sum(axis=0)
     null = np.sort(draw_null(projections[search.allowed.index(search.best)], columns, _SEED))
@@ -117,12 +121,16 @@ def detect(search: Search, held: Held) -> list[Found]:
         inside = 2.0 * behind <= CHI2_95_TWO
         adjusted = np.where(inside, tail, 0.0).max(axis=0)
         log_p = np.where(inside, own, np.inf).min(axis=0)
+    adjusted[exhausted], log_p[exhausted] = 1.0, 0.0
     order = np.lexsort((-log_p, np.round(adjusted, _PLACES)))
     return [Found(search.joined.owners[i], float(log_p[i]), float(adjusted[i])) for i in order]
 
 
 def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: int) -> FloatArray:
-    """Residual log-likelihood of a colour with map and candidate projected out, for every candidate."""
+    """Residual log-likelihood of a colour with map and candidate projected out, for every candidate.
+
+    nan: map and candidate have as many columns as there are data, which then say nothing about it.
+    """
     gram, a = projection.gram, projection.a * view.scale
     alive, diagonal = projection.alive, np.diag(projection.gram)
     index = columns.single
@@ -131,6 +139,8 @@ def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: 
     freedom = size - projection.rank
     parts = [
         residual_log_likelihood(projection.rest - energy, freedom - 1, projection.log_det + np.log(safe))
+        if freedom > 1
+        else np.full(len(safe), np.nan)
     ]
     for group in (*columns.pairs, *columns.variance):
         values, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
@@ -138,7 +148,9 @@ def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: 
         c = vectors[:, keep].T @ a[group]
         left = projection.rest - float((c**2 / values[keep]).sum())
         log_det = projection.log_det + float(np.log(values[keep]).sum())
-        parts.append(np.array([residual_log_likelihood(left, freedom - int(keep.sum()), log_det)]))
+        remaining = freedom - int(keep.sum())
+        likelihood = residual_log_likelihood(left, remaining, log_det) if remaining > 0 else np.nan
+        parts.append(np.array([likelihood]))
     parts.append(np.array([view.log_likelihood]))
     return np.concatenate(parts)
 

@@ -93,11 +93,16 @@ class Ladder:
             return next(n for n, found in noise.items() if found >= max(noise.values()) - LIKELIER)
         mean = {n: float(self._score(n).mean()) for n in able if n in _SIMPLE}
         name = next(n for n, score in mean.items() if score <= min(mean.values()) + _LEAST)
-        for richer in (n for n in able if n not in _SIMPLE):
-            gains = self._score(name) - self._score(richer)
-            level = _OF_NETWORK if richer == "mrbf" else _OF_STATES
-            name = richer if gains.mean() > _LEAST and surely_above_0(gains, significance=level) else name
-        return name if self.beats_constant(name) else "constant"
+        if "mrbf" in able and self._surely_better("mrbf", name, _OF_NETWORK):
+            name = "mrbf"
+        name = name if self.beats_constant(name) else "constant"
+        for states in (n for n in able if n not in RUNGS):
+            name = states if self._surely_better(states, name, _OF_STATES) else name
+        return name
+
+    def _surely_better(self, name: str, other: str, level: float) -> bool:
+        gains = self._score(other) - self._score(name)
+        return bool(gains.mean() > _LEAST) and surely_above_0(gains, significance=level)
 
     def _rms(self, name: str) -> FloatArray:
         return np.asarray(self.rms_dph[:, self.rungs.index(name)])
