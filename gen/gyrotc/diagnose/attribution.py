@@ -61,6 +61,10 @@ class Attribution:
     probabilities: tuple[dict[str, float], ...] = ()
     wide: WideMemory | None = None
 
+    def without_causes(self) -> Attribution:
+        """The same with nothing named."""
+        return replace(self, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
+
     @property
     def columns(self) -> FloatArray:
         """All columns that stand in the model when the causes are named, shape (N, k)."""

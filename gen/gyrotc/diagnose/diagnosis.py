@@ -23,7 +23,7 @@ from ..train.fitting import HOLD_S, FitOptions, front_end, map_method, model_of,
 from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import records_of
-from .extension import Extension, extend, stand_ins_of
+from .extension import Extension, extend, refittable, stand_ins_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refit import Effect, added_range, play_runs, terms_of
@@ -104,6 +104,8 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         return Diagnosis(not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if is_single_cycle(records) else None
+    if not refittable(dataset, analysis.attribution.causes, chosen):
+        analysis = replace(analysis, attribution=analysis.attribution.without_causes(), separations=())
     named = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = named if cycle is None else cycle.able
     extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)

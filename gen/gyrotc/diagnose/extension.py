@@ -59,6 +59,7 @@ __all__ = [
     "Shipping",
     "extend",
     "folds_of",
+    "refittable",
     "shipping",
     "stand_ins_of",
 ]
@@ -195,6 +196,16 @@ class Refitting:
             masks.append(run.usable & ~hidden)
         rest = self.records.without_rows(masks)
         return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
+
+
+def refittable(dataset: Dataset, causes: Sequence[Refined], options: FitOptions) -> bool:
+    """Whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
+    effects = [effect for effect in map(Effect.of, causes) if effect.term.mended]
+    if not effects:
+        return True
+    runs = [run for run in dataset.runs if run.role == "train"]
+    played = play_runs(dataset, runs, front_end(runs, options.block_s))
+    return all(any(known(run, [effect]).any() for run in played) for effect in effects)
 
 
 def folds_of(refitting: Refitting) -> list[list[BoolArray]]:

@@ -309,7 +309,7 @@ class Cycle:
     def attribution(self, before: Attribution) -> Attribution:
         """The attribution with this cycle's causes in place of those of the search."""
         if self.chosen is None or not self.causes:
-            return replace(before, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
+            return before.without_causes()
         share = 1.0 - (self.chosen.rms_dph / self.rms_dph) ** 2
         count = len(self.causes)
         return replace(

@@ -367,12 +367,42 @@ def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(
     result = diagnosed("mpu6000-chamber-cycle", 3130.0, "x", tmp_path, gyrotc)
     assert result["extended"]["exam_rms_dph"] < 0.5 * STATIC_MAP_DPH
     assert result["extended"]["terms"] == ["thermal_gradient", "thermal_gradient"]
-    assert result["verdict"] == "not_testable", "one cycle does not tell a memory from a static dT/dt"
+    assert result["verdict"] == "ambiguous", (
+        "a static dT/dt explains the cycle as well, unseen branches do not"
+    )
+    assert "equally well: a static dependence on dT/dt" in result["text"]
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "How much can be said" in page and "no memory: products of T and dT/dt" in page
     assert {"warm_up", "turn_on_offset", "ageing"} <= {
         c["id"] for c in result["considered"] if "not_testable" in c
     }
+
+
+def cut_out(folder: Path, source: Path, spans: list[tuple[float, float]]) -> Dataset:
+    """A data set of some spans of a measured recording."""
+    if not source.is_file():
+        pytest.skip(f"{source.parent.name} is absent: see GYROTC_REAL_DATA")
+    (folder / source.name).write_bytes(source.read_bytes())
+    runs = [
+        f'[[run]]\nfile = "{source.name}"\npower_on_s = "unknown"\nfrom_s = {a}\nto_s = {b}\n'
+        for a, b in spans
+    ]
+    (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{"".join(runs)}', "utf-8")
+    return load(folder, axis="x")
+
+
+def test_more_functions_than_means_are_no_fault(tmp_path: Path) -> None:
+    """A ramp of 17 means: a wave beside the map has as many columns, and is not tested."""
+    dataset = cut_out(tmp_path, REAL / "pan-lsm6dsm-cold" / "burst-means.csv", [(0.0, 5000.0)])
+    result = diagnose(dataset, options=FitOptions(average_s=60.0)).result
+    assert all(c.p_value is None or np.isfinite(c.p_value) for c in result.considered)
+
+
+@pytest.mark.slow
+def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
+    """Every second five minutes: a record that is late by more leaves no sample whose input is known."""
+    spans = [(start, start + 300.0) for start in np.arange(1.0, 4246.0, 600.0).tolist()]
+    assert diagnose(cut_out(tmp_path, SOURCE, spans)).result.verdict == "unexplained"
 
 
 @pytest.mark.slow
