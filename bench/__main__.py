@@ -140,6 +140,13 @@ def _formats(docs: Path) -> None:
     write(docs, "formats", formats(_say), section)
 
 
+def _splits(docs: Path, sets: Path) -> None:
+    """Measured gyros with parts of their history left out."""
+    from .splits import write_splits
+
+    write_splits(docs, sets, _say)
+
+
 _PARTS = {"training": _training, "runtime": _runtime, "growth": _growth}
 _ALONE = {
     "raw": _raw,
@@ -160,8 +167,14 @@ _ALONE = {
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench")
     parser.add_argument("docs", type=Path)
-    parser.add_argument("--only", choices=[*_PARTS, *_ALONE])
+    parser.add_argument("--only", choices=[*_PARTS, *_ALONE, "splits"])
+    parser.add_argument("--sets", type=Path, help="for splits: a folder with a folder for each measured set")
     chosen = parser.parse_args()
+    if chosen.only == "splits":
+        if chosen.sets is None or not chosen.sets.is_dir():
+            parser.error("--only splits needs --sets FOLDER, a folder with a folder for each measured set")
+        _splits(chosen.docs, chosen.sets)
+        return
     parts = _PARTS if chosen.only is None else {chosen.only: (_PARTS | _ALONE)[chosen.only]}
     for part in parts.values():
         part(chosen.docs)

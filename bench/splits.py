@@ -8,6 +8,7 @@ in hindsight, which no choice can know.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gyrotc.common.errors import GyrotcError
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.recordings.records import Dataset
 from gyrotc.train.cross_validation import turning_points
@@ -22,6 +24,7 @@ from gyrotc.train.data import TrainingData, average, joined, scaling_of
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.simple import design, solve
 from numpy.typing import NDArray
+from results import table, write
 
 __all__ = ["Judged", "Split", "counts", "judged", "samples", "splits"]
 
@@ -36,7 +39,7 @@ _MIDDLE = (0.4, 0.65)  # shares of the time of a ramp
 _HALVES = (0.33, 0.67)  # shares of the time of a recording at one temperature
 _STILL_C = 2.0  # spans less: nothing is said about temperature
 Say = Callable[[str], None]
-Span = tuple[float, float, bool]  # from, to, whether it is the exam
+Span = tuple[Path, float, float, bool]  # file, from, to, whether it is the exam
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ def splits(sets: Path, work: Path) -> Iterator[Split]:
             yield Split(source.name, left_out, _described(folder, source.name, runs))
 
 
-def _spans(file: Path) -> dict[str, list[tuple[Path, float, float, bool]]]:
+def _spans(file: Path) -> dict[str, list[Span]]:
     """The only recording of a set cut into spans, once for each part that is left out."""
     rows = np.genfromtxt(file, delimiter=",", names=True)
     time, t = rows["time_s"], rows["temperature_c"]
@@ -109,7 +112,7 @@ def _spans(file: Path) -> dict[str, list[tuple[Path, float, float, bool]]]:
     start, end = float(time[0]), float(time[-1]) + step
     turns = turning_points(time, t)
 
-    def cut(*edges: float, held: int) -> list[tuple[Path, float, float, bool]]:
+    def cut(*edges: float, held: int) -> list[Span]:
         return [(file, a, b, k == held) for k, (a, b) in enumerate(pairwise(edges)) if b > a]
 
     def share(x: float) -> float:
@@ -140,7 +143,7 @@ def _spans(file: Path) -> dict[str, list[tuple[Path, float, float, bool]]]:
     return found
 
 
-def _described(folder: Path, serial: str, runs: Sequence[tuple[Path, float, float, bool]]) -> Path:
+def _described(folder: Path, serial: str, runs: Sequence[Span]) -> Path:
     """A data set of copies of files, and what of them is the exam."""
     folder.mkdir(parents=True, exist_ok=True)
     text = [f'schema = 1\nserial = "{serial}"\n']
@@ -209,3 +212,45 @@ def counts(rows: Sequence[Judged]) -> dict[str, Any]:
         "worst_through_richer": float(ratio[~constant].max(initial=1.0)),
         "geometric_mean": float(np.exp(np.log(ratio).mean())),
     }
+
+
+def write_splits(docs: Path, sets: Path, say: Say) -> None:
+    """Judges all splits of the sets in a folder, and keeps the counts and every row."""
+    rows = []
+    with tempfile.TemporaryDirectory() as work:
+        for split in splits(sets, Path(work)):
+            say(f"{split.name} without {split.left_out}")
+            try:
+                rows += list(judged(split))
+            except GyrotcError as refused:
+                say(str(refused))
+    named = [
+        {
+            "set": row.split.name,
+            "left_out": row.split.left_out,
+            "axis": row.axis,
+            "method": row.method,
+            "t": row.t,
+            "rms_dph": row.rms_dph,
+            "trivial_dph": row.trivial_dph,
+        }
+        for row in rows
+    ]
+    write(
+        docs,
+        "splits",
+        {"counts": counts(rows), "rows": named},
+        section,
+        lambda found: {"counts": found["counts"]},
+    )
+
+
+def section(result: dict[str, Any]) -> str:
+    """The counts as a table."""
+    return (
+        "## Measured gyros, parts of their history left out (`python -m bench docs --only splits`)\n\n"
+        + table(
+            ("splits", "count "),
+            [(name.replace("_", " "), f"{count:.4g}") for name, count in result["counts"].items()],
+        )
+    )
