@@ -119,6 +119,13 @@ def _lot_unrelated(docs: Path) -> None:
     write_unrelated(docs)
 
 
+def _planted(docs: Path) -> None:
+    """Faults planted among 300 healthy gyros."""
+    from .planted import write_planted
+
+    write_planted(docs, _say)
+
+
 def _recalibration(docs: Path) -> None:
     """Units that come back, changed in five ways or not at all."""
     from .recalibration import write_recalibration
@@ -159,6 +166,7 @@ _ALONE = {
     "formats": _formats,
     "lot": _lot,
     "lot-speed": _lot_speed,
+    "planted": _planted,
     "recalibration": _recalibration,
     "lot-unrelated": _lot_unrelated,
 }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from recordings import write_csv
 
-__all__ = ["FAULTS", "Lot"]
+__all__ = ["FAULTS", "RUN_FAULTS", "Lot"]
 
 Array = NDArray[np.float64]
 
@@ -23,8 +23,12 @@ FAULTS = (
     "noise",
     "scale",
     "outliers",
+    "warm_up",
+    "thermometer_late",
     "copy_of_other",
 )  # fmt: skip; the copy last, for it takes a unit without fault
+RUN_FAULTS = ("run_reversed", "run_outlier")
+"""What a unit's own runs show, by the rules of `check`; the reason of the first is `sign_reversed`."""
 _ROW_S, _HOURS = 20.0, 2.0
 _NOISE_DPH = 2e-3  # of a row
 _PROGRAMMES = ((-30.0, 60.0), (60.0, -30.0), (20.0, 50.0), (0.0, -25.0), (-10.0, 40.0), (45.0, 5.0))  # C
@@ -98,8 +102,37 @@ class Lot:
         self._all(unit, f"rate_{axis}_dph", lambda rate: rate + more * self.draw.normal(size=rate.size))
 
     def _scale(self, unit: str, axis: str) -> None:
-        factor = self.draw.choice([0.5, 2.0, 3.6, 15.0])
+        factor = self.draw.choice([0.5, 1.5, 2.0, 3.6, 15.0])
         self._all(unit, f"rate_{axis}_dph", lambda rate: factor * rate)
+
+    def _warm_up(self, unit: str, axis: str) -> None:
+        fades = (
+            self.draw.choice([-1.0, 1.0])
+            * self.draw.uniform(2.0, 4.0)
+            * _NOISE_DPH
+            * np.exp(-self.time_s / 900.0)
+        )
+        self._all(unit, f"rate_{axis}_dph", lambda rate: rate + fades)
+
+    def _thermometer_late(self, unit: str, _: str) -> set[str]:
+        share = 1.0 - np.exp(-_ROW_S / self.draw.uniform(200.0, 600.0))
+
+        def late(temperature: Array) -> Array:
+            found = temperature.copy()
+            for k in range(1, found.size):
+                found[k] = found[k - 1] + share * (temperature[k] - found[k - 1])
+            return found + 0.02 * self.draw.normal(size=found.size)
+
+        self._all(unit, "temperature_c", late)
+        return {f"{unit}-{a}" for a in AXES}
+
+    def _run_reversed(self, unit: str, axis: str) -> None:
+        run = self.runs[unit][int(self.draw.integers(len(_PROGRAMMES)))]
+        run[f"rate_{axis}_dph"] = -run[f"rate_{axis}_dph"]
+
+    def _run_outlier(self, unit: str, axis: str) -> None:
+        run = self.runs[unit][int(self.draw.integers(len(_PROGRAMMES)))]
+        run[f"rate_{axis}_dph"] = run[f"rate_{axis}_dph"] + self.draw.choice([-1.0, 1.0]) * 5.0 * _NOISE_DPH
 
     def _outliers(self, unit: str, axis: str) -> None:
         def spoiled(rate: Array) -> Array:

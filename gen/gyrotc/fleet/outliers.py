@@ -27,6 +27,7 @@ __all__ = [
     "FIGURES",
     "FIRST_C",
     "NOISY_RUN",
+    "PROFILE_S",
     "copies",
     "facts_of",
     "mirrored_units",
@@ -92,6 +93,11 @@ NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is wh
 _LEAST_IN_BIN = 3  # means, for a mean of them
 _LEAST_MEANS = 16  # a shorter run does not show a step
 _EDGE = 0.1  # of a run, on either side of which a step is not sought
+_WARM_UP_S, _FADES = (
+    900.0,
+    4.0,
+)  # a quarter of an hour, as of discharges and electronics; and it is over in an hour
+PROFILE_S = 600.0  # s between two temperatures of a run that are compared
 _POINTS = 160  # of the residual that a picture shows
 
 
@@ -120,9 +126,27 @@ def _compared(file: str, a: Averages, step: tuple[int, float, float]) -> Compare
     return ComparedRun(
         file=file,
         mean_c=float(a.temperature_c.mean()),
+        warm_up_dph=_warm_up(a),
+        profile_c=_profile(a),
         noise_dph=_noise(a.after_dph),
         step=LikelyStep(time_s=_edge_s(a, index), size_dph=size, score=score),
     )
+
+
+def _warm_up(a: Averages) -> float:
+    """Amplitude of what fades from the start of a run, beside a constant, deg/h; 0 of a run too short to show it."""
+    age = a.time_s - a.time_s[0]
+    if age[-1] < _FADES * _WARM_UP_S:
+        return 0.0
+    fades = np.exp(-age / _WARM_UP_S)
+    fades -= fades.mean()
+    return float(fades @ a.after_dph / (fades @ fades))
+
+
+def _profile(a: Averages) -> tuple[float, ...]:
+    """Temperature at equal times from the start of a run, C."""
+    at = np.arange(a.time_s[0], a.time_s[-1], PROFILE_S)
+    return tuple(round(float(t), 3) for t in np.interp(at, a.time_s, a.temperature_c))
 
 
 def _series(file: str, a: Averages) -> ResidualSeries:

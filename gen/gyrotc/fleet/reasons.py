@@ -14,7 +14,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
-from .outliers import NOISY_RUN, mirrored_units
+from .outliers import NOISY_RUN, PROFILE_S, mirrored_units
 
 __all__ = ["reasons", "with_reasons"]
 
@@ -24,12 +24,30 @@ _FAR = 5.0  # robust standard deviations beyond which one is an outlier
 _NEAR = 3.0  # and within which a supposed fault must bring it back
 _LEAST_BINS = 4  # cells of 5 C: a shift of a shorter curve is not distinguished from an offset
 _LEAST_SHIFT_C = 1.0  # thermometers of a kind agree to this
-_LEAST_SCALE = 1.5  # factor: less is the scatter of a lot
+_LEAST_SCALE = 1.25  # factor: less is the scatter of a lot
 _LEAST_NOISE = 1.5  # times the usual noise: less is the scatter of a lot
 _LEAST_STEP = 1.6  # times the usual score
 _FAR_LOG = 4.0  # for logarithms of scores and factors, beside a least ratio
 _LEAST_SPIKES = 5  # rows
-_MISMOUNTED = frozenset({"sign_reversed", "axes_exchanged"})
+_LEAST_PROFILE = 6  # temperatures, an hour: fewer do not tell a lag from an offset
+_LEAST_LATE_S = 60.0  # thermometers of a kind are mounted alike
+_LEAST_WARM_UP = 1.0  # times the noise of a mean: four standard deviations of the median over six runs
+_ALIKE = 0.8  # share of the runs in which a warm-up has one sign
+_NOT_CALIBRATED = frozenset({"sign_reversed", "axes_exchanged", "scale", "gain_changed", "warm_up"})
+_OF_RUN = (
+    "sign_reversed",
+    "axes_exchanged",
+    "gain_changed",
+)  # what a run is as a whole comes before what happened in it
+_IN_RUN = (
+    "restart",
+    "step",
+    "step_and_recover",
+    "ramp",
+    "thermometer_jump",
+    "thermometer_lost",
+    "run_outlier",
+)
 _PER_H = 3600.0  # s in an hour
 
 
@@ -80,7 +98,7 @@ def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[
                 found.setdefault(name, _reason(by_name[name], "copy_of_other", text))
     kinds = _kinds(entries)
     mirrored = set(mirrored_units(entries))
-    for reason in (*_exchanged(kinds), *(r for kind in kinds.values() for r in _of_kind(kind))):
+    for reason in (*_exchanged(kinds), *_in_order(entries, list(kinds.values()))):
         found.setdefault(reason.name, reason)
     for entry in entries:
         known = found.get(entry.name)
@@ -97,13 +115,13 @@ def _reason(
 
 
 def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:
-    """The entries with their reasons' words; what is mounting or wiring is a finding too."""
+    """The entries with their reasons' words; that it is not calibrated is a finding too."""
     by_name = {reason.name: reason for reason in named}
     return [_with_reason(entry, by_name[entry.name]) if entry.name in by_name else entry for entry in entries]
 
 
 def _with_reason(entry: FleetEntry, reason: Reason) -> FleetEntry:
-    more = _MISMOUNTED & {reason.id} - set(entry.findings)
+    more = _NOT_CALIBRATED & {reason.id} - set(entry.findings)
     return entry.model_copy(update={"outlier_reason": reason.text, "findings": (*entry.findings, *more)})
 
 
@@ -133,14 +151,68 @@ def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
                     yield _reason(axes[a][0], "axes_exchanged", text)
 
 
-def _of_kind(kind: _Kind) -> Iterator[Reason]:
+def _in_order(entries: Sequence[FleetEntry], kinds: Sequence[_Kind]) -> Iterator[Reason]:
     """In the order of what explains most: a later reason of the same gyro follows from an earlier one."""
-    yield from _thermometers(kind)
-    yield from _mirrored_or_scaled(kind)
-    yield from _spikes(kind)
-    yield from _steps(kind)
-    yield from _noise(kind)
-    yield from _bias_outlier(kind)
+    for rule in (_late, _thermometers, _mirrored_or_scaled):
+        yield from (reason for kind in kinds for reason in rule(kind))
+    yield from _own(entries, _OF_RUN)
+    for rule in (_warm_up, _spikes):
+        yield from (reason for kind in kinds for reason in rule(kind))
+    yield from _own(entries, _IN_RUN)
+    for rule in (_steps, _noise, _bias_outlier):
+        yield from (reason for kind in kinds for reason in rule(kind))
+
+
+def _own(entries: Sequence[FleetEntry], ids: Sequence[str]) -> Iterator[Reason]:
+    """What a gyro's runs show by themselves, by the rules of `check` and `diagnose`."""
+    for entry in entries:
+        known = [event for event in (entry.facts.own if entry.facts else ()) if event.id in ids]
+        if known:
+            first = min(known, key=lambda event: ids.index(event.id))
+            yield _reason(entry, first.id, first.text, first.file, first.time_s)
+
+
+def _late(kind: _Kind) -> Iterator[Reason]:
+    """The programme is the same for all: a thermometer with a bad contact follows it later."""
+    found = np.array([_lateness(kind.facts, k) for k in range(len(kind.facts))])
+    usual, scatter = _usual(found) if np.isfinite(found).any() else (0.0, 0.0)
+    for entry, late in zip(kind.entries, found, strict=True):
+        if abs(late - usual) > max(_FAR * scatter, _LEAST_LATE_S):
+            word = "later" if late > usual else "earlier"
+            text = f"lag: its thermometer follows the programme about {abs(late - usual):.0f} s {word} than the others"
+            yield _reason(entry, "thermometer_late", text)
+
+
+def _lateness(facts: Sequence[Facts], number: int) -> float:
+    """By how much a gyro's temperatures follow the median of all, s: median over runs; NaN where nothing changes."""
+    late = []
+    for k, run in enumerate(facts[number].runs):
+        others = [f.runs[k].profile_c for f in facts if k < len(f.runs)]
+        length = min(len(profile) for profile in others)
+        if length < _LEAST_PROFILE:
+            continue
+        usual = np.median([profile[:length] for profile in others], axis=0)
+        change = np.gradient(usual) / PROFILE_S
+        apart = np.array(run.profile_c[:length]) - usual
+        change, apart = change - change.mean(), apart - apart.mean()
+        if float(np.ptp(usual)) > _LEAST_SHIFT_C and float(change @ change) > 0.0:
+            late.append(-float(change @ apart) / float(change @ change))
+    return float(np.median(late)) if late else float("nan")
+
+
+def _warm_up(kind: _Kind) -> Iterator[Reason]:
+    amplitudes = _run_figures(kind.facts, lambda run: run.warm_up_dph)
+    noise = np.nanmedian(_run_figures(kind.facts, lambda run: run.noise_dph), axis=1)
+    levels = np.nanmedian(amplitudes, axis=1)
+    usual, scatter = _usual(levels)
+    for entry, level, of_runs, sigma in zip(kind.entries, levels, amplitudes, noise, strict=True):
+        one_sign = float(np.nanmean(np.sign(of_runs) == np.sign(level)))
+        if abs(level - usual) > max(_FAR * scatter, _LEAST_WARM_UP * sigma) and one_sign >= _ALIKE:
+            text = (
+                f"warm-up: every run begins about {level:+.2g} deg/h away and settles within an hour; "
+                "gyrotc diagnose measures it, build --extend takes it into the table"
+            )
+            yield _reason(entry, "warm_up", text)
 
 
 def _thermometers(kind: _Kind) -> Iterator[Reason]:

@@ -18,11 +18,12 @@ from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.build import Built, build_into
+from ..quality.sign_and_gain import found_events
 from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
 from ..results.evaluation import Evaluation
-from ..results.fleet import FleetEntry
+from ..results.fleet import Facts, FleetEntry, OwnEvent
 from ..store.cache import inputs_of, program_of
 from ..store.files import Lock, digest_of, json_text, write_atomically
 from ..store.folder import clean, leftovers, result_folder, share_by_hash
@@ -290,11 +291,31 @@ def _entry_of(
             [run.started.date().isoformat() for run in dataset.runs if run.started is not None],
         ),
         rows_left_out=built.evaluation.rows_left_out,
-        facts=facts_of(runs),
+        facts=_facts(dataset, built, runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
         key=key,
     )
     return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry
+
+
+def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> Facts | None:
+    """What the gyro is compared by; where more than noise is left also what its runs show by themselves."""
+    facts = facts_of(runs)
+    if not built.evaluation.structure_left:
+        return facts
+    starts = {run.file: float(run.rows().time_s[0]) for run in dataset.runs}
+    events = [
+        OwnEvent(
+            id=e.id, text=e.text, file=e.file, time_s=None if e.whole_run else e.time_s[0] - starts[e.file]
+        )
+        for e in found_events(dataset)
+    ]
+    named = [
+        OwnEvent(id=f.id, text=f.text, file=str(f.evidence["file"]), time_s=None)
+        for f in built.evaluation.findings
+        if f.id == "run_outlier"
+    ]
+    return facts.model_copy(update={"own": (*events, *named)})
 
 
 def _expanded(evaluation: Evaluation) -> float | None:

@@ -14,7 +14,14 @@ from .display import in_unit, rate_unit
 
 __all__ = ["curves_of_units", "rms_of_units", "why_outlier"]
 
-_IN_TIME = ("step", "outliers", "noise")  # reasons that show over time, not over temperature
+_IN_TIME = (
+    "step",
+    "outliers",
+    "noise",
+    "warm_up",
+    "ramp",
+    "run_outlier",
+)  # reasons that show over time, not over temperature
 _FIRST_C, _BIN_C = -90.0, 5.0  # of the curves of entries
 _SMALL_FLEET = 200  # gyros: beyond it dots are drawn smaller
 _MOST_CURVES = 400  # of an axis: more make one dark area, which the band shows as well

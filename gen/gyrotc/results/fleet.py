@@ -21,6 +21,7 @@ __all__ = [
     "FleetSummary",
     "FleetUnit",
     "LikelyStep",
+    "OwnEvent",
     "Reason",
     "ResidualSeries",
     "Spread",
@@ -81,6 +82,9 @@ BARRING = frozenset(
         "not_of_its_lot",
         "does_not_generalise",
         "shared_axes",
+        "scale",
+        "gain_changed",
+        "warm_up",
     }
 )
 """Findings that say that the recordings are not this gyro's, or that it is not calibrated: no release by itself."""
@@ -114,8 +118,8 @@ class FleetUnit(Part):
     error_bound_dph: Figure = Field(default=None, description="of the tables for any input, deg/h")
     findings: tuple[str, ...] = Field(
         default=(),
-        description="ids of findings; `copy_of_other`, `axes_exchanged` and `sign_reversed` are also those of the "
-        "comparison with the fleet",
+        description="ids of findings; `copy_of_other`, `axes_exchanged`, `sign_reversed`, `scale`, `gain_changed` and "
+        "`warm_up` are also those of the comparison with the fleet",
     )
     model_hash: str | None = Field(default=None, description="hash of the model")
     verdict: Verdict | None = Field(
@@ -165,6 +169,19 @@ class ComparedRun(Part):
     mean_c: float = Field(description="mean temperature, C")
     noise_dph: Amount = Field(description="noise of a mean, deg/h")
     step: LikelyStep = Field(description="its likeliest step, however small")
+    warm_up_dph: float = Field(
+        default=0.0, description="part of what remains that fades with 15 minutes from the start, deg/h"
+    )
+    profile_c: tuple[float, ...] = Field(default=(), description="temperature every 10 minutes, C")
+
+
+class OwnEvent(Part):
+    """What a gyro's recordings show by themselves, by the rules of `check` and `diagnose`."""
+
+    id: str = Field(description="of the event or finding")
+    text: str = Field(description="what it is")
+    file: str | None = Field(description="run in which it is; null: in all")
+    time_s: float | None = Field(description="from the start of that run, s; null: all the time")
 
 
 class ResidualSeries(Part):
@@ -183,6 +200,9 @@ class Facts(Part):
     )
     runs: tuple[ComparedRun, ...] = Field(description="every run")
     series: ResidualSeries | None = Field(description="of the run whose step is the clearest")
+    own: tuple[OwnEvent, ...] = Field(
+        default=(), description="events of its runs; sought where more than noise is left"
+    )
 
 
 class FleetEntry(FleetUnit):
@@ -237,8 +257,9 @@ class Reason(Part):
 
     name: str = Field(description="of the gyro")
     id: str = Field(
-        description="`copy_of_other`, `axes_exchanged`, `thermometer_offset`, `sign_reversed`, `scale`, `outliers`, "
-        "`step`, `noise`, or `bias_outlier` where nothing known explains it"
+        description="`copy_of_other`, `axes_exchanged`, `thermometer_late`, `thermometer_offset`, `sign_reversed`, "
+        "`scale`, `warm_up`, `outliers`, `step`, `noise`, an event of its own runs (`own` of its facts), or "
+        "`bias_outlier` where nothing known explains it"
     )
     text: str = Field(description="the reason in words")
     file: str | None = Field(default=None, description="run in which it shows; null: in all")
