@@ -1,4 +1,4 @@
-"""Thirty faults planted among 330 gyros, through `gyrotc fleet`: which are named, and which healthy ones are accused."""
+"""Faults planted among 300 healthy gyros, through `gyrotc fleet`: which are named, and which healthy ones are accused."""
 
 from __future__ import annotations
 
