@@ -24,7 +24,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.feather
 
-from .common.errors import install_command
+from .common.errors import InputError, install_command
+from .common.texts import file_stem
 from .jobs.build import Built
 from .jobs.build import build as _build
 from .model import Model
@@ -83,6 +84,8 @@ class Dataset(records.Dataset):
             InputError: A column or unit that is not known, or values that contradict their unit.
         """
         runs = {"run": frames} if hasattr(frames, "columns") else dict(frames)
+        if exam is not None and (exam not in runs or len(runs) < 2):
+            raise InputError("exam", repr(exam), f"one of several runs: {', '.join(map(str, runs))}")
         if exam is not None:
             runs |= {exam: runs.pop(exam)}  # the last run is the exam
         stated_units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
@@ -90,8 +93,8 @@ class Dataset(records.Dataset):
         chosen = Map.model_validate({"units": units, "columns": _columns(columns or {})} | stated)
         with ExitStack() as stack:
             scratch = stack.enter_context(scratch_folder())
-            place = Path(folder) if folder is not None else scratch / serial
-            files = [scratch / f"{name}.feather" for name in runs]
+            place = Path(folder) if folder is not None else scratch / "data"
+            files = [scratch / f"{file_stem(str(name))}.feather" for name in runs]
             for file, frame in zip(files, runs.values(), strict=True):
                 pyarrow.feather.write_feather(_table(frame), file)
             import_files(files, place, chosen, ImportOptions(serial=serial, exam=exam is not None))

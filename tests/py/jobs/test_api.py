@@ -44,6 +44,12 @@ def test_a_frame_gives_the_rows_that_it_holds() -> None:
     assert not folder.exists(), "a data set of memory leaves nothing behind"
 
 
+def test_names_of_runs_are_no_paths(tmp_path: Path) -> None:
+    runs = {"../../evil": frame(1), "b": frame(2)}
+    data = gyrotc.Dataset.from_pandas(runs, rate_unit="deg/s", folder=tmp_path / "in" / "R")
+    assert len(data.runs) == 2 and [p.name for p in tmp_path.iterdir()] == ["in"]
+
+
 def test_an_index_of_times_is_the_time(tmp_path: Path) -> None:
     stamped = frame(1)
     stamped.index = pd.Timestamp("2026-03-01T08:00Z") + pd.to_timedelta(stamped.pop("t [s]"), unit="s")
@@ -55,6 +61,8 @@ def test_an_index_of_times_is_the_time(tmp_path: Path) -> None:
 def test_units_and_columns_are_not_guessed() -> None:
     with pytest.raises(InputError, match="temperature"):
         gyrotc.Dataset.from_pandas(frame(1).rename(columns={"T [K]": "x"}), rate_unit="deg/s")
+    with pytest.raises(InputError, match="exam"):
+        gyrotc.Dataset.from_pandas({"a": frame(1)}, rate_unit="deg/s", exam="a")
     with pytest.raises(InputError, match="unit"):
         gyrotc.Dataset.from_pandas(frame(1), rate_unit="furlong")
 
