@@ -19,7 +19,20 @@ import self_test_page  # noqa: E402
 import targets_page  # noqa: E402
 from results import recorded  # noqa: E402
 
-from bench import bounds, budget, faults, fleet, growth, importing, lot_prior, runtime, service, sigma, sizes  # noqa: E402
+from bench import (  # noqa: E402  # noqa: E402
+    bounds,
+    budget,
+    faults,
+    fleet,
+    formats,
+    growth,
+    importing,
+    lot_prior,
+    runtime,
+    service,
+    sigma,
+    sizes,
+)
 from bench import page as bench_page  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
@@ -46,6 +59,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "fleet": fleet.section,
     "catalogue": fleet.catalogue_section,
     "growth": growth.section,
+    "formats": formats.section,
     "import": importing.section,
     "kills": kills.section,
     "mutants": mutants.section,

@@ -30,6 +30,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "faults": (*_RUNTIME, *_TRAIN),
     "fleet": _MANY,
     "growth": _MANY,
+    "formats": ("gen/gyrotc/recordings/importers",),
     "import": ("gen/gyrotc/recordings",),
     "kills": ("gen/gyrotc/store",),
     "lot": ("gen/gyrotc/fleet", "gen/gyrotc/quality"),

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..common.arrays import FloatArray
 from ..common.texts import checked_svg, picture_text, pictures_in_rows
 from .images import Image, image_svg
-from .marks import Mark, mark_svg, sample, text_svg
-from .scales import Scale, power, scale_of
+from .marks import Drawn, mark_svg, sample, text_svg
+from .scales import AxisScale, power, scale_of
 
 __all__ = [
     "ACCENT",
@@ -92,7 +92,7 @@ class Panel:
     y_ticks: Sequence[tuple[float, str]] | None = None
     whole_x: bool = False
     zoom: bool = False
-    marks: list[Mark] = field(default_factory=list)
+    marks: list[Drawn] = field(default_factory=list)
     background: Image | None = None
 
     def line(
@@ -168,7 +168,7 @@ class Panel:
         self, kind: str, x: ArrayLike, y: ArrayLike, color: str, label: str = "", **more: object
     ) -> None:
         at, to = (np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (x, y))
-        self.marks.append(Mark(kind, at, to, color, label, **more))  # type: ignore[arg-type]
+        self.marks.append(Drawn(kind, at, to, color, label, **more))  # type: ignore[arg-type]
 
     def span_of(self, axis: str) -> FloatArray:
         """The numbers that an axis has to hold."""
@@ -257,7 +257,7 @@ def stacked(*pictures: Markup) -> Markup:
     return checked_svg(f"{head}{''.join(parts)}</svg>")
 
 
-def _scales(panels: Sequence[Panel], axis: str, shared: bool) -> list[Scale]:
+def _scales(panels: Sequence[Panel], axis: str, shared: bool) -> list[AxisScale]:
     numbers = [panel.span_of(axis) for panel in panels]
     if shared:
         numbers = [np.concatenate(numbers)] * len(panels)
@@ -273,7 +273,7 @@ def _wide(text: str, size: float = _SMALL) -> float:
     return _WIDE * size * len(text)
 
 
-def _ticks(panel: Panel, scale: Scale, axis: str, length: float) -> list[tuple[float, str]]:
+def _ticks(panel: Panel, scale: AxisScale, axis: str, length: float) -> list[tuple[float, str]]:
     given = panel.x_ticks if axis == "x" else panel.y_ticks
     if given is None:
         return scale.ticks(max(int(length / (55.0 if axis == "x" else 36.0)), 2))
@@ -290,7 +290,7 @@ def _ticks(panel: Panel, scale: Scale, axis: str, length: float) -> list[tuple[f
     return kept
 
 
-def _left(panel: Panel, scale: Scale, height: float) -> float:
+def _left(panel: Panel, scale: AxisScale, height: float) -> float:
     widest = max((_wide(text) for _, text in _ticks(panel, scale, "y", height)), default=0.0)
     return widest + 10.0 + (_LINE + 2.0 if panel.y else 0.0)
 
@@ -306,7 +306,7 @@ def _foot(panel: Panel, numbered: bool) -> float:
 
 def _legend(panels: Sequence[Panel], width: float) -> tuple[str, float]:
     """One entry for each label, in lines from the left; and their height."""
-    entries: dict[str, Mark] = {}
+    entries: dict[str, Drawn] = {}
     for panel in panels:
         for mark in panel.marks:
             if mark.label:
@@ -323,7 +323,13 @@ def _legend(panels: Sequence[Panel], width: float) -> tuple[str, float]:
 
 
 def _panel(
-    panel: Panel, box: tuple[float, float, float, float], xs: Scale, ys: Scale, *, left: bool, bottom: bool
+    panel: Panel,
+    box: tuple[float, float, float, float],
+    xs: AxisScale,
+    ys: AxisScale,
+    *,
+    left: bool,
+    bottom: bool,
 ) -> str:
     x, y, w, h = box
     parts = []
@@ -361,7 +367,7 @@ def _panel(
     return "".join(parts)
 
 
-def _named(words: str, scale: Scale) -> str:
+def _named(words: str, scale: AxisScale) -> str:
     """Words of an axis, with the power of ten of its numbers before the unit."""
     if not scale.exponent:
         return picture_text(words)
@@ -372,7 +378,7 @@ def _named(words: str, scale: Scale) -> str:
 _clips = "gy-clip"
 
 
-def _drawn(panel: Panel, box: tuple[float, float, float, float], xs: Scale, ys: Scale) -> str:
+def _drawn(panel: Panel, box: tuple[float, float, float, float], xs: AxisScale, ys: AxisScale) -> str:
     """The marks, cut off at the axes."""
     x, y, w, h = box
     name = f"{_clips}-{x:.0f}-{y:.0f}-{w:.0f}-{h:.0f}"

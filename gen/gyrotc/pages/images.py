@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from .marks import Box, text_svg
-from .scales import Scale, scale_of
+from .scales import AxisScale, scale_of
 
 __all__ = ["Image", "image_svg"]
 
@@ -57,7 +57,9 @@ def _png(pixels: NDArray[np.uint8]) -> str:
     return "data:image/png;base64," + base64.b64encode(data).decode("ascii")
 
 
-def image_svg(image: Image, box: Box, xs: Scale, ys: Scale, named: Callable[[str, Scale], str]) -> str:
+def image_svg(
+    image: Image, box: Box, xs: AxisScale, ys: AxisScale, named: Callable[[str, AxisScale], str]
+) -> str:
     """The picture and its scale; `named` gives the words of an axis."""
     x, y, w, h = box
     finite = image.values[np.isfinite(image.values)]

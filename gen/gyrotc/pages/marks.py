@@ -11,9 +11,9 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.texts import picture_text
-from .scales import Scale
+from .scales import AxisScale
 
-__all__ = ["Box", "Mark", "mark_svg", "sample", "text_svg"]
+__all__ = ["Box", "Drawn", "mark_svg", "sample", "text_svg"]
 
 Box = tuple[float, float, float, float]
 """Left, top, width and height, points."""
@@ -21,7 +21,7 @@ _MOST = 4000  # points of a line: four for each column of the widest picture, mo
 
 
 @dataclass
-class Mark:
+class Drawn:
     """Something in a panel: its SVG is made when the scales are known."""
 
     kind: str
@@ -36,7 +36,7 @@ class Mark:
     texts: tuple[str, ...] = ()
 
 
-def sample(mark: Mark, x: float, y: float) -> str:
+def sample(mark: Drawn, x: float, y: float) -> str:
     if mark.kind in ("band", "span", "bars"):
         kind = "" if mark.kind == "bars" else ' class="area"'
         return f'<g{kind}><rect class="f-{mark.color}" x="{x:g}" y="{y - 5:g}" width="20" height="10"/></g>'
@@ -47,7 +47,7 @@ def sample(mark: Mark, x: float, y: float) -> str:
     return f'<path d="M{x:g} {y:g}h20" class="s-{mark.color}" stroke-width="{max(mark.width, 1.2):g}"{_dash(mark)}/>'
 
 
-def _dash(mark: Mark) -> str:
+def _dash(mark: Drawn) -> str:
     return f' stroke-dasharray="{mark.dash}"' if mark.dash else ""
 
 
@@ -69,7 +69,7 @@ def text_svg(x: float, y: float, text: str, *, anchor: str = "start", more: str 
     return f'<text x="{x:.1f}" y="{y:.1f}"{where}{more}>{escape(text, quote=False)}</text>'
 
 
-def mark_svg(mark: Mark, box: Box, xs: Scale, ys: Scale) -> str:
+def mark_svg(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale) -> str:
     x0, y0, w, h = box
     x = x0 + w * xs.place(mark.x)
     y = y0 + h * (1.0 - ys.place(mark.y))
@@ -111,10 +111,10 @@ def mark_svg(mark: Mark, box: Box, xs: Scale, ys: Scale) -> str:
 
 
 def _boxes(
-    mark: Mark,
+    mark: Drawn,
     box: Box,
-    xs: Scale,
-    ys: Scale,
+    xs: AxisScale,
+    ys: AxisScale,
     at: tuple[FloatArray, FloatArray],
 ) -> str:
     """Bars, words, and words on squares."""

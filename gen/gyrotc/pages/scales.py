@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 
-__all__ = ["Scale", "is_plain", "power", "scale_of", "significant"]
+__all__ = ["AxisScale", "is_plain", "power", "scale_of", "significant"]
 
 _ROUND = (
     1.0,
@@ -43,7 +43,7 @@ def significant(value: float, digits: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class AxisScale:
     """An axis from `low` to `high`; `exponent`: the power of ten that its numbers are written without.
 
     `linear_to`: 0: a linear axis; infinite: a logarithmic one; else linear up to there on both sides of zero.
@@ -137,7 +137,7 @@ def scale_of(
     margin: float,
     *,
     whole: bool = False,
-) -> Scale:
+) -> AxisScale:
     """The scale of an axis that has to hold these numbers.
 
     Args:
@@ -157,11 +157,11 @@ def scale_of(
         low, high = (low / 2.0, low * 2.0) if logarithmic else (low - around, high + around)
     if logarithmic:
         more = (high / low) ** margin
-        return Scale(
+        return AxisScale(
             low if limits[0] is not None else low / more,
             high if limits[1] is not None else high * more,
             math.inf,
         )
     room = margin * (high - low)
     low, high = low - room * (limits[0] is None), high + room * (limits[1] is None)
-    return Scale(low, high, 0.0 if isinstance(log, bool) else log, whole)
+    return AxisScale(low, high, 0.0 if isinstance(log, bool) else log, whole)

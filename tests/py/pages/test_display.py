@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text
-from gyrotc.pages.scales import Scale, scale_of, significant
+from gyrotc.pages.scales import AxisScale, scale_of, significant
 from gyrotc.pages.words import sci, with_uncertainty, words
 from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
@@ -114,4 +114,4 @@ def test_ticks_are_round_and_lie_on_the_axis() -> None:
         assert len(set(texts)) == len(texts), (low, high, texts)
         log = scale_of(np.array([abs(low), abs(low) + high - low]), (None, None), True, 0.04)
         assert all(log.low * 0.999 <= at <= log.high * 1.001 for at, _ in log.ticks(6))
-    assert Scale(0.0, 1.0).ticks(5)[0] == (0.0, "0.0")
+    assert AxisScale(0.0, 1.0).ticks(5)[0] == (0.0, "0.0")

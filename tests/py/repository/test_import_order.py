@@ -44,7 +44,11 @@ def test_what_stands_beside_the_package_imports_modules_that_are_there() -> None
 
 
 #: Classes that have one name on purpose, with the reason.
-_SAME = {"Points": "target/f32.py and target/q31.py say the same in either arithmetic"}
+_SAME = {
+    "Dataset": "api.py has that of recordings/records.py with what users of Python ask of it besides",
+    "Points": "target/f32.py and target/q31.py say the same in either arithmetic",
+    "Result": "what gyrotc.build gives users of Python, and a file of JSON",
+}
 
 
 def _classes() -> dict[str, list[str]]:
