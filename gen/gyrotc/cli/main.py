@@ -65,6 +65,7 @@ def _kept(number: str, text: str) -> str:
     return "its report could not be written"
 
 
+_LOOP = "Symlink loop"  # what `Path.resolve` says of links that lead to one another, until Python 3.13
 _CLOSED = 128 + 13  # what a shell reports of a program that SIGPIPE ended
 
 
@@ -190,6 +191,11 @@ def run(arguments: list[str]) -> int:
         print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
         return GyrotcError.exit_status
     except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
+        if isinstance(error, RuntimeError) and str(error).startswith(_LOOP):
+            print(
+                f"gyrotc: {terminal_line(str(error))}; expected a path that ends somewhere", file=sys.stderr
+            )
+            return GyrotcError.exit_status
         print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
         return EXIT_STATUS
     return 0

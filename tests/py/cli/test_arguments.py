@@ -157,6 +157,14 @@ def test_any_arguments_end_by_a_known_status(calls: int, place: Path) -> None:
     check()
 
 
+@pytest.mark.parametrize("option", ["--out", "--json"])
+def test_a_loop_of_links_is_one_message(option: str, place: Path) -> None:
+    """Before: `plan ... --out loop` ended with 70; the drawn calls found it."""
+    words = ("emit", "result") if option == "--out" else ("check", "data")
+    done = run_gyrotc(*words, option, "loop")
+    assert done.returncode in (0, 2) and "internal fault" not in done.stderr, done.stderr
+
+
 def _names(count: int) -> list[bytes]:
     names = {
         text.encode("utf-8", "surrogatepass").replace(b"/", b"|").replace(b"\x00", b"")[:200]
