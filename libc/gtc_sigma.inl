@@ -122,15 +122,18 @@ static void FN(uncertainty_input)(STATE *state, const EFFECT *effect, NUM slope)
 
 /* ---- the parts of a variance ------------------------------------------------------------------------- */
 
-/* Of the map where it was asked, from the grid of covered or that of uncovered cells. */
+/* Of the map, from the grid of covered or that of uncovered cells: where it was asked, but with the slope that the
+ * correction should have had, where one is known that is not in it yet. */
 static SQUARE FN(variance_of_map)(const STATE *state)
 {
     const TABLE *const table = state->table;
+    const int is_late = ((state->status & GTC_WARMING) != 0) && (state->uncertainty.slope_known == 2U);
+    const NUM slope = (is_late != 0) ? state->uncertainty.slope : state->uncertainty.input[1];
     uint_least32_t cell[2];
     uint_least32_t index;
     POINT in;
 
-    if (FN(locate)(table, state->uncertainty.input[0], state->uncertainty.input[1], &in) < 0) {
+    if (FN(locate)(table, state->uncertainty.input[0], slope, &in) < 0) {
         return FN(squared)(FN(rule)(table, RULE_NONE));
     }
     FN(cells)(table, &in, table->sigma_cells, cell);

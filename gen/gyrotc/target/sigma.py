@@ -284,7 +284,9 @@ def _rules(table: Table) -> Numbers:
 
 def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
     low, high = table.numbers(table.envelope).reshape(2, 2).T
-    x = np.clip(np.stack([evidence.at, evidence.slope], axis=1), low, high)
+    is_late = ((evidence.status & WARMING) != 0) & evidence.sure
+    slope = np.where(is_late, evidence.drift, evidence.slope)
+    x = np.clip(np.stack([evidence.at, slope], axis=1), low, high)
     if table.numeric == "f32":
         cell = f32.cells(table, f32.normalise(table, x.astype(np.float32)), table.sigma_cells)
     else:
