@@ -425,6 +425,21 @@ TEST(a_table_with_a_lead_looks_a_block_ahead)
     CHECK(same(map_of(C(15.0 + (0.015625 * 13.5) + 0.0625), C(0.0625)), bias_of(&state)));
 }
 
+TEST(a_block_of_one_or_two_samples_counts_with_one)
+{
+    num_t temp = C(15.0);
+    state_t state;
+    int k;
+
+    for (k = 1; k <= 2; k++) {
+        CHECK_INT(GTC_OK, FN(init)(&state, &TABLE, 10000000UL / (uint_least32_t)k));
+        CHECK((ramp(&state, &temp, STEP, 9 * k) & ~GTC_HELD) == GTC_OK);
+    }
+    CHECK_INT(GTC_HELD, missed(&state, 1U));
+    CHECK_INT(GTC_OK, ramp(&state, &temp, STEP, 2));
+    CHECK_INT(GTC_OK, status_of(&state));
+}
+
 /* Whatever a state holds, and whatever the map says. */
 TEST(no_correction_leaves_the_authority)
 {
@@ -623,6 +638,7 @@ TEST(a_state_that_lost_its_times_is_refused_and_ends)
 
 int main(void)
 {
+    RUN(a_block_of_one_or_two_samples_counts_with_one);
     RUN(before_the_first_sample_the_correction_is_zero_and_held);
     RUN(the_first_valid_sample_gives_the_map_at_slope_0);
     RUN(a_correction_is_in_force_for_a_block);

@@ -206,8 +206,8 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define WINDOW_AT 11
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
 #define TERM_AT (INPUT_AT + (13 * (GTC_MAX_TERMS + 1)))
-#define DOUBT_AT (TERM_AT + (2 * GTC_MAX_TERMS))
-#define SHIFT_AT (DOUBT_AT + 11)
+#define UNCERTAINTY_AT (TERM_AT + (2 * GTC_MAX_TERMS))
+#define SHIFT_AT (UNCERTAINTY_AT + 11)
 
 /* CRC of a saved state, bit by bit: over all words before it. */
 static void resealed(gtc_word_t words[WORDS])
@@ -226,15 +226,15 @@ static void resealed(gtc_word_t words[WORDS])
 /* Whoever wrote it: a CRC says nothing of that. */
 TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
 {
-    static const int at[19] = {
+    static const int at[20] = {
         STATUS, STATUS, POSITION, FILLED, ELAPSED, BIAS, WINDOW_AT + 3, INPUT_AT + 4, INPUT_AT + 5, INPUT_AT + 6,
         INPUT_AT + 7, INPUT_AT + 8, INPUT_AT + 9, INPUT_AT + 10, INPUT_AT + 10, INPUT_AT + 7, TERM_AT, TERM_AT + 1,
-        TERM_AT + 1,
+        TERM_AT + 1, TERM_AT,
     };
-    static const uint_least32_t to[19] = {
+    static const uint_least32_t to[20] = {
         0xFFFFFFFFUL, 64UL, 5UL, 5UL, 0x1000000UL, MISSING_BITS, 0x70000000UL, 5UL, 4UL, 4UL,
         0x70000000UL, 0x70000000UL, 0x70000000UL, 0x70000000UL, 0xF0000000UL, MISSING_BITS, 0x70000000UL, 0xF0000000UL,
-        70000UL,
+        70000UL, 0xF0000000UL,
     };
     gtc_word_t words[WORDS];
     gtc_word_t forged[WORDS];
@@ -243,7 +243,7 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
 
     walk(&state, 0, 30);
     saved(&state, words);
-    for (k = 0; k < 19; k++) {
+    for (k = 0; k < 20; k++) {
         memcpy(forged, words, sizeof forged);
         if (at[k] == (TERM_AT + 1)) {
             forged[TERM_AT].bits = 0U;
@@ -266,11 +266,30 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
     CHECK_INT(GTC_OK, restored(&state, words, 0U));
 }
 
-/* What the uncertainty goes by must be numbers and temperatures, the shift what the table grants. */
+/* 0 stands for a number of a channel that has none yet, whatever its range is. */
+TEST(a_state_of_a_range_below_0_is_restored)
+{
+    gtc_word_t guard[GTC_GUARD_WORDS];
+    gtc_word_t words[WORDS];
+    table_t table = TABLE;
+    state_t state;
+
+    memcpy(guard, TABLE.guards, sizeof guard);
+    NUMBER(guard[1]) = C(-1.0);
+    table.guards = guard;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&state, &table, PERIOD, words, 0U));
+    CHECK_INT(GTC_WARMING, feed(&state, C(-2.0), 9));
+    CHECK_INT(GTC_OK, FN(save)(&state, words));
+    CHECK_INT(GTC_OK, FN(restore)(&state, &table, PERIOD, words, 0U));
+}
+
+/* What the uncertainty is computed from must be numbers and temperatures, the shift what the table grants. */
 TEST(uncertainties_that_no_call_leaves_are_refused_with_a_right_crc)
 {
     static const int at[11] = {
-        DOUBT_AT, DOUBT_AT + 1, DOUBT_AT + 2, DOUBT_AT + 3, DOUBT_AT + 4, DOUBT_AT + 5, DOUBT_AT + 6, DOUBT_AT + 7,
+        UNCERTAINTY_AT, UNCERTAINTY_AT + 1, UNCERTAINTY_AT + 2, UNCERTAINTY_AT + 3, UNCERTAINTY_AT + 4, UNCERTAINTY_AT + 5, UNCERTAINTY_AT + 6, UNCERTAINTY_AT + 7,
         SHIFT_AT, SHIFT_AT, SHIFT_AT + 1,
     };
     static const uint_least32_t to[11] = {
@@ -317,6 +336,7 @@ TEST(bad_arguments_are_refused)
 
 int main(void)
 {
+    RUN(a_state_of_a_range_below_0_is_restored);
     RUN(a_restored_state_goes_on_as_if_nothing_had_happened);
     RUN(a_saved_state_is_the_same_words_again);
     RUN(after_a_time_without_power_the_window_starts_again);
