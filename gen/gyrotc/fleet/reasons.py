@@ -156,10 +156,12 @@ def _in_order(entries: Sequence[FleetEntry], kinds: Sequence[_Kind]) -> Iterator
     for rule in (_late, _thermometers, _mirrored_or_scaled):
         yield from (reason for kind in kinds for reason in rule(kind))
     yield from _own(entries, _OF_RUN)
-    for rule in (_warm_up, _spikes):
+    for rule in (_spikes, _warm_up):
         yield from (reason for kind in kinds for reason in rule(kind))
     yield from _own(entries, _IN_RUN)
-    for rule in (_steps, _noise, _bias_outlier):
+    yield from (reason for kind in kinds for reason in _steps(kind))
+    yield from _own(entries, ("run_outlier",))  # a run with a step lies off, too
+    for rule in (_noise, _bias_outlier):
         yield from (reason for kind in kinds for reason in rule(kind))
 
 
