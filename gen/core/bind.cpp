@@ -144,6 +144,7 @@ NB_MODULE(_core, m) {
             "t"_a, "r"_a, "weight"_a, "target"_a, "ridge"_a)
         .def("project", &VariableProjection::project, "shapes"_a)
         .def("gradient", &VariableProjection::gradient, "network"_a)
+        .def("losses", nb::overload_cast<const Shapes &>(&VariableProjection::losses, nb::const_), "shapes"_a)
         .def("refine", &VariableProjection::refine, "start"_a, "tolerance"_a, "max_steps"_a)
         .def("path", &VariableProjection::path, "centers"_a, "max_size"_a, "enough"_a, "settled"_a,
              "tolerance"_a);

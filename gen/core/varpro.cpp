@@ -27,6 +27,7 @@ constexpr double kWidthsR[] = {0.1, 0.25, 0.6, 1.2, 3.0};
 constexpr int kMaxRefineSteps = 40;  // bounds the time; the tolerance ends a refinement before
 constexpr double kRelativeTolerance = 0.01;  // a step that gains less of the objective ends the refinement
 constexpr int kExactGains = 200;  // of so many candidates the gain is computed exactly
+constexpr int kExactDeletions = 4;  // of so many, the cheapest, the loss is computed exactly: two are tried
 
 double beyond(double x, int k) { return x < kLow[k] ? x - kLow[k] : x > kHigh[k] ? x - kHigh[k] : 0.0; }
 
@@ -136,17 +137,21 @@ double VariableProjection::walls(const Shapes &shapes) const {
     return sum;
 }
 
-Network VariableProjection::project(const Shapes &shapes) const {
-    const MatrixXd x = columns(shapes);
-    Network n;
+VariableProjection::Projection VariableProjection::projection(const Shapes &shapes) const {
+    Projection p;
+    p.columns = columns(shapes);
+    p.factor = factorise(normal_matrix(p.columns, ridge_));
+    Network &n = p.network;
     n.shapes = shapes;
-    n.weights = factorise(normal_matrix(x, ridge_)).solve(x.transpose() * target_);
-    n.misfit = (target_ - x * n.weights).squaredNorm();
+    n.weights = p.factor.solve(p.columns.transpose() * target_);
+    n.misfit = (target_ - p.columns * n.weights).squaredNorm();
     n.cost = n.misfit + ridge_ * n.weights.tail(shapes.cols()).squaredNorm();
     n.cost += walls(shapes);
     if (!std::isfinite(n.cost)) n.cost = std::numeric_limits<double>::infinity();
-    return n;
+    return p;
 }
+
+Network VariableProjection::project(const Shapes &shapes) const { return projection(shapes).network; }
 
 namespace {
 
@@ -179,19 +184,22 @@ Shapes VariableProjection::gradient(const Network &network) const {
 }
 
 Network VariableProjection::refine(const Network &start, double tolerance, int max_steps) const {
-    Network best = start;
-    const Eigen::Index m = start.shapes.cols();
-    if (m == 0) return best;
+    return start.shapes.cols() ? refined(projection(start.shapes), tolerance, max_steps) : start;
+}
+
+Network VariableProjection::refined(Projection at, double tolerance, int max_steps) const {
+    const Eigen::Index m = at.network.shapes.cols();
     double damping = 1e-3;
     for (int step = 0; step < max_steps; ++step) {
-        const MatrixXd x = columns(best.shapes);
+        const MatrixXd &x = at.columns;
+        const Network &best = at.network;
         const MatrixXd d = derivatives(t_, r_, x, best);
         const VectorXd residual = target_ - x * best.weights;
         const MatrixXd cross = x.transpose() * d;
         VectorXd down = d.transpose() * residual;
         MatrixXd h = MatrixXd::Zero(d.cols(), d.cols());
         h.selfadjointView<Eigen::Lower>().rankUpdate(d.transpose());
-        const MatrixXd projected = factorise(normal_matrix(x, ridge_)).matrixL().solve(cross);
+        const MatrixXd projected = at.factor.matrixL().solve(cross);
         h.selfadjointView<Eigen::Lower>().rankUpdate(projected.transpose(), -1.0);
         for (Eigen::Index i = 0; i < h.rows(); ++i) {
             const double b = beyond(best.shapes(i % kNonlinear, i / kNonlinear), static_cast<int>(i % kNonlinear));
@@ -206,18 +214,21 @@ Network VariableProjection::refine(const Network &start, double tolerance, int m
             damped.diagonal() += damping * diagonal;
             const VectorXd move = factorise(damped).solve(down).cwiseMax(-0.7).cwiseMin(0.7);
             const Shapes shapes = best.shapes + Eigen::Map<const Shapes>(move.data(), kNonlinear, m);
-            Network trial = project(shapes);
-            if (trial.cost < best.cost) {
-                gained = best.cost - trial.cost;
-                best = std::move(trial);
-                damping = std::max(damping * 0.2, 1e-7);
-                break;
+            // Walls are a part of the cost: a trial that runs into them so far needs no projection.
+            if (walls(shapes) < best.cost) {
+                Projection trial = projection(shapes);
+                if (trial.network.cost < best.cost) {
+                    gained = best.cost - trial.network.cost;
+                    at = std::move(trial);
+                    damping = std::max(damping * 0.2, 1e-7);
+                    break;
+                }
             }
             damping *= 5.0;
         }
-        if (gained <= std::max(tolerance, kRelativeTolerance * best.cost)) break;
+        if (gained <= std::max(tolerance, kRelativeTolerance * at.network.cost)) break;
     }
-    return best;
+    return at.network;
 }
 
 namespace {
@@ -363,24 +374,42 @@ class VariableProjection::Appended {
 // The better of two trials: the candidate with the largest gain, and the best one far from it.
 Network VariableProjection::grow(const Network &network, const Dictionary &candidates, double tolerance) const {
     const auto [first, second] = best_two(gains(network, candidates), candidates.shapes);
-    Network best = refine(project(with(network.shapes, candidates.shapes.col(first))), tolerance, kMaxRefineSteps);
+    Network best = refined(projection(with(network.shapes, candidates.shapes.col(first))), tolerance, kMaxRefineSteps);
     if (second >= 0) {
         const Shapes shapes = with(network.shapes, candidates.shapes.col(second));
-        Network other = refine(project(shapes), tolerance, kMaxRefineSteps);
+        Network other = refined(projection(shapes), tolerance, kMaxRefineSteps);
         if (other.cost < best.cost) best = std::move(other);
     }
     return best;
 }
 
+// What the objective rises by when a Gaussian is deleted and all weights are fitted anew: w^2 over its entry in the
+// inverse of the normal matrix.
+VectorXd VariableProjection::losses(const Projection &whole) const {
+    const Shapes &shapes = whole.network.shapes;
+    const Eigen::Index m = shapes.cols(), k = kLinear + m;
+    const MatrixXd inverse = whole.factor.matrixL().solve(MatrixXd::Identity(k, k));
+    VectorXd loss = whole.network.weights.tail(m).cwiseAbs2().cwiseQuotient(
+        inverse.rightCols(m).colwise().squaredNorm().transpose());
+    for (Eigen::Index j = 0; j < m; ++j) loss[j] -= walls(shapes.col(j));
+    return loss;
+}
+
 // The best of the two cheapest deletions.
 Network VariableProjection::prune(const Network &network, double tolerance) const {
-    const Eigen::Index m = network.shapes.cols();
-    std::vector<Network> trials;
-    for (Eigen::Index j = 0; j < m; ++j) trials.push_back(project(without(network.shapes, j)));
-    std::stable_sort(trials.begin(), trials.end(), [](const Network &a, const Network &b) { return a.cost < b.cost; });
-    Network best = refine(trials[0], tolerance, kMaxRefineSteps);
-    if (m > 1) {
-        Network other = refine(trials[1], tolerance, kMaxRefineSteps);
+    const VectorXd loss = losses(projection(network.shapes));
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(loss.size()));
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return loss[a] < loss[b]; });
+    order.resize(std::min<std::size_t>(order.size(), kExactDeletions));
+    std::sort(order.begin(), order.end());
+    std::vector<Projection> trials;
+    for (const Eigen::Index j : order) trials.push_back(projection(without(network.shapes, j)));
+    std::stable_sort(trials.begin(), trials.end(),
+                     [](const Projection &a, const Projection &b) { return a.network.cost < b.network.cost; });
+    Network best = refined(std::move(trials[0]), tolerance, kMaxRefineSteps);
+    if (trials.size() > 1) {
+        Network other = refined(std::move(trials[1]), tolerance, kMaxRefineSteps);
         if (other.cost < best.cost) best = std::move(other);
     }
     return best;

@@ -42,6 +42,9 @@ class VariableProjection {
     // Gradient of the objective, kNonlinear x M, at a projected network.
     Shapes gradient(const Network &network) const;
 
+    // What the objective of a projected network rises by when each Gaussian is deleted and all weights are fitted anew.
+    Eigen::VectorXd losses(const Shapes &shapes) const { return losses(projection(shapes)); }
+
     // Levenberg-Marquardt from `start`, until a step gains less than `tolerance` or 1 %. Never worse than the start.
     Network refine(const Network &start, double tolerance, int max_steps) const;
 
@@ -60,6 +63,16 @@ class VariableProjection {
         Eigen::VectorXd norms;  // squared
     };
 
+    // A network with its columns and the Cholesky factor of their normal matrix, from which the next step starts.
+    struct Projection {
+        Network network;
+        Eigen::MatrixXd columns;
+        Eigen::LLT<Eigen::MatrixXd> factor;
+    };
+
+    Projection projection(const Shapes &shapes) const;
+    Network refined(Projection at, double tolerance, int max_steps) const;
+    Eigen::VectorXd losses(const Projection &whole) const;
     Eigen::MatrixXd gaussians(const Shapes &shapes) const;
     Eigen::MatrixXd dictionary_columns(const Eigen::MatrixXd &centers) const;
     Eigen::MatrixXd columns(const Shapes &shapes) const;

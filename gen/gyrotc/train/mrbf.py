@@ -242,7 +242,7 @@ def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatAr
 
 MAX_CENTERS = 24  # bounds the time of a fit, and its table at 504 bytes
 _DEPARTURE = 0.1  # of the expected squared error: docs/training.md, section 1, step 5
-_SETTLED = 0.01  # of a misfit that is small enough: refining stops there, because no choice depends on less
+_SETTLED = 0.02  # of a misfit that is small enough: refining stops there, because no choice depends on less
 _RIDGE = 0.01  # of the noise variance: it bounds the weights (docs/training.md, section 1)
 _KOHONEN_NODES = 40  # candidates: docs/training.md, section 1, step 3
 _GAP_GRID = (17, 9)  # points of T and of dT/dt over the envelope

@@ -68,6 +68,19 @@ def test_projected_weights_are_ridge_regression(seed: int) -> None:
     assert found.cost == pytest.approx(found.misfit + 0.3 * float(np.sum(w[3:] ** 2)), rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_loss_of_a_deletion_is_that_of_a_projection_without_it(seed: int) -> None:
+    """Also of a Gaussian beyond the walls, whose price goes with it, and of two that nearly coincide."""
+    t, r, weight = points(seed)
+    solver = _core.VariableProjection(t, r, weight, np.sin(3.0 * t) + r * t, 0.1)
+    shapes = shapes_of(
+        (-0.5, 0.2, 0.4, 0.8), (-0.5, 0.21, 0.4, 0.8), (0.6, -0.3, 0.3, 1.5), (1.4, 0.1, 0.5, 0.9)
+    )
+    whole = solver.project(shapes).cost
+    exact = [solver.project(np.delete(shapes, j, axis=1)).cost - whole for j in range(4)]
+    np.testing.assert_allclose(solver.losses(shapes), exact, rtol=1e-6, atol=1e-9 * whole)
+
+
 def test_true_centers_and_widths_are_recovered() -> None:
     t, r, weight = points(2)
     truth = shapes_of((-0.6, 0.1, 0.35, 0.7), (0.5, -0.4, 0.5, 0.9))
