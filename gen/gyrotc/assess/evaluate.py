@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..common.arrays import FloatArray, Progress
+from ..common.arrays import Progress
 from ..common.errors import CheckFailed, GyrotcError
-from ..common.metrics import Averages, average, statistics, time_statistics
-from ..common.texts import file_stem
+from ..common.metrics import Averager, Averages, statistics, time_statistics
 from ..model import Model, load_model
 from ..quality.facts import RunFacts, facts_of
 from ..quality.outliers import departing_rows
@@ -39,38 +36,38 @@ from ..results.evaluation import (
 )
 from ..results.training import Training
 from ..simulate.truth import simulated_floor
-from ..store.files import create
 from ..tables.emit import emitted_tables
-from ..target.table import Table
+from ..target.history import Replay
+from ..target.table import Table, Words
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
 from .residual import residual_test
 from .residuals import residual_findings
-from .uncertainties import figure_uncertainties, root_mean, squares_of
+from .trace import trace_at, trace_name
+from .uncertainties import figure_uncertainties, root_mean, squares_in_all, squares_of
 
 __all__ = [
-    "ReplayedRun",
+    "ReplayedRows",
     "Watch",
     "evaluate",
-    "trace_name",
 ]
 
 Watch = Callable[[Run, Averages], None]
 _HOST = "host-gcc-O2"
-_TRACE_ROWS = 2**16  # written at once
-_TRACE_COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
 
 
 @dataclass(frozen=True, slots=True)
-class ReplayedRun:
-    """One run replayed, every row of the file.
+class ReplayedRows:
+    """Some rows of a run replayed.
 
-    Correction in force (deg/h), status bits, whether the row is judged (its block is valid, and a correction has been
-    made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None: none is stated).
+    Which rows of the file; correction in force (deg/h), status bits, whether the row is judged (its block is valid, and
+    a correction has been made), number of differing steps (None: not compared), 1 sigma of the correction (deg/h; None:
+    none is stated).
     """
 
+    rows: slice
     bias_dph: NDArray[np.float64]
     status: NDArray[np.int32]
     scored: NDArray[np.bool_]
@@ -234,25 +231,28 @@ def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> It
 
 def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
-) -> ReplayedRun:
-    """Feeds all rows of a file to the compiled code and to the reference, and compares every step."""
+) -> Iterator[ReplayedRows]:
+    """Feeds all rows of a file to the compiled code and to the reference, and compares every step; part by part."""
     history = history_of(rows, run, model, table)
-    known = history.reference
-    scored = known.block_valid & known.begun
-    sigma = None if known.sigma is None else table.decode_bias(known.sigma)
     if program is None:
-        return ReplayedRun(table.decode_bias(known.bits), known.status, scored, None, sigma)
+        for part in history.parts():
+            known = history.reference.rows(part)
+            yield _replayed(part, known, known.bits, known.status, None, table)
+        return
     try:
-        replayed = replay_on(*program, history)
+        for replayed in replay_on(*program, history):
+            yield _replayed(
+                replayed.rows, replayed.reference, replayed.bits, replayed.status, replayed.wrong.size, table
+            )
     except CheckFailed as error:
         raise CheckFailed(f"{run.file}: {error}") from error
-    return ReplayedRun(
-        bias_dph=table.decode_bias(replayed.bits),
-        status=replayed.status,
-        scored=scored,
-        mismatches=replayed.mismatches,
-        sigma_dph=sigma,
-    )
+
+
+def _replayed(
+    rows: slice, known: Replay, bits: Words, status: NDArray[np.int32], wrong: int | None, table: Table
+) -> ReplayedRows:
+    sigma = None if known.sigma is None else table.decode_bias(known.sigma)
+    return ReplayedRows(rows, table.decode_bias(bits), status, known.block_valid & known.begun, wrong, sigma)
 
 
 def _one_run(
@@ -267,77 +267,35 @@ def _one_run(
     all_runs: Sequence[Run],
 ) -> _Part:
     rows = run.rows()
-    replayed = replay_run(rows, run, model, table, program)
     inside = run.in_span(rows.time_s)
-    span = slice(None) if inside.all() else inside  # no copies of a whole file
-    averages = average(
-        rows.time_s[span],
-        rows.temperature_c[span],
-        rows.rate_dph[span],
-        (rows.rate_dph - replayed.bias_dph)[span],
-        scored=replayed.scored[span],
-        average_s=average_s,
-    )
-    if trace is not None:
-        each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
-        _write_trace(trace / trace_name(run, all_runs), rows, replayed, span, each)
+    times = rows.time_s if inside.all() else rows.time_s[inside]
+    averager = Averager(times, average_s)
     wild = departing_rows(rows, run, max(round(model.block_s / run.row_period_s), 1))
-    robust = averages
-    if wild.size:
-        kept = replayed.scored.copy()
-        kept[wild] = False
-        robust = average(
-            rows.time_s[span],
-            rows.temperature_c[span],
-            rows.rate_dph[span],
-            (rows.rate_dph - replayed.bias_dph)[span],
-            scored=kept[span],
-            average_s=average_s,
-        )
-    plain = (replayed.status[span] == 0) & replayed.scored[span]
-    squares = squares_of(None if replayed.sigma_dph is None else replayed.sigma_dph[span][plain])
-    return _Part(run, averages, replayed.mismatches, facts_of(run, rows), squares, robust, int(wild.size))
-
-
-def trace_name(run: Run, all_runs: Sequence[Run]) -> str:
-    """Name of a run's trace: the file's stem, its start where runs share a file, its folders where stems collide."""
-    stem = Path(run.file).stem
-    if any(Path(r.file).stem == stem and r.file != run.file for r in all_runs):
-        stem = run.file.replace("/", "_")
-    shared = sum(r.file == run.file for r in all_runs) > 1
-    return file_stem(stem) + (f"@{run.from_s or 0.0:g}" if shared else "") + ".csv"
-
-
-def _write_trace(
-    path: Path, rows: Rows, replayed: ReplayedRun, span: slice | NDArray[np.bool_], each: int
-) -> None:
-    """Writes means of every `each` rows of a span; those of rows with a rate, where there is one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    columns = (rows.time_s[span], rows.temperature_c[span], rows.rate_dph[span], replayed.bias_dph[span])
-    status = replayed.status[span]
-    options = pacsv.WriteOptions(include_header=False, quoting_style="none")
-    part = path.with_name(f".{path.name}.part")
-    step = each * max(1, _TRACE_ROWS // each)
-    with create(part) as stream:
-        stream.write((",".join(_TRACE_COLUMNS) + "\n").encode("ascii"))
-        for start in range(0, status.size, step):
-            k = slice(start, start + step)
-            time, temperature, rate, bias = _means([values[k] for values in columns], each)
-            bits = np.bitwise_or.reduceat(status[k], np.arange(0, status[k].size, each))
-            written = (time, temperature, rate, bias, rate - bias, bits)
-            pacsv.write_csv(pa.table(dict(zip(_TRACE_COLUMNS, written, strict=True))), stream, options)
-    part.replace(path)
-
-
-def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:
-    """Means of every `each` rows of columns, of which the third counts most: rows in which it is NaN do not."""
-    if each == 1:
-        return columns
-    starts = np.arange(0, columns[0].size, each)
-    known = np.isfinite(columns[2])
-    used = known | np.repeat(np.add.reduceat(known, starts, dtype=np.int64) == 0, each)[: known.size]
-    count = np.add.reduceat(used, starts, dtype=np.int64)
-    return [np.add.reduceat(np.where(used, values, 0.0), starts) / count for values in columns]
+    robust = Averager(times, average_s) if wild.size else averager
+    each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
+    squares: list[tuple[float, int]] = []
+    wrong: int | None = None
+    path = trace / trace_name(run, all_runs) if trace is not None else None
+    with trace_at(path, each) if path else nullcontext() as written:
+        for part in replay_run(rows, run, model, table, program):
+            span = inside[part.rows]
+            time, temperature, rate = (
+                column[part.rows][span] for column in (rows.time_s, rows.temperature_c, rows.rate_dph)
+            )
+            bias, status, scored = part.bias_dph[span], part.status[span], part.scored[span]
+            averager.add(time, temperature, rate, rate - bias, scored)
+            if robust is not averager:
+                kept = part.scored.copy()
+                first, after = np.searchsorted(wild, (part.rows.start, part.rows.stop))
+                kept[wild[first:after] - part.rows.start] = False
+                robust.add(time, temperature, rate, rate - bias, kept[span])
+            if written:
+                written((time, temperature, rate, bias), status)
+            plain = (status == 0) & scored
+            squares.append(squares_of(None if part.sigma_dph is None else part.sigma_dph[span][plain]))
+            wrong = None if part.mismatches is None else (wrong or 0) + part.mismatches
+    facts, together = facts_of(run, rows), squares_in_all(squares)
+    return _Part(run, averager.averages(), wrong, facts, together, robust.averages(), int(wild.size))
 
 
 def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:

@@ -18,7 +18,7 @@ from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from ..results.evaluation import EvaluatedRun, FigureUncertainty
 
-__all__ = ["figure_uncertainties", "root_mean", "squares_of"]
+__all__ = ["figure_uncertainties", "root_mean", "squares_in_all", "squares_of"]
 
 _BLOCK_S = (
     7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
@@ -67,6 +67,12 @@ def figure_uncertainties(
 def squares_of(sigma_dph: FloatArray | None) -> tuple[float, int]:
     """Sum of squares and number of the 1 sigma of corrections; nothing where a table states none."""
     return (0.0, 0) if sigma_dph is None else (float(np.sum(sigma_dph**2)), sigma_dph.size)
+
+
+def squares_in_all(squares: Iterable[tuple[float, int]]) -> tuple[float, int]:
+    """Several such sums together."""
+    totals, numbers = zip(*squares, strict=True)
+    return float(sum(totals)), int(sum(numbers))
 
 
 def root_mean(squares: Iterable[tuple[float, int]]) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import logging
 import os
@@ -78,6 +79,7 @@ def main() -> None:
     _open_closed_streams()
     _quiet_start()
     _single_threaded()
+    _returning_columns()
     _without_warnings()
     from ..store.interrupts import Interrupted, die_of, raise_on_signals
 
@@ -89,6 +91,21 @@ def main() -> None:
             print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
         die_of(end.number)
     os._exit(status)
+
+
+_COLUMN_BYTES = 2**23  # of a recording of 1e6 rows; what is done part by part stays below
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # names of glibc's mallopt
+
+
+def _returning_columns() -> None:
+    """Columns of long recordings go back to the system when they are freed, where the C library is glibc.
+
+    Left to itself it keeps what was freed of up to 32 MiB, and soon as much again as is in use.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, _COLUMN_BYTES)
+        mallopt(_TRIM_THRESHOLD, 4 * _COLUMN_BYTES)
 
 
 def _open_closed_streams() -> None:

@@ -6,6 +6,8 @@ with ddof 0; pooled figures are over all averaged samples.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
@@ -19,10 +21,14 @@ from .inputs import need_memory
 __all__ = [
     "LEAST_SPAN_C",
     "MAD_TO_SIGMA",
+    "Averager",
     "Averages",
+    "Parts",
     "average",
     "median",
+    "median_of_parts",
     "middle_of_five",
+    "quantile_of_parts",
     "statistics",
     "time_statistics",
 ]
@@ -37,7 +43,7 @@ LEAST_SPAN_C = 2.0
 _HALF_HOUR_S = 1800.0  # the name of the figure says it
 _HOUR_S = 3600.0  # the name of the figure says it
 _FIRST_S = 600.0  # ten minutes: the name of the figure says it
-_BIN_BYTES = 24  # of a mean while it is made: its count, its number and a sum
+_BIN_BYTES = 40  # of a mean while it is made: its count and four sums
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +67,74 @@ def median(values: NDArray[Any], overwrite_input: bool = False) -> float:
     return float((ordered[middle - 1] + ordered[middle]) / 2)
 
 
+Parts = Callable[[], Iterable[FloatArray]]
+"""Numbers part by part, each time they are asked for: arrays of float64, none of them negative or NaN."""
+
+_TOGETHER = 2**18  # numbers that are put in order at once: 2 MiB
+_DIGIT_BITS = 16  # of a float64: its numbers are in the order of their bits, so four digits find one
+
+
+def median_of_parts(parts: Parts) -> float:
+    """`median` of numbers that do not fit in memory together, to the bit."""
+    return sum(_middle(parts, lambda count: ((count - 1) // 2, count // 2))) / 2
+
+
+def quantile_of_parts(parts: Parts, share: float) -> float:
+    """`np.quantile` of numbers that do not fit in memory together, to the bit."""
+    fraction = 0.0
+
+    def ranks(count: int) -> tuple[int, int]:
+        nonlocal fraction
+        fraction, at = math.modf((count - 1) * share)
+        return int(at), min(int(at) + 1, count - 1)
+
+    return float(np.quantile(_middle(parts, ranks), fraction))
+
+
+def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
+    """The numbers of two ranks that follow each other (or are one), counted from 0, by digits of their bits."""
+    together: list[FloatArray] = []
+    for part in parts():
+        together.append(part)
+        if sum(map(len, together)) > _TOGETHER:
+            return _far_apart(parts, ranks_of)
+    few = np.concatenate(together)
+    few.partition(ranks := ranks_of(few.size))
+    return float(few[ranks[0]]), float(few[ranks[1]])
+
+
+def _far_apart(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
+    """As `_middle`, of many: counts their leading digits, goes on with those that have the digits of the ranks."""
+    prefix, below, ranks = 0, 0, None
+    for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):
+
+        def digits(
+            shift: int = shift, prefix: int = prefix
+        ) -> Iterable[tuple[FloatArray, NDArray[np.int64]]]:
+            for part in parts():
+                known = np.ascontiguousarray(part).view(np.int64) >> shift
+                mine = (known >> _DIGIT_BITS) == prefix
+                yield part[mine], known[mine] & (2**_DIGIT_BITS - 1)
+
+        count = np.zeros(2**_DIGIT_BITS, dtype=np.int64)
+        for _, digit in digits():
+            count += np.bincount(digit, minlength=count.size)
+        ends = below + np.cumsum(count)
+        ranks = ranks or ranks_of(int(ends[-1]))
+        first, last = np.searchsorted(ends, ranks, side="right").tolist()
+        below = int(ends[first] - count[first])
+        if first != last:  # so the one is the largest with its digit, the other the smallest
+            return (
+                max(float(part[digit == first].max(initial=0.0)) for part, digit in digits()),
+                min(float(part[digit == last].min(initial=np.inf)) for part, digit in digits()),
+            )
+        if count[first] <= _TOGETHER:
+            few = np.sort(np.concatenate([part[digit == first] for part, digit in digits()]))
+            return float(few[ranks[0] - below]), float(few[ranks[1] - below])
+        prefix = prefix << _DIGIT_BITS | first
+    return (float(np.int64(prefix).view(np.float64)),) * 2
+
+
 def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e: FloatArray) -> FloatArray:
     """Median of each five numbers, none of them NaN; arrays of one shape."""
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
@@ -68,24 +142,65 @@ def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e)))
 
 
-def _bins(
-    time_s: FloatArray, scored: NDArray[np.bool_], average_s: float, from_s: float | None
-) -> tuple[NDArray[np.int64], int]:
-    """Bin of every row (from `from_s` on; None: the first row) and their number; a bin less than half full gets -1."""
-    if time_s.size == 0:
-        return np.zeros(0, dtype=np.int64), 0
-    period = median(np.diff(time_s), overwrite_input=True) if time_s.size > 1 else average_s
-    # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
-    passed = time_s - (time_s[0] if from_s is None else from_s)
-    passed += 1e-3 * period
-    passed /= max(average_s, period)
-    raw = np.floor(passed, out=passed).astype(np.int64)
-    full = max(average_s, period) / period
-    need_memory(_BIN_BYTES * float(raw[-1]), "the recording", f"its means over {average_s:g} s")
-    count = np.bincount(raw if scored.all() else raw[scored], minlength=int(raw[-1]) + 1)
-    keep = count >= max(0.5 * full, 1.0)
-    number = np.where(keep, np.cumsum(keep) - 1, -1)
-    return np.where(scored, number[raw], -1), int(keep.sum())
+class Averager:
+    """Means of the scored rows of one run over `average_s`, of rows that come part by part.
+
+    Bins begin at `from_s`, at or before the first row; None: at the first row. Those less than half full are left out.
+
+    Args:
+        time_s: Times of all rows, shape (n,), increasing.
+        average_s: Length of a bin, s.
+        from_s: Where the first begins.
+    """
+
+    def __init__(self, time_s: FloatArray, average_s: float, from_s: float | None = None) -> None:
+        def steps() -> Iterable[FloatArray]:
+            parts = range(0, time_s.size - 1, _TOGETHER)
+            return (np.diff(time_s[at : at + _TOGETHER + 1]) for at in parts)
+
+        self._period = median_of_parts(steps) if time_s.size > 1 else average_s
+        self._average_s = max(average_s, self._period)
+        self._from_s = (float(time_s[0]) if time_s.size else 0.0) if from_s is None else from_s
+        bins = int(self._bins(time_s[-1:])[0]) + 1 if time_s.size else 0
+        need_memory(_BIN_BYTES * float(bins), "the recording", f"its means over {average_s:g} s")
+        self._count, self._sums = np.zeros(bins, dtype=np.int64), np.zeros((4, bins))
+
+    def _bins(self, time_s: FloatArray) -> NDArray[np.int64]:
+        # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
+        passed = time_s - self._from_s
+        passed += 1e-3 * self._period
+        passed /= self._average_s
+        return np.floor(passed, out=passed).astype(np.int64)
+
+    def add(
+        self,
+        time_s: FloatArray,
+        temperature_c: FloatArray,
+        before_dph: FloatArray,
+        after_dph: FloatArray,
+        scored: NDArray[np.bool_],
+    ) -> None:
+        """Adds the next rows, in order of time."""
+        used = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
+        bins = self._bins(time_s)
+        if not used.all():
+            bins = bins[used]
+        if bins.size == 0:
+            return
+        first, after = int(bins[0]), int(bins[-1]) + 1
+        self._count[first:after] += np.bincount(bins - first)
+        index = np.concatenate([[0], bins - first])
+        known_c = np.where(np.isfinite(temperature_c), temperature_c, 0.0)
+        for sums, column in zip(self._sums, (time_s, before_dph, after_dph, known_c), strict=True):
+            # The sum of a bin that goes on comes first, so that it is added up in the order of its rows.
+            values = np.concatenate([sums[first : first + 1], column[used]])
+            sums[first:after] = np.bincount(index, values)
+
+    def averages(self) -> Averages:
+        """The means of what was added."""
+        kept = self._count >= max(0.5 * self._average_s / self._period, 1.0)
+        time_s, before, after, temperature = self._sums[:, kept] / self._count[kept]
+        return Averages(time_s, before, after, temperature)
 
 
 def average(
@@ -98,26 +213,10 @@ def average(
     average_s: float,
     from_s: float | None = None,
 ) -> Averages:
-    """Averages the scored rows of one run over `average_s`; bins less than half full are left out.
-
-    Bins begin at `from_s`, at or before the first row; None: at the first row.
-    """
-    scored = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
-    bins, n = _bins(time_s, scored, average_s, from_s)
-    # Without copies where every row counts: a file of 100 Hz fills memory.
-    used = slice(None) if np.all(bins >= 0) else bins >= 0
-    bins = bins[used]
-    count = np.bincount(bins, minlength=n)
-
-    def mean(values: FloatArray) -> FloatArray:
-        return np.asarray(np.bincount(bins, weights=values[used], minlength=n) / count)
-
-    return Averages(
-        time_s=mean(time_s),
-        before_dph=mean(before_dph),
-        after_dph=mean(after_dph),
-        temperature_c=mean(np.where(np.isfinite(temperature_c), temperature_c, 0.0)),
-    )
+    """As `Averager`, of rows that are in memory together."""
+    made = Averager(time_s, average_s, from_s)
+    made.add(time_s, temperature_c, before_dph, after_dph, scored)
+    return made.averages()
 
 
 def statistics(values: FloatArray) -> dict[str, float | None]:

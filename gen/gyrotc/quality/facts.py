@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -10,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray
-from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
+from ..common.metrics import MAD_TO_SIGMA, median, median_of_parts, middle_of_five, quantile_of_parts
 from ..common.statistics import cell_means
 from ..recordings.records import EarthRate, Rows, Run
 
@@ -238,15 +239,23 @@ def _jumps(time: FloatArray, temperature: FloatArray, resolution: float) -> tupl
     """
     if len(temperature) < 7:
         return ()
-    departure = _departures(np.diff(temperature))
-    noise = MAD_TO_SIGMA * median(departure)
+
+    def departures() -> Iterator[FloatArray]:
+        return _departures(temperature)
+
+    noise = MAD_TO_SIGMA * median_of_parts(departures)
     if noise == 0.0:  # a coarse thermometer stays where it is most times; its larger steps tell how it wavers
-        noise = float(np.quantile(departure, _WAVERING)) / _WAVERING_SIGMAS
-    found = np.flatnonzero(departure > _JUMP_SIGMAS * noise + 2.0 * resolution)
+        noise = quantile_of_parts(departures, _WAVERING) / _WAVERING_SIGMAS
+    limit = _JUMP_SIGMAS * noise + 2.0 * resolution
+    wide = [
+        (at * _PART + np.flatnonzero(part > limit), part[part > limit])
+        for at, part in enumerate(departures())
+    ]
+    found, departure = (np.concatenate(column) for column in zip(*wide, strict=True))
     changes = _changes(temperature)
     last = changes[np.searchsorted(changes, found, side="right") - 1]
     taken = np.maximum(time[found + 1] - time[found], np.minimum(time[found + 1] - time[last], _HOLD_S))
-    jumps = found[departure[found] > _JUMP_C_PER_MIN / 60.0 * taken]
+    jumps = found[departure > _JUMP_C_PER_MIN / 60.0 * taken]
     return tuple(
         Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS]
     )
@@ -301,17 +310,17 @@ def _jumps_rather_than_bends(u: FloatArray, x: FloatArray) -> bool:
     return corner > _RATHER * left(np.asarray(u > 0.0, dtype=np.float64), np.maximum(u, 0.0))
 
 
-def _departures(step: FloatArray) -> FloatArray:
-    """Magnitudes of the differences from the median of the two before, the value itself, and the two after."""
-    result = np.empty_like(step)
-    for start in range(0, len(step), _PART):
-        part = step[start : start + _PART]
-        before = step[2:0:-1] if start == 0 else step[start - 2 : start]
-        after = step[start + len(part) : start + len(part) + 2]
-        after = np.r_[after, step[-2 : len(after) - 4 : -1]]  # mirrored at both ends
-        around = sliding_window_view(np.r_[before, part, after], 5)
-        result[start : start + len(part)] = np.abs(part - middle_of_five(*around.T))
-    return result
+def _departures(values: FloatArray) -> Iterator[FloatArray]:
+    """How far each difference of neighbours is from the median of the two before, itself, and the two after; in parts.
+
+    At both ends they are mirrored.
+    """
+    for start in range(0, len(values) - 1, _PART):
+        step = np.diff(values[max(start - 2, 0) : start + _PART + 3])
+        before, after = min(start, 2), max(min(len(values) - 1 - start - _PART, 2), 0)
+        around = np.r_[step[2:0:-1][: 2 - before], step, step[-2 : -4 + after : -1][: 2 - after]]
+        windows = sliding_window_view(around, 5)
+        yield np.abs(step[before : len(step) - after] - middle_of_five(*windows.T))
 
 
 def _outliers(time: FloatArray, rate: FloatArray) -> tuple[int, Outlier | None]:
@@ -325,10 +334,12 @@ def _outliers(time: FloatArray, rate: FloatArray) -> tuple[int, Outlier | None]:
     step = np.empty(len(rate) + 1)
     step[0], step[-1] = rate[0] - rate[2], rate[-3] - rate[-1]
     np.subtract(rate[1:], rate[:-1], out=step[1:-1])
-    moved = step[step != 0.0]
-    np.abs(moved, out=moved)
-    scale = median(moved, overwrite_input=True) if len(moved) else np.inf
-    del moved
+
+    def moved() -> Iterator[FloatArray]:
+        parts = (step[at : at + _PART] for at in range(0, len(step), _PART))
+        return (np.abs(part[part != 0.0]) for part in parts)
+
+    scale = median_of_parts(moved) if step.any() else np.inf
     limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * scale / np.sqrt(2.0)
     large = np.flatnonzero((step > limit) | (step < -limit))
     first, last = large[:-1], large[1:]
@@ -373,7 +384,12 @@ def _longest_stretch(values: FloatArray) -> int:
     """Number of rows in the longest stretch of one identical value."""
     if len(values) == 0:
         return 0
-    return int(np.diff(np.r_[_changes(values), len(values)]).max())
+    longest = begun = 0
+    for start in range(1, len(values), _PART):
+        part = values[start : start + _PART]
+        at = np.r_[begun, start + np.flatnonzero(part != values[start - 1 : start - 1 + len(part)])]
+        longest, begun = max(longest, int(np.diff(at).max(initial=0))), int(at[-1])
+    return max(longest, len(values) - begun)
 
 
 def _held(rate: FloatArray) -> int:

@@ -9,7 +9,7 @@ row can do to a mean is bounded: Hampel's rejection, see Rousseeuw and Croux, J.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray
-from ..common.metrics import MAD_TO_SIGMA, median, middle_of_five
+from ..common.metrics import MAD_TO_SIGMA, median_of_parts, middle_of_five
 from ..recordings.records import Run
 from ..results.training import LeftOutRows, Outliers
 
@@ -147,17 +147,15 @@ def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int
     def rest(a: int, b: int) -> FloatArray:
         return np.abs(rate[a:b] - _of_rows(level, n, np.arange(a, b)))
 
-    moved, count = np.empty(len(rate)), 0
-    for a in range(0, len(rate), _PART):
-        part = steps(a, min(a + _PART, len(rate)))
-        part = part[part > 0.0]
-        moved[count : count + len(part)] = part
-        count += len(part)
+    def moved() -> Iterable[FloatArray]:
+        parts = (steps(a, min(a + _PART, len(rate))) for a in range(0, len(rate), _PART))
+        return (part[part > 0.0] for part in parts)
+
     group = min(max(_GROUP, _GROUP_BLOCKS * n), len(rate))
     whole = len(rate) // group * group
-    if count == 0:
+    if not any(map(len, moved())):
         return np.full(whole // group, np.inf), group
-    least = MAD_TO_SIGMA * median(moved[:count], overwrite_input=True) / np.sqrt(2.0)
+    least = MAD_TO_SIGMA * median_of_parts(moved) / np.sqrt(2.0)
     of_steps = _medians(steps, whole, group) / np.sqrt(2.0)
     sigma = MAD_TO_SIGMA * _running(np.maximum(of_steps, _medians(rest, whole, group)))
     return np.maximum(sigma, 0.5 * least), group

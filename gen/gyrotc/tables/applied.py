@@ -62,5 +62,8 @@ def channels_of(rows: Rows, model: Model, table: Table) -> NDArray[np.uint32]:
     for name in names:
         if not rows.has_channel(name):
             raise InputError(f"channel {name}", "the recording has no such column", "the channel of a term")
-    columns = [rows.temperature_c, *(rows.channel(name) for name in names)]
-    return table.encode_inputs(np.stack(columns, axis=1))
+    bits = np.empty((len(rows), 1 + len(names)), dtype=np.uint32)
+    bits[:, 0] = table.encode_inputs(rows.temperature_c)
+    for k, name in enumerate(names, 1):
+        bits[:, k] = table.encode_inputs(rows.channel(name))
+    return bits

@@ -23,7 +23,7 @@ from .sigma import evidence_of, sigma_bits
 from .status import CHANNEL_LOST, CLAMPED, HELD
 from .table import Table, Words
 
-__all__ = ["Replay", "answers", "replay"]
+__all__ = ["History", "Replay", "answers", "followed", "replay"]
 
 _WINDOW = 2  # blocks: the slope of a channel is of no use
 
@@ -94,18 +94,52 @@ def _guarded(table: Table, channel: int) -> Guarded:
 
 
 @dataclass(frozen=True, slots=True)
-class _Followed:
-    """A history and its corrections; these have one entry more, the first, for the time before any."""
+class History:
+    """A history that was followed: its corrections, of which `steps` gives what every row sees of them.
+
+    Attributes:
+        stream: The samples.
+        corrections: In the order in which they come into force.
+        samples_per_block: As the target has it.
+        status, bits, sigma, age: Of each correction, with one entry more, the first, for the time before any; sigma is
+            None where the table has no uncertainties.
+    """
 
     stream: Stream
-    steps: Steps
+    corrections: Steps
+    samples_per_block: int
     status: NDArray[np.int32]
     bits: Words
-    sigma: Words | None  # None: the table has no uncertainties
+    sigma: Words | None
     age: NDArray[np.int64]
 
+    def __len__(self) -> int:
+        return self.stream.position.size
 
-def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_per_block: int) -> _Followed:
+    def rows(self, part: slice) -> Replay:
+        """What a part of the rows gets, in steps of 1: of a long recording all of it would fill memory."""
+        position, steps = self.stream.position[part], self.corrections
+        in_force = steps.in_force(position)
+        begun = in_force >= 0
+        in_force += 1
+        gaps = np.flatnonzero(self.stream.missed[part])
+        missed_status = np.zeros(position.size, dtype=np.int32)
+        missed_status[gaps] = self.status[steps.in_force(position[gaps] - 1) + 1] | HELD
+        held = np.where(steps.believed[position], np.int32(0), np.int32(HELD))
+        at_rows = self.status[in_force]
+        return Replay(
+            sample_status=at_rows | held,
+            status=at_rows,
+            bits=self.bits[in_force],
+            missed_status=missed_status,
+            block_valid=steps.valid[position // self.samples_per_block],
+            begun=begun,
+            sigma=None if self.sigma is None else self.sigma[in_force],
+            age=self.age[in_force],
+        )
+
+
+def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> History:
     """Front end, terms, map and uncertainty over a history; arguments as of `replay`."""
     settings, arithmetic = _settings(table, samples_per_block), F32 if table.numeric == "f32" else Q31
     readings = table.numbers(channels)
@@ -134,9 +168,10 @@ def _followed(table: Table, channels: Words, missed: NDArray[np.int64], samples_
         recursion.apply(course, shown, outcome)
     status, bits = _corrections(table, led, outcome)
     found = evidence_of(table, steps, course, outcome, status, samples_per_block)
-    return _Followed(
+    return History(
         stream,
         steps,
+        samples_per_block,
         np.concatenate([[np.int32(HELD)], status]).astype(np.int32),
         np.concatenate([[np.uint32(0)], bits]).astype(np.uint32),
         sigma_bits(table, found) if table.sigma.size else None,
@@ -236,28 +271,8 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     missed = np.asarray(missed, dtype=np.int64)
-    found = _followed(table, np.asarray(channels), missed, samples_per_block)
-    stream, steps, status = found.stream, found.steps, found.status
-    position = stream.position
-    valid = steps.valid[position // samples_per_block]
-    in_force = steps.in_force(position)
-    begun = in_force >= 0
-    in_force += 1
-    gaps = np.flatnonzero(stream.missed)
-    missed_status = np.zeros(position.size, dtype=np.int32)
-    missed_status[gaps] = status[steps.in_force(position[gaps] - 1) + 1] | HELD
-    held = np.where(steps.believed[position], np.int32(0), np.int32(HELD))
-    at_rows = status[in_force]
-    return Replay(
-        sample_status=at_rows | held,
-        status=at_rows,
-        bits=found.bits[in_force],
-        missed_status=missed_status,
-        block_valid=valid,
-        begun=begun,
-        sigma=None if found.sigma is None else found.sigma[in_force],
-        age=found.age[in_force],
-    )
+    found = followed(table, np.asarray(channels), missed=missed, samples_per_block=samples_per_block)
+    return found.rows(slice(None))
 
 
 def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
@@ -283,8 +298,8 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     if waiting:  # the history ends with missing samples: one more holds their place
         absent = np.full((1, table.n_channels), table.encode_inputs(np.nan), dtype=np.uint32)
         channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
-    found = _followed(table, channels, missed, samples_per_block)
-    stream, steps, status = found.stream, found.steps, found.status
+    found = followed(table, channels, missed=missed, samples_per_block=samples_per_block)
+    stream, steps, status = found.stream, found.corrections, found.status
     bits = found.bits if found.sigma is None else found.bits + found.sigma * _SPREAD
     row = np.cumsum(~was_missed) - 1
     last = np.where(

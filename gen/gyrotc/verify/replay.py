@@ -7,10 +7,12 @@ file of the emulator's host), and so come the results out.
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +27,17 @@ from ..store.files import write_own
 from ..store.scratch import scratch_folder
 from ..tables.applied import channels_of
 from ..target.front_end import period_us, samples_per_block
-from ..target.history import Replay, replay
+from ..target.history import History, Replay, followed
 from ..target.table import Table, Words
 from ..train.samples import blocks_since_power_on, missed_before
 from .board import Job
 from .emitted import checked_sources, table_files
 from .toolchain import Target, compile_objects, link, run_program, runtime_object
 
-__all__ = ["ReplayCase", "Replayed", "history_of", "replay_dataset", "replay_on", "replay_program"]
+__all__ = ["ReplayCase", "ReplayedPart", "history_of", "replay_dataset", "replay_on", "replay_program"]
 
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
+_PART = 2**18  # rows that are answered together: bounds memory
 _MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
 
 
@@ -49,21 +52,45 @@ class ReplayCase:
     missed: NDArray[np.int64]
     samples_per_block: int
     period_us: int
-    reference: Replay
+    reference: History
+
+    def parts(self) -> Iterator[slice]:
+        """The rows, part by part."""
+        return (slice(at, min(at + _PART, len(self.missed))) for at in range(0, len(self.missed), _PART))
 
 
 @dataclass(frozen=True, slots=True)
-class Replayed:
-    """What the compiled code answered, every row of the file.
+class ReplayedPart:
+    """What the compiled code answered to some rows.
 
-    Bits of the bias and status in force after each row, the number of rows that differ from the
-    reference in any bit, and the first of them with all bits.
+    Attributes:
+        rows: Which of the file.
+        reference: What it must answer.
+        bits: Of the bias in force after each row.
+        status: In force after each row.
+        wrong: Rows of the part that differ from the reference in any bit.
+        words: Status of the sample, status in force and bits, three arrays, as they came.
     """
 
+    rows: slice
+    reference: Replay
     bits: Words
     status: NDArray[np.int32]
-    mismatches: int
-    first: tuple[str, ...]
+    wrong: NDArray[np.intp]
+    words: Words
+
+    def differences(self) -> Iterator[str]:
+        """In words, with the number of the row."""
+        for row in self.wrong.tolist():
+            texts = [
+                " ".join(f"{int(words[row]):08x}" for words in side)
+                for side in (self.words, _words_of(self.reference))
+            ]
+            yield f"row {self.rows.start + row}: statuses and bits {texts[0]}, reference {texts[1]}"
+
+
+def _words_of(answers: Replay) -> tuple[Words, Words, Words]:
+    return answers.sample_status.view(np.uint32), answers.status.view(np.uint32), answers.bits
 
 
 def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
@@ -83,7 +110,7 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
             found = f"power-on {before * run.row_period_s:.4g} s before the first row"
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
         missed = np.append(before, missed[1:])
-    answers = replay(table, channels, missed=missed, samples_per_block=per_block)
+    answers = followed(table, channels, missed=missed, samples_per_block=per_block)
     return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
 
 
@@ -112,43 +139,35 @@ def replay_program(
         yield program
 
 
-def replay_on(target: Target, program: Path, history: ReplayCase) -> Replayed:
-    """Feeds a recording to the compiled code and compares every step with the reference.
+def replay_on(target: Target, program: Path, history: ReplayCase) -> Iterator[ReplayedPart]:
+    """Feeds a recording to the compiled code and compares every step with the reference; part by part.
 
     Raises:
         CheckFailed: The program did not run to its end.
     """
     word = np.dtype("<u4" if target.byte_order == "little" else ">u4")
     n = len(history.missed)
-    done = run_program(target, program, data=_stream(history, word))
-    if done.returncode != 0 or len(done.stdout) != 12 * n:
-        raise CheckFailed(
-            f"the replay ended with status {done.returncode} after {len(done.stdout) // 12} "
-            f"of {n} rows {done.stderr[:200]}"
-        )
-    answers = history.reference
-    want = (answers.sample_status.view(np.uint32), answers.status.view(np.uint32), answers.bits)
-    got = tuple(np.frombuffer(done.stdout, dtype=word).reshape(-1, 3).T)
-    wrong = np.flatnonzero((got[0] != want[0]) | (got[1] != want[1]) | (got[2] != want[2]))
-    first = tuple(_difference(int(k), got, want) for k in wrong[:_SHOWN_MISMATCHES])
-    bits, status = got[2].astype(np.uint32), got[1].astype(np.uint32).view(np.int32)
-    return Replayed(bits, status, int(wrong.size), first)
+    with tempfile.TemporaryFile() as printed:
+        done = run_program(target, program, _stream(history, word), printed)
+        size = printed.seek(0, os.SEEK_END)
+        if done.returncode != 0 or size != 12 * n:
+            raise CheckFailed(
+                f"the replay ended with status {done.returncode} after {size // 12} of {n} rows {done.stderr[:200]}"
+            )
+        printed.seek(0)
+        for rows in history.parts():
+            answers = history.reference.rows(rows)
+            got = np.frombuffer(printed.read(12 * (rows.stop - rows.start)), dtype=word).reshape(-1, 3).T
+            different = np.any([a != b for a, b in zip(got, _words_of(answers), strict=True)], axis=0)
+            bits, status = got[2].astype(np.uint32), got[1].astype(np.uint32).view(np.int32)
+            yield ReplayedPart(rows, answers, bits, status, np.flatnonzero(different), got)
 
 
-def _stream(history: ReplayCase, word: np.dtype[np.uint32]) -> bytes:
+def _stream(history: ReplayCase, word: np.dtype[np.uint32]) -> Iterator[bytes]:
     """Standard input of the replay program."""
-    n, n_channels = history.channels.shape
-    stream = np.empty(2 + n * (1 + n_channels), dtype=word)
-    stream[:2] = history.period_us, n
-    rows = stream[2:].reshape(n, 1 + n_channels)
-    rows[:, 0] = history.missed
-    rows[:, 1:] = history.channels
-    return stream.tobytes()
-
-
-def _difference(row: int, got: Sequence[Words], want: Sequence[Words]) -> str:
-    texts = [" ".join(f"{int(words[row]):08x}" for words in side) for side in (got, want)]
-    return f"row {row}: statuses and bits {texts[0]}, reference {texts[1]}"
+    yield np.array([history.period_us, len(history.missed)], dtype=word).tobytes()
+    for part in history.parts():
+        yield np.column_stack([history.missed[part], history.channels[part]]).astype(word).tobytes()
 
 
 @dataclass(slots=True)
@@ -168,15 +187,15 @@ class _Lane:
         if self.program is None or self.error is not None:
             return
         try:
-            replayed = replay_on(self.target, self.program, history)
+            for part in replay_on(self.target, self.program, history):
+                self.mismatches += part.wrong.size
+                room = _SHOWN_MISMATCHES - len(self.first)
+                self.first += [f"{file}, {text}" for text in islice(part.differences(), room)]
         except CheckFailed as error:
             self.error = f"{file}: {error}"
             return
         self.runs += 1
         self.rows += len(history.missed)
-        self.mismatches += replayed.mismatches
-        room = _SHOWN_MISMATCHES - len(self.first)
-        self.first += [f"{file}, {text}" for text in replayed.first[:room]]
 
 
 def replay_dataset(

@@ -22,7 +22,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -124,15 +124,23 @@ def _end(group: int) -> None:
 
 
 def run_to_end(
-    command: Sequence[str], folder: Path, what: str, stdin: Stream = subprocess.DEVNULL
+    command: Sequence[str],
+    folder: Path,
+    what: str,
+    stdin: Stream = subprocess.DEVNULL,
+    printed: IO[bytes] | None = None,
 ) -> ProgramRun:
     """Runs a command in `folder` to its end.
+
+    Args:
+        printed: Takes what it prints, which the result then is without.
 
     Raises:
         CheckFailed: It did not end; `what` says in words who it is.
     """
-    # Files, not pipes: a recording goes in and comes out, and is in memory once.
-    with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+    # Files, not pipes: a recording goes in and comes out, and is never in memory as a whole.
+    with tempfile.TemporaryFile() as own, tempfile.TemporaryFile() as stderr:
+        stdout = printed or own
         # The clock ends it; the limit of processor time is for what escapes the clock, and must not come first.
         with confined(
             command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S
@@ -143,9 +151,7 @@ def run_to_end(
                 raise CheckFailed(f"{what} did not end within {LIMIT_S} s") from error
         for stream in (stdout, stderr):
             stream.seek(0)
-        return ProgramRun(
-            process.returncode, stdout.read(), stderr.read(_SAID_BYTES).decode("utf-8", "replace")
-        )
+        return ProgramRun(process.returncode, own.read(), stderr.read(_SAID_BYTES).decode("utf-8", "replace"))
 
 
 def _environment(folder: Path) -> dict[str, str]:
@@ -413,21 +419,22 @@ def compile_c(
     link(target, objects, program)
 
 
-def run_program(target: Target, program: Path, data: bytes = b"") -> ProgramRun:
-    """Runs a program with `data` on its standard input; bounded in time.
+def run_program(
+    target: Target, program: Path, data: Iterable[bytes] = (), printed: IO[bytes] | None = None
+) -> ProgramRun:
+    """Runs a program with `data` on its standard input; bounded in time. `printed` as of `run_to_end`.
 
     Raises:
         CheckFailed: It did not end.
     """
     with tempfile.TemporaryFile() as stdin:
         if target.bare:
-            write_own(program.parent / _STDIN, data)
+            write_own(program.parent / _STDIN, b"".join(data))
         else:
-            stdin.write(data)
+            stdin.writelines(data)
             stdin.seek(0)
-        del data
         command = [*target.run, str(program.absolute())]
-        return run_to_end(command, program.parent, f"{target.name}: the program", stdin)
+        return run_to_end(command, program.parent, f"{target.name}: the program", stdin, printed)
 
 
 def symbols(target: Target, *files: Path) -> list[Symbol]:

@@ -175,7 +175,7 @@ def test_the_replay_is_what_the_target_does(
     per_block = history.samples_per_block
     last = np.searchsorted(position, per_block * (_numbers(data.time_s, rows.time_s[0], front) + 1) - 1)
     there = position[np.minimum(last, len(rows) - 1)] % per_block == per_block - 1
-    done = table.decode_bias(history.reference.bits[last[there]])
+    done = table.decode_bias(history.reference.rows(slice(None)).bits[last[there]])
     assert there.sum() > 0.9 * data.bias_dph.size
     assert promised[there] == pytest.approx(done, abs=ERROR_DPH, rel=0.0)
 
