@@ -49,7 +49,7 @@ from .trace import trace_at, trace_name
 from .uncertainties import figure_uncertainties, root_mean, squares_in_all, squares_of
 
 __all__ = [
-    "ReplayedRows",
+    "AnsweredRows",
     "Watch",
     "evaluate",
 ]
@@ -59,7 +59,7 @@ _HOST = "host-gcc-O2"
 
 
 @dataclass(frozen=True, slots=True)
-class ReplayedRows:
+class AnsweredRows:
     """Some rows of a run replayed.
 
     Which rows of the file; correction in force (deg/h), status bits, whether the row is judged (its block is valid, and
@@ -231,7 +231,7 @@ def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> It
 
 def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
-) -> Iterator[ReplayedRows]:
+) -> Iterator[AnsweredRows]:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step; part by part."""
     history = history_of(rows, run, model, table)
     if program is None:
@@ -250,9 +250,9 @@ def replay_run(
 
 def _replayed(
     rows: slice, known: Replay, bits: Words, status: NDArray[np.int32], wrong: int | None, table: Table
-) -> ReplayedRows:
+) -> AnsweredRows:
     sigma = None if known.sigma is None else table.decode_bias(known.sigma)
-    return ReplayedRows(rows, table.decode_bias(bits), status, known.block_valid & known.begun, wrong, sigma)
+    return AnsweredRows(rows, table.decode_bias(bits), status, known.block_valid & known.begun, wrong, sigma)
 
 
 def _one_run(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -137,19 +137,17 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
     time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
     finite = inside & np.isfinite(rows.rate_dph)
     rate = _those(rows.rate_dph, finite)
-    step = np.diff(time)
-    gaps = step > _GAP_PERIODS * run.row_period_s
+    late = np.flatnonzero(_steps_are(time, lambda step: step > _GAP_PERIODS * run.row_period_s))
     if not inside.all():
-        gaps &= np.diff(np.flatnonzero(inside)) == 1  # what was excluded is no gap
-    n_gaps, missing = int(gaps.sum()), int(np.sum(np.round(step[gaps] / run.row_period_s) - 1.0))
-    del step, gaps  # a file of 100 Hz fills memory
+        late = late[np.diff(np.flatnonzero(inside))[late] == 1]  # what was excluded is no gap
+    missing = int(np.sum(np.round((time[late + 1] - time[late]) / run.row_period_s) - 1.0))
     low_c, high_c, resolution = _levels(temperature)
     measured = _those(rows.rate_dph, inside)
     if not np.isfinite(measured).all():
         measured = np.where(np.isfinite(measured), measured, rate.mean() if len(rate) else 0.0)
     cells_t, slopes, cells_rate = _cells(time, temperature, measured, run.row_period_s)
     count, outlier = _outliers(_those(rows.time_s, finite), rate)
-    noise = _robust_sigma(np.diff(rate)) / np.sqrt(2.0)
+    noise = _robust_sigma(rate) / np.sqrt(2.0)
     return RunFacts(
         file=run.file,
         from_s=run.from_s,
@@ -161,7 +159,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         first_s=float(time[0]),
         last_s=float(time[-1]),
         row_period_s=run.row_period_s,
-        gaps=n_gaps,
+        gaps=len(late),
         missing_rows=missing,
         temperature_c=(low_c, high_c),
         temperature_step_c=resolution,
@@ -188,6 +186,12 @@ def _those(values: FloatArray, chosen: BoolArray) -> FloatArray:
     return values if chosen.all() else values[chosen]
 
 
+def _steps_are(values: FloatArray, found: Callable[[FloatArray], BoolArray]) -> BoolArray:
+    """What is found of the differences of neighbours, shape (n - 1,); part by part, as all of them fill memory."""
+    parts = (np.diff(values[at : at + _PART + 1]) for at in range(0, len(values) - 1, _PART))
+    return np.concatenate([np.zeros(0, dtype=bool), *map(found, parts)])
+
+
 def _levels(temperature: FloatArray) -> tuple[float, float, float]:
     """Lowest and highest of the values, and the least difference of two of them; 0 where there is one."""
     values = temperature[np.r_[True, temperature[1:] != temperature[:-1]]]
@@ -205,14 +209,18 @@ def _changes(values: FloatArray) -> NDArray[np.int64]:
 
 
 def _robust_sigma(values: FloatArray) -> float:
-    """Standard deviation about 0 from the median magnitude, or the RMS where more than half are 0.
+    """Standard deviation about 0 of differences of neighbours from their median magnitude.
 
-    `values` are lost: they make room for the magnitudes.
+    Their RMS where more than half are 0.
     """
-    if len(values) == 0:
+    if len(values) < 2:
         return 0.0
-    sigma = MAD_TO_SIGMA * median(np.abs(values, out=values), overwrite_input=True)
-    return sigma if sigma > 0.0 else float(np.sqrt(np.mean(values**2)))
+
+    def magnitudes() -> Iterator[FloatArray]:
+        return (np.abs(np.diff(values[at : at + _PART + 1])) for at in range(0, len(values) - 1, _PART))
+
+    sigma = MAD_TO_SIGMA * median_of_parts(magnitudes)
+    return sigma if sigma > 0.0 else float(np.sqrt(np.mean(np.diff(values) ** 2)))
 
 
 def _cells(
@@ -220,8 +228,13 @@ def _cells(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean temperature of cells, its rate (C/min) by central differences, mean rate; empty for fewer than three."""
     length = max(_CELL_S, _CELL_ROWS * period_s)
-    number = (time - time[0]) / length
-    starts = _changes(np.floor(number, out=number))
+    numbers = (np.floor((time[at : at + _PART] - time[0]) / length) for at in range(0, len(time), _PART))
+    last = np.array([-1.0])
+    found = []
+    for at, number in enumerate(numbers):
+        found.append(at * _PART + np.flatnonzero(np.diff(number, prepend=last)))
+        last = number[-1:]
+    starts = np.concatenate(found)
     count = np.diff(np.r_[starts, len(time)])
     full = count * period_s >= 0.5 * length
     mean_t = (np.add.reduceat(temperature, starts) / count)[full]

@@ -328,7 +328,9 @@ def copied_channel_findings(run: Run, rows: Rows) -> Iterator[Finding]:
 def stuck_temperature_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """The longest stretch in which the thermometer was stuck."""
     inside = run.in_span(rows.time_s)
-    temperature, time = rows.temperature_c[inside], rows.time_s[inside]
+    temperature, time = rows.temperature_c, rows.time_s
+    if not inside.all():
+        temperature, time = temperature[inside], time[inside]
     stretches = stuck_stretches(time, temperature, run.row_period_s)
     if not stretches:
         return

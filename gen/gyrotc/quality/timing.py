@@ -43,7 +43,7 @@ def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     step = np.diff(time)
     if len(step) < _AROUND_ROWS:
         return
-    coarse = _coarse(run, step[together])
+    coarse = _coarse(run, step if inside.all() else step[together])
     if coarse is not None:
         yield coarse
         return

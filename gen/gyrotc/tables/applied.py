@@ -18,6 +18,8 @@ from .quantise import NUMERICS, quantise
 
 __all__ = ["applied_of", "channels_of"]
 
+_PART = 2**18  # rows that are looked at together: bounds memory
+
 
 def applied_of(path: Path) -> Applied:
     """The model of a `model.json` as `load` takes it.
@@ -63,7 +65,7 @@ def channels_of(rows: Rows, model: Model, table: Table) -> NDArray[np.uint32]:
         if not rows.has_channel(name):
             raise InputError(f"channel {name}", "the recording has no such column", "the channel of a term")
     bits = np.empty((len(rows), 1 + len(names)), dtype=np.uint32)
-    bits[:, 0] = table.encode_inputs(rows.temperature_c)
-    for k, name in enumerate(names, 1):
-        bits[:, k] = table.encode_inputs(rows.channel(name))
+    for k, column in enumerate([rows.temperature_c, *map(rows.channel, names)]):
+        for at in range(0, len(rows), _PART):
+            bits[at : at + _PART, k] = table.encode_inputs(column[at : at + _PART])
     return bits

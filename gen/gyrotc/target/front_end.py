@@ -108,26 +108,30 @@ def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.i
     return np.asarray(shortened)
 
 
-def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.integer]:
-    """Number of each row's sample where `missed` samples come before the row.
+def positions(missed: NDArray[np.int64], where: str = "the recording") -> NDArray[np.integer] | None:
+    """Number of each row's sample where `missed` samples come before the row; None: that of the row.
 
     Raises:
         InputError: Rows and gaps together are more samples than memory is granted for.
     """
-    need_memory(_SAMPLE_BYTES * float(missed.size + missed.sum()), where, "its rows and gaps as samples")
     samples = missed.size + int(missed.sum())
-    position = np.arange(missed.size, dtype=np.int32 if samples < 2**31 else np.int64)
-    if samples > missed.size:
-        position += np.cumsum(missed, dtype=position.dtype)
+    need_memory(_SAMPLE_BYTES * float(samples), where, "its rows and gaps as samples")
+    if samples == missed.size:
+        return None
+    position = np.arange(missed.size, dtype=_number_type(samples))
+    position += np.cumsum(missed, dtype=position.dtype)
     return position
 
 
-def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.integer]) -> Numbers:
-    """Samples at their positions, missing ones between them."""
-    n = int(position[-1]) + 1 if position.size else 0
-    if n == x.size:
+def _number_type(samples: int) -> type[np.integer]:
+    return np.int32 if samples < 2**31 else np.int64
+
+
+def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.integer] | None) -> Numbers:
+    """Samples at their positions, missing ones between them; None: there are none."""
+    if position is None:
         return x
-    samples = arithmetic.missing(n)
+    samples = arithmetic.missing(int(position[-1]) + 1)
     samples[position] = x
     return samples
 
@@ -319,14 +323,28 @@ _MAX_ELAPSED = 0xFFFFFF  # blocks since power-on that a target counts
 class Stream:
     """Samples, missing ones among them.
 
-    `samples`: temperatures; `position[k]`: sample number of row k; `missed[k]`: samples missed before it,
-    shortened, and `dropped[k]`: whole blocks that were left out of them.
+    `samples`: temperatures; `placed[k]`: sample number of row k, None where that is k; `missed[k]`: samples missed
+    before it, shortened, and `dropped[k]`: whole blocks that were left out of them.
     """
 
     samples: Numbers
-    position: NDArray[np.integer]
+    placed: NDArray[np.integer] | None
     missed: NDArray[np.int64]
     dropped: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return self.missed.size
+
+    @property
+    def position(self) -> NDArray[np.integer]:
+        """Sample number of each row."""
+        return self.positions(slice(0, len(self)))
+
+    def positions(self, part: slice) -> NDArray[np.integer]:
+        """Of some rows."""
+        if self.placed is not None:
+            return self.placed[part]
+        return np.arange(*part.indices(len(self)), dtype=_number_type(len(self)))
 
     @staticmethod
     def of_rows(

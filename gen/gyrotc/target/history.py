@@ -23,7 +23,7 @@ from .sigma import evidence_of, sigma_bits
 from .status import CHANNEL_LOST, CLAMPED, HELD
 from .table import Table, Words
 
-__all__ = ["History", "Replay", "answers", "followed", "replay"]
+__all__ = ["FollowedHistory", "Replay", "answers", "followed", "replay"]
 
 _WINDOW = 2  # blocks: the slope of a channel is of no use
 
@@ -94,7 +94,7 @@ def _guarded(table: Table, channel: int) -> Guarded:
 
 
 @dataclass(frozen=True, slots=True)
-class History:
+class FollowedHistory:
     """A history that was followed: its corrections, of which `steps` gives what every row sees of them.
 
     Attributes:
@@ -114,11 +114,11 @@ class History:
     age: NDArray[np.int64]
 
     def __len__(self) -> int:
-        return self.stream.position.size
+        return len(self.stream)
 
     def rows(self, part: slice) -> Replay:
         """What a part of the rows gets, in steps of 1: of a long recording all of it would fill memory."""
-        position, steps = self.stream.position[part], self.corrections
+        position, steps = self.stream.positions(part), self.corrections
         in_force = steps.in_force(position)
         begun = in_force >= 0
         in_force += 1
@@ -139,7 +139,9 @@ class History:
         )
 
 
-def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> History:
+def followed(
+    table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int
+) -> FollowedHistory:
     """Front end, terms, map and uncertainty over a history; arguments as of `replay`."""
     settings, arithmetic = _settings(table, samples_per_block), F32 if table.numeric == "f32" else Q31
     readings = table.numbers(channels)
@@ -160,7 +162,7 @@ def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], sample
     for recursion, channel, number in terms if led.at.size else ():
         shown = None
         if channel:
-            of_rows = with_missing(arithmetic, readings[:, channel], stream.position)
+            of_rows = with_missing(arithmetic, readings[:, channel], stream.placed)
             fallback = table.numbers(table.records("guards")[channel])[7]
             shown = channel_at(arithmetic, of_rows, _guarded(table, channel), fallback, settings, led)
             if number:
@@ -168,7 +170,7 @@ def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], sample
         recursion.apply(course, shown, outcome)
     status, bits = _corrections(table, led, outcome)
     found = evidence_of(table, steps, course, outcome, status, samples_per_block)
-    return History(
+    return FollowedHistory(
         stream,
         steps,
         samples_per_block,
@@ -301,10 +303,9 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     found = followed(table, channels, missed=missed, samples_per_block=samples_per_block)
     stream, steps, status = found.stream, found.corrections, found.status
     bits = found.bits if found.sigma is None else found.bits + found.sigma * _SPREAD
+    position = stream.position
     row = np.cumsum(~was_missed) - 1
-    last = np.where(
-        was_missed, stream.position[np.minimum(row + 1, len(channels) - 1)] - 1, stream.position[row]
-    )
+    last = np.where(was_missed, position[np.minimum(row + 1, len(channels) - 1)] - 1, position[row])
     k = steps.in_force(last) + 1
     held = np.where(was_missed | ~steps.believed[last], HELD, 0)
     call = status[k] | held

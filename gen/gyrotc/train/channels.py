@@ -255,7 +255,7 @@ _OPEN = Guarded(  # as of a channel without a guard: every reading passes
 
 def channel_shown(blocks: Blocks, column: FloatArray) -> CourseChannel:
     """A channel as the target sees it at every correction; NaN where it shows nothing."""
-    readings = with_missing(F32, F32.numbers(column), blocks.stream.position)
+    readings = with_missing(F32, F32.numbers(column), blocks.stream.placed)
     guard = replace(_OPEN, missing_blocks=blocks.settings.guard.missing_blocks)
     shown = channel_at(F32, readings, guard, np.float32(np.nan), blocks.settings, blocks.steps)
     return replace(shown, mean=shown.mean.astype(np.float64))

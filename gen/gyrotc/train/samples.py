@@ -71,13 +71,15 @@ class Blocks:
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
     """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    gaps = np.diff(time_s)
-    gaps /= row_period_s
-    late = np.flatnonzero(gaps > _GAP)
+    parts = [
+        np.diff(time_s[at : at + _PART + 1]) / row_period_s > _GAP for at in range(0, time_s.size, _PART)
+    ]
+    late = np.flatnonzero(np.concatenate([np.zeros(0, dtype=bool), *parts]))
     if len(late) == 0:
         return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
     missed = np.zeros(time_s.size, dtype=np.int64)
-    missed[late + 1] = np.minimum(np.rint(gaps[late]) - 1.0, _MAX_MISSED).astype(np.int64)
+    gaps = (time_s[late + 1] - time_s[late]) / row_period_s
+    missed[late + 1] = np.minimum(np.rint(gaps) - 1.0, _MAX_MISSED).astype(np.int64)
     return missed
 
 
@@ -141,11 +143,14 @@ def run_blocks(
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)
     temperature, slope, status = _in_force(steps, k)
-    starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size).astype(stream.position.dtype)
-    first_row = np.searchsorted(stream.position, starts)
+    position = stream.position
+    starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size).astype(position.dtype)
+    first_row = np.searchsorted(position, starts)
+    start_s = _time_of(starts[:-1], position, rows.time_s)
+    del position  # of a file of 100 Hz it fills memory
     rate, count, left_out = _mean_rate(rows, run, first_row, n)
     return Blocks(
-        start_s=_time_of(starts[:-1], stream.position, rows.time_s),
+        start_s=start_s,
         valid=steps.valid,
         temperature_c=temperature,
         slope_c=slope,

@@ -27,7 +27,7 @@ from ..store.files import write_own
 from ..store.scratch import scratch_folder
 from ..tables.applied import channels_of
 from ..target.front_end import period_us, samples_per_block
-from ..target.history import History, Replay, followed
+from ..target.history import FollowedHistory, Replay, followed
 from ..target.table import Table, Words
 from ..train.samples import blocks_since_power_on, missed_before
 from .board import Job
@@ -52,7 +52,7 @@ class ReplayCase:
     missed: NDArray[np.int64]
     samples_per_block: int
     period_us: int
-    reference: History
+    reference: FollowedHistory
 
     def parts(self) -> Iterator[slice]:
         """The rows, part by part."""
