@@ -344,25 +344,34 @@ def _outliers(time: FloatArray, rate: FloatArray) -> tuple[int, Outlier | None]:
     """
     if len(rate) < 3:
         return 0, None
-    step = np.empty(len(rate) + 1)
-    step[0], step[-1] = rate[0] - rate[2], rate[-3] - rate[-1]
-    np.subtract(rate[1:], rate[:-1], out=step[1:-1])
 
     def moved() -> Iterator[FloatArray]:
-        parts = (step[at : at + _PART] for at in range(0, len(step), _PART))
-        return (np.abs(part[part != 0.0]) for part in parts)
+        return (np.abs(part[part != 0.0]) for part in _to_and_from(rate))
 
-    scale = median_of_parts(moved) if step.any() else np.inf
+    scale = median_of_parts(moved) if any(map(len, moved())) else np.inf
     limit = _OUTLIER_SIGMAS * MAD_TO_SIGMA * scale / np.sqrt(2.0)
-    large = np.flatnonzero((step > limit) | (step < -limit))
+    wide = [
+        (k * _PART + (at := np.flatnonzero(np.abs(part) > limit)), part[at])
+        for k, part in enumerate(_to_and_from(rate))
+    ]
+    large, step = (np.concatenate(column) for column in zip(*wide, strict=True))
     first, last = large[:-1], large[1:]
-    pair = (np.sign(step[first]) != np.sign(step[last])) & (last - first <= _OUTLIER_ROWS)
+    pair = (np.sign(step[:-1]) != np.sign(step[1:])) & (last - first <= _OUTLIER_ROWS)
     pair[1:] &= ~_follows(pair)[1:]
-    first, last = first[pair], last[pair]
+    first, last, step = first[pair], last[pair], step[:-1][pair]
     if len(first) == 0:
         return 0, None
-    k = first[np.argmax(np.abs(step[first]))]
-    return int(np.sum(last - first)), Outlier(float(time[k]), float(rate[k]), float(step[k]))
+    most = np.argmax(np.abs(step))
+    k = first[most]
+    return int(np.sum(last - first)), Outlier(float(time[k]), float(rate[k]), float(step[most]))
+
+
+def _to_and_from(rate: FloatArray) -> Iterator[FloatArray]:
+    """Steps to every row and from the last one, shape (n + 1,), part by part; at the ends from and to the third row."""
+    first, last = rate[0] - rate[2], rate[-3] - rate[-1]
+    for at in range(0, len(rate) + 1, _PART):
+        step = np.diff(rate[max(at - 1, 0) : at + _PART])
+        yield np.r_[[first] if at == 0 else [], step, [last] if at + _PART > len(rate) else []]
 
 
 def _follows(pair: BoolArray) -> BoolArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gyrotc.common import metrics
 from gyrotc.common.metrics import MAD_TO_SIGMA, average, median, middle_of_five, statistics, time_statistics
 from gyrotc.common.statistics import (
     CHI2_95_ONE,
@@ -133,3 +134,39 @@ def test_quantiles_are_those_of_their_distributions() -> None:
     assert pytest.approx(NORMAL_95**2) == CHI2_95_ONE
     normal = 3.0 * stats.norm.ppf((np.arange(100001) + 0.5) / 100001)
     assert MAD_TO_SIGMA * np.median(np.abs(normal)) == pytest.approx(3.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("together", [10, 2**18])
+def test_the_median_of_parts_is_that_of_the_whole(
+    seed: int, together: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of numbers that hardly differ, of coarse ones, of an even number, and by digits of their bits."""
+    rng = np.random.default_rng(seed)
+    size = 3001 + seed
+    kinds = (
+        rng.exponential(size=size),
+        np.abs(np.round(rng.normal(size=size))),
+        np.abs(np.diff(np.arange(size + 1) / 290.0)),
+    )
+    monkeypatch.setattr(metrics, "_TOGETHER", together)
+    for values in kinds:
+
+        def parts(values: np.ndarray = values) -> list[np.ndarray]:
+            return np.array_split(values, 7)
+
+        assert metrics.median_of_parts(parts) == np.median(values)
+        assert metrics.quantile_of_parts(parts, 0.9) == np.quantile(values, 0.9)
+
+
+def test_means_of_rows_that_come_in_parts_are_those_of_the_whole() -> None:
+    rng = np.random.default_rng(5)
+    time = np.cumsum(rng.uniform(0.9, 1.1, 5000))
+    columns = [time, rng.normal(size=5000), np.where(rng.random(5000) < 0.01, np.nan, rng.normal(size=5000))]
+    scored = rng.random(5000) < 0.9
+    whole = average(*columns, columns[2], scored=scored, average_s=37.0)
+    made = metrics.Averager(time, 37.0)
+    for part in np.array_split(np.arange(5000), 13):
+        made.add(*(c[part] for c in columns), columns[2][part], scored[part])
+    for name in ("time_s", "temperature_c", "before_dph", "after_dph"):
+        assert np.array_equal(getattr(made.averages(), name), getattr(whole, name)), name
