@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from gyrotc.lot.service import PowerOn, Spread, fitted_spread, prior_of
-from gyrotc.target.learning import Learner, Prior, Stop
+from gyrotc.lot.service import PowerOn, BiasSpread, fitted_spread, prior_of
+from gyrotc.target.learning import Learner, ServicePrior, Stop
 from numpy.typing import NDArray
 from results import recorded, write
 from results import table as markdown
@@ -167,7 +167,7 @@ class Android(Nothing):
 class Learned:
     """The unit of the runtime."""
 
-    def __init__(self, prior: Prior, axes: int) -> None:
+    def __init__(self, prior: ServicePrior, axes: int) -> None:
         self.unit, self.off_s = Learner(prior, axes), None
         self.refused = 0
 
@@ -236,10 +236,10 @@ def missions(draw: np.random.Generator, axes: int, table: float, turn_on: float)
     return found
 
 
-def data_sheet_prior(table: float, turn_on: float, arw: float) -> Prior:
+def data_sheet_prior(table: float, turn_on: float, arw: float) -> ServicePrior:
     """From what a data sheet says: the table's error, turn-on offsets, ageing; noise as of a mean over an hour."""
     hour = np.sqrt(_MONTH_H)
-    spread = Spread(
+    spread = BiasSpread(
         level=table, slope=0.2 * table / 30.0, shape=0.16 * table, turn_on=turn_on, turn_on_slope=1e-8, warm_up=1e-9,
         warm_up_s=600.0, memory=float(np.hypot(3e-5, 0.02 * table)), memory_s=14400.0, memory_c=20.0,
         ageing=1.06 * _AGEING / hour, ageing_shape=0.09 * _AGEING / hour,
@@ -318,7 +318,7 @@ def laser(
 _NOISE = 15.0  # deg/h of a mean over 10 s of the measured sensor
 _SKIP_S = 70.0  # of a power-on, whose first readings are spikes
 _EVERY_S = (60.0, 300.0, 900.0, np.inf)
-_GUESS = Spread(
+_GUESS = BiasSpread(
     3000.0, 100.0, 100.0, 2000.0, 100.0, 1000.0, 600.0, 1000.0, 1e5, 12.0
 )  # deg/h, C, s: a consumer's MEMS
 
@@ -379,7 +379,7 @@ def _replayed(
 class _EachAxis:
     """The unit of each axis with its own scale of the spread."""
 
-    def __init__(self, priors: Sequence[Prior]) -> None:
+    def __init__(self, priors: Sequence[ServicePrior]) -> None:
         self.axes = [Learned(prior, 1) for prior in priors]
 
     def power_on(self, clock_s: float, temp_c: float) -> None:

@@ -465,7 +465,8 @@ static void update(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, con
 
 /* Compares an innovation with its variance, and opens states where that is due. Returns GTC_OK, GTC_DISAGREES or
  * GTC_E_REST. */
-static int judged(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, float innovation, float var, int sure)
+static int judged(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, float innovation, float var,
+                  int_least32_t sure)
 {
     const float square = times(innovation, innovation);
     int status = GTC_OK;

@@ -12,16 +12,16 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..common.arrays import FloatArray
-from ..target.learning import KNOTS, Prior, packed
+from ..target.learning import KNOTS, ServicePrior, packed
 
-__all__ = ["PowerOn", "Spread", "fitted_spread", "prior_of"]
+__all__ = ["PowerOn", "BiasSpread", "fitted_spread", "prior_of"]
 
 _LOG_SPREAD = 0.5  # standard deviation of a logarithm about its start: an order of magnitude is 4.6 of them
 _STEPS = 40  # of the search: it ends before
 
 
 @dataclass(frozen=True)
-class Spread:
+class BiasSpread:
     """How the biases of a type differ: standard deviations in deg/h unless stated, lengths in C, times in s.
 
     Attributes:
@@ -49,7 +49,7 @@ class Spread:
     ageing: float = 0.0
     ageing_shape: float = 0.0
 
-    def scaled(self, factor: float) -> Spread:
+    def scaled(self, factor: float) -> BiasSpread:
         """The same type with all deviations this many times as large."""
         same = {"warm_up_s", "memory_s", "memory_c"}
         return replace(
@@ -74,7 +74,7 @@ def _walk(knots: FloatArray) -> FloatArray:
 
 
 def prior_of(
-    spread: Spread,
+    spread: BiasSpread,
     envelope_c: tuple[float, float],
     center_c: float,
     noise_dph: float,
@@ -87,7 +87,7 @@ def prior_of(
     open_gate: float | None = None,
     agreeing: int = 3,
     power_ons: int = 3,
-) -> Prior:
+) -> ServicePrior:
     """The prior of a table.
 
     Args:
@@ -107,7 +107,7 @@ def prior_of(
     low, high = envelope_c
     knots = np.linspace(low, high, KNOTS) - center_c
     level = spread.level**2 + spread.slope**2 * np.outer(knots, knots) + spread.shape**2 * _walk(knots)
-    return Prior(
+    return ServicePrior(
         id=id, low_c=low, per_knot=(KNOTS - 1) / (high - low), center_c=center_c, authority_dph=authority_dph,
         offset_var=spread.turn_on**2, slope_var=spread.turn_on_slope**2, warm_var=spread.warm_up**2,
         memory_var=spread.memory**2, memory_per_c=float(np.sqrt(3.0)) / spread.memory_c,
@@ -119,7 +119,7 @@ def prior_of(
 
 
 def _innovations(
-    spread: Spread, past: Sequence[PowerOn], envelope_c: tuple[float, float], center_c: float, var: float
+    spread: BiasSpread, past: Sequence[PowerOn], envelope_c: tuple[float, float], center_c: float, var: float
 ) -> tuple[FloatArray, FloatArray]:
     """Innovations of all stops, (n, axes), and their variances for a scale of 1, by the filter in float64."""
     low, high = envelope_c
@@ -166,12 +166,12 @@ def _innovations(
 
 
 def fitted_spread(
-    start: Spread,
+    start: BiasSpread,
     past: Sequence[PowerOn],
     envelope_c: tuple[float, float],
     center_c: float,
     noise_dph: float,
-) -> tuple[Spread, FloatArray]:
+) -> tuple[BiasSpread, FloatArray]:
     """Maximum likelihood of the innovations of past power-ons, all axes together, about `start`.
 
     Ageing stays as it was: power-ons of one day do not show it.
@@ -186,13 +186,13 @@ def fitted_spread(
     Returns:
         The spread for a scale of 1, and each axis' scale, shape (axes,).
     """
-    names = [f.name for f in fields(Spread) if getattr(start, f.name) > 0.0 and "ageing" not in f.name]
+    names = [f.name for f in fields(BiasSpread) if getattr(start, f.name) > 0.0 and "ageing" not in f.name]
     begin = np.log([getattr(start, name) for name in names])
 
-    def spread_at(x: FloatArray) -> Spread:
+    def spread_at(x: FloatArray) -> BiasSpread:
         return replace(start, **{name: float(np.exp(v)) for name, v in zip(names, x, strict=True)})
 
-    def scales(spread: Spread) -> tuple[FloatArray, FloatArray]:
+    def scales(spread: BiasSpread) -> tuple[FloatArray, FloatArray]:
         nu, s = _innovations(spread, past, envelope_c, center_c, noise_dph**2)
         return np.mean(nu**2 / s[:, None], axis=0), s
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import f32
 
-__all__ = ["KEPT_WORDS", "KNOTS", "Learner", "Prior", "Stop", "packed"]
+__all__ = ["KEPT_WORDS", "KNOTS", "Learner", "ServicePrior", "Stop", "packed"]
 
 Floats = NDArray[np.float32]
 
@@ -46,7 +46,7 @@ def packed(matrix: ArrayLike) -> Floats:
 
 
 @dataclass(frozen=True)
-class Prior:
+class ServicePrior:
     """What is known of the type before a gyro learns: `gtc_learn_prior_t`, where the units stand."""
 
     id: int
@@ -139,7 +139,7 @@ class _Step:
     h: list[np.float32]
 
 
-def _memory(prior: Prior, dt: np.float32, d_temp: np.float32) -> tuple[Any, Any]:
+def _memory(prior: ServicePrior, dt: np.float32, d_temp: np.float32) -> tuple[Any, Any]:
     length = prior.number("memory_per_c")
     way = length * np.abs(d_temp)
     kept = _decay(way)[0]
@@ -170,7 +170,7 @@ def _memory(prior: Prior, dt: np.float32, d_temp: np.float32) -> tuple[Any, Any]
 class Learner:
     """Axes that learn. `x`, shape (13, n), and packed `p`, shape (91, n), are float32."""
 
-    def __init__(self, prior: Prior, axes: int = 1) -> None:
+    def __init__(self, prior: ServicePrior, axes: int = 1) -> None:
         self.prior, self.axes = prior, axes
         self.x: Floats = np.zeros((STATES, axes), dtype=np.float32)
         self.p: Floats = np.zeros((_PAIRS, axes), dtype=np.float32)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.target.learning import DISAGREES, KEPT_WORDS, OK, REFUSED, Learner, Prior, Stop, packed
+from gyrotc.target.learning import DISAGREES, KEPT_WORDS, OK, REFUSED, Learner, ServicePrior, Stop, packed
 
 ROOT = Path(__file__).resolve().parents[3]
 E_IMAGE, E_ID = -4, -5
 
 
-def prior(**changed: object) -> Prior:
+def prior(**changed: object) -> ServicePrior:
     """Of a laser gyro of the paper's class: deg/h, C, s."""
     knots = -40.0 + 100.0 / 7.0 * np.arange(8) - 10.0
     same = np.where(np.outer(knots, knots) > 0, np.minimum.outer(abs(knots), abs(knots)), 0.0)
@@ -26,7 +26,7 @@ def prior(**changed: object) -> Prior:
         "agreeing": 3, "power_ons": 3, "map_var": packed(2e-4**2 + 3.2e-5**2 * same),
         "ageing_var": packed(1e-12 + 1e-14 * same),
     }  # fmt: skip
-    return Prior(**{**shape, **changed})  # type: ignore[arg-type]
+    return ServicePrior(**{**shape, **changed})  # type: ignore[arg-type]
 
 
 class _Stop(ctypes.Structure):
@@ -40,7 +40,7 @@ class _Stop(ctypes.Structure):
 class Unit:
     """The compiled unit, one axis."""
 
-    def __init__(self, library: ctypes.CDLL, known: Prior) -> None:
+    def __init__(self, library: ctypes.CDLL, known: ServicePrior) -> None:
         words = known.words()
         self.c, self.prior = library, (ctypes.c_uint32 * len(words))(*words)
         self.state = (ctypes.c_uint32 * 111)()
@@ -126,7 +126,7 @@ def test_the_unit_has_the_bits_of_its_mirror(library: ctypes.CDLL) -> None:
             assert unit.save() == mirror.save()
 
 
-def served(known: Prior, wrong: float, seed: int) -> tuple[float, float, float]:
+def served(known: ServicePrior, wrong: float, seed: int) -> tuple[float, float, float]:
     """RMS of the error without and with learning, deg/h, and the largest |shift|; a share of the rests are wrong."""
     draw = np.random.default_rng(seed)
     learner, errors, shifts = Learner(known), [], []
