@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from ..common.arrays import FloatArray
 from ..target.learning import KNOTS, ServicePrior, packed
 
-__all__ = ["PowerOn", "BiasSpread", "fitted_spread", "prior_of"]
+__all__ = ["BiasSpread", "PowerOn", "fitted_spread", "prior_of"]
 
 _LOG_SPREAD = 0.5  # standard deviation of a logarithm about its start: an order of magnitude is 4.6 of them
 _STEPS = 40  # of the search: it ends before
