@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -52,3 +53,13 @@ def test_every_command_writes_its_json_by_the_same_function() -> None:
     for command in commands:
         parameter = inspect.signature(command, eval_str=True).parameters.get("json_file")
         assert parameter is None or parameter.annotation == base.JsonOption, command.__name__
+
+
+def test_help_of_the_package_begins_with_commands_that_there_are() -> None:
+    import gyrotc
+
+    lines = re.findall(r"^    gyrotc (\S+) ", str(gyrotc.__doc__), re.MULTILINE)
+    assert len(lines) >= 5 and str(gyrotc.__doc__).index("    gyrotc ") < 300
+    commands = {str(info.name or getattr(info.callback, "__name__", "")) for info in app.registered_commands}
+    commands |= {name.replace("_", "-") for name in commands}
+    assert set(lines) <= commands

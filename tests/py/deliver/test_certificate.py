@@ -13,6 +13,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate, facts_of
 from gyrotc.jobs.build import build_into
+from gyrotc.pages.unit import unit_in
 from gyrotc.pages.words import digits_of
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
@@ -126,6 +127,20 @@ def test_conformity_numbers_and_hashes_are_in_both(made: Path, built: Path) -> N
     for fact in (REASON, "2026-0042", "K-4711", "North &lt;&amp; Sons&gt;", "A. &lt;U+0007&gt;Berg", manifest.program,
                  manifest.model_hash):  # fmt: skip
         assert fact in page and fact in text, fact
+
+
+def test_who_states_no_thermometer_is_sent_to_the_data_set(
+    built: Path, tmp_path: Path, paper: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A facts file refuses instruments, so nobody is asked to put one there."""
+    unit = unit_in(built)
+    assert unit.budget is not None
+    unit.budget = unit.budget.model_copy(update={"instruments": ()})
+    (line,) = printing._missing(facts_of({}, built.parent / "facts.toml", "1"), [unit])
+    assert "only dataset.toml states instruments: [[meta.instrument]]" in line and "build again" in line
+    (tmp_path / "facts.toml").write_text("schema = 1\n[[instrument]]\nname = 'Pt100'\n")
+    with pytest.raises(InputError, match="instrument"):
+        facts_of({}, tmp_path / "facts.toml", None)
 
 
 def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Path, paper: None) -> None:

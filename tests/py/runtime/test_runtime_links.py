@@ -287,6 +287,9 @@ CPLUSPLUS = """
 #include "gtc.hpp"
 #include "gtc_rlg_0042.h"
 
+template struct gtc::Runtime<gtc::F32>; // every member, used here or not
+template struct gtc::Runtime<gtc::Q31>;
+
 int main()
 {
     gtc::q31::Correction fixed;
@@ -309,6 +312,15 @@ int main()
     return (started && went && (bias.value() == map) WRONG) ? 0 : 1;
 }
 """
+
+
+def test_the_cplusplus_header_has_every_call_of_c() -> None:
+    header = (ROOT / "include" / "gtc.h").read_text("ascii")
+    own = (ROOT / "include" / "gtc.hpp").read_text("ascii")
+    declared = set(re.findall(r"^GTC_MUST_CHECK int (gtc_(?:f32|q31)_\w+)\(", header, re.MULTILINE))
+    assert len(declared) >= 18 and declared <= set(re.findall(r"\b(gtc_(?:f32|q31)_\w+)\(", own))
+
+
 #: Each swaps units, and must not compile.
 SWAPPED = (
     "&& correction.sample(1000000UL, 20.0F).failed()",
