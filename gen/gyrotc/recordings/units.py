@@ -233,6 +233,8 @@ def _size(text: str) -> _Size:
     """A unit as a number of base units."""
     unknown = UnitError(f"{text!r} is not known as a unit")
     plain = " ".join(text.replace("º", "°").replace("μ", "µ").split())
+    if len(plain) > _MOST:
+        raise unknown
     while plain[:1] + plain[-1:] in ("[]", "{}"):
         plain = plain[1:-1].strip()
     plain = re.sub("[⁻¹²³]+", lambda raised: "^" + raised[0].translate(_RAISED), plain).replace("**", "^")
@@ -242,7 +244,7 @@ def _size(text: str) -> _Size:
     words, at = list[str](), 0
     while at < len(plain):
         found = _TOKEN.match(plain, at)
-        if found is None or len(plain) > _MOST:
+        if found is None:
             raise unknown
         power = found["power"] or ""
         words.append(found[0].removesuffix(power).strip())
