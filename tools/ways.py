@@ -2,8 +2,8 @@
 
 Makes the archives, installs the generator by each way of pip and emits C with it (of the wheel a whole build with its
 report), builds a program with each package of the C library (tests of tests/py/repository), and weighs what an
-installation and each extra bring. Prints the tables; `--docs docs` keeps the figures in docs/results/summary.json, and
-`--tree DIR` tries the generator of another tree and keeps them as those of before. What the machine lacks is named.
+installation and each extra bring. Prints the tables; `--docs docs` keeps the figures in docs/results/summary.json;
+`--only PART` tries a part and keeps it beside the others. What the machine lacks is named.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import version
+import archives
 
 import packages
 
-ROOT = version.ROOT
+ROOT = archives.ROOT
 sys.path[:0] = [str(ROOT / "tests" / "py")]
 
 MODEL = ROOT / "examples" / "minimal" / "model.json"
@@ -72,21 +72,21 @@ USES = {
 }
 
 
-def generator(tree: Path, work: Path, wheel: Path, sdist: Path) -> Iterator[dict[str, Any]]:
+def generator(work: Path, wheel: Path, sdist: Path) -> Iterator[dict[str, Any]]:
     """Installs gyrotc by each way into an environment of its own, and emits C with it."""
-    git = f"git+file://{tree}#subdirectory=gen"
+    git = f"git+file://{ROOT}#subdirectory=gen"
     ways = [
-        ("pip, source folder", ["{bin}/pip", "install", "-q", str(tree / "gen")]),
-        ("pip, git", ["{bin}/pip", "install", "-q", git]),
-        ("pip, sdist", ["{bin}/pip", "install", "-q", str(sdist)]),
         ("pip, wheel", ["{bin}/pip", "install", "-q", str(wheel)]),
+        ("pip, sdist", ["{bin}/pip", "install", "-q", str(sdist)]),
+        ("pip, source folder", ["{bin}/pip", "install", "-q", str(ROOT / "gen")]),
+        ("pip, git", ["{bin}/pip", "install", "-q", git]),
         (
             "uv, source folder",
-            ["uv", "pip", "install", "-q", "--python", "{bin}/python", str(tree / "gen")],
+            ["uv", "pip", "install", "-q", "--python", "{bin}/python", str(ROOT / "gen")],
         ),
     ]
     for number, (name, words) in enumerate(ways):
-        shown = " ".join(words).replace("{bin}/", "").replace(str(tree), ".")
+        shown = " ".join(words).replace("{bin}/", "").replace(str(ROOT), ".")
         shown = shown.replace(str(wheel), wheel.name).replace(str(sdist), sdist.name)
         if words[0] == "uv" and shutil.which("uv") is None:
             yield {"way": name, "command": shown, "seconds": 0.0, "result": "not tried: uv is not installed"}
@@ -175,23 +175,16 @@ def section(result: dict[str, Any]) -> str:
     """All tables."""
     from results import table
 
-    text = ""
-    for title, found in (("now", result), ("before", result.get("before"))):
-        if found:
-            ways = [
-                [w["way"], f"`{w['command']}`", f"{w['seconds']:.1f}", w["result"]] for w in found["ways"]
-            ]
-            sizes = [[e["extra"], f"{e['mb']:.0f}", e["packages"]] for e in found["installs"]]
-            text += f"{title}\n\n{table(('way', 'command', 's ', 'result'), ways)}\n"
-            text += f"{table(('installation', 'MB ', 'packages '), sizes)}\n"
-    return text
+    ways = [*result.get("generator", []), *result.get("library", [])]
+    rows = [[w["way"], f"`{w['command']}`", f"{w['seconds']:.1f}", w["result"]] for w in ways]
+    sizes = [[e["extra"], f"{e['mb']:.1f}", e["packages"]] for e in result.get("weights", [])]
+    return f"{table(('way', 'command', 's ', 'result'), rows)}\n{table(('installation', 'MB ', 'packages '), sizes)}"
 
 
-def _archives(tree: Path, out: Path) -> tuple[Path, Path]:
-    """The wheel and the sdist that a tree makes."""
-    subprocess.run([sys.executable, tree / "tools" / "archives.py", out], check=True, capture_output=True)
-    (wheel,), (sdist,) = out.glob("gyrotc-*.whl"), out.glob("gyrotc-*.tar.gz")
-    return wheel.resolve(), sdist.resolve()
+def _archives(out: Path) -> tuple[Path, Path]:
+    """The wheel and the sdist of this tree."""
+    sdist = archives.sdist(out)
+    return archives.wheel(sdist, out).resolve(), sdist.resolve()
 
 
 def main() -> int:
@@ -199,28 +192,25 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="tools/ways.py", description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--docs", type=Path)
-    parser.add_argument("--tree", type=Path)
+    parser.add_argument("--only", choices=("generator", "library", "weights"))
     arguments = parser.parse_args()
-    tree = (arguments.tree or ROOT).resolve()
-    if arguments.tree is None:
-        packages.assemble(arguments.out, list(packages.KINDS))
+    packages.assemble(arguments.out, list(packages.KINDS))
+    wheel, sdist = _archives(arguments.out) if arguments.only != "library" else (Path(), Path())
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
-        wheel, sdist = _archives(tree, work / "archives")
-        ways = list(generator(tree, work, wheel, sdist))
-        ways += [] if arguments.tree else library(work)
-        result: dict[str, Any] = {"ways": ways, "installs": [*weights(work, wheel)]}
-        if arguments.tree is None:
-            for archive in (wheel, sdist):
-                shutil.copy(archive, arguments.out)
+        parts = {
+            "generator": lambda: generator(work, wheel, sdist),
+            "library": lambda: library(work),
+            "weights": lambda: weights(work, wheel),
+        }
+        result = {name: [*part()] for name, part in parts.items() if arguments.only in (None, name)}
     if arguments.docs is not None:
         from results import recorded, write
 
         earlier = recorded(arguments.docs, "packages") or {}
-        kept = earlier | {"before": result} if arguments.tree else result | {"before": earlier.get("before")}
-        write(arguments.docs.resolve(), "packages", kept, section)
+        write(arguments.docs.resolve(), "packages", earlier | result, section)
     print(section(result))
-    return int(any(w["result"].startswith("failed") for w in [*ways, *result["installs"]]))
+    return int(any(found["result"].startswith("failed") for part in result.values() for found in part))
 
 
 if __name__ == "__main__":
