@@ -9,13 +9,14 @@ installation and each extra bring. Prints the tables; `--docs docs` keeps the fi
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -118,7 +119,7 @@ def _builds(folder: Path) -> str:
     return wrong
 
 
-def _ran(command: list[str], work: Path) -> str:
+def _ran(command: Sequence[str | Path], work: Path) -> str:
     """Nothing, or the last line of what went wrong."""
     clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=False, env=clean)
@@ -147,21 +148,23 @@ def weights(work: Path, wheel: Path) -> Iterator[dict[str, Any]]:
     """MB and packages of the plain installation and of each extra, what the plain one has left out."""
     plain: set[str] = set()
     for extra in ("", *EXTRAS):
-        folder = work / f"weight-{extra}"
+        name, folder = extra or "plain", work / f"weight-{extra}"
+        pip = [sys.executable, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
+        report = work / f"report-{extra}.json"
         what = f"{wheel}[{extra}]" if extra else str(wheel)
-        wrong = _ran([sys.executable, "-m", "pip", "install", "-q", "--target", str(folder), what], work)
+        wrong = _ran([*pip, "--dry-run", "--ignore-installed", "--report", str(report), what], work)
+        if not wrong:
+            chosen = [one["metadata"] for one in json.loads(report.read_text("utf-8"))["install"]]
+            new = {f"{one['name']}=={one['version']}" for one in chosen if one["name"] != "gyrotc"} - plain
+            wrong = _ran(
+                [*pip, "--no-deps", "--target", str(folder), *new, *([] if plain else [wheel])], work
+            )
         if wrong:
-            yield {"extra": extra or "plain", "mb": 0.0, "packages": 0, "result": wrong}
+            yield {"extra": name, "mb": 0.0, "packages": 0, "result": wrong}
             continue
-        have = {path.name: path for path in folder.glob("*.dist-info")}
-        new = {name: path for name, path in have.items() if name not in plain}
-        yield {
-            "extra": extra or "plain",
-            "mb": sum(map(_size, new.values())) / 1e6,
-            "packages": len(new),
-            "result": "",
-        }
-        plain = plain or set(have)
+        have = list(folder.glob("*.dist-info"))
+        yield {"extra": name, "mb": sum(map(_size, have)) / 1e6, "packages": len(have), "result": ""}
+        plain = plain or new
         shutil.rmtree(folder)
 
 
