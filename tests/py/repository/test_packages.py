@@ -300,6 +300,8 @@ def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
     defaults = dict(re.findall(r"#ifndef GTC_(\w+)\n#define GTC_\w+ (\d+)", text))
     options = _kconfig(PACKAGES / "Kconfig")
     for name, value in defaults.items():
+        if name.startswith("WITH_") and name != "WITH_BANK":
+            continue  # parts that a build by hand may leave out
         assert options.get(f"CONFIG_GYROTC_{name}") == {"0": "n"}.get(value, value), name
 
 
@@ -565,6 +567,7 @@ def test_every_option_of_the_configuration_is_one_of_the_package() -> None:
     options = set(re.findall(r"^#ifn?def (GTC_\w+)$", config, re.MULTILINE)) - {
         "GTC_CONFIG_H_INCLUDED",
         "GTC_CONFIG_HEADER",
+        "GTC_ASSERT",  # with an argument: in a configuration header
     }
     listed = re.search(r"set\(GTC_OPTIONS ([^)]*)\)", (ROOT / "CMakeLists.txt").read_text())
     assert listed is not None and set(listed[1].split()) == options
