@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from gyrotc.lot.service import PowerOn, BiasSpread, fitted_spread, prior_of
+from gyrotc.lot.service import BiasSpread, PowerOn, fitted_spread, prior_of
 from gyrotc.target.learning import Learner, ServicePrior, Stop
 from numpy.typing import NDArray
 from results import recorded, write

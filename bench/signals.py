@@ -69,7 +69,7 @@ line of two Gaussians, or a slope that depends on temperature, takes its place w
 
 One Gaussian of a bent line takes {f32:g} instructions in float32 and {q31:g} in fixed point on a Cortex-M4F, counted in
 the object code (aim: 26). A term takes 32 bytes of a table whatever its shape, so Gaussians take none beside the line;
-its stand-in is a network of 12 + 20 M bytes for M centers.
+its fallback model is a network of 12 + 20 M bytes for M centers.
 
 ## Useless channels
 
@@ -78,7 +78,7 @@ With {useless} useless channels beside: RMS changes by {harm} in the worlds (aim
 
 ## A channel lost during the whole exam
 
-RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the stand-in
+RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the fallback model
 of the term is added, a network of temperature and its rate; GTC_CHANNEL_LOST is set, and sigma has grown. Of all that
 are taken at once: "all".
 

@@ -165,7 +165,7 @@ def judged(split: Split) -> Iterator[Judged]:
         trivial = {}
         for name in TRIVIAL:
             trivial[name] = _rms(exam, of_trivial(train, name, exam))
-        t = next((row.t or 0.0 for row in fitted.training.ladder if row.chosen), 0.0)
+        t = next((row.t or 0.0 for row in fitted.training.candidates if row.chosen), 0.0)
         model = fitted.model
         left = _rms(exam, model.map_dph(exam.temperature_c, exam.slope_c_per_min))
         yield Judged(split, axis, model.method, t, left, trivial)

@@ -53,10 +53,10 @@ def training_lines(training: Training) -> Iterator[str]:
             yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
             for s in spans:
                 yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
-    if training.ladder:
+    if training.candidates:
         yield f"correction {training.method}: {training.reason}"
         tried = (
-            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.ladder if r.left_out_rms_dph is not None
+            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.candidates if r.left_out_rms_dph is not None
         )
         yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
     yield from _channel_lines(training)

@@ -97,13 +97,13 @@ def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[f
     for part in parts():
         together.append(part)
         if sum(map(len, together)) > _TOGETHER:
-            return _far_apart(parts, ranks_of)
+            return _farthest(parts, ranks_of)
     few = np.concatenate(together)
     few.partition(ranks := ranks_of(few.size))
     return float(few[ranks[0]]), float(few[ranks[1]])
 
 
-def _far_apart(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
+def _farthest(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
     """As `_middle`, of many: counts their leading digits, goes on with those that have the digits of the ranks."""
     prefix, below, ranks = 0, 0, None
     for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):

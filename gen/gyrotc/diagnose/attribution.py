@@ -229,12 +229,12 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
     third = _third(two.found, pair) if two.remains else None
     if third is not None:
         three = _stage(search, gains, (*pair, third))
-        if three.left.p_value >= _WELL > two.left.p_value and _believed(gains, three.refined):
+        if three.left.p_value >= _WELL > two.left.p_value and _plausible(gains, three.refined):
             return three
     return two if two.well else one
 
 
-def _believed(gains: Gains, causes: tuple[Refined, ...]) -> bool:
+def _plausible(gains: Gains, causes: tuple[Refined, ...]) -> bool:
     """Whether no cause is larger than is accepted: the third one comes from the search, which asks for no size."""
     return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate))
 

@@ -34,11 +34,13 @@ __all__ = [
     "testable",
 ]
 
-_TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))  # a factor 1.6 apart: memories nearer than that are alike
+_TAUS_S = tuple(
+    np.geomspace(150.0, 4000.0, 8)
+)  # in steps of a factor 1.6: memories nearer than that are alike
 _EDGES = (0.6, 1.3)  # thresholds, in standard deviations of T − z
 _QUICK_S = tuple(np.geomspace(120.0, 1500.0, 7))  # time constant of the quicker direction
 _SLOWER = (3.0, 7.0)  # by which factor the other direction is slower
-_PERIODS_C = (12.0, 18.0, 26.0, 36.0, 50.0)  # a factor 1.4 apart
+_PERIODS_C = (12.0, 18.0, 26.0, 36.0, 50.0)  # in steps of a factor 1.4
 _MODULATING_S = (300.0, 700.0, 1500.0)  # time constants of memories whose strength changes
 _SWITCH_C, _GAPS_C = 6.0, (10.0, 20.0)  # steps of the upper threshold; width between the thresholds
 _HAT_C = 3.5  # width of the local functions of a map that a switch changes
@@ -158,14 +160,14 @@ def _switch(t: FloatArray, on: float, off: float) -> FloatArray:
 
 
 def _creep(history: History, grain: float) -> FloatArray:
-    """Sign of the last direction times log(1 + time since it turned / grain), shape (n, 1)."""
+    """Sign of the last direction times log(1 + time since it changed / grain), shape (n, 1)."""
     slope = centred_slope(history)
     sign = np.where(slope > _TURNING, 1, np.where(slope < -_TURNING, -1, 0))
     number = np.arange(len(sign))
     last = np.maximum.accumulate(np.where(sign != 0, number, -1))
     direction = np.where(last >= 0, sign[np.maximum(last, 0)], 0)
-    turned = np.maximum.accumulate(np.where(np.diff(direction, prepend=0) != 0, number, 0))
-    since = history.time_s - history.time_s[turned]
+    turning = np.maximum.accumulate(np.where(np.diff(direction, prepend=0) != 0, number, 0))
+    since = history.time_s - history.time_s[turning]
     return np.asarray(direction * np.log1p(since / grain))[:, None]
 
 

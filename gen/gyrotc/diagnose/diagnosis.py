@@ -165,7 +165,7 @@ def _extended_model(
 
 
 def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:
-    """Terms as a model has them, those of channels last: a stand-in is fitted to what all others leave of the input."""
+    """Terms as a model has them, those of channels last: a fallback model is fitted to what all others leave."""
     entries = []
     for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):
         if effect.term.table is None:

@@ -32,7 +32,7 @@ from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, front_end, map_method, power_ons
 from ..train.mrbf import Bumps
 from ..train.result import Fit
-from ..train.selection import Ladder, climb
+from ..train.selection import Comparison, compare_candidates
 from .attribution import choose
 from .blocks import Records
 from .gain import Gain, floor_of, gain_of
@@ -229,14 +229,14 @@ class Shipping:
 
     Attributes:
         shipped: Effects of the extended model.
-        rung: What model selection would emit without them.
+        candidate: What model selection would emit without them.
         left_out: What was left out, in words.
         before_dph, after_dph: RMS over these stretches without and with the effects, all stretches counting alike;
             None where nothing can be left out, or nothing was to be added.
     """
 
     shipped: list[Effect]
-    rung: str
+    candidate: str
     left_out: list[str]
     before_dph: float | None
     after_dph: float | None
@@ -245,7 +245,7 @@ class Shipping:
         """As `diagnose.json` has it."""
         return ShippingTrial(
             ships=bool(self.shipped),
-            beside=self.rung,
+            beside=self.candidate,
             left_out=tuple(self.left_out),
             rms_before_dph=self.before_dph,
             rms_after_dph=self.after_dph,
@@ -255,22 +255,22 @@ class Shipping:
 def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     """Adds the effects that a table can hold one after the other; those of a single cycle all at once."""
     able = [e for e in effects if e.term.shipped][:MOST_TERMS]
-    best = _ladder(refitting, [])
-    rung = best.chosen()
+    best = _comparison(refitting, [])
+    candidate = best.chosen()
     shipped: list[Effect] = []
-    before, after = best.rms_of(rung), None
+    before, after = best.rms_of(candidate), None
     together = refitting.single_cycle
     for tried in [able] if together and able else [able[: k + 1] for k in range(len(able))]:
         new = tried if together else [*shipped, tried[-1]]
         name = f"{len(new)} states"
-        beside = best.with_states(name, _ladder(refitting, new))
+        beside = best.with_states(name, _comparison(refitting, new))
         after = beside.rms_of(name)
         if beside.chosen() == name:
             shipped, best = new, beside
-    return Shipping(shipped, rung, best.stretches(), before, after)
+    return Shipping(shipped, candidate, best.stretches(), before, after)
 
 
-def _ladder(refitting: Refitting, effects: Sequence[Effect]) -> Ladder:
+def _comparison(refitting: Refitting, effects: Sequence[Effect]) -> Comparison:
     """Every candidate beside the effects, without each piece of history."""
     data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
     scaling = scaling_of(data)
@@ -279,7 +279,9 @@ def _ladder(refitting: Refitting, effects: Sequence[Effect]) -> Ladder:
     except TrainingFailed:
         process = None
     rate = not (effects and refitting.single_cycle)
-    return climb(data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate)
+    return compare_candidates(
+        data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate
+    )
 
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts

@@ -28,7 +28,7 @@ from .joined import variance_ratio_of
 from .noise import Whitener
 from .search import Search
 
-__all__ = ["APART", "CauseSet", "Gains", "Point", "SizeLimit", "best_of", "clear_pair", "makes_sense"]
+__all__ = ["SEPARATION", "CauseSet", "Gains", "Point", "SizeLimit", "best_of", "clear_pair", "makes_sense"]
 
 _MOST_SPREAD = (
     2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
@@ -272,7 +272,7 @@ _PAIR = 10.0  # what a pair must gain over the best single cause
 _MEMBER = 15.0  # what each of a pair must gain beside the other
 _SMALLEST = 0.03  # ... and of the pair's gain: what is less may be the imperfection of the other
 _LEADING = 0.35  # share of a pair's gain that its best single cause must have
-APART = 0.7
+SEPARATION = 0.7
 """Difference of the logarithms of the parameters of two states of one kind: a factor of two. Nearer ones are one
 state with another parameter."""
 
@@ -285,7 +285,7 @@ def makes_sense(point: Point) -> bool:
     if not searched(a.id).twice or a.channel != b.channel:
         return a.channel != b.channel
     x, y = (next(iter(m.values.values())) for m in (a, b))
-    return bool(abs(np.log(x / y)) > APART)
+    return bool(abs(np.log(x / y)) > SEPARATION)
 
 
 def best_of(points: Sequence[Point], size: int) -> Point:

@@ -1,6 +1,6 @@
 """All columns that a search knows side by side, and what is left once a model is projected out.
 
-Whitened and with the map projected out, every candidate is an energy of normal variables. Each is turned
+Whitened and with the map projected out, every candidate is an energy of normal variables. Each is converted
 into minus the logarithm of its p-value; the largest of all is compared with the largest of all in data
 without any effect (Westfall and Young 1993). These draws depend on the temperature records alone.
 

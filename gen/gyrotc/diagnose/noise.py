@@ -74,7 +74,7 @@ def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> FloatAr
 
 
 def flicker_row(lags: NDArray[np.int64], block_s: float) -> FloatArray:
-    """The same for flicker noise: equal Markov processes, correlation times a factor 4 apart."""
+    """The same for flicker noise: equal Markov processes, correlation times in steps of a factor 4."""
     return np.asarray(sum(markov_row(lags, block_s, tau) for tau in _FLICKER_S))
 
 
@@ -112,7 +112,7 @@ class Declared:
         """Covariance of block means in (deg/h)², scale included.
 
         White: N² 3600/block_s. Flicker: B²/(2π f) is the sum of Markov processes of variance
-        B² ln 4/π each, a factor 4 apart. Quantisation: rounding error uniform over one count, q²/12 at each edge.
+        B² ln 4/π each, in steps of a factor 4. Quantisation: rounding error uniform over one count, q²/12 at each edge.
         """
         return Colour(
             white=self.arw_deg_per_sqrt_h**2 * 3600.0 / block_s,

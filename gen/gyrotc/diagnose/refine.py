@@ -193,11 +193,11 @@ class _Fit:
         """Energy of the data that the members explain beyond the map; 0 where one would be larger than is accepted."""
         white = [self.white(m) for m in members]
         q = orthonormal(*white)
-        if not self._believed(members, white):
+        if not self._plausible(members, white):
             return 0.0
         return float(((q.T @ self.y) ** 2).sum())
 
-    def _believed(self, members: list[Candidate], white: list[FloatArray]) -> bool:
+    def _plausible(self, members: list[Candidate], white: list[FloatArray]) -> bool:
         weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=1e-10)[0]
         at = 0
         for member, own in zip(members, white, strict=True):

@@ -159,11 +159,11 @@ class Played:
         channel = None if effect.channel is None else self.channels[effect.channel]
         table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
         self._outcomes[:0] = [(effect, made)]
-        del self._outcomes[_REMEMBERED:]
+        del self._outcomes[_KEPT:]
         return made
 
 
-_REMEMBERED = 8  # outcomes of terms for each run: those of two full tables
+_KEPT = 8  # outcomes of terms for each run: those of two full tables
 
 
 def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:

@@ -83,8 +83,8 @@ def _step(rate: FloatArray, noise: float) -> float:
     What is printed, or a mean of rounded rows, is beside its step by a trace of the noise: that is the same value.
     """
     gaps = np.diff(np.sort(rate))
-    apart = gaps[gaps > _ALIKE * noise]
-    return float(np.median(apart)) if apart.size else 0.0
+    distinct = gaps[gaps > _ALIKE * noise]
+    return float(np.median(distinct)) if distinct.size else 0.0
 
 
 def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, float]:

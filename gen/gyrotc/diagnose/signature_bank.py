@@ -37,7 +37,7 @@ _DICTIONARY_LAGS_S = (
     1000.0,
     2500.0,
     6000.0,
-)  # a factor 2.5 apart, over what a day of recordings shows
+)  # in steps of a factor 2.5, over what a day of recordings shows
 # Of the texture; of the play that tells the direction; of its memory.
 _TEXTURE_C, _DIRECTION_C, _MODULATING_S = 8.0, 3.0, 700.0
 _COMMON = 0.05  # directions below this share of the largest singular value are left to the noise

@@ -30,7 +30,7 @@ from ..train.cross_validation import turning_points
 from .attribution import Attribution
 from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
-from .gains import APART
+from .gains import SEPARATION
 from .refine import Interval, Refined
 from .rivals import EQUIVALENT, Rival
 
@@ -116,15 +116,15 @@ class CycleFits:
         c = self.columns[kinds[0]].T @ self.columns[kinds[1]]
         ok = np.abs(c) < _MOST_ALIKE
         if kinds[0] == kinds[1]:
-            ok &= self._apart(kinds[0])
+            ok &= self._separate(kinds[0])
         raw = a[:, None] ** 2 + b[None, :] ** 2 - 2.0 * c * a[:, None] * b[None, :]
         out = np.where(ok, raw / np.where(ok, 1.0 - c**2, 1.0), 0.0)
         return np.asarray(np.triu(out, 1) if kinds[0] == kinds[1] else out)
 
-    def _apart(self, kind: str) -> NDArray[np.bool_]:
-        """Which two states of a kind are far enough apart to be two, as in `gains`."""
+    def _separate(self, kind: str) -> NDArray[np.bool_]:
+        """Which two states of a kind are different enough to be two, as in `gains`."""
         logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
-        return np.asarray(np.abs(logs[:, None] - logs[None, :]) > APART)
+        return np.asarray(np.abs(logs[:, None] - logs[None, :]) > SEPARATION)
 
     def left(self, members: tuple[Candidate, ...]) -> FloatArray:
         """Residual of map and states."""
@@ -152,7 +152,7 @@ class CycleFits:
         return np.asarray(rest / np.linalg.norm(rest))
 
     def polished(self, members: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-        """The states moved off the grid to the optimum nearby, one after the other; two of a kind stay apart."""
+        """The states moved off the grid to the optimum nearby, one after the other; two of a kind stay separate."""
         best, least = members, float((self.left(members) ** 2).sum())
         for k in [k for _ in range(_ROUNDS) for k in range(len(members))]:
             moved, sum_of_squares = self._along(best, k)
@@ -171,7 +171,7 @@ class CycleFits:
         if together:
             low, high = _shared(here, low, high, grid)
         elif twins:
-            low = max(low, here[0] + APART)
+            low = max(low, here[0] + SEPARATION)
 
         def at(value: float) -> tuple[Candidate, ...]:
             moved = [h + value - here[k] if together or j == k else h for j, h in enumerate(here)]

@@ -39,7 +39,7 @@ _STEPS, _SOFT = 7, 0.85
 as fine as the coarsest static map, beside which a loop is seen."""
 
 _NODE_C = 2.5  # distance of the finest functions: as of the map's, once it is named too coarse (`static_map`)
-_POINTS = 12  # widths (time constants) that are tried: a factor of 1.4 (1.6) apart
+_POINTS = 12  # widths (time constants) that are tried: in steps of a factor 1.4 (1.6)
 _NEAR = (0.3, 0.7, 1.0, 0.7, 0.3)  # weights of the widths about one: a factor of two to either side
 _NARROWEST_C, _QUICKEST_S, _SLOWEST_S = 0.5, 60.0, 8000.0  # what is searched for plays and lags (`causes`)
 _ROW_S = 10.0  # rows that are nearer than that are thinned: nothing here is as quick

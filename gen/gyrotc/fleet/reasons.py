@@ -195,10 +195,10 @@ def _lateness(facts: Sequence[Facts], number: int) -> float:
             continue
         usual = np.median([profile[:length] for profile in others], axis=0)
         change = np.gradient(usual) / PROFILE_S
-        apart = np.array(run.profile_c[:length]) - usual
-        change, apart = change - change.mean(), apart - apart.mean()
+        difference = np.array(run.profile_c[:length]) - usual
+        change, difference = change - change.mean(), difference - difference.mean()
         if float(np.ptp(usual)) > _LEAST_SHIFT_C and float(change @ change) > 0.0:
-            late.append(-float(change @ apart) / float(change @ change))
+            late.append(-float(change @ difference) / float(change @ change))
     return float(np.median(late)) if late else float("nan")
 
 

@@ -21,7 +21,7 @@ __all__ = ["Departures", "within"]
 
 Span = tuple[float, float]
 
-_CENTERS = 17  # of regions over the run's temperatures: half of the narrowest one's width apart
+_CENTERS = 17  # of regions over the run's temperatures: at half of the narrowest one's width
 _WIDTHS = (
     0.125,
     0.25,

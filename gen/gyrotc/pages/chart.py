@@ -362,8 +362,8 @@ def _panel(
         ) + "</g>")  # fmt: skip
         if panel.y:
             at = x - max((_wide(text) for _, text in y_ticks), default=0.0) - 16.0
-            turned = f' transform="rotate(-90 {at:.1f} {y + h / 2:.1f})"'
-            parts.append(text_svg(at, y + h / 2, _named(panel.y, ys), anchor="middle", more=turned))
+            rotated = f' transform="rotate(-90 {at:.1f} {y + h / 2:.1f})"'
+            parts.append(text_svg(at, y + h / 2, _named(panel.y, ys), anchor="middle", more=rotated))
     return "".join(parts)
 
 

@@ -148,8 +148,8 @@ class UnitResults:
 
     def against_constant(self, candidate: CandidateModel) -> float | None:
         """How many times what this correction leaves a constant leaves."""
-        ladder = self.training.ladder if self.training else ()
-        constant = next((r.left_out_rms_dph for r in ladder if r.id == "constant"), None)
+        candidates = self.training.candidates if self.training else ()
+        constant = next((r.left_out_rms_dph for r in candidates if r.id == "constant"), None)
         return constant / candidate.left_out_rms_dph if constant and candidate.left_out_rms_dph else None
 
     @property

@@ -22,10 +22,10 @@ from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
 from .fits import (
     LEAST_ENERGY,
     LONGEST_GAP_S,
-    Cells,
-    Fit,
     Noise,
     Rows,
+    RunCells,
+    SmoothFit,
     cells_of,
     knots_of,
     likeliest_noise,
@@ -41,7 +41,7 @@ FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
 _MOST_CELLS = 150_000  # of all runs: longer ones have longer cells
 _STEP_S = 30.0  # what takes no longer is a step
-_DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)
+_DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)  # from a step to ten minutes, where a drift begins
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
 _BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
 _MARGIN = (
@@ -162,7 +162,7 @@ def _within(one: Change, gain: Change) -> bool:
 
 
 def _columns(
-    cells: Cells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]
+    cells: RunCells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]
 ) -> FloatArray | None:
     """Columns of the changes of a run; `curves`: times and the map along each run, shape (2, n)."""
     t = cells.time_s
@@ -171,7 +171,7 @@ def _columns(
     return np.column_stack(found) if found else None
 
 
-def _over_s(cells: Cells) -> float:
+def _over_s(cells: RunCells) -> float:
     """What takes no longer is a step: two rows that are means may hold it."""
     return max(_STEP_S, 2.0 * cells.cell_s)
 
@@ -180,7 +180,7 @@ class _Search:
     """Runs with the noise that their changes are judged against."""
 
     def __init__(
-        self, cells: Sequence[Cells], maps: Sequence[FloatArray], noise: Noise, curves: list[FloatArray]
+        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: Noise, curves: list[FloatArray]
     ) -> None:
         self._cells, self._maps, self._noise, self._curves = cells, maps, noise, curves
         self._looks = _KINDS * sum(len(one) for one in cells)
@@ -209,7 +209,7 @@ class _Search:
                 break
         return found
 
-    def _measure(self, found: Sequence[_At]) -> tuple[Fit, list[tuple[FloatArray, list[_Tried]]]]:
+    def _measure(self, found: Sequence[_At]) -> tuple[SmoothFit, list[tuple[FloatArray, list[_Tried]]]]:
         """The fit beside what was found, and sizes over errors at all places; the first time also their scale."""
         fit = self._fit(found)
         self._curves[:] = [np.stack([one.time_s, fit.curve[k]]) for k, one in enumerate(self._cells)]
@@ -222,9 +222,9 @@ class _Search:
             self._scale = np.outer(louder, np.maximum(overall, fit.sigma))
         return fit, looked
 
-    def _fit(self, changes: Sequence[_At]) -> Fit:
+    def _fit(self, changes: Sequence[_At]) -> SmoothFit:
         columns = [_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)]
-        return Fit.of(self._cells, self._maps, self._noise, columns)
+        return SmoothFit.of(self._cells, self._maps, self._noise, columns)
 
     def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
         """Of every run the clearest change, if it is clear; of a departure that comes back both steps."""
@@ -236,7 +236,7 @@ class _Search:
             far = np.abs(z) / self._scale[k][:, None]
             for at in found:
                 if at.run == k:
-                    far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._apart(k)] = 0.0
+                    far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._separation_s(k)] = 0.0
             gain = self._gain(fit, k, found)
             if gain is not None and gain[0] > float(far.max()) ** 2 + self._limit:
                 yield gain[1]
@@ -256,16 +256,16 @@ class _Search:
 
     def _differ(self, one: _At, other: _At) -> bool:
         """Whether two changes of a run are two."""
-        return abs(one.middle_s - other.middle_s) > self._apart(one.run) or {one.kind, other.kind} == {
+        return abs(one.middle_s - other.middle_s) > self._separation_s(one.run) or {one.kind, other.kind} == {
             "gain",
             "drift",
         }
 
-    def _apart(self, run: int) -> float:
-        """How far two changes lie apart, s: nearer ones are one."""
+    def _separation_s(self, run: int) -> float:
+        """Least separation of two changes, s: nearer ones are one."""
         return max(2.0 * _STEP_S, 3.0 * self._cells[run].cell_s)
 
-    def _gain(self, fit: Fit, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
+    def _gain(self, fit: SmoothFit, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
         """The likeliest change of gain of a run and what it gains with its step; None where none is clear.
 
         Two other runs at least say what the curve is.
@@ -312,7 +312,7 @@ class _Search:
             del own[int(np.argmin(over))]
         return others + own
 
-    def _best(self, at: _At, fit: Fit, others: Sequence[_At]) -> _At:
+    def _best(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> _At:
         """The place and duration of the largest likelihood; of those nearly as likely the shortest."""
         cells = self._cells[at.run]
         reach = _HOUR_S if at.kind in ("drift", "gain") else max(_AROUND_S, at.duration_s, 3.0 * cells.cell_s)
@@ -335,7 +335,7 @@ class _Search:
         most = max(gain for gain, _ in best)
         return next(one for gain, one in best if gain >= most - CHI2_95_ONE)
 
-    def _gains(self, fit: Fit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
+    def _gains(self, fit: SmoothFit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
         """Twice the gain of log-likelihood of each of some changes of one kind and run, beside others of it."""
         run, beside = tried[0].run, self._of(others, tried[0].run)
         columns = self._of(tried, run)
@@ -348,13 +348,13 @@ class _Search:
             found[k] += self._gain_of(fit, run, columns[:, 2 * k + 1 : 2 * k + 2], both)[0]
         return found
 
-    def _alone(self, fit: Fit, at: _At, others: Sequence[_At]) -> float:
+    def _alone(self, fit: SmoothFit, at: _At, others: Sequence[_At]) -> float:
         """Twice the gain of log-likelihood of one change; of a gain without its step."""
         columns = self._of([at], at.run)
         beside = np.column_stack([self._of(others, at.run), columns[:, :-1]])
         return float(self._gain_of(fit, at.run, columns[:, -1:], beside)[0])
 
-    def _gain_of(self, fit: Fit, run: int, columns: FloatArray, beside: FloatArray) -> FloatArray:
+    def _gain_of(self, fit: SmoothFit, run: int, columns: FloatArray, beside: FloatArray) -> FloatArray:
         inner, energy = fit.amplitudes(run, columns, beside)
         return np.asarray(inner**2 / np.maximum(energy, 1e-300)) / self._white(run) ** 2
 
@@ -404,7 +404,7 @@ class _Search:
         gaps = [(float(t[k]), gap) for k, gap in self._cells[at.run].behind_gap]
         return next((gap for end, gap in gaps if end - gap - cell_s < at.middle_s <= end + cell_s), 0.0)
 
-    def _begins(self, at: _At, fit: Fit, others: Sequence[_At]) -> Limits:
+    def _begins(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> Limits:
         """The beginning of a drift with the times that are nearly as likely."""
         t = self._cells[at.run].time_s
         near = t[np.abs(t - at.begin_s) < _HOUR_S]
@@ -444,7 +444,7 @@ def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> tup
 _Tried = tuple[str, float]
 
 
-def _looked(fit: Fit, run: int) -> tuple[FloatArray, list[_Tried]]:
+def _looked(fit: SmoothFit, run: int) -> tuple[FloatArray, list[_Tried]]:
     """Sizes over errors of changes at every cell of a run, shape (shapes, n), and what the shapes are.
 
     The filter does not change with time: the inner products of a change at every place are a correlation.

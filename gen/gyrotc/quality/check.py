@@ -20,11 +20,11 @@ from ..recordings.load import asked_axes, survey
 from ..recordings.records import Applied, Dataset, Mark
 from ..results.recordings import Checked, CheckedRun, MarkedRows, Problem, Suspected
 from .facts import RunFacts
-from .findings import Doubt, Envelope, looked_at, warnings_of_data_set, where_of
+from .findings import CheckWarning, Envelope, looked_at, warnings_of_data_set, where_of
 
 __all__ = [
     "CheckResult",
-    "Doubt",
+    "CheckWarning",
     "Envelope",
     "check",
     "envelope_of",
@@ -48,7 +48,7 @@ class CheckResult:
     serial: str | None
     axis: str | None
     problems: tuple[InputError, ...]
-    warnings: tuple[Doubt, ...]
+    warnings: tuple[CheckWarning, ...]
     facts: tuple[tuple[str | None, RunFacts], ...]
     marks: Mapping[str, tuple[Mark, ...]]
     datasets: tuple[tuple[str | None, Dataset], ...]
@@ -57,10 +57,10 @@ class CheckResult:
         """For a person: a line for each problem, warning (and what to do next) and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
-        for doubt in self.warnings:
-            yield f"doubt: {doubt}"
-            if doubt.advice:
-                yield f"  next: {doubt.advice}"
+        for warning in self.warnings:
+            yield f"warning: {warning}"
+            if warning.advice:
+                yield f"  next: {warning.advice}"
         for axis, f in self.facts:
             yield _run_line(axis, f)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
@@ -126,7 +126,7 @@ def check(
     """
     problems: dict[str, InputError] = {}
     marks: dict[str, tuple[Mark, ...]] = {}
-    warnings: dict[Doubt, list[str | None]] = {}
+    warnings: dict[CheckWarning, list[str | None]] = {}
     facts: list[tuple[str | None, RunFacts]] = []
     datasets: list[tuple[str | None, Dataset]] = []
     axes = _axes(folder, axis)
@@ -145,10 +145,10 @@ def check(
                 looked.append(looked_at(run))
             of_axis = [f for f, _ in looked]
             together = warnings_of_data_set(dataset, of_axis, envelope, earlier)
-            for doubt in (*together, *(doubt for _, of_run in looked for doubt in of_run)):
-                warnings.setdefault(doubt, []).append(one)
+            for warning in (*together, *(warning for _, of_run in looked for warning in of_run)):
+                warnings.setdefault(warning, []).append(one)
             facts += [(one, f) for f in of_axis]
-    named = (_of_axes(doubt, seen, len(axes)) for doubt, seen in warnings.items())
+    named = (_of_axes(warning, seen, len(axes)) for warning, seen in warnings.items())
     serial = datasets[-1][1].serial if datasets else None
     return CheckResult(
         serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets)
@@ -159,11 +159,11 @@ def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:
     return tuple(MarkedRows(file=m.file, rows=m.rows, span_s=m.span_s) for m in marks)
 
 
-def _of_axes(doubt: Doubt, seen: Sequence[str | None], axes: int) -> Doubt:
+def _of_axes(warning: CheckWarning, seen: Sequence[str | None], axes: int) -> CheckWarning:
     """Says for which axes a warning holds, where that is not for all."""
     if len(seen) == axes:
-        return replace(doubt, axes=tuple(seen))
-    return replace(doubt, where=f"{doubt.where}, axis {', '.join(map(str, seen))}", axes=tuple(seen))
+        return replace(warning, axes=tuple(seen))
+    return replace(warning, where=f"{warning.where}, axis {', '.join(map(str, seen))}", axes=tuple(seen))
 
 
 def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:

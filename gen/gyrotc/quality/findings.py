@@ -33,7 +33,7 @@ from .recorded import (
 from .thermometers import thermometer_findings
 from .timing import time_findings
 
-__all__ = ["Doubt", "Envelope", "advice_of", "looked_at", "warnings_of_data_set", "where_of"]
+__all__ = ["CheckWarning", "Envelope", "advice_of", "looked_at", "warnings_of_data_set", "where_of"]
 
 _ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
@@ -91,7 +91,7 @@ _LINES = 20  # that are offered to be pasted: more are a fault of the recording
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class CheckWarning:
     """Something suspect: a stable id, where, what, the rows, and the axes that show it."""
 
     id: str
@@ -114,7 +114,7 @@ def where_of(file: str, from_s: float | None) -> str:
     return file if from_s is None else f"{file} from {from_s:.6g} s"
 
 
-def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
+def looked_at(run: Run) -> tuple[RunFacts, list[CheckWarning]]:
     """Facts of a run, and the warnings that its rows alone raise."""
     rows = run.rows()
     f = facts_of(run, rows)
@@ -129,17 +129,19 @@ def looked_at(run: Run) -> tuple[RunFacts, list[Doubt]]:
         *_of_temperature(f, where),
         *_of_rate(f, rows, where, coarse=any(one["id"] == "coarse_rate" for one in found)),
         *_of_time(f, where),
-        *(Doubt(one["id"], where, one["text"], one.get("marks", ())) for one in found),
+        *(CheckWarning(one["id"], where, one["text"], one.get("marks", ())) for one in found),
         *_of_counter(f, rows, where),
-        *(Doubt(one["id"], where, one["text"]) for one in held_findings([f])),
+        *(CheckWarning(one["id"], where, one["text"]) for one in held_findings([f])),
         *_of_outliers(run, rows, f, where),
     ]
     return f, warnings
 
 
-def _of_counter(f: RunFacts, rows: Rows, where: str) -> Iterator[Doubt]:
+def _of_counter(f: RunFacts, rows: Rows, where: str) -> Iterator[CheckWarning]:
     for one in counter_findings([f]):
-        yield Doubt(one["id"], where, one["text"], (_mark_at(f.file, rows, one["evidence"]["time_s"]),))
+        yield CheckWarning(
+            one["id"], where, one["text"], (_mark_at(f.file, rows, one["evidence"]["time_s"]),)
+        )
 
 
 def _mark_at(file: str, rows: Rows, time_s: float) -> Mark:
@@ -149,7 +151,7 @@ def _mark_at(file: str, rows: Rows, time_s: float) -> Mark:
     return Mark(file, (first + 1, k + 1), (float(rows.time_s[first]), float(rows.time_s[end])))
 
 
-def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[Doubt]:
+def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[CheckWarning]:
     """Spikes and bursts, with the lines that leave them out."""
     wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
     stretches = stretches_left_out(run, rows.time_s[wild])
@@ -170,7 +172,9 @@ def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[Doub
     if f.outlier is not None and not marks:
         marks = [_mark_at(run.file, rows, f.outlier.time_s)]
     if texts:
-        yield Doubt("rate_outliers", where, "; ".join(text.rstrip(".") for text in texts), tuple(marks))
+        yield CheckWarning(
+            "rate_outliers", where, "; ".join(text.rstrip(".") for text in texts), tuple(marks)
+        )
 
 
 def _mark(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
@@ -183,7 +187,7 @@ def warnings_of_data_set(
     facts: Sequence[RunFacts],
     envelope: Envelope | None,
     earlier: Mapping[str, Model] | None = None,
-) -> Iterator[Doubt]:
+) -> Iterator[CheckWarning]:
     """What all runs together raise.
 
     Args:
@@ -191,20 +195,20 @@ def warnings_of_data_set(
     """
     for warning in dataset.warnings:
         where, _, text = warning.partition(": ")
-        yield Doubt("left_out", where, text)
+        yield CheckWarning("left_out", where, text)
     isothermal = list(temperature_findings(facts))
     for one in (*isothermal, *jump_findings(facts), *earth_rate_findings(dataset, facts)):
-        yield Doubt(one["id"], "data set", one["text"], _of_jumps(one))
+        yield CheckWarning(one["id"], "data set", one["text"], _of_jumps(one))
     for one in (*contradiction_findings(facts), *thermometer_findings(dataset)):
         yield _of_run(one)
     for shared, one in zip(dataset.shared, shared_rows_findings(dataset), strict=True):
-        yield Doubt(one["id"], shared.file, one["text"], shared.marks)
+        yield CheckWarning(one["id"], shared.file, one["text"], shared.marks)
     for one in shared_axes_findings(dataset):
-        yield Doubt(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
-    turned = {one["evidence"]["file"]: one for one in sign_findings(facts)}
-    turned |= {one["evidence"]["file"]: one for one in orientation_findings(dataset, earlier)}
-    for one in turned.values():
-        yield Doubt(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
+        yield CheckWarning(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
+    reversed_files = {one["evidence"]["file"]: one for one in sign_findings(facts)}
+    reversed_files |= {one["evidence"]["file"]: one for one in orientation_findings(dataset, earlier)}
+    for one in reversed_files.values():
+        yield CheckWarning(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
     yield from _between_runs(facts)
     training = [f for f in facts if f.role == "train" and len(f.slopes_c_per_min)]
     if training and not isothermal:
@@ -213,10 +217,10 @@ def warnings_of_data_set(
         yield from _of_coverage(training, envelope)
 
 
-def _of_run(one: dict[str, Any]) -> Doubt:
+def _of_run(one: dict[str, Any]) -> CheckWarning:
     evidence = one["evidence"]
     where = where_of(evidence["file"], evidence["from_s"])
-    return Doubt(one["id"], where, one["text"], (Mark(evidence["file"]),))
+    return CheckWarning(one["id"], where, one["text"], (Mark(evidence["file"]),))
 
 
 def _of_jumps(one: dict[str, Any]) -> tuple[Mark, ...]:
@@ -224,24 +228,24 @@ def _of_jumps(one: dict[str, Any]) -> tuple[Mark, ...]:
     return tuple(Mark(j["file"], None, (j["time_s"], j["time_s"])) for j in jumps)
 
 
-def _of_temperature(f: RunFacts, where: str) -> Iterator[Doubt]:
+def _of_temperature(f: RunFacts, where: str) -> Iterator[CheckWarning]:
     for column in f.constant:
-        yield Doubt("constant_channel", where, f"{column} holds one value in all {f.rows} rows")
+        yield CheckWarning("constant_channel", where, f"{column} holds one value in all {f.rows} rows")
     step = f.temperature_step_c
     if step >= _COARSE_STEP_C:
         what = "whole degrees" if step % 1.0 == 0.0 else f"steps of {step:.3g} C"
         text = f"temperature comes in {what}: its rate is the difference of two such steps"
-        yield Doubt("coarse_temperature", where, text)
+        yield CheckWarning("coarse_temperature", where, text)
 
 
-def _of_rate(f: RunFacts, rows: Rows, where: str, *, coarse: bool) -> Iterator[Doubt]:
+def _of_rate(f: RunFacts, rows: Rows, where: str, *, coarse: bool) -> Iterator[CheckWarning]:
     if 0.0 < f.largest_dph < _SMALL_DPH:
         text = f"no rate exceeds {f.largest_dph:.3g} deg/h; are they in deg/s or rad/s?"
-        yield Doubt("small_rates", where, text)
+        yield CheckWarning("small_rates", where, text)
     stuck = f.stuck_s > max(_STUCK_S, _STUCK_ROWS * f.row_period_s)
     if stuck and not coarse and "rate" not in f.constant:
         marks = (_stuck(f.file, rows),)
-        yield Doubt("stuck_rate", where, f"the rate stays at one value for {f.stuck_s:.4g} s", marks)
+        yield CheckWarning("stuck_rate", where, f"the rate stays at one value for {f.stuck_s:.4g} s", marks)
 
 
 def _stuck(file: str, rows: Rows) -> Mark:
@@ -253,32 +257,32 @@ def _stuck(file: str, rows: Rows) -> Mark:
     return Mark(file, (first + 1, last + 1), (float(rows.time_s[first]), float(rows.time_s[last])))
 
 
-def _of_time(f: RunFacts, where: str) -> Iterator[Doubt]:
+def _of_time(f: RunFacts, where: str) -> Iterator[CheckWarning]:
     if abs(f.first_s) > _LATE_S:
         text = f"time starts at {f.first_s:.10g} s; it should count from power-on"
-        yield Doubt("time_since_epoch", where, text)
+        yield CheckWarning("time_since_epoch", where, text)
 
 
-def _between_runs(facts: Sequence[RunFacts]) -> Iterator[Doubt]:
+def _between_runs(facts: Sequence[RunFacts]) -> Iterator[CheckWarning]:
     first: dict[str, str] = {}
     for f in facts:
         other = first.setdefault(f.sha256, f.file)
         if other != f.file:
-            yield Doubt("same_recording_twice", f.file, f"holds the same bytes as {other}")
+            yield CheckWarning("same_recording_twice", f.file, f"holds the same bytes as {other}")
     periods = [f.row_period_s for f in facts]
     if periods and max(periods) > (1.0 + _PERIODS) * min(periods):
         text = f"row periods from {min(periods):.4g} to {max(periods):.4g} s"
-        yield Doubt("row_periods_differ", "data set", text)
+        yield CheckWarning("row_periods_differ", "data set", text)
 
 
-def _of_holds(facts: Sequence[RunFacts]) -> Iterator[Doubt]:
+def _of_holds(facts: Sequence[RunFacts]) -> Iterator[CheckWarning]:
     holds = float(np.average([f.hold_share for f in facts], weights=[len(f.slopes_c_per_min) for f in facts]))
     if holds > _HOLDS:
         text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
-        yield Doubt("mostly_holds", "data set", text)
+        yield CheckWarning("mostly_holds", "data set", text)
 
 
-def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[Doubt]:
+def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[CheckWarning]:
     """What the training runs do not show of the requested envelope."""
     slopes = np.concatenate([f.slopes_c_per_min for f in facts] or [np.zeros(0)])
     temperatures = np.concatenate([f.temperatures_c for f in facts] or [np.zeros(0)])
@@ -290,8 +294,8 @@ def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[Doub
         reached = (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
         if not (reached[0] <= low + margin and reached[1] >= high - margin):
             text = f"{name} covers {reached[0]:.4g} ... {reached[1]:.4g} of {low:.4g} ... {high:.4g} {unit}"
-            yield Doubt("envelope_not_reached", "data set", text)
+            yield CheckWarning("envelope_not_reached", "data set", text)
     seen, *_ = np.histogram2d(temperatures, slopes, bins=_ENVELOPE_CELLS, range=envelope)
     share = float(np.mean(seen > 0))
     text = f"{share:.0%} of the cells of temperature and its rate hold training data"
-    yield Doubt("envelope_coverage", "data set", text)
+    yield CheckWarning("envelope_coverage", "data set", text)

@@ -21,7 +21,7 @@ from scipy.signal import lfilter
 from ..common.arrays import FloatArray
 from ..common.statistics import cell_means, orthonormal, running_mean
 
-__all__ = ["Cells", "Fit", "Noise", "Rows", "cells_of", "knots_of", "likeliest_noise", "maps_of"]
+__all__ = ["Noise", "Rows", "RunCells", "SmoothFit", "cells_of", "knots_of", "likeliest_noise", "maps_of"]
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
@@ -38,7 +38,7 @@ _LEAST_SLOPE = 1e-14  # below it the equation of the filter has no solution in f
 
 
 @dataclass(frozen=True, slots=True)
-class Cells:
+class RunCells:
     """Means of one run.
 
     Attributes:
@@ -57,13 +57,13 @@ class Cells:
         return len(self.time_s)
 
 
-def cells_of(rows: Rows, cell_s: float) -> Cells:
+def cells_of(rows: Rows, cell_s: float) -> RunCells:
     """Means over cells of at least one row."""
     length = max(float(np.median(np.diff(rows[0]))), cell_s)
     t, x, y = cell_means(length, *rows)
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > _GAP_CELLS * length)
-    return Cells(t, x, y, length, tuple((int(k) + 1, float(steps[k])) for k in gaps))
+    return RunCells(t, x, y, length, tuple((int(k) + 1, float(steps[k])) for k in gaps))
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class SmoothFit:
     """Runs, made white and fitted.
 
     Attributes:
@@ -106,7 +106,7 @@ class Fit:
         sigma: Standard deviation of the white part of a cell, deg/h.
     """
 
-    cells: tuple[Cells, ...]
+    cells: tuple[RunCells, ...]
     noise: Noise
     own: tuple[FloatArray, ...]
     shared: tuple[FloatArray, ...]
@@ -117,11 +117,11 @@ class Fit:
 
     @staticmethod
     def of(
-        cells: Sequence[Cells],
+        cells: Sequence[RunCells],
         maps: Sequence[FloatArray],
         noise: Noise,
         changes: Sequence[FloatArray | None],
-    ) -> Fit:
+    ) -> SmoothFit:
         """Fits all runs.
 
         Args:
@@ -156,7 +156,7 @@ class Fit:
         by_column = (
             np.linalg.lstsq(shared.T @ stacked, amplitudes, rcond=None)[0] if shared.size else amplitudes
         )
-        return Fit(
+        return SmoothFit(
             tuple(cells),
             noise,
             tuple(own),
@@ -197,7 +197,7 @@ LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
 LEAST_ENERGY = 1e-3  # of a change's own, below which what is fitted beside it holds it
 
 
-def maps_of(cells: Sequence[Cells], knots_c: float) -> list[FloatArray]:
+def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
     """Columns of a map over temperature and its rate at the cells of each run, shape (n, p)."""
     low = min(float(one.temperature_c.min()) for one in cells)
     high = max(float(one.temperature_c.max()) for one in cells)
@@ -215,7 +215,7 @@ def maps_of(cells: Sequence[Cells], knots_c: float) -> list[FloatArray]:
     return found
 
 
-def knots_of(cells: Sequence[Cells]) -> float:
+def knots_of(cells: Sequence[RunCells]) -> float:
     """Distance of the map's knots, C, by Schwarz's criterion (BIC): a bend that all passages show is no change."""
     chosen, least = _KNOTS_C[0], np.inf
     for knots_c in _KNOTS_C:
@@ -230,15 +230,15 @@ def knots_of(cells: Sequence[Cells]) -> float:
 
 
 def likeliest_noise(
-    cells: Sequence[Cells], maps: Sequence[FloatArray], changes: Sequence[FloatArray | None]
+    cells: Sequence[RunCells], maps: Sequence[FloatArray], changes: Sequence[FloatArray | None]
 ) -> tuple[Noise, float]:
-    """The walks of the largest likelihood beside changes that are known (as for `Fit.of`), and its logarithm."""
+    """The walks of the largest likelihood beside changes that are known (as for `SmoothFit.of`), and its logarithm."""
     known: dict[tuple[int, int], float] = {}
 
     def likelihood(at: tuple[int, int]) -> float:
         if at not in known:
             noise = Noise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]))
-            known[at] = Fit.of(cells, maps, noise, changes).log_likelihood
+            known[at] = SmoothFit.of(cells, maps, noise, changes).log_likelihood
         return known[at]
 
     best, last = _START, (-1, -1)

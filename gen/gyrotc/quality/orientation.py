@@ -22,7 +22,7 @@ __all__ = ["orientation_findings"]
 Finding = dict[str, Any]
 
 _NEXT = (
-    "Look at mounting and wiring; where only the columns are exchanged or turned over, write them right or name them "
+    "Look at mounting and wiring; where only the columns are exchanged or mirrored, write them right or name them "
     "by [columns] in dataset.toml, else leave the run out."
 )
 _LEAST_OTHERS = 2  # of two runs nobody knows which one is reversed
@@ -34,7 +34,7 @@ _EARTH_DPH = 15.04  # deg/h: Earth's rate, to the digits that a comparison withi
 _NORM, _DIRECTION = 0.03, 0.05  # three means that are Earth's rate, and its direction
 _ALONG, _LEAST_ALONG_DPH = 0.1, 1.0  # one mean that is Earth's component
 _EARLIER = 0.1  # of the departure, what may be left against an earlier calibration
-_TURNED, _SWING = -0.9, 2.0  # correlation with an earlier curve, and how much more or less it may swing
+_REVERSED, _SWING = -0.9, 2.0  # correlation with an earlier curve, and how much more or less it may swing
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ def _against_earlier(curve: Curve, earlier: Mapping[str, Model]) -> tuple[_Way, 
         return _within(found[0], columns, _stated(curve)), (
             f"the earlier calibration (off by {found[2]:.4g} deg/h as it stands, by {found[1]:.2g} so)"
         )
-    if alike < _TURNED and 1.0 / _SWING < np.std(rates) / np.std(maps) < _SWING:
+    if alike < _REVERSED and 1.0 / _SWING < np.std(rates) / np.std(maps) < _SWING:
         return _within(_Way((0,), (-1,)), columns, _stated(curve)), (
             f"the shape of the earlier calibration (correlation {alike:.3f})"
         )

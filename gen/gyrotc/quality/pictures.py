@@ -15,7 +15,7 @@ from ..recordings.reading import open_file
 from ..recordings.records import Curve, Dataset, Mark
 from .check import CheckResult
 from .facts import RunFacts
-from .findings import Doubt
+from .findings import CheckWarning
 
 __all__ = ["Columned", "Compared", "Covered", "Picture", "Seen", "Strip", "pictures_of"]
 
@@ -86,7 +86,9 @@ def pictures_of(folder: Path, result: CheckResult) -> list[list[Picture]]:
         InputError: A recording changed meanwhile.
     """
     of_problems = (_of_problem(folder, result, _marks(result, problem)) for problem in result.problems)
-    return [list(one) for one in (*of_problems, *(_of_doubt(result, doubt) for doubt in result.warnings))]
+    return [
+        list(one) for one in (*of_problems, *(_of_warning(result, warning) for warning in result.warnings))
+    ]
 
 
 def _marks(result: CheckResult, problem: InputError) -> Sequence[Mark]:
@@ -121,21 +123,21 @@ def _column(folder: Path, mark: Mark) -> Columned | None:
     return Columned(mark.file, mark.column, np.arange(first, end) + 1, values[first:end], wrong + 1)
 
 
-def _of_doubt(result: CheckResult, doubt: Doubt) -> Iterator[Picture]:
-    axis = doubt.axes[0] if doubt.axes else None
+def _of_warning(result: CheckResult, warning: CheckWarning) -> Iterator[Picture]:
+    axis = warning.axes[0] if warning.axes else None
     dataset = dict(result.datasets)[axis]
     facts = [f for of, f in result.facts if of == axis]
-    files = list(dict.fromkeys(mark.file for mark in doubt.marks)) or [
-        f.file for f in facts if doubt.where.startswith(f.file)
+    files = list(dict.fromkeys(mark.file for mark in warning.marks)) or [
+        f.file for f in facts if warning.where.startswith(f.file)
     ]
-    if doubt.id in _COVERED:
+    if warning.id in _COVERED:
         yield _covered(facts)
-    elif doubt.id in _COMPARED:
+    elif warning.id in _COMPARED:
         named = tuple(c for c in dataset.curves if c.file in files)
         yield Compared(named, tuple(c for c in dataset.curves if c.file not in files))
     else:
         for file in files[:_MOST_FILES]:
-            yield from _file_rows(dataset, [m for m in doubt.marks if m.file == file] or [Mark(file)])
+            yield from _file_rows(dataset, [m for m in warning.marks if m.file == file] or [Mark(file)])
 
 
 def _covered(facts: Sequence[RunFacts]) -> Covered:

@@ -178,17 +178,17 @@ def _contradictions(
         for m, other in zip(members, others, strict=True):
             departures.setdefault(int(keys[m, 2]), []).append(float(mean[m]) - other)
     for k, values in departures.items():
-        apart = float(np.median(np.abs(values)))
-        if len(values) >= _COMMON_PLACES and apart > _CONTRADICTION * scatter:
+        difference = float(np.median(np.abs(values)))
+        if len(values) >= _COMMON_PLACES and difference > _CONTRADICTION * scatter:
             yield finding(
                 "runs_contradict",
                 f"{_run(runs[k])} contradicts the other training runs: at the same temperature and its rate, it "
-                f"shows {apart:.4g} deg/h more or less ({len(values)} places; minutes of a run scatter by "
+                f"shows {difference:.4g} deg/h more or less ({len(values)} places; minutes of a run scatter by "
                 f"{scatter:.2g}). "
                 "A map can follow only one of them.",
                 file=runs[k].file,
                 from_s=runs[k].from_s,
-                apart_dph=apart,
+                difference_dph=difference,
                 scatter_dph=scatter,
                 places=len(values),
             )
@@ -274,7 +274,7 @@ def sign_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
                 "id": "sign_reversed",
                 "text": (
                     f"{f.file} has its sign reversed against the other runs: its mean rate over temperature is "
-                    f"theirs turned over (correlation {max(mine):.3f} or less; theirs with one another "
+                    f"theirs mirrored (correlation {max(mine):.3f} or less; theirs with one another "
                     f"{min(among):.3f} or more). Look at mounting and wiring; where it is only the sign, write "
                     f"the rates of this file with the other sign, or leave the run out."
                 ),

@@ -22,7 +22,7 @@ from .facts import RunFacts, facts_of
 from .orientation import orientation_findings
 from .recorded import sign_findings
 
-__all__ = ["another_gain_throughout", "found_events", "turned_runs"]
+__all__ = ["another_gain_throughout", "found_events", "reversed_runs"]
 
 _Means = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -37,9 +37,9 @@ _PLACE_C = 1.0  # what counts as the same temperature, as for curves of runs
 def found_events(dataset: Dataset) -> list[Event]:
     """Events of the training runs, those of whole runs first; of such a run nothing else is said."""
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    turned = turned_runs(dataset)
-    files = {event.file for event in turned}
-    return [*turned, *(event for event in events_of(whole, files) if event.file not in files)]
+    reversed_files = reversed_runs(dataset)
+    files = {event.file for event in reversed_files}
+    return [*reversed_files, *(event for event in events_of(whole, files) if event.file not in files)]
 
 
 def _means(run: Run) -> _Means:
@@ -107,7 +107,7 @@ _OF_UNIT = (
 _NOISE_ALIKE = 1.1  # ratio of the noises of the other runs, largest to smallest, for the noise to be evidence
 
 
-def turned_runs(dataset: Dataset) -> list[Event]:
+def reversed_runs(dataset: Dataset) -> list[Event]:
     """One event at most for each training run; the whole run is left out."""
     training = [run for run in dataset.runs if run.role == "train"]
     found: dict[str, tuple[str, str, tuple[float, float, float]]] = {}

@@ -52,10 +52,12 @@ def stuck_stretches(time: FloatArray, temperature: FloatArray, period_s: float) 
     if len(starts) < 2 or len(long) == 0:
         return []
     longest = np.sort(np.r_[lengths[long], np.delete(lengths, long).max(initial=1)])[::-1].astype(np.float64)
-    apart = np.flatnonzero(longest[:-1] >= _LONGER * longest[1:])
-    apart = apart[apart < _MOST]
-    rare = len(apart) > 0 and len(starts) >= _OFTEN * (len(temperature) - longest[: apart[-1] + 1].sum())
-    least = longest[apart[-1]] if rare else np.inf
+    difference = np.flatnonzero(longest[:-1] >= _LONGER * longest[1:])
+    difference = difference[difference < _MOST]
+    rare = len(difference) > 0 and len(starts) >= _OFTEN * (
+        len(temperature) - longest[: difference[-1] + 1].sum()
+    )
+    least = longest[difference[-1]] if rare else np.inf
     steps = np.abs(np.diff(temperature[starts]))
     release = _RELEASE * float(np.quantile(steps, _ON_RAMPS))
     moved = np.r_[steps, np.inf]  # behind each stretch
@@ -109,29 +111,29 @@ def _followed(run: Run, rows: Rows, name: str) -> _Followed | None:
     if settled.sum() < _LEAST_CELLS:
         return None
     rate = np.gradient(own, kept * _CELL_S)[settled]
-    own, apart = own[settled], (other - own)[settled]
-    lag = -float(_fit(own, rate, apart)[2]) if np.ptp(own) >= _LEAST_RANGE_C else None
-    return _Followed(run, own, rate, apart, lag)
+    own, difference = own[settled], (other - own)[settled]
+    lag = -float(_fit(own, rate, difference)[2]) if np.ptp(own) >= _LEAST_RANGE_C else None
+    return _Followed(run, own, rate, difference, lag)
 
 
 def _columns(own: FloatArray, rate: FloatArray, center: float) -> FloatArray:
     return np.stack([np.ones(len(own)), own - center, rate], axis=1)
 
 
-def _fit(own: FloatArray, rate: FloatArray, apart: FloatArray) -> FloatArray:
+def _fit(own: FloatArray, rate: FloatArray, difference: FloatArray) -> FloatArray:
     """Offset at the mean temperature, share, and less the lag."""
-    return np.asarray(np.linalg.lstsq(_columns(own, rate, float(own.mean())), apart, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(_columns(own, rate, float(own.mean())), difference, rcond=None)[0])
 
 
 def _odd_ones(name: str, runs: list[_Followed]) -> Iterator[dict[str, Any]]:
     lags = np.array([np.nan if one.lag_s is None else one.lag_s for one in runs])
     for k, one in enumerate(runs):
         others = [other for j, other in enumerate(runs) if j != k]
-        own, rate, apart = (
+        own, rate, difference = (
             np.concatenate([getattr(o, part) for o in others]) for part in ("own_c", "rate", "difference_c")
         )
         center = float(own.mean())
-        found = np.linalg.lstsq(_columns(own, rate, center), apart, rcond=None)[0]
+        found = np.linalg.lstsq(_columns(own, rate, center), difference, rcond=None)[0]
 
         def mean_left(o: _Followed, found: FloatArray = found, center: float = center) -> float:
             return float(np.mean(o.difference_c - _columns(o.own_c, o.rate, center) @ found))

@@ -20,7 +20,7 @@ _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
 _LEAST_JUMP_C, _JUMP_SIGMAS = 1.0, 20.0  # what the time would have done to the temperature, had it passed
 # Of the change that the gap should have brought: less is none; and of its noise
 _UNMOVED, _UNMOVED_SIGMAS = 0.1, 5.0
-_SLOPES_APART = 2.0  # ratio of dT/dt before and after: beyond it the temperature turned within the gap
+_SLOPE_RATIO = 2.0  # ratio of dT/dt before and after: beyond it the temperature reversed_files within the gap
 # Of a run, and rows in each: enough for a median that is sure to a tenth of its scatter
 _PARTS, _LEAST_STEPS = 50, 40
 _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
@@ -106,7 +106,7 @@ def _clock_was_set(time: FloatArray, temperature: FloatArray, k: int, period_s: 
     if fits[0] is None or fits[1] is None:
         return False
     (level, slope, noise), (next_level, next_slope, next_noise) = fits[0], fits[1]
-    if slope * next_slope <= 0.0 or not 1.0 / _SLOPES_APART < slope / next_slope < _SLOPES_APART:
+    if slope * next_slope <= 0.0 or not 1.0 / _SLOPE_RATIO < slope / next_slope < _SLOPE_RATIO:
         return False
     gap = float(time[k + 1] - time[k])
     sigma = max(noise, next_noise)
@@ -178,11 +178,11 @@ def _drift(run: Run, time: FloatArray, at: Sequence[int], step: FloatArray) -> I
     usual = float(np.median(mean))
     squares = sum(float(np.nansum((steps[k] - m) ** 2)) for k, m in zip(kept, mean, strict=True))
     scatter = float(np.sqrt(squares / count[kept].sum()))
-    apart = np.abs(mean / usual - 1.0)
+    difference = np.abs(mean / usual - 1.0)
     limit = _DRIFT + _DRIFT_SIGMAS * scatter / usual / np.sqrt(count[kept])
-    if not (apart > limit).any():
+    if not (difference > limit).any():
         return
-    worst = int(kept[np.argmax(apart - limit)])
+    worst = int(kept[np.argmax(difference - limit)])
     total = float(np.sum(np.abs(mean - usual) * count[kept]))
     every = (usual, float(np.nanmean(steps[worst])))
     yield _drifting(run, time, at, (worst * size, (worst + 1) * size), every, total)

@@ -259,7 +259,7 @@ class Training(UnitResult):
     left_out_spans: tuple[Pooled, ...] = Field(description="each of them")
     noise: NoiseTerms = Field(description="of the compensated training runs")
     sensitivity: BiasPlane = Field(description="of the bias before compensation")
-    ladder: tuple[CandidateModel, ...] = Field(
+    candidates: tuple[CandidateModel, ...] = Field(
         description="what was tried, the simplest first; empty of a named method"
     )
     reason: str = Field(description="why this one was chosen, in words")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..common.inputs import need_memory
 from .arithmetic import Arithmetic, Numbers
 from .recursions import Course
-from .samples import HELD, RESTART, Guarded, believe
+from .samples import HELD, RESTART, Guarded, judge_readings
 from .status import WARMING
 
 __all__ = [
@@ -54,7 +54,7 @@ class Settings:
 class Steps:
     """The corrections of a history, in the order in which they come into force.
 
-    `believed[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the
+    `accepted[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the
     same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
     before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
     GTC_WARMING or 0; `missing`: samples without a reading in the block that it was made of. Where `kind` is not
@@ -63,7 +63,7 @@ class Steps:
     its missing end counts as not valid).
     """
 
-    believed: NDArray[np.bool_]
+    accepted: NDArray[np.bool_]
     at: NDArray[np.int64]
     kind: NDArray[np.int8]
     temperature: Numbers
@@ -138,7 +138,7 @@ def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.intege
 
 def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     """Follows samples x, shape (n,), from the start of a state on."""
-    verdict, fallback = _believed(arithmetic, x, settings)
+    verdict, fallback = _accepted(arithmetic, x, settings)
     x = settings.guard.limited(x)
     valid, mean, count = _block_means(arithmetic, x, verdict, settings.samples_per_block)
     restarts = np.flatnonzero(verdict == RESTART)
@@ -158,7 +158,7 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     kind = np.concatenate([closings.kind, starts.kind])[order]
     made = order[np.maximum.accumulate(np.where(kind == MAP, np.arange(kind.size), 0))]
     return Steps(
-        believed=verdict != HELD,
+        accepted=verdict != HELD,
         at=np.concatenate([closings.at, starts.at])[order],
         kind=kind,
         temperature=np.concatenate([closings.temperature, starts.temperature])[made],
@@ -219,7 +219,7 @@ def _is_enough(count: NDArray[np.integer], n: int) -> NDArray[np.bool_]:
     return np.asarray((2 * count >= n) | (count >= 2))
 
 
-def _believed(
+def _accepted(
     arithmetic: Arithmetic, x: Numbers, settings: Settings
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Verdict on every sample, and blocks after which the fallback is in force.
@@ -229,7 +229,7 @@ def _believed(
     n = settings.samples_per_block
     lost: list[int] = []
     while True:
-        verdict = believe(arithmetic, x, settings.guard, period_us=settings.period_us, lost=lost)
+        verdict = judge_readings(arithmetic, x, settings.guard, period_us=settings.period_us, lost=lost)
         fallback = _fallen(verdict, settings)
         starts = (1 + np.flatnonzero(fallback & ~np.concatenate([[False], fallback[:-1]]))) * n
         new = [int(start) for start in starts if start < x.size and start not in lost]

@@ -58,7 +58,7 @@ def channel_at(
 
 def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[np.bool_]:
     """Whether the mean of each correction has a reading that was taken as the edge of the range."""
-    edge = own.believed & (guard.limited(readings) != readings)
+    edge = own.accepted & (guard.limited(readings) != readings)
     restarts = own.at[own.is_restart]
     used = edge.copy()
     for i in restarts.tolist():  # what came before in the block is dropped
@@ -125,7 +125,7 @@ class FollowedHistory:
         gaps = np.flatnonzero(self.stream.missed[part])
         missed_status = np.zeros(position.size, dtype=np.int32)
         missed_status[gaps] = self.status[steps.in_force(position[gaps] - 1) + 1] | HELD
-        held = np.where(steps.believed[position], np.int32(0), np.int32(HELD))
+        held = np.where(steps.accepted[position], np.int32(0), np.int32(HELD))
         at_rows = self.status[in_force]
         return Replay(
             sample_status=at_rows | held,
@@ -307,6 +307,6 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     row = np.cumsum(~was_missed) - 1
     last = np.where(was_missed, position[np.minimum(row + 1, len(channels) - 1)] - 1, position[row])
     k = steps.in_force(last) + 1
-    held = np.where(was_missed | ~steps.believed[last], HELD, 0)
+    held = np.where(was_missed | ~steps.accepted[last], HELD, 0)
     call = status[k] | held
     return np.stack([(call + 256 * status[k]).astype(np.uint32), bits[k]], axis=1)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from .arithmetic import Arithmetic, Numbers
 
-__all__ = ["BELIEVED", "HELD", "RESTART", "Guarded", "believe"]
+__all__ = ["ACCEPTED", "HELD", "RESTART", "Guarded", "judge_readings"]
 
-HELD, BELIEVED, RESTART = 0, 1, 2  # any three numbers
+HELD, ACCEPTED, RESTART = 0, 1, 2  # any three numbers
 _PART = 2**18  # readings that are looked at together: bounds memory
 _LONGEST_US = 2**32 - 1  # that the target counts
 
@@ -50,10 +50,10 @@ class Guarded:
         return np.clip(x, self.low, self.high) if self.takes_edge else x
 
 
-def believe(
+def judge_readings(
     arithmetic: Arithmetic, x: Numbers, guard: Guarded, *, period_us: int, lost: Sequence[int] = ()
 ) -> NDArray[np.int8]:
-    """Verdict on every reading: HELD, BELIEVED, or RESTART (readings that agreed with one another for long enough).
+    """Verdict on every reading: HELD, ACCEPTED, or RESTART (readings that agreed with one another for long enough).
 
     Args:
         arithmetic: The numbers that the target computes with.
@@ -83,7 +83,7 @@ def believe(
         if verdict[i - 1] != HELD:
             k = np.searchsorted(events, i)
             event = int(events[k]) if k < events.size else x.size
-            verdict[i:event] = BELIEVED
+            verdict[i:event] = ACCEPTED
             judge.last = judged[event - 1]
             i = event
     return verdict
@@ -145,12 +145,12 @@ class _Judge:
 
     def take(self, x: Any) -> int:
         if self._follows(x):
-            return self._believed(x, BELIEVED)
+            return self._accepted(x, ACCEPTED)
         agrees = self._suspects and self._arithmetic.is_near(x, self._candidate, self.near)
         self._suspects = self._suspects + 1 if agrees else 1
         self._candidate = x
         if (self._suspects - 1) * self._period_us >= self._guard.agree_us:
-            return self._believed(x, RESTART)
+            return self._accepted(x, RESTART)
         self._gap += 1
         return HELD
 
@@ -159,6 +159,6 @@ class _Judge:
             return False
         return bool(self._arithmetic.is_near(x, self.last, self._limit(self._gap)))
 
-    def _believed(self, x: Any, verdict: int) -> int:
+    def _accepted(self, x: Any, verdict: int) -> int:
         self.last, self._gap, self._suspects = x, 1, 0
         return verdict

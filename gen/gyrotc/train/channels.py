@@ -10,7 +10,7 @@ at a quarter and three quarters of what training showed, 0.9 of its half range w
 exponentials over the range that leaves one to two hundredths of the variance that a line leaves, of a corner a
 twentieth.
 
-A stand-in is fitted to what map and other terms leave of the training samples, so that map and stand-in together are
+A fallback model is fitted to what map and other terms leave of the training samples, so that both together are
 the best correction of one thermometer that these samples give. The fit is that of a map, which takes no more Gaussians
 than the noise can show.
 """

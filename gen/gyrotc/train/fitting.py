@@ -443,7 +443,7 @@ def training_of(
         left_out_spans=tuple(Pooled.of([a]) for a in left_out or []),
         noise=_noise(data, fitted, front.block_s),
         sensitivity=sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
-        ladder=tuple(CandidateModel(**row) for row in fitted.ladder),
+        candidates=tuple(CandidateModel(**row) for row in fitted.candidates),
         reason=fitted.reason,
         generalises=_generalises(fitted),
         findings=tuple(FoundIn(**f) for f in fitted.findings),
@@ -460,7 +460,7 @@ def _generalises(fitted: Fit) -> bool | None:
     """Whether the correction was shown to hold on history that it has not seen; None: a named method, not asked."""
     if any(f["id"] in _NOT_GENERAL for f in fitted.findings):
         return False
-    return True if fitted.ladder else None
+    return True if fitted.candidates else None
 
 
 def _noise(data: TrainingData, fitted: Fit, block_s: float) -> NoiseTerms:

@@ -18,7 +18,7 @@ from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOpti
 from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
 from .prior import Prior
 from .result import Fit, Outcome, network, predict
-from .selection import chosen_by_ladder, fit_mixed
+from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .uncertainty import coverage, uncertainty
 
@@ -61,7 +61,7 @@ def fit(
 
     Args:
         data: Samples; exact duplicates by run and time count once.
-        method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: the ladder chooses, unless a number
+        method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: model selection, unless a number
             of centers or ρ is asked for.
         seed: Whatever is drawn at random (start of the Kohonen network, random centers) follows from it.
         centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
@@ -99,7 +99,7 @@ def fit(
         findings.append(_no_information(samples))
         method = "constant" if method == AUTO else method
     elif method == AUTO:
-        found = chosen_by_ladder(samples, scaling, power_on, seed=seed, average_s=average_s)
+        found = chosen_by_cross_validation(samples, scaling, power_on, seed=seed, average_s=average_s)
         method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
         findings += found.findings
     else:

@@ -55,7 +55,7 @@ class Fit:
         noise_floor_dph: Estimated noise of means over `average_s`, deg/h.
         average_s: Averaging of RMS figures, s.
         fallback_dph: Weighted mean of the training bias, deg/h.
-        ladder: What was tried and chosen from, where the method was left to the data; as in `training.json`.
+        candidates: What was tried and chosen from, where the method was left to the data; as in `training.json`.
         reason: Why this one was chosen, in words.
         lot: What a lot did for it, where one was given.
         prior: What an earlier model did for it, where one was given.
@@ -69,7 +69,7 @@ class Fit:
     noise_floor_dph: float
     average_s: float
     fallback_dph: float
-    ladder: Sequence[Mapping[str, Any]] = ()
+    candidates: Sequence[Mapping[str, Any]] = ()
     reason: str = ""
     lot: LotUse | None = None
     prior: EarlierUse | None = None

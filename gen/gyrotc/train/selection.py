@@ -50,11 +50,13 @@ from .noise import difference_sigma
 from .result import Outcome
 from .simple import all_solved, fit_simple, outcome_of, powers_of, triangle_of
 
-__all__ = ["RUNGS", "Chosen", "Ladder", "Rest", "chosen_by_ladder", "climb", "fit_mixed"]
+__all__ = [
+    "CANDIDATES", "Chosen", "Comparison", "Rest", "chosen_by_cross_validation", "compare_candidates", "fit_mixed",
+]  # fmt: skip
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
 _SIMPLE = (*_FEW_COLUMNS, "mixed")
-RUNGS = ("nothing", *_SIMPLE, "mrbf")
+CANDIDATES = ("nothing", *_SIMPLE, "mrbf")
 """From the simplest to the richest."""
 _OF_NETWORK, _OF_STATES = 0.025, 0.05  # of the t test: states that a verdict names have evidence of their own
 _LEAST = 0.02  # share of RMS by which the network has to be better: what "no worse than trivial" allows (docs/real.md)
@@ -64,16 +66,16 @@ _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ
 
 
 @dataclass(frozen=True, slots=True)
-class Ladder:
+class Comparison:
     """What every candidate leaves on every piece of history, and the choice among them.
 
     Attributes:
         folds: Pieces that were left out.
-        rms_dph: RMS of each piece under each rung, shape (folds, rungs); nan: the rung could not be fitted.
+        rms_dph: RMS of each piece under each candidate, shape (folds, candidates); nan: it could not be fitted.
         noise_dph: Noise of a mean over `average_s`, from all differences of neighbours.
         white_dph: The same without slopes and outliers.
         means: Number of means in each piece, shape (folds,).
-        rungs: Names of the candidates, from the simplest to the richest.
+        candidates: Names of the candidates, from the simplest to the richest.
     """
 
     folds: Sequence[Fold]
@@ -81,11 +83,11 @@ class Ladder:
     noise_dph: float
     white_dph: float
     means: FloatArray
-    rungs: tuple[str, ...] = RUNGS
+    candidates: tuple[str, ...] = CANDIDATES
 
     def chosen(self, without: Sequence[str] = ()) -> str:
         """The candidate to emit, with some that must not be."""
-        able = [n for n in self.rungs[1:] if n not in without and np.all(np.isfinite(self._rms(n)))]
+        able = [n for n in self.candidates[1:] if n not in without and np.all(np.isfinite(self._rms(n)))]
         if len(self.folds) < 2:
             return "constant"
         likely = {n: unseen_log_likelihood(self._rms(n) ** 2, self.means, self.white_dph) for n in able}
@@ -96,7 +98,7 @@ class Ladder:
         if "mrbf" in able and self._surely_better("mrbf", name, _OF_NETWORK):
             name = "mrbf"
         name = name if self.beats_constant(name) else "constant"
-        for states in (n for n in able if n not in RUNGS):
+        for states in (n for n in able if n not in CANDIDATES):
             name = states if self._surely_better(states, name, _OF_STATES) else name
         return name
 
@@ -105,7 +107,7 @@ class Ladder:
         return bool(gains.mean() > _LEAST) and surely_above_0(gains, significance=level)
 
     def _rms(self, name: str) -> FloatArray:
-        return np.asarray(self.rms_dph[:, self.rungs.index(name)])
+        return np.asarray(self.rms_dph[:, self.candidates.index(name)])
 
     def _score(self, name: str) -> FloatArray:
         """½ log(mean square + s²) of every piece."""
@@ -121,10 +123,10 @@ class Ladder:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
         return t_statistic(self._score("constant") - self._score(name))
 
-    def with_states(self, name: str, other: Ladder) -> Ladder:
-        """Besides, the network of another ladder over the same pieces, beside states that a verdict names."""
-        added = other.rms_dph[:, [other.rungs.index("mrbf")]]
-        return replace(self, rms_dph=np.hstack([self.rms_dph, added]), rungs=(*self.rungs, name))
+    def with_states(self, name: str, other: Comparison) -> Comparison:
+        """Besides, the network of another comparison over the same pieces, beside states that a verdict names."""
+        added = other.rms_dph[:, [other.candidates.index("mrbf")]]
+        return replace(self, rms_dph=np.hstack([self.rms_dph, added]), candidates=(*self.candidates, name))
 
     def rms_of(self, name: str) -> float | None:
         """RMS of a candidate over the pieces, all counting alike; None where it is not known."""
@@ -132,8 +134,8 @@ class Ladder:
         return float(np.sqrt(square.mean())) if len(square) and np.all(np.isfinite(square)) else None
 
     def rows(self, chosen: str) -> list[dict[str, Any]]:
-        """`ladder` of `training.json`: RMS over the pieces, all counting alike, with its standard error."""
-        return [self._row(name, chosen) for name in self.rungs]
+        """`candidates` of `training.json`: RMS over the pieces, all counting alike, with its standard error."""
+        return [self._row(name, chosen) for name in self.candidates]
 
     def _row(self, name: str, chosen: str) -> dict[str, Any]:
         square, rms = self._rms(name) ** 2, self.rms_of(name)
@@ -167,7 +169,7 @@ _COUNTED = {
 }
 
 
-def climb(
+def compare_candidates(
     samples: TrainingData,
     scaling: Scaling,
     process: Process | None,
@@ -175,7 +177,7 @@ def climb(
     average_s: float,
     *,
     rate: bool = True,
-) -> Ladder:
+) -> Comparison:
     """Fits every candidate without every piece of history.
 
     Args:
@@ -193,9 +195,11 @@ def climb(
     least = max(_LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
     noise = max(_difference_rms(judged), least)
     rest = Rest(means, kept, scaling, process, _on(means, power_on), rate=rate)
-    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(len(folds), len(RUNGS))
+    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(
+        len(folds), len(CANDIDATES)
+    )
     count = np.array([len(average(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
-    return Ladder(folds, np.sqrt(square), noise, max(white, least), count)
+    return Comparison(folds, np.sqrt(square), noise, max(white, least), count)
 
 
 def _difference_rms(means: TrainingData) -> float:
@@ -230,9 +234,9 @@ def _squares(fold: Fold, rest: Rest, average_s: float) -> list[float]:
     )
     flat = high[0] - low[0] < LEAST_SPAN_C
     cells = cells_of(held, average_s)
-    corrections = rest.corrections(fold.near, t, r, ("constant",) if flat else RUNGS[1:])
+    corrections = rest.corrections(fold.near, t, r, ("constant",) if flat else CANDIDATES[1:])
     squares = []
-    for name in RUNGS:
+    for name in CANDIDATES:
         correction = 0.0 * t if name == "nothing" else corrections["constant" if flat else name]
         left = None if correction is None else cells.mean(held.bias_dph - correction)
         squares.append(np.nan if left is None else weighted_mean(left**2, cells.weight))
@@ -361,7 +365,7 @@ NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The rung that is emitted: its name, networks, the table of all rungs, why, and what a user should know."""
+    """The candidate that is emitted: name, networks, the table of all candidates, why, and what a user should know."""
 
     method: str
     outcome: Outcome
@@ -370,7 +374,7 @@ class Chosen:
     findings: list[dict[str, Any]]
 
 
-def chosen_by_ladder(
+def chosen_by_cross_validation(
     samples: TrainingData,
     scaling: Scaling,
     power_on: NDArray[np.int64] | None,
@@ -378,7 +382,7 @@ def chosen_by_ladder(
     seed: int,
     average_s: float,
 ) -> Chosen:
-    """Trains the rung that the ladder chooses; one that fails or must not be used makes way for the next choice.
+    """Trains the candidate that model selection chooses; where that fails or must not be used, the next choice.
 
     Args:
         samples: As `cleaned` returns them; their temperature spans at least 2 C.
@@ -393,9 +397,9 @@ def chosen_by_ladder(
         process = fit_process(samples, scaling)
     except TrainingFailed as failure:
         refused["mrbf"] = str(failure)
-    ladder = climb(samples, scaling, process, power_on, average_s)
+    comparison = compare_candidates(samples, scaling, process, power_on, average_s)
     while True:
-        name = ladder.chosen(tuple(refused))
+        name = comparison.chosen(tuple(refused))
         try:
             outcome = _trained(name, samples, scaling, process, power_on, seed, average_s)
             against = objection(outcome, samples, scaling, average_s) if name != "constant" else ""
@@ -405,13 +409,14 @@ def chosen_by_ladder(
             break
         refused[name] = against
     rows = [
-        row | ({"refused": refused[row["id"]]} if row["id"] in refused else {}) for row in ladder.rows(name)
+        row | ({"refused": refused[row["id"]]} if row["id"] in refused else {})
+        for row in comparison.rows(name)
     ]
     findings = [_refusal(one, text) for one, text in refused.items()]
-    misses = name == "constant" and _misses(samples, ladder)
+    misses = name == "constant" and _misses(samples, comparison)
     if misses:
-        findings.insert(0, _does_not_generalise(ladder))
-    return Chosen(name, outcome, rows, _reason(ladder, name, misses), findings)
+        findings.insert(0, _does_not_generalise(comparison))
+    return Chosen(name, outcome, rows, _reason(comparison, name, misses), findings)
 
 
 def _trained(
@@ -430,15 +435,15 @@ def _trained(
     return fit_simple(name, samples, scaling, average_s)
 
 
-def _misses(samples: TrainingData, ladder: Ladder) -> bool:
+def _misses(samples: TrainingData, comparison: Comparison) -> bool:
     """Whether a constant leaves more than noise on what it has not seen."""
-    rms = ladder.rms_dph[:, RUNGS.index("constant")]
-    return len(rms) == 0 or bool(np.sqrt(np.mean(rms**2)) > _STRUCTURE * ladder.noise_dph)
+    rms = comparison.rms_dph[:, CANDIDATES.index("constant")]
+    return len(rms) == 0 or bool(np.sqrt(np.mean(rms**2)) > _STRUCTURE * comparison.noise_dph)
 
 
-def _reason(ladder: Ladder, name: str, misses: bool) -> str:
+def _reason(comparison: Comparison, name: str, misses: bool) -> str:
     """Why this candidate, in words."""
-    tried = f"left out in turn: {', '.join(ladder.stretches()) or 'nothing, there is too little'}"
+    tried = f"left out in turn: {', '.join(comparison.stretches()) or 'nothing, there is too little'}"
     if misses:
         return f"nothing is shown to be better than a constant on history that was not seen ({tried})"
     if name == "constant":
@@ -448,7 +453,7 @@ def _reason(ladder: Ladder, name: str, misses: bool) -> str:
         if name == "mrbf"
         else "the least mean score of simple corrections"
     )
-    return f"{text}; {_gain(*ladder.gain(name))} ({tried})"
+    return f"{text}; {_gain(*comparison.gain(name))} ({tried})"
 
 
 def _gain(t: float, freedom: int) -> str:
@@ -457,29 +462,30 @@ def _gain(t: float, freedom: int) -> str:
     return f"t of the gain over a constant is {t:.2g} with {freedom} degrees of freedom{undecided}"
 
 
-def _does_not_generalise(ladder: Ladder) -> dict[str, Any]:
+def _does_not_generalise(comparison: Comparison) -> dict[str, Any]:
     """The finding, with its reason and what would help."""
-    rms = {name: ladder.rms_of(name) for name in RUNGS}
+    rms = {name: comparison.rms_of(name) for name in CANDIDATES}
     able = {n: v for n, v in rms.items() if n not in ("nothing", "constant") and v is not None}
     text = (
         "No correction is shown to hold on thermal history that it has not seen, so the model is a constant."
     )
-    evidence: dict[str, Any] = {"noise_dph": ladder.noise_dph, "stretches": ladder.stretches()}
+    evidence: dict[str, Any] = {"noise_dph": comparison.noise_dph, "stretches": comparison.stretches()}
     if able:
         best = min(able, key=lambda n: able[n])
-        t, freedom = ladder.gain(best)
+        t, freedom = comparison.gain(best)
         text += (
-            f" Left out in turn ({', '.join(ladder.stretches())}), a constant leaves {rms['constant']:.4g} deg/h and "
+            f" Left out in turn ({', '.join(comparison.stretches())}), a constant leaves {rms['constant']:.4g} deg/h, "
+            "and "
             f"{NAMES[best]} {able[best]:.4g}; {_gain(t, freedom)}."
         )
         evidence |= {"best": best, "best_rms_dph": able[best], "constant_rms_dph": rms["constant"]}
         evidence |= {"t": t, "degrees_of_freedom": freedom}
-    return {"id": "does_not_generalise", "text": f"{text} {_advice(ladder)}", "evidence": evidence}
+    return {"id": "does_not_generalise", "text": f"{text} {_advice(comparison)}", "evidence": evidence}
 
 
-def _advice(ladder: Ladder) -> str:
+def _advice(comparison: Comparison) -> str:
     """Which recordings would help."""
-    kinds = {fold.kind for fold in ladder.folds}
+    kinds = {fold.kind for fold in comparison.folds}
     if "run" in kinds:
         return (
             "Repeat the runs with the same programme, up and down, after a power-on each: what repeats can be "

@@ -351,7 +351,7 @@ _TRAINING: dict[str, Any] = {
         "allan": [],
     },
     "sensitivity": {"bias_dph_per_c": None, "bias_dph_per_c_per_min": None, "residual_rms_dph": None},
-    "ladder": [],
+    "candidates": [],
     "reason": "text",
     "generalises": None,
     "findings": [],

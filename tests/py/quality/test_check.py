@@ -15,9 +15,9 @@ import pytest
 from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
-from gyrotc.quality.check import CheckResult, Doubt, check, envelope_of
-from gyrotc.quality.findings import __file__ as doubts_file
-from gyrotc.quality.findings import advice_of
+from gyrotc.quality.check import CheckResult, check, envelope_of
+from gyrotc.quality.findings import CheckWarning, advice_of
+from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.recordings.plausibility import earth_rate
 from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
@@ -256,7 +256,7 @@ def swapped(table: Columns, columns_of: str) -> Columns:
     return table | {f"rate_{a}_dph": values for a, values in zip(AXES, held, strict=True)}
 
 
-def oriented(result: CheckResult) -> list[Doubt]:
+def oriented(result: CheckResult) -> list[CheckWarning]:
     return [d for d in result.warnings if d.id in ORIENTED]
 
 
@@ -381,12 +381,15 @@ def test_every_warning_says_what_to_do_next() -> None:
     """By `advice`, or, with the line to paste or the place to look, in its own text."""
     reported_in_text = {"shared_rows", "sign_reversed", "axes_exchanged", "stuck_temperature", "channel_copy"}
     reported_in_text |= {"thermometer_changed"}
-    judge = Path(doubts_file).parent
+    judge = Path(findings_file).parent
     texts = "".join(
         (judge / f"{name}.py").read_text("utf-8")
         for name in ("findings", "recorded", "thermometers", "timing", "orientation")
     )
-    ids = set(re.findall(r'(?:Doubt\(|"id": )"(\w+)"', texts)) | {"axes_exchanged", "jump_in_temperature"}
+    ids = set(re.findall(r'(?:CheckWarning\(|"id": )"(\w+)"', texts)) | {
+        "axes_exchanged",
+        "jump_in_temperature",
+    }
     assert len(ids) > 20
     assert {id for id in ids if not advice_of(id)} <= reported_in_text
 

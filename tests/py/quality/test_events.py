@@ -14,7 +14,7 @@ from gyrotc.quality.check import check
 from gyrotc.quality.events import Event, accepted, events_of
 from gyrotc.quality.facts import displaced
 from gyrotc.quality.outliers import departing
-from gyrotc.quality.sign_and_gain import another_gain_throughout, turned_runs
+from gyrotc.quality.sign_and_gain import another_gain_throughout, reversed_runs
 from gyrotc.quality.thermometers import stuck_stretches, thermometer_findings
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
@@ -148,7 +148,7 @@ def test_what_a_unit_always_does_is_no_event(tmp_path: Path, seed: int, number: 
     """Relays of which a branch looked like a gain that changed, in a run and of a run; a kink passed in a minute."""
     write(draw_recording(seed, number, "one", name), tmp_path, "A")
     dataset = load(tmp_path)
-    assert [e.id for e in (*turned_runs(dataset), *events_of(dataset))] == []
+    assert [e.id for e in (*reversed_runs(dataset), *events_of(dataset))] == []
 
 
 def test_recordings_without_changes_have_none_though_temperatures_are_followed_late() -> None:
@@ -261,7 +261,7 @@ def test_a_run_with_another_gain_is_reported_with_its_factor(tmp_path: Path) -> 
         columns["rate_dph"] = 1.3 * columns["rate_dph"]
 
     dataset = load(ramps(tmp_path, louder))
-    (event,) = turned_runs(dataset)
+    (event,) = reversed_runs(dataset)
     assert (event.id, event.file, event.unit) == ("gain_changed", "2.csv", "times")
     assert event.size[1] <= 1.3 <= event.size[2] and event.size[0] == pytest.approx(1.3, abs=0.03)
     assert event.result().exclude is None, "the whole run goes, by its entry"
@@ -299,7 +299,7 @@ def test_a_run_with_its_sign_reversed_is_reported(tmp_path: Path) -> None:
     def mirrored(columns: EventColumns) -> None:
         columns["rate_dph"] = -columns["rate_dph"]
 
-    (event,) = turned_runs(load(ramps(tmp_path, mirrored)))
+    (event,) = reversed_runs(load(ramps(tmp_path, mirrored)))
     assert (event.id, event.file) == ("sign_reversed", "2.csv")
 
 
@@ -307,8 +307,8 @@ def test_runs_that_agree_are_reported_nothing_of(tmp_path: Path) -> None:
     def shifted(columns: EventColumns) -> None:
         columns["rate_dph"] = columns["rate_dph"] + 0.01
 
-    assert turned_runs(load(ramps(tmp_path))) == []
-    assert turned_runs(load(ramps(tmp_path, shifted))) == [], "an offset is no gain"
+    assert reversed_runs(load(ramps(tmp_path))) == []
+    assert reversed_runs(load(ramps(tmp_path, shifted))) == [], "an offset is no gain"
 
 
 Floats = NDArray[np.float64]
@@ -549,4 +549,4 @@ def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: flo
         columns["rate_dph"] = factor * columns["rate_dph"]
 
     dataset = load(ramps(tmp_path, in_unit), trust_units=True)
-    assert [(e.id, e.file) for e in turned_runs(dataset)] == [("unit_changed", "2.csv")]
+    assert [(e.id, e.file) for e in reversed_runs(dataset)] == [("unit_changed", "2.csv")]

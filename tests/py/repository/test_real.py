@@ -45,10 +45,10 @@ def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(
         assert ("does_not_generalise" in found(result)) == (result["model"]["method"] == "constant")
         assert "jump_in_temperature" in found(result), "the start-up row"
         assert result["evaluate"]["mismatches"] == 0
-        ladder = {row["id"]: row for row in result["training"]["ladder"]}
-        [chosen] = (row for row in ladder.values() if row["chosen"])
+        candidates = {row["id"]: row for row in result["training"]["candidates"]}
+        [chosen] = (row for row in candidates.values() if row["chosen"])
         assert chosen["id"] == result["model"]["method"]
-        assert chosen["left_out_rms_dph"] <= ladder["constant"]["left_out_rms_dph"]
+        assert chosen["left_out_rms_dph"] <= candidates["constant"]["left_out_rms_dph"]
         assert result["evaluate"]["generalises"] == (chosen["id"] != "constant")
         assert [span["kind"] for span in result["training"]["spans"]] == ["branch"] * 3
 

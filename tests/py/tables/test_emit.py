@@ -92,7 +92,7 @@ def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: P
     assert bias == pytest.approx(float(model.map_dph(temperature, 0.0)), abs=2e-6)
 
 
-#: Readings of a supply of 27 ... 29 V, believed in that range, 28.4 V where it is lost; what its term then adds, deg/h.
+#: Readings of a supply of 27 ... 29 V, accepted in that range, 28.4 V where it is lost; what its term then adds, deg/h.
 READINGS = {
     "28.40000F": 0.004,
     "0.0F": -0.01,

@@ -123,7 +123,7 @@ def test_before_the_first_correction_the_bias_is_nothing_and_reported(numeric: s
     x, missed = random_history(model, seed, 400, 4)
     found = replay(table, table.encode_inputs(x[:, None]), missed=missed, samples_per_block=4)
     waiting = ~found.begun
-    assert found.begun[-1] and (waiting[0] or model.agree_s == 0.0), "one reading alone is not believed"
+    assert found.begun[-1] and (waiting[0] or model.agree_s == 0.0), "one reading alone is not accepted"
     assert np.all(np.diff(found.begun.astype(int)) >= 0), "once begun it goes on"
     assert np.all(found.bits[waiting] == 0) and np.all(found.status[waiting] == HELD)
 

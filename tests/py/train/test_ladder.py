@@ -1,4 +1,4 @@
-"""The ladder of corrections, where its training runs are cut, and what is refused before anything is read."""
+"""The candidates of corrections, where its training runs are cut, and what is refused before anything is read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gyrotc.train.methods import METHODS, NETWORK_METHODS, fit
 from gyrotc.train.mixed import fit_mixed_model
 from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
-from gyrotc.train.selection import RUNGS, Ladder, Rest
+from gyrotc.train.selection import CANDIDATES, Comparison, Rest
 from gyrotc.train.simple import all_solved, design, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -49,8 +49,8 @@ def test_a_gyro_that_repeats_gets_a_map_that_is_as_good_as_the_default_was(seed:
     error -= true_bias(data.temperature_c, data.slope_c_per_min)
     assert rms(error) < 0.25 * NOISE_DPH
     assert not found.findings
-    assert [row["id"] for row in found.ladder] == list(RUNGS)
-    assert [row["id"] for row in found.ladder if row["chosen"]] == [found.method]
+    assert [row["id"] for row in found.candidates] == list(CANDIDATES)
+    assert [row["id"] for row in found.candidates if row["chosen"]] == [found.method]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_the_simplest_correction_that_does_is_taken(name: str, bias: Callable[..
     data = samples(0)
     data = with_bias(data, bias(data.temperature_c, data.slope_c_per_min))
     found = auto(data)
-    assert found.method == name, found.ladder
+    assert found.method == name, found.candidates
     assert not found.findings, "a constant that leaves noise only is no failure"
 
 
@@ -81,49 +81,52 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
     assert "nothing is shown to be better" in found.reason
 
 
-def ladder(**rms: list[float]) -> Ladder:
-    """What each rung leaves on four runs; others leave what a constant does. The noise is 1."""
-    table = np.array([rms.get(name, rms["constant"]) for name in RUNGS]).T
+def candidates(**rms: list[float]) -> Comparison:
+    """What each candidate leaves on four runs; others leave what a constant does. The noise is 1."""
+    table = np.array([rms.get(name, rms["constant"]) for name in CANDIDATES]).T
     whole = np.arange(4)
     folds = [Fold("run", k, whole, whole) for k in range(4)]
-    return Ladder(folds, table, 1.0, 1.0, np.full(4, 50.0))
+    return Comparison(folds, table, 1.0, 1.0, np.full(4, 50.0))
 
 
 def test_the_least_score_is_taken_the_network_only_where_pieces_agree() -> None:
     constant, cubic = [900.0, 1100.0, 1000.0, 950.0], [20.0, 90.0, 30.0, 60.0]
-    assert ladder(constant=constant, cubic=cubic).chosen() == "cubic"
+    assert candidates(constant=constant, cubic=cubic).chosen() == "cubic"
     assert (
-        ladder(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen() == "cubic_slope"
+        candidates(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen()
+        == "cubic_slope"
     )
-    assert ladder(constant=constant, cubic=cubic, mixed=[0.9 * x for x in cubic]).chosen() == "mixed"
-    assert ladder(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
-    assert ladder(constant=constant, cubic=cubic, mrbf=[0.9 * x for x in cubic]).chosen() == "mrbf"
-    assert ladder(constant=constant, cubic=cubic, mrbf=[12.0, 91.0, 29.0, 60.0]).chosen() == "cubic"
+    assert candidates(constant=constant, cubic=cubic, mixed=[0.9 * x for x in cubic]).chosen() == "mixed"
+    assert (
+        candidates(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
+    )
+    assert candidates(constant=constant, cubic=cubic, mrbf=[0.9 * x for x in cubic]).chosen() == "mrbf"
+    assert candidates(constant=constant, cubic=cubic, mrbf=[12.0, 91.0, 29.0, 60.0]).chosen() == "cubic"
 
 
 def test_the_constant_stays_unless_it_is_beaten_by_a_tenth_or_surely() -> None:
     constant = [300.0, 400.0, 350.0, 320.0]
-    assert ladder(constant=constant, cubic=[0.95 * x for x in constant]).chosen() == "cubic", "surely"
-    assert ladder(constant=constant, cubic=[250.0, 390.0, 360.0, 320.0]).chosen() == "constant"
-    undecided = ladder(constant=constant, cubic=[60.0, 900.0, 500.0, 340.0])
+    assert candidates(constant=constant, cubic=[0.95 * x for x in constant]).chosen() == "cubic", "surely"
+    assert candidates(constant=constant, cubic=[250.0, 390.0, 360.0, 320.0]).chosen() == "constant"
+    undecided = candidates(constant=constant, cubic=[60.0, 900.0, 500.0, 340.0])
     assert undecided.gain("cubic")[0] < 1.0 and undecided.chosen() == "constant"
-    assert ladder(constant=constant, cubic=[60.0, 200.0, 400.0, 340.0]).chosen() == "cubic"
+    assert candidates(constant=constant, cubic=[60.0, 200.0, 400.0, 340.0]).chosen() == "cubic"
 
 
 def test_where_only_noise_is_left_the_likelihood_on_unseen_means_decides() -> None:
     """Two hundred means: what explains 3 % more of the squares is three units of likelihood, and hardly luck."""
     constant, noise = [1.1, 1.0, 1.3, 1.0], [1.0] * 4
-    assert ladder(constant=constant, cubic=noise).chosen() == "cubic"
-    assert ladder(constant=noise, cubic=[0.999] * 4).chosen() == "constant"
-    assert ladder(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.1] * 4, mrbf=noise).chosen() == "mrbf"
-    assert ladder(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.001] * 4, mrbf=noise).chosen() == "cubic"
+    assert candidates(constant=constant, cubic=noise).chosen() == "cubic"
+    assert candidates(constant=noise, cubic=[0.999] * 4).chosen() == "constant"
+    assert candidates(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.1] * 4, mrbf=noise).chosen() == "mrbf"
+    assert candidates(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.001] * 4, mrbf=noise).chosen() == "cubic"
 
 
 def test_states_are_one_candidate_more() -> None:
     constant = [900.0, 1100.0, 1000.0, 950.0]
-    plain = ladder(constant=constant, cubic=[x / 10.0 for x in constant])
-    better = ladder(constant=constant, mrbf=[x / 20.0 for x in constant])
-    alike = ladder(constant=constant, mrbf=[80.0, 112.0, 99.0, 96.0])
+    plain = candidates(constant=constant, cubic=[x / 10.0 for x in constant])
+    better = candidates(constant=constant, mrbf=[x / 20.0 for x in constant])
+    alike = candidates(constant=constant, mrbf=[80.0, 112.0, 99.0, 96.0])
     assert plain.with_states("states", better).chosen() == "states"
     assert plain.with_states("states", alike).chosen() == "cubic"
 
@@ -195,7 +198,7 @@ def test_a_cubic_as_gaussians_is_the_cubic(name: str) -> None:
         error = predict(found, data.temperature_c, data.slope_c_per_min) - bias
         assert np.abs(error).max() < 5e-4 * 5e-3
     assert found.sum_abs_weights <= 26.0 * sum(powers.values())
-    assert found.method == name and not found.ladder
+    assert found.method == name and not found.candidates
 
 
 def test_a_map_that_leaves_its_process_or_the_data_is_refused_with_words() -> None:
@@ -252,9 +255,9 @@ def test_the_choice_does_not_depend_on(name: str, repeats: bool) -> None:
 
 
 def same(one: Fit, two: Fit, shift: float = 0.0, share: float = 1e-3) -> None:
-    """The same rung, the same table, and maps within a share of the noise."""
+    """The same candidate, the same table, and maps within a share of the noise."""
     assert two.method == one.method
-    for a, b in zip(one.ladder, two.ladder, strict=True):
+    for a, b in zip(one.candidates, two.candidates, strict=True):
         if a["id"] != "nothing":
             assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=max(share, 1e-6))
     t, r = np.meshgrid(
@@ -292,7 +295,7 @@ def test_where_touching_spans_are_cut_changes_nothing_that_matters(tmp_path: Pat
 
 def close(whole: Fitted, parts: Fitted) -> None:
     assert parts.model.method == whole.model.method
-    for a, b in zip(*(f.training.content()["ladder"] for f in (whole, parts)), strict=True):
+    for a, b in zip(*(f.training.content()["candidates"] for f in (whole, parts)), strict=True):
         assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=0.02), a["id"]
     e = whole.model.envelope
     t, r = np.meshgrid(np.linspace(*e.temperature_c, 21), np.linspace(*e.slope_c_per_min, 11))
@@ -317,7 +320,7 @@ def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path
     moved = cut_at(tmp_path / "moved", table | {"rate_dph": table["rate_dph"] + 1e4}, [])
     later = cut_at(tmp_path / "later", table | {"time_s": table["time_s"] + 4096.0}, [])
     assert moved.model.method == later.model.method == whole.model.method
-    for row, a, b in zip(*(f.training.content()["ladder"] for f in (whole, moved, later)), strict=True):
+    for row, a, b in zip(*(f.training.content()["candidates"] for f in (whole, moved, later)), strict=True):
         if row["id"] != "nothing":
             assert a["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
         assert b["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
@@ -369,7 +372,7 @@ def test_what_remains_without_a_piece_is_what_a_fit_of_the_rest_gives(still: boo
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     most = np.flatnonzero(data.time_s > 300.0)  # some minutes remain of each run
     for near in [*(fold.near for fold in pieces(data)), most]:
-        found = rest.corrections(near, t, r, RUNGS[1:])
+        found = rest.corrections(near, t, r, CANDIDATES[1:])
         out = np.ones(len(data), dtype=bool)
         out[near] = False
         left = data.select(out)

@@ -36,7 +36,7 @@ def test_the_ladder_survives_odd_samples_and_keeps_to_them(seed: int) -> None:
     data = odd_samples(seed)
     found = fit(data, method="auto")
     assert beyond(found, data) < 1.02, f"seed {seed}: {found.method}"
-    assert not found.ladder or [row["id"] for row in found.ladder if row["chosen"]] == [found.method]
+    assert not found.candidates or [row["id"] for row in found.candidates if row["chosen"]] == [found.method]
 
 
 @pytest.mark.parametrize("seed", range(FIRST, FIRST + SETS // 2))
