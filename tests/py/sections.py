@@ -28,10 +28,13 @@ from bench import (  # noqa: E402  # noqa: E402
     growth,
     importing,
     lot_prior,
+    planted,
+    recalibration,
     runtime,
     service,
     sigma,
     sizes,
+    splits,
 )
 from bench import page as bench_page  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
@@ -61,6 +64,9 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "growth": growth.section,
     "formats": formats.section,
     "import": importing.section,
+    "planted": planted.section,
+    "recalibration": recalibration.section,
+    "splits": splits.section,
     "kills": kills.section,
     "mutants": mutants.section,
 }

@@ -41,7 +41,17 @@ FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
 _MOST_CELLS = 150_000  # of all runs: longer ones have longer cells
 _STEP_S = 30.0  # what takes no longer is a step
-_DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)  # from a step to ten minutes, where a drift begins
+_DURATIONS_S = (
+    0.0,
+    30.0,
+    60.0,
+    90.0,
+    120.0,
+    180.0,
+    300.0,
+    450.0,
+    600.0,
+)  # from a step to ten minutes, where a drift begins
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
 _BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
 _MARGIN = (
