@@ -64,7 +64,7 @@ _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
 _TAKEN_ID = re.compile(
-    r"e|angle|crc|config|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
+    r"e|angle|crc|config|learn|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
 )
 
 Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]

@@ -32,7 +32,7 @@ from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, front_end, map_method, power_ons
 from ..train.mrbf import Bumps
 from ..train.result import Fit
-from ..train.selection import Comparison, compare_candidates
+from ..train.selection import CandidateScores, compare_candidates
 from .attribution import choose
 from .blocks import Records
 from .gain import Gain, floor_of, gain_of
@@ -270,7 +270,7 @@ def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     return Shipping(shipped, candidate, best.stretches(), before, after)
 
 
-def _comparison(refitting: Refitting, effects: Sequence[Effect]) -> Comparison:
+def _comparison(refitting: Refitting, effects: Sequence[Effect]) -> CandidateScores:
     """Every candidate beside the effects, without each piece of history."""
     data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
     scaling = scaling_of(data)

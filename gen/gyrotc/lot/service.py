@@ -6,7 +6,7 @@ From a data sheet, or by maximum likelihood from the power-ons of a unit of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -186,7 +186,7 @@ def fitted_spread(
     Returns:
         The spread for a scale of 1, and each axis' scale, shape (axes,).
     """
-    names = [f.name for f in fields(BiasSpread) if getattr(start, f.name) > 0.0 and "ageing" not in f.name]
+    names = [f.name for f in fields(BiasSpread) if getattr(start, f.name) > 0.0 and f.default is MISSING]
     begin = np.log([getattr(start, name) for name in names])
 
     def spread_at(x: FloatArray) -> BiasSpread:

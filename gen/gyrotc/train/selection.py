@@ -51,7 +51,7 @@ from .result import Outcome
 from .simple import all_solved, fit_simple, outcome_of, powers_of, triangle_of
 
 __all__ = [
-    "CANDIDATES", "Chosen", "Comparison", "Rest", "chosen_by_cross_validation", "compare_candidates", "fit_mixed",
+    "CANDIDATES", "Chosen", "CandidateScores", "Rest", "chosen_by_cross_validation", "compare_candidates", "fit_mixed",
 ]  # fmt: skip
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
@@ -66,7 +66,7 @@ _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class CandidateScores:
     """What every candidate leaves on every piece of history, and the choice among them.
 
     Attributes:
@@ -123,7 +123,7 @@ class Comparison:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
         return t_statistic(self._score("constant") - self._score(name))
 
-    def with_states(self, name: str, other: Comparison) -> Comparison:
+    def with_states(self, name: str, other: CandidateScores) -> CandidateScores:
         """Besides, the network of another comparison over the same pieces, beside states that a verdict names."""
         added = other.rms_dph[:, [other.candidates.index("mrbf")]]
         return replace(self, rms_dph=np.hstack([self.rms_dph, added]), candidates=(*self.candidates, name))
@@ -177,7 +177,7 @@ def compare_candidates(
     average_s: float,
     *,
     rate: bool = True,
-) -> Comparison:
+) -> CandidateScores:
     """Fits every candidate without every piece of history.
 
     Args:
@@ -199,7 +199,7 @@ def compare_candidates(
         len(folds), len(CANDIDATES)
     )
     count = np.array([len(average(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
-    return Comparison(folds, np.sqrt(square), noise, max(white, least), count)
+    return CandidateScores(folds, np.sqrt(square), noise, max(white, least), count)
 
 
 def _difference_rms(means: TrainingData) -> float:
@@ -435,13 +435,13 @@ def _trained(
     return fit_simple(name, samples, scaling, average_s)
 
 
-def _misses(samples: TrainingData, comparison: Comparison) -> bool:
+def _misses(samples: TrainingData, comparison: CandidateScores) -> bool:
     """Whether a constant leaves more than noise on what it has not seen."""
     rms = comparison.rms_dph[:, CANDIDATES.index("constant")]
     return len(rms) == 0 or bool(np.sqrt(np.mean(rms**2)) > _STRUCTURE * comparison.noise_dph)
 
 
-def _reason(comparison: Comparison, name: str, misses: bool) -> str:
+def _reason(comparison: CandidateScores, name: str, misses: bool) -> str:
     """Why this candidate, in words."""
     tried = f"left out in turn: {', '.join(comparison.stretches()) or 'nothing, there is too little'}"
     if misses:
@@ -462,7 +462,7 @@ def _gain(t: float, freedom: int) -> str:
     return f"t of the gain over a constant is {t:.2g} with {freedom} degrees of freedom{undecided}"
 
 
-def _does_not_generalise(comparison: Comparison) -> dict[str, Any]:
+def _does_not_generalise(comparison: CandidateScores) -> dict[str, Any]:
     """The finding, with its reason and what would help."""
     rms = {name: comparison.rms_of(name) for name in CANDIDATES}
     able = {n: v for n, v in rms.items() if n not in ("nothing", "constant") and v is not None}
@@ -483,7 +483,7 @@ def _does_not_generalise(comparison: Comparison) -> dict[str, Any]:
     return {"id": "does_not_generalise", "text": f"{text} {_advice(comparison)}", "evidence": evidence}
 
 
-def _advice(comparison: Comparison) -> str:
+def _advice(comparison: CandidateScores) -> str:
     """Which recordings would help."""
     kinds = {fold.kind for fold in comparison.folds}
     if "run" in kinds:

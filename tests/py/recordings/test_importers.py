@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 import json
 import os
+import random
 import re
 import subprocess
 import sys
@@ -398,8 +399,9 @@ def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
 
 def test_the_last_file_becomes_the_exam_where_that_is_stated_or_answered(tmp_path: Path, run: Run) -> None:
     files = [tmp_path / name for name in ("a.csv", "b.csv")]
-    for scale, file in enumerate(files, 1):
-        file.write_text(lines(OWN, lambda k, t, r, scale=scale: f"{k},{t},{scale * r}"))
+    for seed, file in enumerate(files):
+        noise = random.Random(seed)  # another run's: the same noise twice is a copy
+        file.write_text(lines(OWN, lambda k, t, r, noise=noise: f"{k},{t},{r + noise.gauss(0.0, 1.0)}"))
     status, out, error = run("import", *files, "--out", tmp_path / "R", "--exam")
     assert status == 0, error
     assert "600 rows of 1 s" in out and "b.parquet is the exam" in out

@@ -22,7 +22,8 @@ def test_pages_have_short_sentences_and_no_new_private_words() -> None:
 def test_there_are_at_most_25_pages_of_60000_words_and_40_entries_of_the_glossary() -> None:
     pages = list((ROOT / "docs").glob("*.md"))
     assert len(pages) <= 25
-    assert sum(len(p.read_text("utf-8").split()) for p in pages) <= 60000
+    texts = [re.sub(r"<!--.*?-->", "", p.read_text("utf-8")) for p in pages]  # names of figures are not read
+    assert sum(len(text.split()) for text in texts) <= 60000
     assert (ROOT / "README.md").read_text("utf-8").count("\n") <= 120
     glossary = (ROOT / "docs" / "index.md").read_text("utf-8").partition("## Glossary")[2]
     assert 20 <= len(re.findall(r"^\| (?!word|---)", glossary, re.MULTILINE)) <= 40

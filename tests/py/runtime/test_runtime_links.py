@@ -145,7 +145,7 @@ def test_an_emitted_runtime_holds_the_arithmetics_asked_for_alone(numeric: str, 
 
 
 def test_the_runtime_is_about_a_dozen_files() -> None:
-    assert len([p for p in (ROOT / "libc").iterdir() if p.suffix in {".c", ".h", ".inl"}]) <= 17
+    assert len([p for p in (ROOT / "libc").iterdir() if p.suffix in {".c", ".h", ".inl"}]) <= 18
 
 
 MAIN = """

@@ -228,6 +228,8 @@ _DOOR = {
     "store/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
     "store/update.py copy2",  # into a folder that the job has just made
     "cli/deliver.py copytree",  # likewise
+    "recordings/importers/formats.py open",  # into a scratch folder that the job has just made
+    "recordings/importers/spreadsheet.py open",  # likewise
 }
 
 

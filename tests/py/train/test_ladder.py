@@ -23,7 +23,7 @@ from gyrotc.train.methods import METHODS, NETWORK_METHODS, fit
 from gyrotc.train.mixed import fit_mixed_model
 from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
-from gyrotc.train.selection import CANDIDATES, Comparison, Rest
+from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
 from gyrotc.train.simple import all_solved, design, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -81,12 +81,12 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
     assert "nothing is shown to be better" in found.reason
 
 
-def candidates(**rms: list[float]) -> Comparison:
+def candidates(**rms: list[float]) -> CandidateScores:
     """What each candidate leaves on four runs; others leave what a constant does. The noise is 1."""
     table = np.array([rms.get(name, rms["constant"]) for name in CANDIDATES]).T
     whole = np.arange(4)
     folds = [Fold("run", k, whole, whole) for k in range(4)]
-    return Comparison(folds, table, 1.0, 1.0, np.full(4, 50.0))
+    return CandidateScores(folds, table, 1.0, 1.0, np.full(4, 50.0))
 
 
 def test_the_least_score_is_taken_the_network_only_where_pieces_agree() -> None:
