@@ -334,9 +334,9 @@ def test_the_cache_is_reported_cleared_and_kept_to_a_limit(
 def test_a_build_ends_with_the_next_command(
     left: bool, diagnosis: str | None, monkeypatch: pytest.MonkeyPatch, gyrotc: Command
 ) -> None:
-    evaluation = SimpleNamespace(structure_left=left, content=dict)
+    evaluation = SimpleNamespace(structure_left=left, content=dict, residual_words="it is correlated")
     built = SimpleNamespace(
-        model=SimpleNamespace(axis=None), evaluation=evaluation, diagnosis=diagnosis, failures=()
+        model=SimpleNamespace(axis=None), evaluation=evaluation, diagnosis=diagnosis, failures=(), limits=None
     )
     monkeypatch.setattr("gyrotc.jobs.build.build", lambda *_, **__: [built])
     monkeypatch.setattr("gyrotc.cli.jobs._print_built", lambda _: None)
