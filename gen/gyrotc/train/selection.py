@@ -51,7 +51,13 @@ from .result import Outcome
 from .simple import all_solved, fit_simple, outcome_of, powers_of, triangle_of
 
 __all__ = [
-    "CANDIDATES", "Chosen", "CandidateScores", "Rest", "chosen_by_cross_validation", "compare_candidates", "fit_mixed",
+    "CANDIDATES",
+    "CandidateScores",
+    "Chosen",
+    "Rest",
+    "chosen_by_cross_validation",
+    "compare_candidates",
+    "fit_mixed",
 ]  # fmt: skip
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
