@@ -26,7 +26,8 @@
 #define GTC_QUANTITY_BIAS 0U /* bias of angular rate */
 #define GTC_UNIT_DEG_PER_H 0U
 
-/* Kinds of extension terms (first word of a term record). */
+/* Kinds of extension terms (first word of a term record).
+ * MISRA 2.5: for whoever reads a table; the runtime tells most of them by their place. */
 #define GTC_TERM_MEMORY 1U    /* first-order memory: cavity_lag (input) and thermal_gradient */
 #define GTC_TERM_PLAY 2U      /* play operator: hysteresis */
 #define GTC_TERM_WARM_UP 3U   /* exponential in the time since power-on */

@@ -12,6 +12,7 @@
 
 #define KNOTS GTC_LEARN_KNOTS
 #define STATES GTC_LEARN_STATES
+#define LAST_KNOT 7.0F
 #define OFFSET 8U /* the states behind the knots */
 #define SLOPE 9U
 #define WARM 10U
@@ -108,8 +109,8 @@ static void knots_at(const gtc_learn_prior_t *prior, float temp_c, step_t *step)
     if (!(u > 0.0F)) {
         u = 0.0F;
     }
-    if (u > (float)(KNOTS - 1U)) {
-        u = (float)(KNOTS - 1U);
+    if (u > LAST_KNOT) {
+        u = LAST_KNOT;
     }
     k = (uint_least32_t)u;
     if (k > (KNOTS - 2U)) {
@@ -407,12 +408,10 @@ static int agrees(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, floa
 {
     const float now = size_of(innovation);
     const float before = size_of(state->refused_dph);
-    const int alike = ((state->refused != 0U) && ((innovation > 0.0F) == (state->refused_dph > 0.0F)) &&
-                       (now < times(before, ALIKE)) && (before < times(now, ALIKE)))
-                          ? 1
-                          : 0;
+    const float product = times(innovation, state->refused_dph); /* 0 or less: of other signs, or none before */
 
-    if (alike == 0) {
+    if ((state->refused == 0U) || !(product > 0.0F) || !(now < times(before, ALIKE)) ||
+        !(before < times(now, ALIKE))) {
         state->refused = 0U;
         state->first_refused = state->power_ons;
     }
@@ -632,11 +631,13 @@ static int is_covariance(const uint_least32_t words[GTC_LEARN_KNOT_PAIRS])
 int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
                       const uint_least32_t words[GTC_LEARN_KEPT_WORDS])
 {
+    uint_least32_t days;
     uint_least32_t k;
 
     if ((state == NULL) || (prior == NULL) || (words == NULL)) {
         return GTC_E_ARG;
     }
+    days = words[2] & 0xFFFFU;
     if ((words[GTC_LEARN_KEPT_WORDS - 1] != crc_of(words)) || (is_covariance(&words[3U + KNOTS]) == 0)) {
         return GTC_E_IMAGE;
     }
@@ -648,7 +649,7 @@ int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
     state->first_refused = (state->power_ons - (words[2] >> 24)) & 0xFFFFU;
     state->refused = (words[2] >> 16) & 255U;
     state->refused_dph = number((words[1] << 16) & 0xFFFFFFFFUL);
-    state->hours = times((float)(words[2] & 0xFFFFU), DAY_H);
+    state->hours = times((float)days, DAY_H);
     for (k = 0U; k < KNOTS; k++) {
         const float x = number(words[3U + k]);
 

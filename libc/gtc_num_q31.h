@@ -41,7 +41,8 @@
 
 #include "gtc_saturate.inl"
 
-/* A number and its negative, of 32 bits. */
+/* A number and its negative, of 32 bits.
+ * MISRA 2.5: for assertions, which most builds leave out. */
 #define IS_32_BITS(x) (((x) >= -2147483647) && ((x) <= 2147483647))
 
 static inline uint_least32_t FN(bits)(int_least32_t x)

@@ -127,12 +127,14 @@ static void FN(uncertainty_input)(STATE *state, const EFFECT *effect, NUM slope)
 static SQUARE FN(variance_of_map)(const STATE *state)
 {
     const TABLE *const table = state->table;
-    const int is_late = ((state->status & GTC_WARMING) != 0) && (state->uncertainty.slope_known == 2U);
-    const NUM slope = (is_late != 0) ? state->uncertainty.slope : state->uncertainty.input[1];
+    NUM slope = state->uncertainty.input[1];
     uint_least32_t cell[2];
     uint_least32_t index;
     POINT in;
 
+    if (((state->status & GTC_WARMING) != 0) && (state->uncertainty.slope_known == 2U)) {
+        slope = state->uncertainty.slope;
+    }
     if (FN(locate)(table, state->uncertainty.input[0], slope, &in) < 0) {
         return FN(squared)(FN(rule)(table, RULE_NONE));
     }

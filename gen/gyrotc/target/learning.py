@@ -333,7 +333,8 @@ class Learner:
 
     def _agrees(self, innovation: Floats, refused: NDArray[np.bool_]) -> NDArray[np.bool_]:
         now, before = np.abs(innovation), np.abs(self.refused_dph)
-        alike = (self.refused != 0) & ((innovation > 0) == (self.refused_dph > 0))
+        with np.errstate(under="ignore"):
+            alike = (self.refused != 0) & (innovation * self.refused_dph > 0)
         alike &= (now < before * _ALIKE) & (before < now * _ALIKE)
         fresh = refused & ~alike
         self.refused[fresh], self.first_refused[fresh] = 0, self.power_ons
