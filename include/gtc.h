@@ -89,7 +89,7 @@ typedef struct {
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
  * the compiler that is installed; docs/results.md of gyrotc has other targets.
  *               f32 code  stack   q31 code  stack
- *   check           4510    450       3690    470
+ *   check           4520    450       3690    470
  *   open            2800    500       2580    520
  *   init             550     70        570     70
  *   sample          6230    320       6700    470
