@@ -85,7 +85,7 @@ typedef struct {
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (13 * GTC_MAX_TERMS) + (14 * GTC_WITH_UNCERTAINTY))
 
-/* Bytes on a Cortex-M4F at -O2, what arm-none-eabi-gcc 12.2 and 14.2 keep to: code with all that it
+/* Bytes on a Cortex-M4F at -O2, what arm-none-eabi-gcc 12.2 keeps to (14.2: save 2170): code with all that it
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
  * the compiler that is installed; docs/results.md of gyrotc has other targets.
  *               f32 code  stack   q31 code  stack

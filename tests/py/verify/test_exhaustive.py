@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -177,6 +178,11 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
     target = all_targets()["cortex-m4f"]
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
+    version = subprocess.run(
+        [target.compiler, "-dumpversion"], capture_output=True, text=True, check=True
+    ).stdout
+    if not version.startswith("12."):
+        pytest.skip("the header states what GCC 12.2 needs")
     folder = emitted(tmp_path / "model")
     (folder / "c" / "gtc_config.h").write_text("")  # the defaults, which the header states
     costs = function_costs(runtime_object(target, folder / "c", tmp_path))
