@@ -3,7 +3,7 @@
 Unrelated units: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
 lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
-knows from what distribution unrelated are drawn (the likelihood ratio of that against the lot's; the distribution is
+knows from what distribution unrelated units are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the foreign units of all other draws), and one that knows each such unit's map.
 
 Cost: the units are simulated from physics, each for itself: copies of a few with noise of their own would be as many
@@ -75,7 +75,7 @@ def _held(units: list[SimulatedGyro]) -> list[tuple[UnitMeans, UnitMeans]]:
 def ratio_test(
     prior: LotPrior, own: list[UnitMeans], strange: list[UnitMeans], known: list[UnitMeans]
 ) -> Any:
-    """Shares of own units and of unrelated refused by the likelihood ratio of the unrelated' distribution to the lot's.
+    """Shares of own and of unrelated units refused by the likelihood ratio of the latter's distribution to the lot's.
 
     Args:
         prior: The lot; of clusters the first.

@@ -268,7 +268,7 @@ _UNRELATED = " ".join(
     (
         "60 units teach a lot (family 0.93); 40 others of it and 40 unrelated, gyros whose physical parameters share nothing",
         "with the lot but the scenario, are held against it by one run of 2.5 h, 1 % false alarms. Beside the test that is",
-        "built stand two that cannot be: the likelihood ratio of the distribution that unrelated are drawn from (known from",
+        "built stand two that cannot be: the likelihood ratio of the distribution that unrelated units are drawn from (known from",
         "the whole calibrations of those of all other draws) to the lot's, and the most powerful test of a map that is known",
         "beforehand. What these miss, the run does not show: the unrelated unit's map lies within the lot's spread where the",
         "run has been.",

@@ -83,7 +83,7 @@ void lower(std::vector<float> &rarity, const Words &before, const Words &rate, s
 
 // Sum of the bits that rates tell before each row: of each rate after the one before, or after the sixteen before,
 // whichever is less.
-std::vector<double> told_before(const Words &rate) {
+std::vector<double> bits_before(const Words &rate) {
     std::vector<float> rarity(rate.size(), INFINITY);
     if (!rarity.empty()) rarity[0] = 1.0F;
     Words before, pairs;
@@ -119,14 +119,14 @@ Windows windows_of(const double *temperature, const std::vector<const double *> 
         }
         last = word;
     }
-    const std::vector<double> reported = told_before(rate);
+    const std::vector<double> bits = bits_before(rate);
     const Rolling rolling(row);
     Windows found;
     Words words;
     for (const std::size_t length : rule.lengths) {
         rolling.windows(length, words);
         for (std::size_t k = 0; k < words.size(); ++k) {
-            if ((words[k] & rule.mask) != 0 || at[k] >= rule.own || reported[k + length] - reported[k + 1] < rule.bits) continue;
+            if ((words[k] & rule.mask) != 0 || at[k] >= rule.own || bits[k + length] - bits[k + 1] < rule.bits) continue;
             found.hash.push_back(words[k]);
             found.first.push_back(static_cast<std::int64_t>(at[k]));
             found.last.push_back(static_cast<std::int64_t>(at[k + length - 1]));

@@ -243,7 +243,7 @@ std::vector<Eigen::Index> promising(const VectorXd &moment, const VectorXd &norm
     return order;
 }
 
-// By a candidate's squared norm: what of it must be orthogonal to the chosen columns, or nothing can be reported of it.
+// By a candidate's squared norm: what of it must be orthogonal to the chosen columns, or it counts as dependent on them.
 constexpr double kDependent = 1e-10;
 
 double gain_of(double moment, double rest, double norm, double ridge) {

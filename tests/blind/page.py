@@ -47,7 +47,7 @@ def write_section(
         docs: The folder docs.
         name: Of the record, and of the marks that hold the section on the page.
         head: Seed, records, how many of them are done, code, commit, start of the run.
-        reported: What is reported of it.
+        reported: What the page states of the campaign.
         section: Its text, from all runs, the newest first.
     """
     result = {**head, "written": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()), **reported}

@@ -139,7 +139,7 @@ def tried(names: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
 
 
 def main() -> int:
-    """Tries all faults, or those that are named, and writes the page if reported where."""
+    """Tries all faults, or those that are named, and writes the page where a folder is given."""
     parser = argparse.ArgumentParser(prog="tests.mutants.run", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--docs", type=Path, help="folder whose results.md gets the table")

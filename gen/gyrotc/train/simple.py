@@ -34,7 +34,7 @@ _POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
 """How many of `powers_of` each has."""
 _DEPENDENT = 1e-8
-"""Of a triangle's diagonal: such columns are distinguished by a singular value decomposition alone."""
+"""Of a triangle's diagonal: only a singular value decomposition tells how far such columns depend on each other."""
 
 # Number, width and outermost center of Gaussians, in half ranges. Largest error of z² and z³ over |z| <= 1, and sum of
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.

@@ -197,7 +197,7 @@ def test_analysers_see_what_is_wrong_with_a_path(tree: Path, one_file: None) -> 
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "untold"),
+    ("name", "text", "unexplained"),
     [
         ("a.py", "_A = 3\n", 1),
         ("a.py", "_A = 3  # sides of a triangle\n", 0),
@@ -217,12 +217,12 @@ def test_analysers_see_what_is_wrong_with_a_path(tree: Path, one_file: None) -> 
         ("a.cpp", "constexpr double kA = 2.5;\nconst int kB = 7;  // days\n", 1),
     ],
 )
-def test_a_number_without_its_origin_is_named(name: str, text: str, untold: int, tmp_path: Path) -> None:
+def test_a_number_without_its_origin_is_named(name: str, text: str, unexplained: int, tmp_path: Path) -> None:
     place = {"py": "gen/gyrotc", "h": "libc", "cpp": "gen/core"}[name.partition(".")[2]]
     (tmp_path / place).mkdir(parents=True)
     (tmp_path / place / name).write_text(text)
     found = [line for line in origins.unexplained_numbers(tmp_path) if "no constant" not in line]
-    assert len(found) == untold, found
+    assert len(found) == unexplained, found
 
 
 def test_what_the_oldest_python_lacks_is_found(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def planned(**changes: object) -> Scenario:
 
 
 def test_thermometers_show_their_own_nodes_with_their_own_faults() -> None:
-    """Offset, lag and steps are distinguished from the true temperature of the node alone."""
+    """Offset, lag and steps follow from the true temperature of the node alone."""
     made = next(campaign(planned(), 3))
     for name, node, lag_s, offset_c, step_c in (
         ("mirror_c", "mirror", 15.0, 0.3, 0.02),
