@@ -85,19 +85,19 @@ typedef struct {
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (13 * GTC_MAX_TERMS) + (14 * GTC_WITH_UNCERTAINTY))
 
-/* Bytes on a Cortex-M4F at -O2, what arm-none-eabi-gcc 12.2 keeps to (14.2: save 2170): code with all that it
+/* Bytes on a Cortex-M4F at -O2, the larger of arm-none-eabi-gcc 12.2 and 14.2, rounded up: code with all that it
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
  * the compiler that is installed; docs/results.md of gyrotc has other targets.
  *               f32 code  stack   q31 code  stack
- *   check           4590    460       3750    480
- *   open            2850    510       2620    530
- *   init             560     80        580     80
- *   sample          6330    330       6810    480
- *   bias             100     10        100     20
- *   snapshot        1340     60       2290    150
- *   rezero          1820     70       3120    190
- *   save            1450     90       1340    110
- *   restore         2310    630       2240    700 */
+ *   check           4520    460       3650    480
+ *   open            2810    500       2600    520
+ *   init             530     60        550     60
+ *   sample          6020    310       6600    490
+ *   bias              90      0         90     10
+ *   snapshot        1310     50       2190    150
+ *   rezero          1770     50       2990    180
+ *   save            2170     80       1640    100
+ *   restore         2970    600       2450    640 */
 
 /* Boot self-test of a compiled-in table, before gtc_<n>_init(), which relies on it: layout, arithmetic (f32:
  * rounding, ties, no fused products, no excess precision, order of sums, subnormals), checksum, range of every word

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -178,11 +177,6 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
     target = all_targets()["cortex-m4f"]
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
-    version = subprocess.run(
-        [target.compiler, "-dumpversion"], capture_output=True, text=True, check=True
-    ).stdout
-    if not version.startswith("12."):
-        pytest.skip("the header states what GCC 12.2 needs")
     folder = emitted(tmp_path / "model")
     (folder / "c" / "gtc_config.h").write_text("")  # the defaults, which the header states
     costs = function_costs(runtime_object(target, folder / "c", tmp_path))
@@ -194,9 +188,9 @@ def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Pa
         for name, stated in _stated_by_the_header(numeric).items():
             for most, size in zip(stated, (found[name].code_bytes, found[name].stack_bytes), strict=True):
                 print(f"gtc_{numeric}_{name}: {size} bytes, at most {most} stated")
-                # Who sizes a stack by the header must have enough. GCC 12.2 and 14.2 differ by up to 15 %; the
-                # header states the larger figure, rounded up to tens.
-                assert not measured(target) or size <= most <= 1.2 * size + 30, name
+                # Who sizes a stack by the header must have enough. GCC 12.2 and 14.2 differ by up to 57 %
+                # (save); the header states the larger figure, rounded up to tens.
+                assert not measured(target) or size <= most <= 1.6 * size + 30, name
 
 
 def _stated_by_the_header(numeric: str) -> dict[str, tuple[int, int]]:
