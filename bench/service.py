@@ -29,7 +29,7 @@ _AGEING = 2e-4  # deg/h in a month, of the constant; half of it in the map's sha
 _CELLS = [(te, on, arw) for te in (2e-4, 2e-3) for on in (1e-4, 3e-4) for arw in (1.2e-4, 5e-4, 2e-3)]
 AUTHORITY = 0.03  # deg/h: three times what a gyro of this class may read
 _POWER_ONS = 100
-_AXES, _SEED = 8, 100  # fresh ones give the same picture
+_AXES, _SEED = 8, 100  # of the draw on the page
 
 
 class Method(Protocol):

@@ -27,7 +27,7 @@
 extern "C" {
 #endif
 
-#define GTC_LEARN_KNOTS 8U          /* more gain nothing on simulated gyros (make service) */
+#define GTC_LEARN_KNOTS 8U          /* one for each 14 C of an envelope of 100 C */
 #define GTC_LEARN_STATES 13U        /* the knots, d, e, w, f, df/dT */
 #define GTC_LEARN_KNOT_PAIRS 36U    /* packed rows of a symmetric matrix: (0,0), (1,0), (1,1), (2,0), ... */
 #define GTC_LEARN_PAIRS 91U
@@ -101,8 +101,8 @@ GTC_MUST_CHECK int gtc_learn_power_on(gtc_learn_state_t *state, const gtc_learn_
                                       float temp_c);
 
 /* Learns from a rest. Returns 0, GTC_DISAGREES, GTC_E_REST (refused: too early, temperature or scatter too large, Earth's
- * rate not known, beyond the authority, or beyond the gate; nothing is learned) or GTC_E_ARG. Cost: about 350
- * multiplications, 1 division. */
+ * rate not known, beyond the authority, or beyond the gate; nothing is learned) or GTC_E_ARG. Cost: the
+ * covariance twice times a vector, and one update of it. */
 GTC_MUST_CHECK int gtc_learn_rest(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
                                   const gtc_learn_stop_t *stop);
 
