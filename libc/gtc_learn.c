@@ -12,7 +12,7 @@
 
 #define KNOTS GTC_LEARN_KNOTS
 #define STATES GTC_LEARN_STATES
-#define LAST_KNOT 7.0F
+#define LAST_KNOT 7.0F /* GTC_LEARN_KNOTS - 1, as a float */
 #define OFFSET 8U /* the states behind the knots */
 #define SLOPE 9U
 #define WARM 10U
