@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import __version__
 from ..model import Model
-from ..results.evaluation import Calibration, Changes, Evaluation
+from ..results.evaluation import PARTS, Calibration, Changes, Evaluation
 from ..results.release import Budget, Contribution, Instrument
 from ..results.training import Training
 from ..results.verification import Verification
@@ -322,13 +322,12 @@ def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Con
     of_floor = 0.0 if evaluation.noise_floor_source == "simulated" else _of_floor(training)
     excess = rms**2 - floor**2 - explained**2
     error = 2.0 * math.hypot(rms * known.standard, floor**2 * of_floor)
-    name = {"exam": "exam runs", "left_out": "spans left out of training"}[judged[0]]
     shown = excess > _SHOWN * error
     return part(
         "unseen",
         "thermal history and rates that were not trained",
         math.sqrt(excess) if shown else 0.0,
-        f"{name}, beyond noise floor and map" + ("" if shown else ": nothing is shown"),
+        f"{PARTS[judged[0]]}, beyond noise floor and map" + ("" if shown else ": nothing is shown"),
         freedom=known.freedom,
         statistical=True,
     )

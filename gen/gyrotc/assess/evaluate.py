@@ -43,8 +43,7 @@ from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .findings import findings_of
-from .residual import residual_test
-from .residuals import residual_findings
+from .residual import residual_findings, residual_test
 from .trace import trace_at, trace_name
 from .uncertainties import figure_uncertainties, root_mean, squares_in_all, squares_of
 
@@ -200,13 +199,14 @@ def _residual_test(result: Evaluation, parts: Sequence[_Part]) -> ResidualTest |
     figures: Statistics = judged[1].after
     if judged[0] != "left_out" and result.without_outliers is not None:
         figures = result.without_outliers
+    known = result.noise_floor_source == "simulated"
+    trained = [p for p in parts if p.run.role == "train" and not known]
     role = "exam" if result.exam else "train"
-    trained = [p.averages.after_dph.size for p in parts if p.run.role == "train"]
     return residual_test(
         [p.robust.after_dph for p in parts if p.run.role == role],
         figures.rms_dph,
         result.noise_floor_dph,
-        None if result.noise_floor_source == "simulated" else trained,
+        [p.averages.after_dph.size for p in trained] if result.exam or known else None,
     )
 
 

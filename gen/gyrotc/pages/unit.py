@@ -9,7 +9,7 @@ from pathlib import Path
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.diagnosed import Diagnosed
-from ..results.evaluation import Changes, Evaluation, Pooled
+from ..results.evaluation import PARTS, Changes, Evaluation, Pooled
 from ..results.release import Budget, HeldLimits, Limit, Verdict
 from ..results.training import CandidateModel, Manifest, Training
 from ..results.verification import Verification
@@ -18,11 +18,7 @@ from .words import limit_words, plain, words
 
 __all__ = ["UnitResults", "failed_checks", "unit_in"]
 
-_JUDGED_ON = {
-    "exam": "exam runs, never seen in training",
-    "left_out": "spans left out of training in turn",
-    "train": "the training runs themselves",
-}
+_JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
     "guard_band": "a guard band of w = U; PASS up to the limit less w, CONDITIONAL PASS from there up to the limit, "
     "else FAIL (ILAC-G8:09/2019, non-binary)",

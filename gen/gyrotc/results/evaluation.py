@@ -14,6 +14,7 @@ from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .release import HeldLimits
 
 __all__ = [
+    "PARTS",
     "RMS_OVER_FLOOR",
     "AsFound",
     "At",
@@ -184,12 +185,17 @@ RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, 
 class ResidualTest(Part):
     """What remains of the judged runs, held against white noise of the same runs."""
 
-    autocorrelation: float = Field(description="mean over the first `lags` lags of means over `average_s`")
-    autocorrelation_limit: float = Field(description="three standard deviations above what white noise has")
+    autocorrelation: Figure = Field(
+        description="mean over the first `lags` lags of means over `average_s`; null: the runs are too short"
+    )
+    autocorrelation_limit: Figure = Field(description="four standard deviations above what white noise has")
     lags: Count = Field(description="number of lags")
-    rms_over_floor: Amount = Field(description="RMS over the noise floor")
-    rms_over_floor_limit: Amount = Field(
-        description="three standard deviations above what white noise has, the floor estimated from as many means"
+    rms_over_floor: Amount = Field(
+        description="RMS over the noise floor, without rows that are spikes or parts of bursts"
+    )
+    rms_over_floor_band: tuple[Amount, Amount] = Field(
+        description="four standard deviations on either side of what white noise has, the floor estimated from as many "
+        "means; at most 1.3"
     )
 
     @property
@@ -197,14 +203,23 @@ class ResidualTest(Part):
         """In which of the two the residual is more than white noise, in words."""
         both = (
             ("autocorrelation", self.autocorrelation, self.autocorrelation_limit),
-            ("RMS over the noise floor", self.rms_over_floor, self.rms_over_floor_limit),
+            ("RMS over the noise floor", self.rms_over_floor, self.rms_over_floor_band[1]),
         )
         return tuple(
-            f"{name} {found:.2f}, white noise up to {most:.2f}" for name, found, most in both if found > most
+            f"{name} {found:.2f}, white noise up to {most:.2f}"
+            for name, found, most in both
+            if found is not None and most is not None and found > most
         )
 
 
-_OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise", "residual_above_noise"})
+_OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
+
+PARTS = {
+    "exam": "exam runs",
+    "left_out": "spans left out of training in turn",
+    "train": "the training runs themselves",
+}
+"""What a model may be judged by, in words."""
 
 
 class Evaluation(UnitResult):
@@ -245,7 +260,8 @@ class Evaluation(UnitResult):
     )
 
     residual: ResidualTest | None = Field(
-        default=None, description="of the runs that the model is judged by; null where they are too short"
+        default=None,
+        description="of the runs that the model is judged by; null without an RMS or a noise floor",
     )
     without_outliers: Statistics | None = Field(
         default=None,

@@ -184,7 +184,7 @@ def test_structure_that_is_left_leads_to_a_diagnosis(
         autocorrelation_limit=0.03,
         lags=10,
         rms_over_floor=over_floor,
-        rms_over_floor_limit=1.05,
+        rms_over_floor_band=(0.95, 1.05),
     )
     evaluation = EVALUATION.model_copy(update={"residual": residual, "findings": found})
     assert evaluation.structure_left == left
