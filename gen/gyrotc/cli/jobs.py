@@ -127,6 +127,9 @@ def _not_shipped(result: Diagnosed) -> str:
     return "no extension is shipped: no cause is shown to gain on runs it was not fitted to"
 
 
+_WORTH_A_LINE = 0.01  # a probability that is 0 % in print says nothing
+
+
 def _limit_text(considered: ConsideredCause) -> str:
     name = considered.id + (f" ({considered.channel})" if considered.channel is not None else "")
     limit = considered.detection_limit
@@ -144,7 +147,8 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
         channels = f" ({', '.join(cause.equivalent_channels)})" if cause.equivalent_channels else ""
         yield f"  as likely on these runs: {', '.join(cause.equivalent)}{channels}"
     if cause.equivalent and cause.probabilities:
-        odds = ", ".join(f"{name} {share:.0%}" for name, share in cause.probabilities.items())
+        likely = {name: share for name, share in cause.probabilities.items() if share >= _WORTH_A_LINE}
+        odds = ", ".join(f"{name} {share:.0%}" for name, share in likely.items())
         yield f"  probabilities: {odds}"
     if cause.separate_by:
         yield f"  to separate them: {cause.separate_by}"

@@ -19,11 +19,12 @@ from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.cross_validation import training_spans
 from ..train.data import TrainingData
-from ..train.fitting import HOLD_S, FitOptions, front_end, map_method, model_of, training_of
+from ..train.fitting import HOLD_S, FitOptions, fit_dataset, front_end, map_method, model_of, training_of
 from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import records_of
 from .extension import Extension, extend, refittable, stand_ins_of
+from .gain import emitted_means, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refit import Effect, added_range, play_runs, terms_of
@@ -119,6 +120,7 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         )
     causes = named if cycle is None else cycle.causes
     extended, training = _extended_model(dataset, extension, chosen)
+    extension = _as_emitted(dataset, extension, extended, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
 
@@ -162,6 +164,19 @@ def _extended_model(
     reported = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
     content = _with_terms(plain, entries, extension.samples, runs, stand_ins)
     return Model.from_dict({**content, **reported}), training
+
+
+def _as_emitted(
+    dataset: Dataset, extension: Extension, extended: Model | None, options: FitOptions
+) -> Extension:
+    """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
+    exam = [run for run in dataset.runs if run.role == "exam"]
+    if extended is None or not exam:
+        return extension
+    plain = fit_dataset(dataset, options).model
+    before, after = emitted_means((plain, extended), exam, options.average_s)
+    total = gain_of(before, after, extension.floor, options.average_s)
+    return replace(extension, total=total, before=before, after=after)
 
 
 def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:

@@ -12,11 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..assess.evaluate import replay_run
 from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA, Averages, time_statistics
+from ..common.metrics import MAD_TO_SIGMA, Averages, average, time_statistics
+from ..model import Model
+from ..recordings.records import Run
 from ..results.diagnosed import Estimate, GainOnUnseen
+from ..tables.emit import quantise_all
 
-__all__ = ["Gain", "floor_of", "gain_of"]
+__all__ = ["Gain", "emitted_means", "floor_of", "gain_of"]
 
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
@@ -82,6 +86,25 @@ def _at_most_all(share: float | None) -> float | None:
 
 def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
     return Estimate(value=value, low=limits[0], high=limits[1])
+
+
+def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
+    """What the emitted tables of each model leave on runs, bit for bit, on the rows that all of them correct."""
+    tables = [next(iter(quantise_all(model, None).tables.values())) for model in models]
+    found: list[list[Averages]] = [[] for _ in models]
+    for run in runs:
+        rows = run.rows()
+        inside = run.in_span(rows.time_s)
+        replayed = [
+            list(replay_run(rows, run, model, table, None))
+            for model, table in zip(models, tables, strict=True)
+        ]
+        scored = np.all([np.concatenate([part.scored for part in parts]) for parts in replayed], axis=0)
+        for means, parts in zip(found, replayed, strict=True):
+            left = rows.rate_dph - np.concatenate([part.bias_dph for part in parts])
+            columns = (rows.time_s, rows.temperature_c, rows.rate_dph, left)
+            means.append(average(*(c[inside] for c in columns), scored=scored[inside], average_s=average_s))
+    return found
 
 
 def floor_of(runs: Sequence[Averages]) -> float:

@@ -47,7 +47,6 @@ _TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
 equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
 
 _SURE = 0.9  # probability from which one cause is reported as the explanation
-_REPORTED = 0.01  # smaller ones are not worth a line
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
 
@@ -68,13 +67,13 @@ class Rival:
 
 
 def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
-    """Of the causes in one place, by id, the chosen one first; those below 1 in 100 are not reported."""
+    """Of all causes in one place, by id, the chosen one first."""
     odds = {chosen: 1.0}
     for rival in ranked:
         if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause
             odds[rival.id] = odds_of(rival)
     total = sum(odds.values())
-    return {id: value / total for id, value in odds.items() if id == chosen or value / total >= _REPORTED}
+    return {id: value / total for id, value in odds.items()}
 
 
 def odds_of(rival: Rival) -> float:

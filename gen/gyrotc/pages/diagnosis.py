@@ -20,6 +20,7 @@ from ..results.diagnosed import (
     DiagnosisSeries,
     FoundEvent,
     GainOnUnseen,
+    NamedCause,
     ParameterLikelihood,
     RunSeries,
     ScoredRun,
@@ -94,6 +95,7 @@ def draw(result: Diagnosed, series: DiagnosisSeries) -> dict[str, Markup]:
         "residual": _cycle_over_time(series.runs) if cycle else _residual_over_time(series.runs, width),
         "statistics": _statistics(result.discrepancies),
         "inputs": None if cycle else _over_inputs(series.runs, width),
+        "posterior": _posterior(result.physical),
         "considered": _considered(series.scores),
         "events": _events(series.runs, result.events),
     }
@@ -276,6 +278,26 @@ def _likelihood(likelihood: ParameterLikelihood) -> Markup:
     panel.dots(likelihood.values, likelihood.gain, AFTER, size=5.0)
     panel.horizontal(-CHI2_95_ONE, dash="5 3")
     return drawing([panel], width=HALF)
+
+
+def _posterior(causes: Sequence[NamedCause]) -> Markup | None:
+    """Probabilities of every cause in the place of each named one."""
+    panels, rows = [], 0
+    for cause in causes:
+        if cause.probabilities is None:
+            continue
+        ids = list(cause.probabilities)
+        places = list(range(len(ids)))[::-1]
+        panel = Panel(
+            x=f"probability in the place of {cause.name[0].lower()}{cause.name[1:]}",
+            x_range=(0.0, 1.0),
+            y_range=(-0.6, len(ids) - 0.4),
+            y_ticks=[(place, id.replace("_", " ")) for place, id in zip(places, ids, strict=True)],
+        )
+        panel.bars(list(cause.probabilities.values()), places, AFTER)
+        panels.append(panel)
+        rows = max(rows, len(ids))
+    return drawing(panels, columns=1, height=40.0 + 20.0 * rows) if panels else None
 
 
 def _considered(scores: SearchScores) -> Markup:
