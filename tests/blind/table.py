@@ -222,6 +222,9 @@ def _time(rows: Sequence[Row]) -> list[dict[str, Any]]:
 _BINS = ((0.1, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.0 + 1e-9))  # of stated probabilities
 
 
+SAID = "true of what was said with"
+
+
 def reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """How often what was said with a probability is true, over all recordings, clean and foreign ones among them."""
     said = [one for row in rows for one in row.get("said", [])]
@@ -231,7 +234,7 @@ def reliability(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if not inside:
             continue
         mean = float(np.mean([one["p"] for one in inside]))
-        name = f"true of what was said with {low:.0%}-{min(high, 1.0):.0%}, on average {mean:.0%}"
+        name = f"{SAID} {low:.0%}-{min(high, 1.0):.0%}, on average {mean:.0%}"
         for entry in proportion(name, f"{mean:.0%}", [one["true"] for one in inside], mean, "min"):
             out.append({**entry, "met": entry["low"] <= mean <= entry["high"]})
     return out

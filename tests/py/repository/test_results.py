@@ -249,6 +249,10 @@ def test_no_run_time_error_was_left_but_those_with_an_argument() -> None:
     assert left == {("map of a bank", "q31"), ("map of any bank", "q31"), ("memory", "q31")}
 
 
+def test_the_diagram_of_reliability_is_of_the_newest_runs() -> None:
+    assert (DOCS / blind.RELIABILITY).read_text("utf-8") == blind.reliability_diagram(DOCS)
+
+
 @pytest.mark.parametrize(("world", "name"), [(blind, "blind"), (other, "blind-other")])
 def test_a_blind_run_written_again_takes_the_place_of_itself_alone(
     world: Any, name: str, tmp_path: Path
