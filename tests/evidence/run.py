@@ -1,7 +1,7 @@
-"""What is found of drawn sets: copies of runs, and faults of timing, holding and pairing; and what of clean ones.
+"""What is found of drawn sets: copies in a set and in a fleet, faults of timing, holding and pairing, and clean ones.
 
-`python -m tests.evidence.run --clean 500 --copies 200 --faults 200 --seed 1` (`make evidence`) prints a table. A set is
-made again by its seed and number.
+`python -m tests.evidence.run --clean 500 --copies 200 --faults 200 --fleets 200 --seed 1` (`make evidence`) prints a
+table. A set is made again by its seed and number.
 """
 
 from __future__ import annotations
@@ -16,25 +16,51 @@ from pathlib import Path
 
 import numpy as np
 from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.fleet.copies import copies
 from gyrotc.jobs.build import build_into
 from gyrotc.recordings.load import load
+from gyrotc.recordings.noise_copies import noise_of, noise_signs
+from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 
-from .sets import EXPORTS, FAULTS, drawn_set, exported_again, faulty, written
+from .sets import EXPORTS, FAULTS, Recorded, drawn_set, exported_again, faulty, written
 
 ABOUT = frozenset(
     {
         "shared_rows", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
-        "runs_contradict", "run_outlier", "sign_reversed",
+        "runs_contradict", "run_outlier", "sign_reversed", "copy_of_other",
     }
 )  # fmt: skip
 """Findings that say that recordings are no evidence of their own, or do not belong together."""
-KINDS = {"clean": ("clean",), "copies": EXPORTS, "faults": FAULTS}
+KINDS = {"clean": ("clean",), "copies": EXPORTS, "faults": FAULTS, "fleets": EXPORTS}
+_GYROS = 12  # of a fleet
+
+
+def found_in_fleet(way: str, rng: np.random.Generator) -> set[str]:
+    """`copy_of_other` where the copy of one gyro's run among another's, and no other, is found; else what is."""
+    drawn = [drawn_set(rng) for _ in range(_GYROS)]
+    one, other = (int(k) for k in rng.choice(_GYROS, 2, replace=False))
+    gyro, runs = drawn[one]
+    drawn[other][1][int(rng.integers(5))] = exported_again(runs[int(rng.integers(5))], way, gyro, rng)
+    pairs = {
+        (copy.name, copy.other) for copy in copies([_entry(k, runs) for k, (_, runs) in enumerate(drawn)])
+    }
+    right = {(str(min(one, other)), str(max(one, other)))}
+    return {"copy_of_other"} if pairs == right else {f"{a} and {b}" for a, b in pairs}
+
+
+def _entry(number: int, runs: list[Recorded]) -> FleetEntry:
+    """As a fleet keeps it of a gyro."""
+    prints = [(f"run-{k + 1}", noise_of(run.time_s, run.rate_dph)) for k, run in enumerate(runs)]
+    noise = tuple(signs for file, one in prints for signs in noise_signs(file, one))
+    return FleetEntry(name=str(number), axis=None, status="done", serial=f"S-{number}", noise=noise)
 
 
 def found(kind: str, way: str, seed: int, number: int) -> set[str]:
     """Ids of findings (or `refused`) of a drawn set; a copy is an exam in half of the cases."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind), number])
+    if kind == "fleets":
+        return found_in_fleet(way, rng)
     gyro, runs = drawn_set(rng)
     if kind == "copies":
         place = 4 if number % 2 else 3  # the exam, or a training run
@@ -69,7 +95,7 @@ def tasks(counts: dict[str, int], seed: int) -> list[tuple[str, str, int, int]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    for kind, count in (("clean", 500), ("copies", 200), ("faults", 200)):
+    for kind, count in (("clean", 500), ("copies", 200), ("faults", 200), ("fleets", 200)):
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
@@ -89,9 +115,9 @@ def main() -> None:
     totals = {
         k: sum(n for (kind, _), n in named.items() if kind == k) / max(getattr(given, k), 1) for k in KINDS
     }
-    print(f"false {totals['clean']:.1%}, copies {totals['copies']:.1%}, faults {totals['faults']:.1%}")
+    print(", ".join(f"{'false' if k == 'clean' else k} {share:.1%}" for k, share in totals.items()))
     good = totals["clean"] <= 0.01 and all(
-        totals[k] >= 0.95 for k in ("copies", "faults") if getattr(given, k)
+        totals[k] >= 0.95 for k in KINDS if k != "clean" and getattr(given, k)
     )
     sys.exit(0 if good else 1)
 

@@ -201,8 +201,8 @@ def _tell_comparison(summary: FleetSummary) -> None:
         )
     for copy in summary.copies:
         tell(
-            f"copy of another: {copy.name} (serial {copy.serial}) has about {copy.share:.0%} of its rows in "
-            f"common with {copy.other} (serial {copy.other_serial}): one gyro under two serials"
+            f"copy of another: {copy.name} (serial {copy.serial}) has {copy.words} with {copy.other} "
+            f"(serial {copy.other_serial}): one gyro under two serials"
         )
 
 

@@ -1,8 +1,8 @@
-"""Serials that differ from the rest of their fleet, copies of recordings, and reversed signs."""
+"""Serials that differ from the rest of their fleet, and reversed signs."""
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +11,6 @@ from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages, median
 from ..results.fleet import (
     ComparedRun,
-    Copy,
     Facts,
     FleetEntry,
     FleetOutlier,
@@ -28,65 +27,12 @@ __all__ = [
     "FIRST_C",
     "NOISY_RUN",
     "PROFILE_S",
-    "copies",
     "facts_of",
     "mirrored_units",
     "outliers",
     "spread",
     "step_in",
-    "with_copies",
 ]
-
-_DIGITS = 16  # of a hash
-_LEAST_COMMON = 2  # hashes; one alone might be chance among 100,000 gyros
-_CROWD = 16  # gyros of which one hash is known: enough to name
-
-
-def copies(entries: Sequence[FleetEntry]) -> list[Copy]:
-    """Pairs of gyros of different serials that share rows, in the order of the entries."""
-    words = [_words(entry.sketch) for entry in entries]
-    holders: dict[str, list[int]] = defaultdict(list)
-    for number, of_one in enumerate(words):
-        for word in of_one:
-            if len(holders[word]) < _CROWD:
-                holders[word].append(number)
-    common: Counter[tuple[int, int]] = Counter()
-    for numbers in holders.values():
-        if len(numbers) > 1:
-            common.update((a, b) for k, a in enumerate(numbers) for b in numbers[k + 1 :])
-    return [
-        Copy(
-            name=entries[a].name,
-            serial=one,
-            other=entries[b].name,
-            other_serial=other,
-            share=min(1.0, count / min(len(words[a]), len(words[b]))),
-        )
-        for (a, b), count in sorted(common.items())
-        if count >= min(_LEAST_COMMON, len(words[a]))
-        and (one := entries[a].serial or "") != (other := entries[b].serial or "")
-    ]
-
-
-def _words(sketch: str) -> list[str]:
-    return [sketch[k : k + _DIGITS] for k in range(0, len(sketch), _DIGITS)]
-
-
-def with_copies(entries: Sequence[FleetEntry], found: Sequence[Copy]) -> list[FleetEntry]:
-    """The entries, each of a pair with the finding `copy_of_other` and the others' names."""
-    others: dict[str, list[str]] = defaultdict(list)
-    for copy in found:
-        others[copy.name].append(copy.other)
-        others[copy.other].append(copy.name)
-    return [
-        entry.model_copy(
-            update={"findings": (*entry.findings, "copy_of_other"), "copy_of": tuple(others[entry.name])}
-        )
-        if entry.name in others and entry.model_hash is not None
-        else entry
-        for entry in entries
-    ]
-
 
 FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
 NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at

@@ -17,8 +17,9 @@ from ..pages.report import page_environment
 from ..results.fleet import FleetEntry, FleetSummary, FleetUnit
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
+from .copies import copies, with_copies
 from .manifest import SUMMARY
-from .outliers import FIGURES, copies, outliers, spread, with_copies
+from .outliers import FIGURES, outliers, spread
 from .reasons import reasons, with_reasons
 
 __all__ = ["summary_of", "write_summary"]

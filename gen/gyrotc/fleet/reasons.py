@@ -93,7 +93,7 @@ def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[
     axis = {entry.name: entry.axis for entry in entries}
     for copy in sorted(copied, key=lambda c: axis.get(c.name) != axis.get(c.other)):  # x with x first
         for name, other in ((copy.name, copy.other), (copy.other, copy.name)):
-            text = f"copy of another unit: it has about {100.0 * copy.share:.0f} % of its rows in common with {other}"
+            text = f"copy of another unit: it has {copy.words} with {other}"
             if name in by_name:
                 found.setdefault(name, _reason(by_name[name], "copy_of_other", text))
     kinds = _kinds(entries)

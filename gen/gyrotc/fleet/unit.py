@@ -293,6 +293,7 @@ def _entry_of(
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
+        noise=dataset.noise_signs,
         key=key,
     )
     return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry

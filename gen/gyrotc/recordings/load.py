@@ -16,6 +16,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
 from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
+from .noise_copies import noise_signs
 from .overlap import counted_once, shared_axes, shared_rows
 from .plausibility import Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
@@ -334,6 +335,11 @@ def survey(
         shared=shared,
         shared_axes=shared_axes(recordings),
         sketch=sketch([r.fingerprints for r in recordings.values()]),
+        noise_signs=tuple(
+            signs
+            for name in dict.fromkeys(run.file for run in runs)
+            for signs in noise_signs(name, recordings[name].noise_on(axis))
+        ),
         curves=curves_of(description, runs_by_entry, recordings),
     )
 

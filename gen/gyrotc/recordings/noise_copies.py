@@ -6,10 +6,13 @@ over one grid of time, differenced and clipped, with a spectrum of equal magnitu
 lines of the mains or of a chamber's fan then count for nothing, and a copy is a peak at the lag of its clock
 (generalized cross-correlation with phase transform: Knapp and Carter, "The generalized correlation method for
 estimation of time delay", IEEE Trans. ASSP 24, 1976).
+
+Gyros of a fleet are too many for a spectrum of each pair: of each run the signs of the same whitened noise are kept.
 """
 
 from __future__ import annotations
 
+import base64
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -20,17 +23,31 @@ import scipy.fft
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median
+from ..results.fleet import NoiseSigns
 
-__all__ = ["AXES_ALIKE", "NoiseCopy", "NoisePrint", "noise_copies", "noise_of"]
+__all__ = [
+    "AXES_ALIKE",
+    "FASTEST_SIGNS",
+    "SLOWEST",
+    "NoiseCopy",
+    "NoisePrint",
+    "noise_copies",
+    "noise_of",
+    "noise_signs",
+]
 
 _MOST_ROWS = 2**14  # that are kept of a recording, means of several rows of a longer one
 _LEAST = 64  # values: of fewer no correlation stands out
 _STEPS = 4  # grids of time in an octave: no run is averaged over much more than its own rows
 _CLIP_SIGMAS = 4.0  # a spike, or a corner of the chamber's profile, is one value among the others
-_SLOWEST = 1.0 / 32.0  # of the grid's frequency: slower parts are the gyro's bias, which does come again
 _COARSE = 0.5  # share of rows that repeat the one before: the noise is below the resolution of the rate
 _SIGMAS = 8.0  # a peak by chance among 1e5 lags of 1e5 pairs: 1e10 values, one in 1e15 beyond 8 sigma
 _LEAST_PEAK = 0.15  # 1: the same noise in all of both runs
+_MOST_SIGNS = 2**11  # of a run
+SLOWEST = 1.0 / 32.0
+"""Of the grid's frequency: slower parts are the gyro's bias, which does come again."""
+FASTEST_SIGNS = 0.25
+"""Of the grid's frequency: signs of what is slower hardly depend on where in a row the grid begins."""
 AXES_ALIKE = 0.9
 """Likeness of two axes that were recorded together: below it, what shakes both of them may do it."""
 
@@ -102,6 +119,23 @@ def noise_copies(prints: Sequence[NoisePrint]) -> Iterator[NoiseCopy]:
                     yield NoiseCopy(i, j, float(shift - found[0] * period), found[1])
 
 
+def noise_signs(file: str, one: NoisePrint) -> Iterator[NoiseSigns]:
+    """Signs of a run's whitened noise on the finest grid of whole octaves, and on the next for copies in other rows."""
+    if _grid_of(one) is None:
+        return
+    span_s = one.time_s[-1] - one.time_s[0] + one.period_s
+    finest = math.ceil(math.log2(max(one.period_s, span_s / _MOST_SIGNS)) - 1e-6)
+    for octave in (finest, finest + 1):
+        series = _series(one, 2.0**octave)
+        if series is not None:
+            n = int(scipy.fft.next_fast_len(len(series), real=True))
+            spectrum = _phases(series, n)
+            spectrum[int(FASTEST_SIGNS * n) + 1 :] = 0.0
+            signs = np.packbits(scipy.fft.irfft(spectrum, n)[: len(series)] > 0.0)
+            text = base64.b64encode(signs.tobytes()).decode("ascii")
+            yield NoiseSigns(file=file, octave=octave, count=len(series), signs=text)
+
+
 def _grid_of(one: NoisePrint) -> int | None:
     """Number of the finest grid of time that a run is averaged over; None where it has no noise to compare."""
     if len(one.time_s) < _LEAST or float(np.mean(np.diff(one.rate) == 0.0)) > _COARSE:
@@ -125,7 +159,7 @@ def _series(one: NoisePrint, period_s: float) -> FloatArray | None:
 def _phases(series: FloatArray, n: int) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
     spectrum = scipy.fft.rfft(series, n)
     size = np.abs(spectrum)
-    size[: int(_SLOWEST * n) + 1] = np.inf
+    size[: int(SLOWEST * n) + 1] = np.inf
     size[size == 0.0] = np.inf
     return np.asarray(spectrum / size)
 
@@ -138,7 +172,7 @@ def _peak(
     n_other: int,
 ) -> tuple[int, float] | None:
     """Lag (by how many cells the other's values come earlier, each from its own start) and height of a copy's peak."""
-    like = scipy.fft.irfft(one * np.conj(other), n) / (1.0 - 2.0 * _SLOWEST)
+    like = scipy.fft.irfft(one * np.conj(other), n) / (1.0 - 2.0 * SLOWEST)
     lags = np.r_[0:n_one, n - n_other + 1 : n]
     there = np.abs(like[lags])
     best = int(np.argmax(there))

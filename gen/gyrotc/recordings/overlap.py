@@ -70,7 +70,7 @@ def _same_noise(
     prints = []
     for run in runs:
         recording = recordings[run.file]
-        noise = recording.noise[list(recording.layout.axes).index(axis) if axis else 0]
+        noise = recording.noise_on(axis)
         prints.append(noise.within(run.in_span(noise.time_s)))
     for copy in noise_copies(prints):
         i, j = copy.one, copy.other

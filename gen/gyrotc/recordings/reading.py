@@ -121,6 +121,10 @@ class Recording:
     n_rows: int
     row_period_s: float
 
+    def noise_on(self, axis: str | None) -> NoisePrint:
+        """Of the one rate, or of that of an axis."""
+        return self.noise[list(self.layout.axes).index(axis) if axis else 0]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reader:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
+from ..results.fleet import NoiseSigns
 
 __all__ = [
     "Applied",
@@ -313,6 +314,7 @@ class Dataset:
         shared: Rows that runs of one role have in common, or that a run has twice; they count once.
         shared_axes: Axes that hold the same noise.
         sketch: Hashes of rows by which gyros of a fleet are compared (`shared_rows.sketch`).
+        noise_signs: What their noise is compared by (`noise_copies.noise_signs`).
         curves: Mean rates over temperature, of every axis of every run.
     """
 
@@ -333,6 +335,7 @@ class Dataset:
     shared: tuple[SharedRows, ...] = ()
     shared_axes: tuple[SharedAxes, ...] = ()
     sketch: tuple[int, ...] = ()
+    noise_signs: tuple[NoiseSigns, ...] = ()
     curves: tuple[Curve, ...] = ()
 
     def __repr__(self) -> str:

@@ -24,3 +24,8 @@ def test_a_run_exported_again_is_named(way: str, number: int) -> None:
 def test_a_fault_of_one_run_is_named(way: str) -> None:
     """Before: held rates, a late temperature and a run turned over built at up to 2.78 times the floor in silence."""
     assert found("faults", way, 2, 0) & NAMED
+
+
+@pytest.mark.parametrize("way", KINDS["fleets"][:2])
+def test_a_run_of_another_gyro_of_the_fleet_is_named(way: str) -> None:
+    assert found("fleets", way, 2, 0) == {"copy_of_other"}

@@ -136,7 +136,7 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
             False,
             "",
         )
-        dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", runs=(), sketch=()))
+        dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", runs=(), sketch=(), noise_signs=()))
         entry = unit._entry_of(task, "0" * 64, dataset, one, ())
         folder = tmp_path / entry.name
         (folder / "c").mkdir(parents=True)

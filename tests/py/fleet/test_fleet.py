@@ -287,4 +287,4 @@ def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: 
     found = {e["name"]: "copy_of_other" in e["findings"] for e in summary["serials"]}
     assert found == {"RLG-1": True, "RLG-2": False, "RLG-3": True}
     assert summary["serials"][2]["copy_of"] == ["RLG-1"]
-    assert "Gyros with rows of another serial" in (tmp_path / "out" / "fleet.html").read_text()
+    assert "Gyros with recordings of another serial" in (tmp_path / "out" / "fleet.html").read_text()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.outliers import copies
+from gyrotc.fleet.copies import copies
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
 from gyrotc.recordings.noise_copies import noise_copies, noise_of
