@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from gyrotc.lot.service import BiasSpread, PowerOn, fitted_spread, prior_of
+from gyrotc.lot.service import PowerOn, fitted_spread
+from gyrotc.model import BiasSpread, Learning
+from gyrotc.tables.learning import data_sheet_spread, service_prior
 from gyrotc.target.learning import Learner, ServicePrior, Stop
 from numpy.typing import NDArray
 from results import recorded, write
@@ -172,8 +174,7 @@ class Learned:
         self.refused = 0
 
     def power_on(self, clock_s: float, temp_c: float) -> None:
-        off_h = np.nan if self.off_s is None else (clock_s - self.off_s) / 3600.0
-        self.unit.power_on(off_h, temp_c)
+        self.unit.power_on(np.nan if self.off_s is None else clock_s - self.off_s, temp_c)
         self.off_s = clock_s
 
     def rest(
@@ -238,13 +239,11 @@ def missions(draw: np.random.Generator, axes: int, table: float, turn_on: float)
 
 def data_sheet_prior(table: float, turn_on: float, arw: float) -> ServicePrior:
     """From what a data sheet says: the table's error, turn-on offsets, ageing; noise as of a mean over an hour."""
-    hour = np.sqrt(_MONTH_H)
-    spread = BiasSpread(
-        level=table, slope=0.2 * table / 30.0, shape=0.16 * table, turn_on=turn_on, turn_on_slope=1e-8, warm_up=1e-9,
-        warm_up_s=600.0, memory=float(np.hypot(3e-5, 0.02 * table)), memory_s=14400.0, memory_c=20.0,
-        ageing=1.06 * _AGEING / hour, ageing_shape=0.09 * _AGEING / hour,
-    )  # fmt: skip
-    return prior_of(spread, (-40.0, 60.0), 10.0, 60.0 * arw, AUTHORITY, span_c=1e9)
+    spread = data_sheet_spread(table, turn_on, _AGEING)
+    learning = Learning(
+        spread=spread, reference_c=10.0, authority_dph=AUTHORITY, noise_deg_per_sqrt_h=arw, span_c=1e6
+    )
+    return service_prior(learning, (-40.0, 60.0))
 
 
 Spoil = Callable[[int, Floats, float], Floats]
@@ -318,9 +317,10 @@ def laser(
 _NOISE = 15.0  # deg/h of a mean over 10 s of the measured sensor
 _SKIP_S = 70.0  # of a power-on, whose first readings are spikes
 _EVERY_S = (60.0, 300.0, 900.0, np.inf)
-_GUESS = BiasSpread(
-    3000.0, 100.0, 100.0, 2000.0, 100.0, 1000.0, 600.0, 1000.0, 1e5, 12.0
-)  # deg/h, C, s: a consumer's MEMS
+_GUESS = BiasSpread(  # of a consumer's MEMS: deg/h, C, s
+    level=3000.0, slope=100.0, shape=100.0, turn_on=2000.0, turn_on_slope=100.0, warm_up=1000.0, warm_up_s=600.0,
+    memory=1000.0, memory_s=1e5, memory_c=12.0,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -410,11 +410,14 @@ def measured(folder: Path, spoil: Spoil | None = None) -> list[dict[str, Any]]:
         cubic = np.stack([np.polynomial.Polynomial.fit(temp_c, r, 3)(run.temp_c) for r in rate.T], axis=1)
         flat = np.tile(mean, (len(run.time_s), 1))
         spread, scale = fitted_spread(_GUESS, [p.past(mean) for p in past], envelope, center, _NOISE)
+        noise = _NOISE * np.sqrt(10.0) / 60.0  # deg/√h
+        known = Learning(
+            spread=spread, reference_c=center, authority_dph=1e5, noise_deg_per_sqrt_h=noise, span_c=1e6,
+            jump_sigma=8.0, agreeing_rests=2, agreeing_power_ons=1,
+        )  # fmt: skip
         priors = [
-            prior_of(spread.scaled(s), envelope, center, _NOISE * np.sqrt(10.0), 1e5, span_c=1e9, open_gate=8.0,
-                     agreeing=2, power_ons=1)
-            for s in scale
-        ]  # fmt: skip
+            service_prior(known.model_copy(update={"spread": spread.scaled(s)}), envelope) for s in scale
+        ]
         for every_s in _EVERY_S:
             android, clock_s = Android(3, 144.0), 0.0
             learned = _EachAxis(priors)

@@ -7,16 +7,15 @@ from pathlib import Path
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..common.runtime import runtime_folders
 from ..common.texts import c_environment
 from ..model import Model, load_model
 from ..pages.report import axes_page
 from ..results.verification import JointVerification, Verification
 from ..store.files import write_atomically, write_own
 from ..store.scratch import scratch_folder
-from ..tables.amalgamate import ARITHMETICS, amalgamate
+from ..tables.amalgamate import ARITHMETICS
 from ..tables.config import config_text
-from ..tables.emit import emitted_tables
+from ..tables.emit import emitted_tables, runtime_texts
 from ..tables.record import RECORD, joint_record_text
 from ..tables.text import example_period_us, example_samples
 from ..verify.emitted import file_entries
@@ -68,10 +67,8 @@ def joint_texts(
         numeric: The arithmetic that `main.c` uses.
     """
     headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
-    runtime = amalgamate(  # with the arithmetics of all axes
-        *runtime_folders(), numerics=tuple(n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers)
-    )
-    texts = {n: t.encode("ascii") for n, t in zip(("gtc.h", "gtc.c"), runtime, strict=True)}
+    held = [n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers]  # of all axes
+    texts = runtime_texts(models.values(), held)
     texts["gtc_config.h"] = config_text(list(models.values()))
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")

@@ -205,8 +205,14 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     if order.limits:
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
         left_out = order.limits.needs.left_out
+        stated = order.limits.learning
+        learning = stated.of(model, order.limits.file) if stated else None
         model = model.model_copy(
-            update={"q31_bias_frac_bits": order.limits.q31_bias_frac_bits, "left_out": left_out}
+            update={
+                "q31_bias_frac_bits": order.limits.q31_bias_frac_bits,
+                "left_out": left_out,
+                "learning": learning,
+            }
         )
         fitted = replace(fitted, model=model)
     fitted.model.save(work / "model.json")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
@@ -25,10 +25,12 @@ from ..model import Model
 from ..store.files import write_own
 from ..store.folder import result_folder
 from ..target.history import answers
+from ..target.learning import ServicePrior
 from ..target.table import LAYOUT, Table
-from .amalgamate import amalgamate
+from .amalgamate import LEARNING, amalgamate
 from .config import config_text, needs_of
 from .error_bounds import MARGIN, channel_error_dph
+from .learning import learning_text, service_prior
 from .quantise import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text
 from .rounding import channel_names
@@ -43,7 +45,9 @@ __all__ = [
     "emitted_tables",
     "expected_answers",
     "image_of",
+    "prior_of",
     "quantise_all",
+    "runtime_texts",
     "write_texts",
 ]
 
@@ -181,9 +185,8 @@ def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
     options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
     vectors = _vectors(made)
     texts = _from_templates(model, emission, options, vectors)
-    header, source = amalgamate(*runtime_folders(), numerics=tuple(sorted(numerics)))
     texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
-    texts["gtc.h"], texts["gtc.c"] = header.encode("ascii"), source.encode("ascii")
+    texts |= runtime_texts([model], numerics)
     texts["gtc_config.h"] = config_text([model])
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
@@ -204,6 +207,7 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "axis": model.axis,
         "model_hash": model.hash,
         "options": options.text,
+        "learning": learning_text(prior) if (prior := prior_of(model, emission.tables)) is not None else [],
         "layout": LAYOUT,
         "numerics": numerics,
         "v": vectors,
@@ -228,6 +232,22 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "main.c": "main.c.j2",
     }
     return {name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+
+
+def runtime_texts(models: Iterable[Model], numerics: Iterable[str]) -> dict[str, bytes]:
+    """Files of the runtime for these tables in these arithmetics, by name."""
+    learns = any(model.learning is not None for model in models)
+    folders = runtime_folders()
+    header, source = amalgamate(*folders, numerics=tuple(sorted(numerics)), learns=learns)
+    own = {LEARNING: (folders[0] / LEARNING).read_bytes()} if learns else {}
+    return {"gtc.h": header.encode("ascii"), "gtc.c": source.encode("ascii"), **own}
+
+
+def prior_of(model: Model, tables: Mapping[str, Table]) -> ServicePrior | None:
+    """What a table's gyro may learn in service; None: nothing."""
+    if model.learning is None:
+        return None
+    return service_prior(model.learning, model.envelope.temperature_c, next(iter(tables.values())).id)
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:

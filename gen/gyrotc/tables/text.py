@@ -14,7 +14,7 @@ from ..target.recursions import TableKind
 from ..target.table import LAYOUT, SERIAL_WORDS, Table
 from .rounding import channel_names, guard_of
 
-__all__ = ["TableText", "example_period_us", "example_samples", "example_values", "table_text"]
+__all__ = ["TableText", "example_period_us", "example_samples", "example_values", "float_text", "table_text"]
 
 _EXAMPLE_US = 10000  # 100 samples a second
 
@@ -208,17 +208,17 @@ def _is_integer(name: str, column: int) -> bool:
 def _word(numeric: str, word: int, *, integer: bool) -> str:
     if integer:
         return f"B(0x{word:x}UL)"
-    return f"V({_float_text(word)})" if numeric == "f32" else f"B(0x{word:08x}UL)"
+    return f"V({float_text(word)})" if numeric == "f32" else f"B(0x{word:08x}UL)"
 
 
 def _number(numeric: str, word: int) -> str:
     if numeric == "f32":
-        return f"V({_float_text(word)})"
+        return f"V({float_text(word)})"
     signed = word - 2**32 if word >= 2**31 else word
     return "(-2147483647L - 1L)" if signed == -(2**31) else f"{signed}L"
 
 
-def _float_text(word: int) -> str:
+def float_text(word: int) -> str:
     """A float32 as a C constant: 9 significant digits, which read back to the same bits."""
     value = struct.unpack("<f", struct.pack("<I", word))[0]
     text = f"{value:.9g}"

@@ -1,12 +1,14 @@
 """Learning in service: the mirror of libc/gtc_learn.c, for many axes at once; docs/numerics.md, section 9.
 
-One numpy operation for each operation of float32, in the order of the C text, so that the bits are the same. An array
-has an element for each axis; all axes share the instants and temperatures of their stops.
+In float32 one numpy operation for each operation of the C text, in its order, so that the bits are the same; in
+float64 the same filter, for the likelihood of a prior (`lot.service`). An array has an element for each axis; all axes
+share the instants and temperatures of their stops.
 """
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -14,35 +16,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import f32
+from .sigma import Squares
 
 __all__ = ["KEPT_WORDS", "KNOTS", "Learner", "ServicePrior", "Stop", "packed"]
 
-Floats = NDArray[np.float32]
+Numbers = NDArray[Any]  # of the learner's type: float32 or float64
 
 KNOTS, STATES = 8, 13  # of include/gtc_learn.h, as all numbers here
-KEPT_WORDS = 48  # id, counters, 8 + 36 numbers, CRC
-_OFFSET, _SLOPE, _WARM, _MEMORY, _ALONG = 8, 9, 10, 11, 12  # places of the states behind the knots
+KEPT_WORDS = 48  # id, counters, times, 8 + 36 numbers, CRC
+_WARM_UP, _MEMORY, _MEMORY_SLOPE = 10, 11, 12  # places of states behind the knots, the offset and its slope
+_DRAWN = 4  # states whose variance at power-on is in the prior
 _KNOT_PAIRS, _PAIRS = 36, 91  # packed triangles of 8 and 13 rows
-_LAYOUT = 0x47544C31  # of kept words: libc/gtc_learn.c
-_EXP_UNITS = np.float32(float.fromhex("0x1.715476p+6"))  # 64 / ln 2
-_ALIKE = np.float32(1.25)  # ratio of two innovations that agree
-_ONE, _TWO, _HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)  # in float32, so that nothing widens
-_SERIES = [
-    np.float32(float.fromhex(c)) for c in ("0x1.24924ap-3", "0x1.555556p-3", "0x1.99999ap-3", "0x1p-2")
-]
-_THIRD = np.float32(float.fromhex("0x1.555556p-2"))  # of the series of 1 - exp(-x)
+_LAYOUT = 0x47544C32  # where the CRC of kept words starts: libc/gtc_learn.c
+_EXP2_UNITS = np.float32(float.fromhex("0x1.715476p+6"))  # 64 / ln 2
+_AGREEING = 0.25  # two innovations that agree differ by at most this part of the later one
+_PLAUSIBLE_C = -90.0, 200.0  # libc/gtc_num_f32.h
+_LONGEST_S = 3.6e9  # a century in service: libc/gtc_learn.c
 OK, DISAGREES, REFUSED, WRONG = 0, 64, -8, -1  # what gtc_learn_rest() returns
+E_IMAGE, E_ID = -4, -5  # and gtc_learn_restore()
+
+_ROWS, _COLUMNS = np.tril_indices(STATES)
+_PAIR = np.zeros((STATES, STATES), dtype=np.int64)  # place of an element among the packed rows
+_PAIR[_ROWS, _COLUMNS] = _PAIR[_COLUMNS, _ROWS] = np.arange(_PAIRS)
 
 
-def _place(i: int, j: int) -> int:
-    row, column = max(i, j), min(i, j)
-    return row * (row + 1) // 2 + column
-
-
-def packed(matrix: ArrayLike) -> Floats:
-    """Lower triangle of a symmetric matrix, row by row, in float32."""
+def packed(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Lower triangle of a symmetric matrix, row by row."""
     full = np.asarray(matrix, dtype=np.float64)
-    return full[np.tril_indices(len(full))].astype(np.float32)
+    return full[np.tril_indices(len(full))]
 
 
 @dataclass(frozen=True)
@@ -51,41 +52,38 @@ class ServicePrior:
 
     id: int
     low_c: float
-    per_knot: float
-    center_c: float
+    knots_per_c: float
+    reference_c: float
     authority_dph: float
-    offset_var: float
-    slope_var: float
-    warm_var: float
-    memory_var: float
+    power_on_var: tuple[float, float, float, float]
     memory_per_c: float
-    forget_per_s: float
-    warm_per_s: float
-    off_h: float
+    memory_per_s: float
+    warm_up_per_s: float
+    off_s: float
     noise_var: float
-    noisy: float
+    noise_ratio: float
     span_c: float
     settle_s: float
-    gate: float
-    open_gate: float
-    agreeing: int
-    power_ons: int
-    map_var: Floats = field(repr=False)
-    ageing_var: Floats = field(repr=False)
+    gate_square: float
+    jump_square: float
+    agreeing_rests: int
+    agreeing_power_ons: int
+    map_var: NDArray[np.float64] = field(repr=False)
+    ageing_var: NDArray[np.float64] = field(repr=False)
 
-    def number(self, name: str) -> np.float32:
-        value: np.float32 = np.float32(getattr(self, name))
-        return value
+    def members(self) -> dict[str, int | NDArray[np.float32]]:
+        """Members of the struct in order: integers, and numbers as the target holds them."""
+        found: dict[str, int | NDArray[np.float32]] = {}
+        for one in fields(self):
+            value = getattr(self, one.name)
+            found[one.name] = value if isinstance(value, int) else np.atleast_1d(np.float32(value))
+        return found
 
     def words(self) -> list[int]:
         """The struct's words in order."""
         found: list[int] = []
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if isinstance(value, int):
-                found.append(value)
-            else:
-                found += np.atleast_1d(np.asarray(value, dtype=np.float32)).view(np.uint32).tolist()
+        for value in self.members().values():
+            found += [value] if isinstance(value, int) else value.view(np.uint32).tolist()
         return found
 
 
@@ -100,268 +98,248 @@ class Stop:
     span_c: float = 0.0
     mean_var: float = 0.0
     earth_var: float = 0.0
-    sure: bool = False
-
-
-def _decay(x: Any) -> Floats:
-    with np.errstate(under="ignore", over="ignore"):
-        return f32.gauss(np.atleast_1d(np.asarray(x * _EXP_UNITS, dtype=np.float32)))
-
-
-def _root(x: Floats) -> Floats:
-    from .sigma import Squares
-
-    return Squares().root(x)
-
-
-def _saturated(x: Floats, limit: np.float32) -> Floats:
-    y = np.where(x > limit, limit, x)
-    return np.asarray(np.where(y < -limit, -limit, y))
-
-
-def _risen(x: np.float32) -> np.float32:
-    if x < np.float32(0.0625):
-        y = (_ONE - x * np.float32(0.25)) * _THIRD
-        y = (_ONE - x * y) * _HALF
-        risen: np.float32 = x * (_ONE - x * y)
-    else:
-        risen = _ONE - _decay(x)[0]
-    return risen
+    confirmed: bool = False
 
 
 @dataclass(frozen=True)
 class _Step:
-    hours: np.float32
-    warm: np.float32
-    f: tuple[np.float32, np.float32, np.float32, np.float32]
-    q: tuple[np.float32, np.float32, np.float32]
-    seen: tuple[int, ...]
-    h: list[np.float32]
+    """From the last stop to an instant; `h` has the two knots, then the states behind the knots, of that instant."""
 
-
-def _memory(prior: ServicePrior, dt: np.float32, d_temp: np.float32) -> tuple[Any, Any]:
-    length = prior.number("memory_per_c")
-    way = length * np.abs(d_temp)
-    kept = _decay(way)[0]
-    forgotten = dt * prior.number("forget_per_s")
-    both = _decay(forgotten)[0] * kept
-    u = way + way
-    kept2 = kept * kept
-    lost2 = _risen(forgotten + forgotten)
-    left2 = _ONE - lost2
-    var, l2 = prior.number("memory_var"), length * length
-    f01 = both * d_temp
-    f = (both * (_ONE + way), f01, -l2 * f01, both * (_ONE - way))
-    if u < _ONE:
-        s = _ONE + u * np.float32(0.125)
-        for part in _SERIES:
-            s = _ONE + (u * part) * s
-        s = (((u * u) * u) * _SERIES[1]) * s
-        own, along = kept2 * s, kept2 * ((u + u) + s)
-    else:
-        half = (u * u) * _HALF
-        own = _ONE - kept2 * ((_ONE + u) + half)
-        along = _ONE - kept2 * ((_ONE - u) + half)
-    cross = (kept2 * u) * (l2 * d_temp)
-    q = (var * (lost2 + left2 * own), var * (left2 * cross), (var * l2) * (lost2 + left2 * along))
-    return f, q
+    elapsed_s: Any
+    warm_up: Any
+    memory: tuple[Any, Any, Any, Any]
+    states: list[int]
+    h: list[Any]
 
 
 class Learner:
-    """Axes that learn. `x`, shape (13, n), and packed `p`, shape (91, n), are float32."""
+    """Axes that learn. `x`, shape (13, n), and packed `p`, shape (91, n); of memory and its slope `p` is less than the
+    covariance by that of power-on.
 
-    def __init__(self, prior: ServicePrior, axes: int = 1) -> None:
-        self.prior, self.axes = prior, axes
-        self.x: Floats = np.zeros((STATES, axes), dtype=np.float32)
-        self.p: Floats = np.zeros((_PAIRS, axes), dtype=np.float32)
-        self.p[:_KNOT_PAIRS] = prior.map_var[:, None]
-        self.time_s, self.temp_c = np.float32(0.0), prior.number("center_c")
-        self.refused_dph: Floats = np.zeros(axes, dtype=np.float32)
-        self.hours = np.float32(0.0)
+    Attributes:
+        innovation, innovation_var: Of the last stop that passed the gates before the innovation's, of each axis.
+    """
+
+    def __init__(self, prior: ServicePrior, axes: int = 1, number: Any = np.float32) -> None:
+        self.prior, self.axes, self._number = prior, axes, number
+        self._numbers = {
+            one.name: number(getattr(prior, one.name)) for one in fields(prior) if one.type != "int"
+        }
+        self.x: Numbers = np.zeros((STATES, axes), dtype=number)
+        self.p: Numbers = np.zeros((_PAIRS, axes), dtype=number)
+        self.p[:_KNOT_PAIRS] = self._numbers["map_var"][:, None]
+        self._draw(prior.reference_c)
+        self.refused_dph: Numbers = np.zeros(axes, dtype=number)
+        self.service_s = number(0.0)
         self.power_ons = 0
-        self.first_refused = np.zeros(axes, dtype=np.int64)
+        self.since_refused = np.zeros(axes, dtype=np.int64)
         self.refused = np.zeros(axes, dtype=np.int64)
+        self.innovation = self.innovation_var = np.zeros(axes, dtype=number)
 
-    def power_on(self, off_h: float, temp_c: float) -> None:
-        """After each switching on; `off_h` is NaN where it is not known."""
-        prior = self.prior
-        self._age(np.float32(off_h) if np.isfinite(off_h) and off_h > 0 else prior.number("off_h"))
-        self.x[KNOTS:] = 0
-        self.p[_KNOT_PAIRS:] = 0
-        var, length = prior.number("memory_var"), prior.number("memory_per_c")
-        for state, value in (
-            (_OFFSET, prior.number("offset_var")), (_SLOPE, prior.number("slope_var")),
-            (_WARM, prior.number("warm_var")), (_MEMORY, var), (_ALONG, (var * length) * length),
-        ):  # fmt: skip
-            self.p[_place(state, state)] = value
-        self.time_s, self.temp_c = np.float32(0.0), np.float32(temp_c)
-        self.power_ons = (self.power_ons + 1) & 0xFFFF
+    def power_on(self, off_s: float, temp_c: float) -> None:
+        """After each switching on; `off_s` is NaN where it is not known."""
+        known = 0.0 < off_s < _LONGEST_S
+        self._age(self._number(off_s) if known else self._numbers["off_s"])
+        self._draw(temp_c)
+        self.power_ons += 1
+        self.since_refused += 1
 
     def rest(self, stop: Stop) -> NDArray[np.int64]:
         """What `gtc_learn_rest` returns for each axis."""
-        prior = self.prior
+        known = self._numbers
         noise = self._noise(stop)
-        if noise is None:
+        if not 0.0 < noise < np.inf:
             return np.full(self.axes, REFUSED)
-        rate = np.broadcast_to(np.asarray(stop.rate_dph, dtype=np.float32), (self.axes,))
-        gate, opened = prior.number("gate"), prior.number("open_gate")
-        limit = prior.number("authority_dph") + gate * _root(np.atleast_1d(noise))[0]
-        step = self._step(np.float32(stop.time_s), np.float32(stop.temp_c))
+        rate = np.broadcast_to(np.asarray(stop.rate_dph, dtype=self._number), (self.axes,))
+        step = self._step(stop.time_s, stop.temp_c)
         self._propagate(step)
-        self.time_s, self.temp_c = np.float32(stop.time_s), np.float32(stop.temp_c)
-        near = ~(np.abs(rate) > limit)
-        h = [*step.h[:4], _ONE, _ONE]
-        ph, var = self._spread(step.seen[:6], h)
+        self.time_s, self.temp_c = self._number(stop.time_s), self._number(stop.temp_c)
+        states = step.states[:-1]
+        expected, ph, var = self._expected(states, step.h)
         var = var + noise
-        innovation = rate - self._expected(step.seen[:6], h)
+        innovation = rate - expected
         square = innovation * innovation
-        big = near & (square > (gate * gate) * var)
-        soft = big & (stop.sure | ~(square > (opened * opened) * var))
-        agreed = self._agrees(innovation, big & ~soft)
-        accepted = near & (~big | soft | agreed)
-        self._open(innovation, soft | agreed, agreed)
-        if (soft | agreed).any():
-            ph, var = self._spread(step.seen[:6], h)
-            var = var + noise
-        self.refused[accepted] = 0
+        near = np.abs(rate) <= known["authority_dph"]
+        beyond = near & ~(square <= known["gate_square"] * var)
+        jump = beyond & (stop.confirmed | (square <= known["jump_square"] * var))
+        agreed = self._agrees(innovation, beyond & ~jump)
+        accepted = near & (~beyond | jump | agreed)
+        if (jump | agreed).any():
+            offset = _PAIR[KNOTS, KNOTS]
+            self.p[offset] = np.where(jump, self.p[offset] + square, self.p[offset])
+            self.p[:_KNOT_PAIRS] = np.where(agreed, self.p[:_KNOT_PAIRS] + square, self.p[:_KNOT_PAIRS])
+            ph[KNOTS] = np.where(jump, ph[KNOTS] + square, ph[KNOTS])
+            ph[:KNOTS] = np.where(agreed, ph[:KNOTS] + square, ph[:KNOTS])
+            var = np.where(jump | agreed, var + square, var)
+        self.refused_dph = np.where(accepted, self._number(0.0), self.refused_dph)
+        self.innovation, self.innovation_var = innovation, var
         self._update(ph, var, innovation, accepted)
         return np.where(accepted, np.where(agreed, DISAGREES, OK), REFUSED)
 
-    def shift(self, time_s: float, temp_c: float) -> tuple[Floats, Floats]:
+    def shift(self, time_s: float, temp_c: float) -> tuple[Numbers, Numbers]:
         """Shift of the correction and its sigma, deg/h, of each axis."""
-        step = self._step(np.float32(time_s), np.float32(temp_c))
-        y = self._expected(step.seen, step.h)
-        var = self._spread(step.seen, step.h)[1] + step.q[0]
-        before = self._prior_variance(step, np.float32(time_s))
-        var = np.where(var < before, var, before)
+        step = self._step(time_s, temp_c)
+        unlearned = self._unlearned_var(step)
+        h = [*step.h[:4], step.warm_up, *step.memory[:2]]
+        y, _, var = self._expected(step.states, h)
         lost = ~np.isfinite(y)
-        y, var = np.where(lost, np.float32(0.0), y), np.where(lost, before, var)
-        return _saturated(y, self.prior.number("authority_dph")), _root(np.asarray(var, dtype=np.float32))
+        y, var = np.where(lost, self._number(0.0), y), np.where(lost, unlearned, var)
+        limit = self._numbers["authority_dph"]
+        return self._within(y, -limit, limit), self._root(np.where(var < unlearned, var, unlearned))
 
     def save(self, axis: int = 0) -> list[int]:
         """The words that `gtc_learn_save` keeps."""
-        since = min((self.power_ons - int(self.first_refused[axis])) & 0xFFFF, 255)
-        refused = int(self.refused_dph[axis : axis + 1].view(np.uint32)[0])
-        days = min(int(np.ceil(self.hours / np.float32(24.0))), 65535)
-        counts = since << 24 | int(self.refused[axis]) << 16 | days
-        words = [self.prior.id, self.power_ons << 16 | refused >> 16, counts]
+        service, refused = (
+            int(x) for x in np.array([self.service_s, self.refused_dph[axis]]).view(np.uint32)
+        )
+        counts = (self.power_ons & 0xFFFF) << 16 | (int(self.since_refused[axis]) & 255) << 8
+        words = [self.prior.id, counts | int(self.refused[axis]) & 255]
+        words.append((service + 0xFFFF) & 0xFFFF0000 | refused >> 16)
         for part in (self.x[:KNOTS, axis], self.p[:_KNOT_PAIRS, axis]):
             words += np.ascontiguousarray(part).view(np.uint32).tolist()
-        data = b"".join(word.to_bytes(4, "little") for word in [_LAYOUT, *words])
-        return [*words, zlib.crc32(data)]
+        return [*words, _crc(words)]
 
-    def _noise(self, stop: Stop) -> np.float32 | None:
-        prior = self.prior
-        var = prior.number("noise_var") / np.float32(stop.duration_s)
-        mean = np.float32(stop.mean_var)
-        if (
-            np.float32(stop.time_s) < prior.number("settle_s")
-            or np.float32(stop.span_c) > prior.number("span_c")
-            or not np.isfinite(stop.earth_var)
-            or mean > prior.number("noisy") * var
-        ):
-            return None
-        total: np.float32 = max(mean, var) + np.float32(stop.earth_var)
-        return total
+    def restore(self, words: Sequence[int]) -> int:
+        """What `gtc_learn_restore` returns; every axis has what was kept then."""
+        numbers = np.array(words[3:-1], dtype=np.uint32).view(np.float32)
+        if words[-1] != _crc(words[:-1]) or not np.isfinite(numbers).all():
+            return E_IMAGE
+        if words[0] != self.prior.id:
+            return E_ID
+        self.__init__(self.prior, self.axes, self._number)  # type: ignore[misc]
+        self.power_ons = words[1] >> 16
+        self.since_refused[:], self.refused[:] = words[1] >> 8 & 255, words[1] & 255
+        halves = np.array([words[2] & 0xFFFF0000, words[2] << 16 & 0xFFFFFFFF], dtype=np.uint32).view(
+            np.float32
+        )
+        self.service_s, self.refused_dph[:] = halves
+        self.x[:KNOTS], self.p[:_KNOT_PAIRS] = numbers[:KNOTS, None], numbers[KNOTS:, None]
+        return OK
 
-    def _age(self, hours: np.float32) -> None:
-        self.p[:_KNOT_PAIRS] = self.p[:_KNOT_PAIRS] + (self.prior.ageing_var * hours)[:, None]
-        self.hours = np.float32(self.hours + hours)
+    def _draw(self, temp_c: float) -> None:
+        """The states that are drawn at a power-on."""
+        self.x[KNOTS:] = 0
+        self.p[_KNOT_PAIRS:] = 0
+        for state in range(KNOTS, _MEMORY):
+            self.p[_PAIR[state, state]] = self._numbers["power_on_var"][state - KNOTS]
+        self.time_s, self.temp_c = self._number(0.0), self._number(temp_c)
 
-    def _step(self, time_s: np.float32, temp_c: np.float32) -> _Step:
-        prior = self.prior
-        dt = max(np.float32(time_s - self.time_s), np.float32(0.0))
-        warm = _decay(dt * prior.number("warm_per_s"))[0]
-        f, q = _memory(prior, dt, np.float32(temp_c - self.temp_c))
-        u = (temp_c - prior.number("low_c")) * prior.number("per_knot")
-        u = min(max(u, np.float32(0.0)), np.float32(KNOTS - 1))
+    def _noise(self, stop: Stop) -> Any:
+        """Variance of a rest's mean; 0: it is not one to learn from."""
+        known, number = self._numbers, self._number
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            least = known["noise_var"] / number(stop.duration_s)
+            mean, earth = number(stop.mean_var), number(stop.earth_var)
+            usable = (
+                number(stop.time_s) >= known["settle_s"]
+                and _PLAUSIBLE_C[0] <= number(stop.temp_c) <= _PLAUSIBLE_C[1]
+                and number(stop.span_c) <= known["span_c"]
+                and mean <= known["noise_ratio"] * least
+                and earth >= 0.0
+            )
+            return (mean if mean > least else least) + earth if usable else number(0.0)
+
+    def _age(self, time_s: Any) -> None:
+        self.p[:_KNOT_PAIRS] = self.p[:_KNOT_PAIRS] + (self._numbers["ageing_var"] * time_s)[:, None]
+        self.service_s = self.service_s + time_s
+
+    def _step(self, time_s: float, temp_c: float) -> _Step:
+        known, one = self._numbers, self._number(1.0)
+        temp = self._number(temp_c)
+        d_temp, length = temp - self.temp_c, known["memory_per_c"]
+        way = length * np.abs(d_temp)
+        dt = max(self._number(time_s) - self.time_s, self._number(0.0))
+        left = self._exp_minus(way + dt * known["memory_per_s"])
+        along = left * d_temp
+        memory = (left + left * way, along, -(length * length) * along, left + left * -way)
+        u = self._within(
+            (temp - known["low_c"]) * known["knots_per_c"], self._number(0.0), self._number(KNOTS - 1)
+        )
         k = min(int(u), KNOTS - 2)
-        u = np.float32(u - np.float32(k))
-        seen = (k, k + 1, _OFFSET, _SLOPE, _WARM, _MEMORY, _ALONG)
-        h = [_ONE - u, u, _ONE, np.float32(temp_c - prior.number("center_c")), warm, f[0], f[1]]
-        return _Step(np.float32(dt / np.float32(3600.0)), warm, f, q, seen, h)
+        u = u - self._number(k)
+        h = [one - u, u, one, temp - known["reference_c"], one, one, self._number(0.0)]
+        return _Step(
+            dt, self._exp_minus(dt * known["warm_up_per_s"]), memory, [k, k + 1, *range(KNOTS, STATES)], h
+        )
 
     def _propagate(self, step: _Step) -> None:
-        p, (f00, f01, f10, f11) = self.p, step.f
-        self._age(step.hours)
-        for j in range(STATES):
-            p[_place(_WARM, j)] = p[_place(_WARM, j)] * step.warm
-        p[_place(_WARM, _WARM)] = p[_place(_WARM, _WARM)] * step.warm
-        self.x[_WARM] = self.x[_WARM] * step.warm
-        for j in range(_MEMORY):
-            a, b = p[_place(_MEMORY, j)].copy(), p[_place(_ALONG, j)].copy()
-            p[_place(_MEMORY, j)] = f00 * a + f01 * b
-            p[_place(_ALONG, j)] = f10 * a + f11 * b
-        own, cross, along = (p[_place(*ij)].copy() for ij in ((11, 11), (12, 11), (12, 12)))
-        a, b = f00 * own + f01 * cross, f00 * cross + f01 * along
-        c, d = f10 * own + f11 * cross, f10 * cross + f11 * along
-        p[_place(_MEMORY, _MEMORY)] = (a * f00 + b * f01) + step.q[0]
-        p[_place(_ALONG, _MEMORY)] = (c * f00 + d * f01) + step.q[1]
-        p[_place(_ALONG, _ALONG)] = (c * f10 + d * f11) + step.q[2]
-        a, b = self.x[_MEMORY].copy(), self.x[_ALONG].copy()
-        self.x[_MEMORY] = f00 * a + f01 * b
-        self.x[_ALONG] = f10 * a + f11 * b
+        p, f = self.p, step.memory
+        self._age(step.elapsed_s)
+        warm_up, memory, slope = (_PAIR[state, : _WARM_UP + 1] for state in range(_WARM_UP, STATES))
+        p[warm_up] = p[warm_up] * step.warm_up
+        p[memory], p[slope] = _transformed(f, p[memory], p[slope])
+        again = _PAIR[_WARM_UP:, _WARM_UP]
+        p[again] = p[again] * step.warm_up
+        own, cross, along = (p[_PAIR[i, j]].copy() for i, j in ((11, 11), (12, 11), (12, 12)))
+        transposed, along = _transformed(f, cross, along)
+        own, cross = _transformed(f, own, cross)
+        own, _ = _transformed(f, own, transposed)
+        cross, along = _transformed(f, cross, along)
+        p[_PAIR[11, 11]], p[_PAIR[12, 11]], p[_PAIR[12, 12]] = own, cross, along
+        self.x[_WARM_UP] = self.x[_WARM_UP] * step.warm_up
+        self.x[_MEMORY], self.x[_MEMORY_SLOPE] = _transformed(f, self.x[_MEMORY], self.x[_MEMORY_SLOPE])
 
-    def _spread(self, seen: tuple[int, ...], h: list[np.float32]) -> tuple[Floats, Floats]:
-        ph = np.zeros((STATES, self.axes), dtype=np.float32)
-        for j in range(STATES):
-            for factor, k in zip(h, seen, strict=True):
-                ph[j] = ph[j] + factor * self.p[_place(j, k)]
-        var = np.zeros(self.axes, dtype=np.float32)
-        for factor, k in zip(h, seen, strict=True):
-            var = var + factor * ph[k]
-        return ph, var
+    def _expected(self, states: list[int], h: list[Any]) -> tuple[Numbers, Numbers, Numbers]:
+        """h x, P h and h P h."""
+        memory_var = self._numbers["power_on_var"][_MEMORY - KNOTS]
+        ph = np.zeros_like(self.x)
+        for state, factor in zip(states, h, strict=False):
+            ph = ph + factor * self.p[_PAIR[state]]
+        rate = var = np.zeros(self.axes, dtype=self._number)
+        for state, factor in zip(states, h, strict=False):
+            rate = rate + factor * self.x[state]
+            var = var + factor * ph[state]
+        ph[_MEMORY] = ph[_MEMORY] + memory_var
+        var = var + memory_var
+        return rate, ph, np.where(var > 0.0, var, self._number(0.0))
 
-    def _expected(self, seen: tuple[int, ...], h: list[np.float32]) -> Floats:
-        y = np.zeros(self.axes, dtype=np.float32)
-        for factor, k in zip(h, seen, strict=True):
-            y = y + factor * self.x[k]
-        return y
+    def _unlearned_var(self, step: _Step) -> Any:
+        known, h = self._numbers, step.h
+        service_s = self._within(self.service_s + step.elapsed_s, self._number(0.0), self._number(_LONGEST_S))
+        var = self._number(0.0)
+        for k, (state, factor) in enumerate(zip(step.states[:2], h, strict=False)):
+            pair = _PAIR[state, state]
+            part = factor * (known["map_var"][pair] + known["ageing_var"][pair] * service_s)
+            var = var + part if k else part
+        for k in range(_DRAWN):
+            var = var + (h[2 + k] * h[2 + k]) * known["power_on_var"][k]
+        return var
 
-    def _prior_variance(self, step: _Step, time_s: np.float32) -> np.float32:
-        prior, k = self.prior, step.seen[0]
-        warm = _decay(time_s * prior.number("warm_per_s"))[0]
-        h, pairs = step.h, prior.map_var + prior.ageing_var * (self.hours + step.hours)
-        var = (h[0] * h[0]) * pairs[_place(k, k)]
-        var = var + ((h[0] * h[1]) * _TWO) * pairs[_place(k + 1, k)]
-        var = var + (h[1] * h[1]) * pairs[_place(k + 1, k + 1)]
-        var = var + prior.number("offset_var")
-        var = var + (h[3] * h[3]) * prior.number("slope_var")
-        var = var + (warm * warm) * prior.number("warm_var")
-        total: np.float32 = var + prior.number("memory_var")
-        return total
+    def _agrees(self, innovation: Numbers, refused: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        limit = self._number(_AGREEING) * np.abs(innovation)
+        other = refused & ~(np.abs(innovation - self.refused_dph) <= limit)
+        self.refused[other], self.since_refused[other] = 0, 0
+        self.refused[refused] += 1
+        self.refused_dph = np.where(refused, innovation, self.refused_dph)
+        enough = self.refused >= self.prior.agreeing_rests
+        return np.asarray(refused & enough & (self.since_refused >= self.prior.agreeing_power_ons))
 
-    def _agrees(self, innovation: Floats, refused: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        now, before = np.abs(innovation), np.abs(self.refused_dph)
-        with np.errstate(under="ignore"):
-            alike = (self.refused != 0) & (innovation * self.refused_dph > 0)
-        alike &= (now < before * _ALIKE) & (before < now * _ALIKE)
-        fresh = refused & ~alike
-        self.refused[fresh], self.first_refused[fresh] = 0, self.power_ons
-        self.refused[refused] = np.minimum(self.refused[refused] + 1, 255)
-        self.refused_dph[refused] = innovation[refused]
-        spread = (self.power_ons - self.first_refused) & 0xFFFF
-        needed = self.prior.agreeing
-        enough = (needed != 0) & (self.refused >= needed) & (spread + 1 >= self.prior.power_ons)
-        return np.asarray(refused & enough)
+    def _update(self, ph: Numbers, var: Numbers, innovation: Numbers, accepted: NDArray[np.bool_]) -> None:
+        gain = ph / var
+        self.p = np.where(accepted, self.p - gain[_ROWS] * ph[_COLUMNS], self.p)
+        x = self.x + gain * innovation
+        limit = self._numbers["authority_dph"]
+        x[:KNOTS] = self._within(x[:KNOTS], -limit, limit)
+        self.x = np.where(accepted, x, self.x)
 
-    def _open(self, innovation: Floats, opened: NDArray[np.bool_], level: NDArray[np.bool_]) -> None:
-        length = self.prior.number("memory_per_c")
-        square = innovation * innovation
-        for state, value in ((_MEMORY, square), (_ALONG, (square * length) * length)):
-            k = _place(state, state)
-            self.p[k] = np.where(opened, self.p[k] + value, self.p[k])
-        self.p[:_KNOT_PAIRS] = np.where(level, self.p[:_KNOT_PAIRS] + square, self.p[:_KNOT_PAIRS])
+    def _exp_minus(self, x: Any) -> Any:
+        if self._number is not np.float32:
+            return np.exp(-x)
+        with np.errstate(under="ignore", over="ignore"):
+            return f32.gauss(np.atleast_1d(x * _EXP2_UNITS))[0]
 
-    def _update(self, ph: Floats, var: Floats, innovation: Floats, accepted: NDArray[np.bool_]) -> None:
-        inverse = _ONE / var
-        for i in range(STATES):
-            gain = ph[i] * inverse
-            self.x[i] = np.where(accepted, self.x[i] + gain * innovation, self.x[i])
-            for j in range(i + 1):
-                k = _place(i, j)
-                self.p[k] = np.where(accepted, self.p[k] - gain * ph[j], self.p[k])
-            k = _place(i, i)
-            self.p[k] = np.where(accepted & ~(self.p[k] > 0), np.float32(0.0), self.p[k])
-        knots = _saturated(self.x[:KNOTS], self.prior.number("authority_dph"))
-        self.x[:KNOTS] = np.where(accepted, knots, self.x[:KNOTS])
+    def _root(self, x: Numbers) -> Numbers:
+        return Squares().root(x) if self._number is np.float32 else np.sqrt(x)
+
+    def _within(self, x: Any, least: Any, most: Any) -> Any:
+        """The least for what is no number."""
+        return np.where(x > most, most, np.where(x >= least, x, least))[()]
+
+
+def _transformed(f: tuple[Any, Any, Any, Any], a: Numbers, b: Numbers) -> tuple[Numbers, Numbers]:
+    return f[0] * a + f[1] * b, f[2] * a + f[3] * b
+
+
+def _crc(words: Sequence[int]) -> int:
+    data = b"".join(word.to_bytes(4, "little") for word in words)
+    return zlib.crc32(data, _LAYOUT ^ 0xFFFFFFFF)

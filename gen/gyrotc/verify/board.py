@@ -22,11 +22,13 @@ from ..common.inputs import read_input
 from ..model import Model
 from ..results.verification import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
 from ..store.scratch import scratch_folder
+from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
 from ..target.history import answers
 from ..target.table import Table
 from .bounds import instruction_bounds
 from .emitted import board_files, checked_sources
+from .learning import learned_on
 from .sizes import function_costs
 from .toolchain import (
     Object,
@@ -321,7 +323,12 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
         try:
             if isinstance(shared, CheckFailed):
                 raise shared
-            yield entry(**_ran(job, target, numeric, shared, work, c), **extra)
+            result = {**_ran(job, target, numeric, shared, work, c), **extra}
+            prior = prior_of(job.model, job.tables)
+            if prior is not None and target.reads_input and numeric == numerics[0]:
+                learned = learned_on(target, job.model, prior, c, shared.objects, work)
+                result |= {"learned": learned} | ({"status": "fail"} if learned.mismatches else {})
+            yield entry(**result)
         except CheckFailed as error:
             yield entry(status="fail", error=str(error))
 

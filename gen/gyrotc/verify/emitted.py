@@ -11,6 +11,7 @@ the names it knows, and comments. Whether the numbers are right is not asked her
 from __future__ import annotations
 
 import hashlib
+import itertools
 import os
 import re
 import stat
@@ -24,7 +25,7 @@ from ..model import SERIAL, Model
 from ..results.verification import VerifiedFile
 from ..store.files import write_own
 from ..store.marker import read_marker
-from ..tables.amalgamate import ARITHMETICS, amalgamate
+from ..tables.amalgamate import ARITHMETICS, LEARNING, amalgamate
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
 
@@ -203,6 +204,10 @@ _TABLE_C = (
     r"const gtc_<n>_table_t gtc_{symbol}_\1 = \{{",
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
     r"\}};",
+    r"const gtc_learn_prior_t gtc_{symbol}_lrn = \{{",
+    r"    \.[a-z_]{{1,20}} = \{{ /\* <text> \*/",
+    "        (?:<cells>),",
+    r"    \}},",
 )
 _CONFIG_H = ("#ifndef GTC_[A-Z_]{{1,32}}", "#define GTC_[A-Z_]{{1,32}}(?: [0-9]{{1,2}})?")
 _TABLE_H = (
@@ -214,6 +219,8 @@ _TABLE_H = (
     "#define GTC_{SYMBOL}_ID <hex><note>",
     r'#define GTC_{SYMBOL}_[A-Z0-9_]{{1,32}} (?:<cells>|\((?:<cells>)\)|"<name>")<note>',
     r"extern const gtc_<n>_table_t gtc_{symbol}_\1;",
+    r'#include "gtc_learn\.h"',
+    r"extern const gtc_learn_prior_t gtc_{symbol}_lrn;",
 )
 _VECTORS_H = (
     "#(?:ifndef|define) VECTORS_{SYMBOL}_INCLUDED",
@@ -234,7 +241,8 @@ _ANY = ("", "#endif", r"/\* <text> \*/")
 
 def table_files(model: Model) -> dict[str, Check]:
     """Runtime and table of a model, each with what it must be."""
-    return {
+    own: dict[str, Check] = {LEARNING: lambda data: _runtime(data, 2)} if model.learning is not None else {}
+    return own | {
         "gtc.h": lambda data: _runtime(data, 0),
         "gtc.c": lambda data: _runtime(data, 1),
         "gtc_config.h": _grammar(_CONFIG_H, model),
@@ -281,9 +289,15 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
 
 
 def _runtime(data: bytes, part: int) -> str | None:
-    held = (ARITHMETICS, *((n,) for n in ARITHMETICS))
-    ours = (amalgamate(*runtime_folders(), numerics=n)[part] for n in held)
-    return None if data in (text.encode("ascii") for text in ours) else "is not the runtime of this gyrotc"
+    """Part: 0 for `gtc.h`, 1 for `gtc.c`, 2 for the header of learning in service."""
+    folders = runtime_folders()
+    if part == 2:
+        ours = {(folders[0] / LEARNING).read_bytes()}
+    else:
+        held = itertools.product((ARITHMETICS, *((n,) for n in ARITHMETICS)), (False, True))
+        texts = (amalgamate(*folders, numerics=n, learns=learns)[part] for n, learns in held)
+        ours = {text.encode("ascii") for text in texts}
+    return None if data in ours else "is not the runtime of this gyrotc"
 
 
 def _grammar(lines: Sequence[str], model: Model) -> Check:

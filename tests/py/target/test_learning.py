@@ -8,10 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.target.learning import DISAGREES, KEPT_WORDS, OK, REFUSED, Learner, ServicePrior, Stop, packed
+from gyrotc.target.learning import (
+    DISAGREES,
+    E_ID,
+    E_IMAGE,
+    KEPT_WORDS,
+    OK,
+    REFUSED,
+    Learner,
+    ServicePrior,
+    Stop,
+    packed,
+)
 
 ROOT = Path(__file__).resolve().parents[3]
-E_IMAGE, E_ID = -4, -5
 
 
 def prior(**changed: object) -> ServicePrior:
@@ -19,12 +29,12 @@ def prior(**changed: object) -> ServicePrior:
     knots = -40.0 + 100.0 / 7.0 * np.arange(8) - 10.0
     same = np.where(np.outer(knots, knots) > 0, np.minimum.outer(abs(knots), abs(knots)), 0.0)
     shape = {
-        "id": 0x1234ABCD, "low_c": -40.0, "per_knot": 0.07, "center_c": 10.0, "authority_dph": 0.03,
-        "offset_var": 3e-4**2, "slope_var": 1e-16, "warm_var": 1e-18, "memory_var": 3e-5**2,
-        "memory_per_c": 0.0866, "forget_per_s": 1 / 14400, "warm_per_s": 1 / 600, "off_h": 48.0,
-        "noise_var": 1.2e-4**2 * 3600, "noisy": 9.0, "span_c": 1.5, "settle_s": 0.0, "gate": 4.0, "open_gate": 4.0,
-        "agreeing": 3, "power_ons": 3, "map_var": packed(2e-4**2 + 3.2e-5**2 * same),
-        "ageing_var": packed(1e-12 + 1e-14 * same),
+        "id": 0x1234ABCD, "low_c": -40.0, "knots_per_c": 0.07, "reference_c": 10.0, "authority_dph": 0.03,
+        "power_on_var": (3e-4**2, 1e-16, 1e-18, 3e-5**2), "memory_per_c": 0.0866, "memory_per_s": 1 / 14400,
+        "warm_up_per_s": 1 / 600, "off_s": 172800.0, "noise_var": 1.2e-4**2 * 3600, "noise_ratio": 9.0,
+        "span_c": 1.5, "settle_s": 0.0, "gate_square": 16.0, "jump_square": 16.0, "agreeing_rests": 3,
+        "agreeing_power_ons": 2, "map_var": packed(2e-4**2 + 3.2e-5**2 * same),
+        "ageing_var": packed((1e-12 + 1e-14 * same) / 3600.0),
     }  # fmt: skip
     return ServicePrior(**{**shape, **changed})  # type: ignore[arg-type]
 
@@ -33,7 +43,7 @@ class _Stop(ctypes.Structure):
     _fields_ = [
         *((n, ctypes.c_float) for n in ("time_s", "temp_c", "span_c", "rate_dph")),
         *((n, ctypes.c_float) for n in ("duration_s", "mean_var", "earth_var")),
-        ("sure", ctypes.c_int32),
+        ("confirmed", ctypes.c_int32),
     ]  # fmt: skip
 
 
@@ -46,15 +56,15 @@ class Unit:
         self.state = (ctypes.c_uint32 * 111)()
         assert self.c.gtc_learn_start(self.state, self.prior) == OK
 
-    def power_on(self, off_h: float, temp_c: float) -> None:
+    def power_on(self, off_s: float, temp_c: float) -> None:
         assert (
-            self.c.gtc_learn_power_on(self.state, self.prior, ctypes.c_float(off_h), ctypes.c_float(temp_c))
+            self.c.gtc_learn_power_on(self.state, self.prior, ctypes.c_float(off_s), ctypes.c_float(temp_c))
             == OK
         )
 
     def rest(self, stop: Stop) -> int:
         given = _Stop(stop.time_s, stop.temp_c, stop.span_c, float(np.asarray(stop.rate_dph)), stop.duration_s,
-                      stop.mean_var, stop.earth_var, int(stop.sure))  # fmt: skip
+                      stop.mean_var, stop.earth_var, int(stop.confirmed))  # fmt: skip
         return int(self.c.gtc_learn_rest(self.state, self.prior, ctypes.byref(given)))
 
     def shift(self, time_s: float, temp_c: float) -> tuple[float, float]:
@@ -96,11 +106,11 @@ def test_the_unit_has_the_bits_of_its_mirror(library: ctypes.CDLL) -> None:
     seed = int(np.random.default_rng().integers(2**31))
     print("seed", seed)
     draw = np.random.default_rng(seed)
-    for soft in (4.0, 8.0):
-        known = prior(open_gate=soft, span_c=2.0, warm_var=1e-8)
+    for soft in (16.0, 64.0):
+        known = prior(jump_square=soft, span_c=2.0, power_on_var=(3e-4**2, 1e-16, 1e-8, 3e-5**2))
         unit, mirror = Unit(library, known), Learner(known)
         for _ in range(6):
-            off, temp = float(draw.choice([np.nan, 12.0, 700.0])), float(np.float32(draw.uniform(-45, 65)))
+            off, temp = float(draw.choice([np.nan, 5e4, 2.5e6])), float(np.float32(draw.uniform(-45, 65)))
             unit.power_on(off, temp)
             mirror.power_on(off, temp)
             time = 0.0
@@ -113,13 +123,13 @@ def test_the_unit_has_the_bits_of_its_mirror(library: ctypes.CDLL) -> None:
                     time, temp, float(np.float32(draw.normal(0.0, 10.0 ** draw.uniform(-5, 0)))),
                     float(draw.choice([1.0, 60.0, 1800.0])), span_c=float(draw.choice([0.0, 2.0, 2.5])),
                     mean_var=float(np.float32(draw.choice([0.0, 1e-7, 1e-3]))),
-                    earth_var=float(np.float32(draw.choice([0.0, 1e-8]))), sure=bool(draw.random() < 0.1),
+                    earth_var=float(np.float32(draw.choice([0.0, 1e-8]))), confirmed=bool(draw.random() < 0.1),
                 )  # fmt: skip
                 assert unit.rest(stop) == mirror.rest(stop)[0]
                 assert np.array_equal(unit.numbers(), bits(mirror))
                 asked = (
                     float(np.float32(time + draw.uniform(0, 9000))),
-                    float(np.float32(temp + draw.normal(0, 5))),
+                    float(np.float32(np.clip(temp + draw.normal(0, 5), -90, 200))),
                 )
                 y, sigma = mirror.shift(*asked)
                 assert unit.shift(*asked) == (float(y[0]), float(sigma[0]))
@@ -133,7 +143,7 @@ def served(known: ServicePrior, wrong: float, seed: int) -> tuple[float, float, 
     level = draw.normal(0, 4e-4)
     for _ in range(12):
         truth = level + draw.normal(0, 3e-4)
-        learner.power_on(48.0, 20.0)
+        learner.power_on(172800.0, 20.0)
         for k in range(6):
             temp = 20.0 + 4.0 * k
             rate = truth + draw.normal(0, 1.2e-4) + (draw.normal(0, 5.0) if draw.random() < wrong else 0.0)
@@ -161,7 +171,7 @@ def test_each_gate_refuses_and_leaves_what_was_learned() -> None:
         {"rate_dph": 0.02},
     ):  # fmt: skip
         learner = Learner(known)
-        learner.power_on(1.0, 20.0)
+        learner.power_on(3600.0, 20.0)
         assert learner.rest(Stop(**{**good, **wrong}))[0] == REFUSED  # type: ignore[arg-type]
         assert not learner.x.any()
         assert learner.rest(Stop(**good))[0] == OK and learner.x.any()  # type: ignore[arg-type]
@@ -171,7 +181,7 @@ def test_a_step_is_accepted_when_three_power_ons_agree() -> None:
     learner = Learner(prior())
     answers = []
     for _ in range(4):
-        learner.power_on(24.0, 20.0)
+        learner.power_on(86400.0, 20.0)
         answers.append(int(learner.rest(Stop(3600.0, 20.0, 5e-3, 3600.0))[0]))
     assert answers[:3] == [REFUSED, REFUSED, DISAGREES]
     assert answers[3] == OK and abs(float(learner.shift(3600.0, 20.0)[0][0]) - 5e-3) < 5e-4
@@ -182,7 +192,7 @@ def test_kept_words_come_back_and_others_are_refused(library: ctypes.CDLL) -> No
     known = prior()
     unit, other = Unit(library, known), Unit(library, known)
     for cycle in range(100):
-        unit.power_on(24.0, 20.0)
+        unit.power_on(86400.0, 20.0)
         unit.rest(Stop(3600.0, 20.0 + cycle % 7, 2e-4, 1800.0))
         words = unit.save()
         assert other.restore(words) == OK and other.save() == words

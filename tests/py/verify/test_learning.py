@@ -1,0 +1,105 @@
+"""Learning in service beside a table: what is emitted is proven on targets; limits files say what is learned."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gyrotc.assess.limits import load_limits
+from gyrotc.common.errors import InputError
+from gyrotc.model import BiasSpread, Learning, Model, load_model
+from gyrotc.tables.emit import emit, prior_of
+from gyrotc.tables.learning import data_sheet_spread
+from gyrotc.target.learning import E_IMAGE, KEPT_WORDS, OK, REFUSED
+from gyrotc.verify.job import verify
+from gyrotc.verify.learning import drawn_calls, expected_words
+
+GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"
+FIRMWARE = "cortex-m4f"
+
+
+def learning_model() -> Model:
+    known = Learning(
+        spread=data_sheet_spread(2e-4, 1e-4, 2e-4),
+        reference_c=20.0,
+        authority_dph=0.03,
+        noise_deg_per_sqrt_h=5e-4,
+    )
+    return load_model(GOLDEN).model_copy(update={"learning": known})
+
+
+@pytest.mark.parametrize("numerics", [None, ("q31",)])
+def test_targets_learn_save_and_restore_as_the_mirror_does(
+    numerics: tuple[str, ...] | None, tmp_path: Path
+) -> None:
+    """Also beside a table in fixed point alone, and where a write was cut off after any number of words."""
+    model = learning_model()
+    model.save(tmp_path / "model.json")
+    assert load_model(tmp_path / "model.json").learning == model.learning
+    emit(model, tmp_path, numerics=numerics)
+    targets = ("host-gcc-O2",) if numerics else ("host-gcc-O2", FIRMWARE)
+    found = verify(tmp_path, targets=targets)
+    assert found.failed == 0
+    learned = [entry.learned for entry in found.targets if entry.learned is not None]
+    assert len(learned) == len({entry.name for entry in found.targets if entry.status != "missing"})
+    assert all(one.calls > 100 and one.mismatches == 0 for one in learned)
+
+
+def test_the_calls_reach_what_they_are_for(tmp_path: Path) -> None:
+    model = learning_model()
+    tables = emit(model, tmp_path).tables
+    prior = prior_of(model, tables)
+    assert prior is not None and prior.id == next(iter(tables.values())).id
+    calls = drawn_calls(prior)
+    rows = expected_words(prior, calls)
+    statuses = rows[:, 0].view(np.int32)
+    kinds = np.array([call.kind for call in calls])
+    assert {OK, REFUSED} <= set(statuses[kinds == 2].tolist())
+    torn = statuses[kinds == 5]
+    assert torn[0] == OK and torn[-1] == OK and (torn[3:KEPT_WORDS] == E_IMAGE).all()
+    assert len(np.unique(rows[:, 1 : 1 + 104], axis=0)) > 40  # states
+
+
+def test_a_changed_prior_is_found(tmp_path: Path) -> None:
+    model = learning_model()
+    model.save(tmp_path / "model.json")
+    emit(model, tmp_path)
+    source = tmp_path / "c" / f"gtc_{model.id}.c"
+    text = source.read_text()
+    assert ".authority_dph = 0.0299999993F," in text
+    source.write_text(text.replace(".authority_dph = 0.0299999993F,", ".authority_dph = 0.299999993F,"))
+    assert [f.file for f in verify(tmp_path, compiled=False).emitted if f.status == "fail"] == [source.name]
+    found = verify(tmp_path, targets=("host-gcc-O2",), trust_code=True)
+    assert found.targets[0].learned is not None and found.targets[0].status == "pass"  # no call comes near it
+    source.write_text(text.replace(".span_c = 1.5F,", ".span_c = 15.0F,"))
+    found = verify(tmp_path, targets=("host-gcc-O2",), trust_code=True)
+    assert found.targets[0].learned is not None and found.targets[0].learned.mismatches > 0
+
+
+def test_a_limits_file_says_what_may_be_learned(tmp_path: Path) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text(
+        "schema = 1\n[learning]\nauthority_dph = 0.03\ntable_dph = 2e-4\nturn_on_dph = 1e-4\n"
+        "ageing_dph_per_sqrt_month = 2e-4\nnoise_deg_per_sqrt_h = 5e-4\nreference_c = 20.0\n"
+    )
+    limits = load_limits(path)
+    model = load_model(GOLDEN)
+    assert limits.learning is not None
+    assert limits.learning.of(model, str(path)) == learning_model().learning
+    spread = data_sheet_spread(1.0, 2.0, 3.0)
+    numbers = "\n".join(f"{name} = {value!r}" for name, value in json.loads(spread.model_dump_json()).items())
+    path.write_text(
+        f"schema = 1\n[learning]\nauthority_dph = 9.0\nnoise_deg_per_sqrt_h = 0.1\n[learning.spread]\n{numbers}\n"
+    )
+    stated = load_limits(path).learning
+    assert stated is not None and stated.of(model, str(path)).spread == BiasSpread(**dict(spread))
+    path.write_text("schema = 1\n[learning]\nauthority_dph = 0.03\n")
+    bare = load_limits(path).learning
+    assert bare is not None
+    with pytest.raises(InputError, match=r"limits.toml, field learning.noise_deg_per_sqrt_h: is missing"):
+        bare.of(model.model_copy(update={"uncertainty_dph": None}), str(path))
+    path.write_text("schema = 1\n[learning]\ntable_dph = 1e-4\n")
+    with pytest.raises(InputError, match="authority_dph"):
+        load_limits(path)
