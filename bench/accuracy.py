@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from . import contestants
 from .contestants import Gyro, dictionary, grid_of, gyro, joined, means, ratio
 
-__all__ = ["SCENARIOS", "accuracy", "invariance"]
-
 SCENARIOS = ("paper", "paper-ripple", "paper-ripple-strong")
 SEEDS = range(1, 11)
 _CENTERS = (14, 20, 40, 60)

@@ -19,8 +19,6 @@ from gyrotc.verify.bounds import instruction_bounds
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, disassembly, run_program, runtime_object
 from results import table
 
-__all__ = ["AIM", "MODELS", "bounds", "bounds_of", "gaussian_instructions", "model_of", "section"]
-
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 MODELS = ("filter", "terms")

@@ -28,8 +28,6 @@ from gyrotc.train.fitting import FitOptions
 
 from .sigma import CAMPAIGNS, exam_of
 
-__all__ = ["Covered", "coverage_of", "section", "units_of"]
-
 FIRST_SEED = 300_000  # of gyros that nothing was tuned on
 UNITS = 200
 _SHARES = (0.4, 0.2, 0.2, 0.2)  # of the first four campaigns, which have no terms

@@ -24,26 +24,6 @@ from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
 from numpy.typing import NDArray
 
-__all__ = [
-    "AVERAGE_S",
-    "BLOCK_S",
-    "KOHONEN",
-    "METHODS",
-    "SELECTIONS",
-    "VARPRO",
-    "Gyro",
-    "Learner",
-    "Predictor",
-    "Task",
-    "cloud",
-    "dictionary",
-    "grid_of",
-    "gyro",
-    "joined",
-    "means",
-    "ratio",
-]
-
 Floats = NDArray[np.float64]
 Predictor = Callable[[Floats, Floats], Floats]
 

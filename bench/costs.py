@@ -19,8 +19,6 @@ from gyrotc.verify.sizes import parse_graph
 
 from .sizes import COMPILER, CORES, LEVELS, LINKED, MODEL
 
-__all__ = ["OPTIONS", "costs", "measure", "write"]
-
 
 @dataclass(frozen=True, slots=True)
 class Option:

@@ -24,8 +24,6 @@ from libc_build import runtime
 from numpy.typing import NDArray
 from results import table as markdown
 
-__all__ = ["CLASSES", "Unit", "faults", "outcome", "outcomes", "section", "unit"]
-
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
 

@@ -31,16 +31,6 @@ from gyrotc.fleet.run import run_fleet
 from lot import FAULTS, Lot
 from results import machine, write
 
-__all__ = [
-    "catalogue_section",
-    "lot_section",
-    "section",
-    "under_serial",
-    "write_catalogue",
-    "write_fleet",
-    "write_lot",
-]
-
 _GYROS = 20
 _SERIALS = 1000
 _JOBS = 2

@@ -13,8 +13,6 @@ from typing import Any
 
 from results import machine, table
 
-__all__ = ["formats", "section"]
-
 _ROWS = 2880  # 8 h of a row each 10 s
 _CASES = {
     "CSV": "German, semicolons, decimal commas, cp1252",

@@ -17,8 +17,6 @@ from results import machine, table
 
 from .fleet import under_serial
 
-__all__ = ["growth", "section"]
-
 _RAW_HZ = (1, 10, 100)  # rows a second of the paper's twelve runs of 8 h
 _SETS = (1, 4, 16)  # of the six runs of the paper, and one set to be judged by
 _CENTERS = (4, 16, 64)

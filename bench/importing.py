@@ -21,8 +21,6 @@ import pyarrow.csv
 from numpy.typing import NDArray
 from results import machine, write
 
-__all__ = ["import_figures", "section"]
-
 _MEGABYTES = 2000
 _ROWS_AT_ONCE = 2**20
 _SECTION = """## A long file in (`make bench-import`)

@@ -34,8 +34,6 @@ from numpy.typing import NDArray
 from .lot_peers import best_power, seen
 from .lot_prior import CASES, learnt, ordered, programmes, recordings_of, write_page
 
-__all__ = ["ratio_test", "write_speed", "write_unrelated"]
-
 Floats = NDArray[np.float64]
 
 _DRAWS = 4

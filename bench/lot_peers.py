@@ -19,8 +19,6 @@ from gyrotc.train.evidence import fit_process
 from gyrotc.train.means import unit_means
 from scipy.stats import norm
 
-__all__ = ["best_power", "peers", "seen"]
-
 Floats = NDArray[np.float64]
 _CELL_C, _CELL_C_PER_MIN = 2.0, 0.2
 _EXPLAINED = 0.99  # of the variance between units: the usual choice of components

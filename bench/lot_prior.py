@@ -39,19 +39,6 @@ from results import recorded, write
 
 from .lot_peers import best_power, peers, seen
 
-__all__ = [
-    "CASES",
-    "Case",
-    "learnt",
-    "measured",
-    "ordered",
-    "programmes",
-    "quoted",
-    "recordings_of",
-    "section",
-    "write_page",
-]
-
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-__all__ = ["AIMS", "Aim", "section"]
-
 _DEFAULT = """The default method on {gyros} simulated gyros of each scenario: trained on set 1 of the paper's six
 environments, everything chosen from it; judged on set 2. RMS of compensated 100-s means ÷ RMS of the noise that
 was really added.

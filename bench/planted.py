@@ -14,8 +14,6 @@ from gyrotc.fleet.run import run_fleet
 from lot import FAULTS, RUN_FAULTS, Lot
 from results import table, write
 
-__all__ = ["section", "write_planted"]
-
 _UNITS, _EACH, _SEED, _JOBS = (
     116,
     3,

@@ -36,8 +36,6 @@ from results import table, write
 
 from .lot_prior import Exam, recordings_of
 
-__all__ = ["recalibrated", "section", "write_recalibration"]
-
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, Floats], Floats]
 

@@ -28,8 +28,6 @@ from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compil
 from numpy.typing import NDArray
 from results import table
 
-__all__ = ["AIMS", "GRIDS", "Aim", "grid_model", "runtime", "section"]
-
 GRIDS = {6: (3, 2), 64: (8, 8)}
 LEVELS = ("-O2", "-O3 -fira-region=one", "-Os")
 CORES = ("cortex-m0", "cortex-m3", "cortex-m4f", "cortex-m7")

@@ -36,22 +36,6 @@ from numpy.typing import NDArray
 from results import table
 from scipy.special import ndtr
 
-__all__ = [
-    "BLOCK_S",
-    "CAMPAIGNS",
-    "STATES",
-    "Campaign",
-    "Gyro",
-    "Recording",
-    "cost",
-    "coverage",
-    "departures",
-    "exam_of",
-    "gyro",
-    "pooled",
-    "section",
-]
-
 Floats = NDArray[np.float64]
 
 BLOCK_S = 10.0

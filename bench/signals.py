@@ -35,8 +35,6 @@ from results import write
 
 from .bounds import gaussian_instructions
 
-__all__ = ["rms_of", "scenario_of", "section", "without", "world"]
-
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 

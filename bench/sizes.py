@@ -17,8 +17,6 @@ from gyrotc.tables.config import SWITCHES
 from gyrotc.tables.emit import emit_texts, quantise_all
 from results import table as markdown
 
-__all__ = ["COMPILER", "CORES", "LEVELS", "LINKED", "MODEL", "PROGRAMS", "Program", "section", "size", "sizes"]
-
 ROOT = Path(__file__).resolve().parents[1]
 MODEL = ROOT / "examples" / "nav_loop" / "filter_model.json"  # of a simulated gyro, with uncertainties
 CORES = {

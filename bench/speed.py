@@ -22,8 +22,6 @@ from typing import Any
 
 from . import contestants
 
-__all__ = ["raw", "speed"]
-
 _SELECTIONS = (  # samples, grid, widths
     (1728, (25, 12), 7),
     (1728, (25, 12), 1),

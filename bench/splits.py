@@ -26,8 +26,6 @@ from gyrotc.train.simple import design, solve
 from numpy.typing import NDArray
 from results import table, write
 
-__all__ = ["Judged", "Split", "counts", "judged", "samples", "splits"]
-
 TRIVIAL = ("constant", "cubic", "cubic_slope")
 AVERAGE_S = 100.0
 _GOOD, _FAIR = (

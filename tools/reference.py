@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 REPORTED_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
 #: Where FORMAT.md has the table of a result's fields.
 PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
-#: Modules that may be imported by users' programs; what stands in their `__all__`.
+#: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
     "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
     "tables.emit", "target.maps", "target.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",

@@ -19,16 +19,6 @@ from .effects import FAMILY
 from .grade import Row
 from .table import SAID, markdown, table
 
-__all__ = [
-    "RELIABILITY",
-    "answer_lines",
-    "reliability_diagram",
-    "run_lines",
-    "section",
-    "write_page",
-    "write_section",
-]
-
 _HEAD = """## Hidden effects (`make blind`)
 
 Recordings with an effect that an independent generator hid in them (tests/blind: its own integration, maps,

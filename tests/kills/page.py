@@ -10,8 +10,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
 
 from results import table, write
 
-__all__ = ["section", "write_page"]
-
 _HEAD = """## Jobs that are killed (`make kills`)
 
 Jobs that end by a signal (KILL, TERM, INT), or that the disk lets down (EIO; ENOSPC from then on), at one of their

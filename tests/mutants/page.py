@@ -11,8 +11,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
 
 from results import recorded, table, write
 
-__all__ = ["section", "write_page"]
-
 _HEAD = """## Faults planted in gyrotc (`make mutants`)
 
 Each is a line of `gen/gyrotc/` that reads otherwise (`tests/mutants/faults.toml`). In what emits, the changed generator

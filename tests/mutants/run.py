@@ -31,8 +31,6 @@ else:
 
 from .page import write_page
 
-__all__ = ["MODELS", "Fault", "House", "faults", "main", "tried"]
-
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 #: Models that together have all that a table can hold.

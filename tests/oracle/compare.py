@@ -13,8 +13,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Reference", "differences"]
-
 _DIGITS = 4  # of base64, 24 bits: a change stays unseen once in 10^7; of JSON results a hash of the whole stands beside
 _LONGEST = 120  # characters of a value that are shown
 

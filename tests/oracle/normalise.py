@@ -8,8 +8,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-__all__ = ["content_of", "digest_of"]
-
 #: Fields of JSON results that are left out, with the reason.
 DROPPED = {
     "gyrotc_version": "changes with each release, not with a result",

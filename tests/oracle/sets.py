@@ -26,8 +26,6 @@ from logger_files import CSV_CASES, truth
 from logger_foreign import FOREIGN
 from recordings import ACCEPTED, REFUSED, Columns, columns, write_csv
 
-__all__ = ["SETS", "RecordingSet", "run_set"]
-
 
 @dataclass(frozen=True)
 class RecordingSet:

@@ -14,8 +14,6 @@ from typing import Any
 
 from .normalise import content_of
 
-__all__ = ["Steps"]
-
 Outcome = dict[str, Any]
 
 # Of an internal fault: its number is a hash of places in the source, its file has a name drawn at random.

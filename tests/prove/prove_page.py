@@ -6,8 +6,6 @@ from typing import Any
 
 from results import table
 
-__all__ = ["section"]
-
 _EVERY = """## Every input, no run-time error, rounding (`make prove`)
 
 {machine}. What is proved by which tool and what it adds up to: [proof.md](proof.md).

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import random
 
-__all__ = ["SEED", "hostile_strings"]
-
 SEED = 20261122
 _PARTS = (
     "*/", "/*", "//", "??/", "??=", "\\", "\\\n", "\n", "\r", "\r\n", "\t", "\v", "\f", "\x00", "\x07",

@@ -11,8 +11,6 @@ import pyarrow as pa
 import pyarrow.feather
 from logger_files import START, Case, Truth
 
-__all__ = ["ANALYSIS_CASES"]
-
 
 def excel(path: Path, t: Truth) -> None:
     """Two sheets: notes, then a title, a header with units, stamps as cells of their own type."""

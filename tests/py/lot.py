@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from recordings import write_csv
 
-__all__ = ["FAULTS", "RUN_FAULTS", "Lot"]
-
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")

@@ -8,8 +8,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-__all__ = ["Form", "mutated"]
-
 Form = Literal["bytes", "text", "json", "toml"]
 _WORDS = [
     "", "0", "-0", "1", "-1", "nan", "NaN", "inf", "-inf", "Infinity", "1e999", "-1e308", "1e-12", "1e-320", "1e12",

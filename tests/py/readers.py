@@ -47,8 +47,6 @@ from gyrotc.verify.job import verify
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet
 
-__all__ = ["READERS", "Reader", "make_seeds", "seeds_in"]
-
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES_EVERY = 50  # drawing takes a second
 SCENARIO = """title = "small"

@@ -16,8 +16,6 @@ from typing import Any
 
 from gyrotc.paper.summary import keep, recorded, shortened
 
-__all__ = ["Results", "machine", "recorded", "table", "write"]
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "promises"))
 
 import ages

@@ -6,8 +6,6 @@ from typing import Any
 
 from results import table
 
-__all__ = ["section"]
-
 _HEAD = """## Self-test against builds that break float32 (`make targets`)
 
 {tables} emitted tables, every other one with terms, under flags that break the arithmetic: of how many the results

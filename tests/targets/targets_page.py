@@ -8,8 +8,6 @@ from typing import Any
 
 from results import table
 
-__all__ = ["quoted", "section"]
-
 _HEAD = """## Every target, bit for bit (`make targets`)
 
 {combinations} combinations of architecture, compiler and optimisation, {entries} with their arithmetics. Every result

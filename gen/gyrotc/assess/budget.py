@@ -25,20 +25,6 @@ from ..results.verification import Verification
 from ..train.options import SIMPLE
 from .limits import Limits, coverage_factor, instruments_in, last_day
 
-__all__ = [
-    "AGEING",
-    "DAYS_A_YEAR",
-    "Known",
-    "ageing",
-    "arithmetic",
-    "budget_of",
-    "combined",
-    "part",
-    "reference",
-    "thermometer",
-    "yearly_drifts",
-]
-
 _STEP = 0.01  # of the range of temperatures, for the map's gradient
 DAYS_A_YEAR = 365.25  # the Julian year
 AGEING: Final = "ageing"  # the contribution of that name

@@ -35,16 +35,6 @@ from ..results.verification import Verification
 from .evaluate import evaluate
 from .limits import Limits, held_against
 
-__all__ = [
-    "Earlier",
-    "as_found",
-    "changes_since",
-    "earlier_models",
-    "history_of",
-    "load_earlier",
-    "started_on",
-]
-
 
 def as_found(
     earlier: Earlier, dataset: Dataset, limits: Limits | None, average_s: float

@@ -21,8 +21,6 @@ from ..results.verification import Verification, VerifiedTarget
 from .budget import AGEING, budget_of
 from .limits import Limits, held_against
 
-__all__ = ["check_budget", "check_figures", "check_limits"]
-
 _EXPECTED = "what gyrotc build wrote; build it again"
 _ROUNDING = 1e-9  # relative: of sums in another order, far below any digit that is reported
 

@@ -32,8 +32,6 @@ from ..quality.thermometers import thermometer_findings
 from ..recordings.records import Dataset
 from ..results.training import Training
 
-__all__ = ["findings_of"]
-
 _UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
 _UNSEEN_TO_FLOOR = 3.0  # below it most of what is left is noise, whatever training left
 _WEIGHTS_TO_RANGE = 10.0  # times the swing: a digit of the correction is then lost to cancelling

@@ -32,18 +32,6 @@ from ..tables.learning import data_sheet_spread
 from ..verify.toolchain import all_targets
 from .product_guards import ProductGuard
 
-__all__ = [
-    "Limits",
-    "StatedInstrument",
-    "coverage_factor",
-    "decided",
-    "held_against",
-    "instruments_in",
-    "last_day",
-    "load_limits",
-    "worst_of",
-]
-
 _NORMAL = NormalDist()
 _UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
 _ORDER: tuple[Verdict, ...] = ("PASS", "CONDITIONAL PASS", "FAIL")

@@ -16,8 +16,6 @@ from ..model import Guard, Model
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
 from ..train.samples import PLAUSIBLE_C
 
-__all__ = ["ProductGuard", "guarded"]
-
 _MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 
 

@@ -20,8 +20,6 @@ from ..recordings.records import Run
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..train.noise import robust_sigma
 
-__all__ = ["residual_findings", "residual_test"]
-
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
 _SIGMAS = 4.0  # of each figure's distribution: one clean residual in ten thousand
 _DRAWS = 400  # which tell a standard deviation to 4 %

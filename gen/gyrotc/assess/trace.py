@@ -17,8 +17,6 @@ from ..common.texts import file_stem
 from ..recordings.records import Run
 from ..store.files import create
 
-__all__ = ["trace_at", "trace_name"]
-
 _COLUMNS = ("time_s", "temperature_c", "rate_dph", "bias_dph", "compensated_dph", "status")
 
 

@@ -18,8 +18,6 @@ from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from ..results.evaluation import EvaluatedRun, FigureUncertainty
 
-__all__ = ["figure_uncertainties", "root_mean", "squares_in_all", "squares_of"]
-
 _BLOCK_S = (
     7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
 )

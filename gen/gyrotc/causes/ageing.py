@@ -25,8 +25,6 @@ from .base import (
     Wording,
 )
 
-__all__ = ["CAUSE"]
-
 _STRAIGHT = math.inf
 
 

@@ -25,8 +25,6 @@ from .base import (
     anywhere,
 )
 
-__all__ = ["CAUSE", "channel_of"]
-
 
 def channel_of(channel: FloatArray | None) -> FloatArray:
     """The channel that a term names.

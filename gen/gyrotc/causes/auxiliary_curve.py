@@ -17,8 +17,6 @@ from ..target.recursions import TableKind
 from .auxiliary import channel_of
 from .base import Cause, Features, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording
 
-__all__ = ["CAUSE"]
-
 _OCTAVES = math.sqrt(math.log2(math.e))  # exp(−x²) = 2^−(this x)²
 
 

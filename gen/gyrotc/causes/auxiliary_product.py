@@ -12,8 +12,6 @@ from ..target.recursions import TableKind
 from .auxiliary import channel_of
 from .base import Cause, Features, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording
 
-__all__ = ["CAUSE"]
-
 _LINEAR = ("slope_dph_per_unit", "slope_dph_per_unit_per_c")
 
 

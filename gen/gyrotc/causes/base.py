@@ -26,35 +26,6 @@ from ..common.arrays import FloatArray
 from ..target.arithmetic import FLOAT64
 from ..target.recursions import Recursion, TableKind, first_order, recursion_of
 
-__all__ = [
-    "COLD_STARTS",
-    "CORNERS",
-    "KNOWN_AFTER",
-    "RATES",
-    "Cause",
-    "Features",
-    "History",
-    "Kind",
-    "Needs",
-    "Parameter",
-    "Reach",
-    "Scene",
-    "SearchRule",
-    "SingleCycle",
-    "Tabled",
-    "Telling",
-    "Values",
-    "Wording",
-    "anywhere",
-    "blocks_per_tau",
-    "geometric",
-    "half_block_before",
-    "lagged",
-    "memory_gain",
-    "octaves_per_block",
-    "turns",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Reach:

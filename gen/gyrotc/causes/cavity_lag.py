@@ -24,8 +24,6 @@ from .base import (
     memory_gain,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _cavity(scene: Scene, values: Values) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.cavity_c)

@@ -15,8 +15,6 @@ from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .base import Cause, Parameter, Scene, Telling, Values, Wording
 
-__all__ = ["CAUSE", "EARTH_RATE_DPH"]
-
 EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
 _REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
 

@@ -26,8 +26,6 @@ from .base import (
     geometric,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     z = play(values["width_c"], scene.cavity_c)

@@ -10,8 +10,6 @@ import numpy as np
 from ..common.arrays import FloatArray
 from .base import Cause, Features, History, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(

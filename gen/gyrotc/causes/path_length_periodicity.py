@@ -30,8 +30,6 @@ from .base import (
     turns,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     phase = 2.0 * math.pi * scene.cavity_c / values["period_c"] + values["phase_rad"]

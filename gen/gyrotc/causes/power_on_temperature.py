@@ -22,8 +22,6 @@ from .base import (
     anywhere,
 )
 
-__all__ = ["CAUSE"]
-
 _REPEATED = "the same hold after power-ons at three temperatures, each twice"
 _REFERENCE_C = 20.0  # room temperature: where the offset counts as none
 

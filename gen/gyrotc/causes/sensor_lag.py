@@ -11,8 +11,6 @@ from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .base import RATES, Cause, Parameter, Scene, Values, Wording
 
-__all__ = ["CAUSE"]
-
 
 def _record(scene: Scene, values: Values) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.sensed_c)

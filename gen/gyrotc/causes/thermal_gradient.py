@@ -31,8 +31,6 @@ from .base import (
     memory_gain,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     second_c = first_order(values["tau_s"], scene.time_s, scene.node_c)

@@ -23,8 +23,6 @@ from .base import (
     Wording,
 )
 
-__all__ = ["CAUSE"]
-
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
 _FAR_S = np.arange(700.0, 1201.0, 100.0)
 """Beyond it: between two of them falls 0.02 % of the energy of a smooth map, between two of the near ones 0.15 %."""

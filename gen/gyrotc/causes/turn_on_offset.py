@@ -22,8 +22,6 @@ from .base import (
     anywhere,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.full(len(scene.time_s), rng.normal(0.0, values["std_dph"]))

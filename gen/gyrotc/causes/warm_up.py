@@ -27,8 +27,6 @@ from .base import (
     octaves_per_block,
 )
 
-__all__ = ["CAUSE"]
-
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * _fading(scene.on_s, values["tau_s"]))

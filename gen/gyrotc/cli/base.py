@@ -28,20 +28,6 @@ if TYPE_CHECKING:
     from ..lot.use import LotPrior
     from ..recordings.records import Applied
 
-__all__ = [
-    "BUILD",
-    "COMPARE",
-    "DIAGNOSE",
-    "EMIT",
-    "FIT",
-    "LOT",
-    "PLAN",
-    "VERIFY",
-    "StageLine",
-    "Stages",
-    "time_left",
-]
-
 _SILENT_S = 2.0  # before a time left is reported
 
 Stages = Sequence[tuple[str, float]]

@@ -6,8 +6,6 @@ from typing import Any
 
 from typer.core import TyperGroup
 
-__all__ = ["GROUPS", "GroupedCommands"]
-
 GROUPS = {
     "Record": ("plan", "simulate", "import", "check"),
     "Calibrate": ("build", "diagnose", "compare", "fit", "emit"),

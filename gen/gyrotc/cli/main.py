@@ -19,8 +19,6 @@ from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..common.texts import terminal_line, terminal_text
 
-__all__ = ["EXIT_STATUS", "crash_line"]
-
 EXIT_STATUS = 70
 """EX_SOFTWARE of sysexits.h: an internal fault, not one of the input."""
 

@@ -18,8 +18,6 @@ from .words import NoiseLevel
 if TYPE_CHECKING:
     from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
 
-__all__ = ["limits_of", "pair_of", "plan_parts"]
-
 _NEVER = 90.0  # where two causes overlap wholly d is 100 (`plan.sensitivity`: √(10 / 1e-3))
 _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next to nothing
 

@@ -22,8 +22,6 @@ from ..results.training import Manifest, Training
 from ..results.verification import Emitted, JointVerification, Verification
 from ..tables.record import EmissionRecord
 
-__all__ = ["KINDS", "schema_text", "tables"]
-
 KINDS: dict[str, type[BaseModel]] = {
     "budget": Budget,
     "catalogue": CatalogueAnswer,

@@ -44,8 +44,6 @@ from .base import (
 )
 from .results import evaluation_table, file_notes, prediction_line, training_lines, verify_notes, verify_table
 
-__all__ = ["evaluation_folders"]
-
 
 @contextmanager
 def evaluation_folders(

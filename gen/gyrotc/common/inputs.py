@@ -23,24 +23,6 @@ from .errors import InputError
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-__all__ = [
-    "CEILINGS",
-    "ENVIRONMENT",
-    "Ceiling",
-    "ceiling",
-    "checked",
-    "need_memory",
-    "open_input",
-    "parse_json",
-    "parse_toml",
-    "read_input",
-    "read_json",
-    "read_toml",
-    "refuse_above",
-    "refused",
-    "set_ceilings",
-]
-
 ENVIRONMENT = "GYROTC_MAX"
 
 

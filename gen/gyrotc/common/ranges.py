@@ -6,8 +6,6 @@ from typing import Annotated
 
 from annotated_types import Interval
 
-__all__ = ["MOST_CENTERS", "MOST_HELD", "AverageLength", "BlockLength"]
-
 MOST_CENTERS = 512
 """What a table holds: docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl."""
 MOST_HELD = 100_000

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from .errors import InputError
 
-__all__ = ["runtime_folders"]
-
 
 def runtime_folders() -> tuple[Path, Path]:
     """Folders `include` and `libc` of the runtime: in the installed package, else in the source tree.

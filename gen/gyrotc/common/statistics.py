@@ -9,18 +9,6 @@ from scipy.special import chdtri, ndtri
 from .arrays import FloatArray
 from .metrics import MAD_TO_SIGMA
 
-__all__ = [
-    "CHI2_95_ONE",
-    "CHI2_95_TWO",
-    "NORMAL_95",
-    "TOLERANCE",
-    "cell_means",
-    "main_directions",
-    "noise_of",
-    "orthonormal",
-    "running_mean",
-]
-
 
 def cell_means(length_s: float, time_s: FloatArray, *columns: FloatArray) -> tuple[FloatArray, ...]:
     """Means of the time and of every column over cells from the first row on; cells without rows are left out.

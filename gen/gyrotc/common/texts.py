@@ -25,27 +25,6 @@ if TYPE_CHECKING:
     import jinja2
     from markupsafe import Markup
 
-__all__ = [
-    "C_COMMENT",
-    "C_INITIALISER",
-    "CText",
-    "c_code",
-    "c_comment",
-    "c_environment",
-    "c_literal",
-    "checked_svg",
-    "csv_cell",
-    "file_stem",
-    "html_environment",
-    "picture_text",
-    "pictures_in_rows",
-    "terminal_line",
-    "terminal_text",
-    "toml_comment",
-    "toml_key",
-    "toml_value",
-]
-
 _LINE = 1000  # characters of one line of a comment, once escaped
 _TITLE = 80  # characters over one panel of a picture
 _STEM = 180  # bytes of a file name made of foreign text; names end at 255

@@ -18,8 +18,6 @@ from ..common.errors import CheckFailed
 from ..common.texts import toml_comment
 from ..model import Model
 
-__all__ = ["AXES", "Autopilot", "Cubic", "best_cubic", "parameters"]
-
 Autopilot = Literal["px4", "ardupilot"]
 Words = NDArray[np.float32]
 

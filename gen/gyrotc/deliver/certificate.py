@@ -35,18 +35,6 @@ from ..store.folder import result_folder
 from ..store.marker import read_marker, sha256
 from ..store.scratch import scratch_folder
 
-__all__ = [
-    "Certified",
-    "CertifiedRow",
-    "LaboratoryFacts",
-    "certificate",
-    "certificate_page",
-    "dcc_text",
-    "facts_of",
-    "print_to_pdf",
-    "rows_of",
-]
-
 _CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
 _UNITS = (
     ("_dph", r"\degree\hour\tothe{-1}"),

@@ -17,8 +17,6 @@ from .autopilots import AXES, Autopilot, best_cubic, parameters
 from .fmu import fmu
 from .grid import GRID, MapGrid, a2l_text, cdf_text, csv_text, grid_of, map_result
 
-__all__ = ["Exporting", "Format", "export"]
-
 Format = Literal["px4", "ardupilot", "csv", "json", "a2l", "cdf", "fmu"]
 
 

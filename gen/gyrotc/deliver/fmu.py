@@ -25,8 +25,6 @@ from ..tables.rounding import channel_names, guard_of, sigma_cells
 from ..tables.text import example_period_us
 from ..verify.toolchain import all_targets, compile_c
 
-__all__ = ["fmu"]
-
 _HOST = "host-gcc-O2"
 _PLATFORMS = {"x86_64": "x86_64-linux", "aarch64": "aarch64-linux"}  # FMI 3.0, section 2.5.1.4
 _FLAGS, _LINK = ("-fPIC", "-fvisibility=hidden"), ("-shared", "-s")

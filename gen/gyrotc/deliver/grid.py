@@ -24,9 +24,6 @@ from ..common.texts import c_comment, c_literal, toml_comment
 from ..model import Model
 from ..results.folder import MapOfAxis, MapOnGrid
 
-__all__ = ["GRID", "MapGrid", "a2l_text", "cdf_text", "csv_text", "grid_of", "map_result", "names_of"]
-
-
 GRID = (61, 25)  # temperatures and rates of a table: finer than any map of a gyro
 _WITHIN = 4  # parts of a cell at which the loss is measured: its middle and two more in each direction
 

@@ -25,8 +25,6 @@ from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranke
 from .search import Search
 from .wide_memory import WideMemory, outlasts, rate_independent
 
-__all__ = ["LEVEL", "Attribution", "attribute", "choose", "overlap"]
-
 LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
 _WELL = 0.08  # p-value of what is left that a pair must reach,
 _NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure

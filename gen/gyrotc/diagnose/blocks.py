@@ -18,8 +18,6 @@ from ..common.errors import InputError
 from ..common.inputs import need_memory
 from ..recordings.records import Dataset, Rows, Run
 
-__all__ = ["Record", "Records", "block_length", "centred_slope", "records_of", "singled_out"]
-
 _BLOCK_BYTES = 8 * 64  # of the features of a block that are averaged together
 _SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could stand for
 

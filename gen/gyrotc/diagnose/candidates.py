@@ -20,20 +20,6 @@ from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .blocks import Records, centred_slope
 
-__all__ = [
-    "Candidate",
-    "Role",
-    "Shape",
-    "columns_of",
-    "diagnosed",
-    "planned",
-    "reach_of",
-    "searched",
-    "shape_parameter",
-    "shapes_of",
-    "testable",
-]
-
 _TAUS_S = tuple(
     np.geomspace(150.0, 4000.0, 8)
 )  # in steps of a factor 1.6: memories nearer than that are alike

@@ -19,16 +19,6 @@ from .candidates import Candidate, searched, shape_parameter
 from .joined import Held, Projection, ScoredColumns, draw_null, score
 from .search import Search, View, residual_log_likelihood
 
-__all__ = [
-    "CauseLimit",
-    "Found",
-    "amplitude_energy",
-    "detect",
-    "detection_limits",
-    "limit_of",
-    "project",
-]
-
 _RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
 
 

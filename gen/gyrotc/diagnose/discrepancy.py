@@ -22,8 +22,6 @@ from .joined import draw_null, score
 from .noise import COLOURS, Declared, Whitener
 from .search import Search, View
 
-__all__ = ["Discrepancy", "Ensemble", "NoiseFinding", "ensemble_of", "noise_findings"]
-
 _LEVEL_P = 1e-3  # one in a thousand campaigns with noise as declared is reported to have another level
 _LEVEL_RATIO = 0.06  # a level that differs by less is as declared
 _HIDDEN_P = 0.003  # a third of the 1 % of the search: level and colour are tested beside it

@@ -51,19 +51,6 @@ from .refit import (
 )
 from .single_cycle import cycle_of
 
-__all__ = [
-    "FEW_RUNS",
-    "Chain",
-    "Extension",
-    "Refitting",
-    "Shipping",
-    "extend",
-    "folds_of",
-    "refittable",
-    "shipping",
-    "stand_ins_of",
-]
-
 
 def stand_ins_of(
     plain: Model, samples: TrainingData, runs: Sequence[Played], effects: Sequence[Effect]

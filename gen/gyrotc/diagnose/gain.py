@@ -20,9 +20,6 @@ from ..recordings.records import Run
 from ..results.diagnosed import Estimate, GainOnUnseen
 from ..tables.emit import quantise_all
 
-__all__ = ["Gain", "emitted_means", "floor_of", "gain_of"]
-
-
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
 _HOUR_S = 3600.0  # the angle after one hour is a figure of merit

@@ -28,8 +28,6 @@ from .joined import variance_ratio_of
 from .noise import Whitener
 from .search import Search
 
-__all__ = ["SEPARATION", "CauseSet", "Gains", "Point", "SizeLimit", "best_of", "clear_pair", "makes_sense"]
-
 _MOST_SPREAD = (
     2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
 )

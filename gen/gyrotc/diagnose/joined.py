@@ -23,19 +23,6 @@ from ..common.arrays import FloatArray, IntArray
 from .candidates import Candidate
 from .signature_bank import SignatureBank
 
-__all__ = [
-    "Channels",
-    "Held",
-    "Joined",
-    "JoinedLayout",
-    "Projection",
-    "ScoredColumns",
-    "Scores",
-    "draw_null",
-    "join",
-    "score",
-]
-
 _DRAWS = 4000  # 40 draws lie beyond the 1 % point: it is known to one sixth of itself
 _WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
 _RANK = 1e-9  # eigenvalues of an inner-product matrix below this share are rounding

@@ -29,8 +29,6 @@ from .candidates import Candidate, diagnosed, searched
 from .gains import CauseSet, Gains, Point, best_of
 from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
-__all__ = ["MarginalLikelihood"]
-
 _Kinds = tuple[Kind, ...]  # of a model, sorted
 _Near = dict[_Kinds, list[Point]]
 _Name = tuple[str, str, str]  # of a candidate

@@ -30,8 +30,6 @@ from .signature_bank import Alternative, direction_of
 from .static_map import proportional_map
 from .wide_memory import WideMemory
 
-__all__ = ["Contest", "Misfit", "contest", "explained", "misfit"]
-
 _BENT = "memory that does not act in proportion"
 _BEND, _BEND_SHARE = 15.0, 0.1  # energy, and share of the cause's gain, that a map may bend more than before
 _OWN = 1e-3  # share of a column's energy that must be its own beside the model

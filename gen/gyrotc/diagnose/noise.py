@@ -18,17 +18,6 @@ from scipy.linalg import cholesky, solve_triangular
 from ..common.arrays import FloatArray
 from ..recordings.records import Dataset
 
-__all__ = [
-    "COLOURS",
-    "NOISE_WORDS",
-    "Colour",
-    "Declared",
-    "Whitener",
-    "declared_noise",
-    "flicker_row",
-    "markov_row",
-]
-
 _FLICKER_S = tuple(100.0 * 4.0**k for k in range(6))  # s, from one block to a day
 
 

@@ -23,9 +23,6 @@ from .screens import Screened, cleaned, screen
 from .search import Search, open_search
 from .signature_bank import bank_of
 
-__all__ = ["Analysis", "analyse", "search_of"]
-
-
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MAIN = (
     0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing

@@ -18,17 +18,6 @@ from .gains import Gains
 from .search import Search
 from .static_map import fine_columns, replaced_map
 
-__all__ = [
-    "Interval",
-    "Refined",
-    "model_columns",
-    "parabola_top",
-    "profile_interval",
-    "random_size",
-    "refine",
-    "sized",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Interval:

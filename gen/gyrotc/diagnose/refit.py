@@ -31,21 +31,6 @@ from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
 from .refine import Refined
 
-__all__ = [
-    "MOST_TERMS",
-    "Effect",
-    "Played",
-    "added_range",
-    "completed",
-    "fit_extended",
-    "known",
-    "overtones_of",
-    "play_runs",
-    "samples",
-    "scored_means",
-    "terms_of",
-]
-
 _NUMBERS = (2, 3)  # of the overtones: with the wave itself they leave a term of four to something else
 _PARAMETERS = 2  # of an overtone: sine and cosine
 

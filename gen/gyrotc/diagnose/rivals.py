@@ -22,19 +22,6 @@ from .candidates import Candidate, searched
 from .gains import Gains, Point
 from .joined import ratio_of
 
-__all__ = [
-    "EQUIVALENT",
-    "LOOKED_AT",
-    "Kind",
-    "Rival",
-    "calibrated",
-    "kind_of",
-    "near_of",
-    "odds_of",
-    "probabilities_of",
-    "ranked_rivals",
-]
-
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
 below e^4, about 50 to 1, name no cause."""

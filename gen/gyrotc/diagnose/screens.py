@@ -19,9 +19,6 @@ from ..common.metrics import MAD_TO_SIGMA
 from ..common.statistics import orthonormal
 from .blocks import Records, centred_slope
 
-__all__ = ["Screened", "screen"]
-
-
 _MEDIAN_ROWS = (
     15  # odd; a median over 15 rows follows a ramp; up to seven outliers in a row do not carry it away
 )

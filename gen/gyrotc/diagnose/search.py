@@ -20,17 +20,6 @@ from .joined import Channels, Joined, join
 from .noise import COLOURS, Colour, Whitener
 from .signature_bank import SignatureBank
 
-__all__ = [
-    "Question",
-    "Search",
-    "View",
-    "open_search",
-    "possible_effects",
-    "residual_log_likelihood",
-    "view_of",
-    "view_of_bank",
-]
-
 _MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
 _FEW_LEFT = 30  # degrees of freedom that noise needs beside effects: its level is known to 13 % then
 _JITTER = 1e-10  # added to the diagonal of inner products of columns of norm 1: dependent columns do not stop Cholesky

@@ -28,8 +28,6 @@ from .detection import Found
 from .diagnosis import Diagnosis
 from .refine import Refined
 
-__all__ = ["SMOOTH_S", "series_of"]
-
 SMOOTH_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it

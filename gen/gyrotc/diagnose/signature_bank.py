@@ -29,8 +29,6 @@ from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, search
 from .noise import COLOURS, Whitener
 from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
 
-__all__ = ["Alternative", "Signature", "SignatureBank", "bank_of", "build", "direction_of"]
-
 _DICTIONARY_LAGS_S = (
     150.0,
     400.0,

@@ -34,8 +34,6 @@ from .gains import SEPARATION
 from .refine import Interval, Refined
 from .rivals import EQUIVALENT, Rival
 
-__all__ = ["Cycle", "CycleFits", "Static", "Tried", "cycle_of", "is_single_cycle", "memories"]
-
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
 _ROUNDS, _AROUND, _FINE = (

@@ -16,16 +16,6 @@ from ..common.arrays import FloatArray
 from .blocks import Records, centred_slope
 from .candidates import Candidate, diagnosed, reach_of, searched
 
-__all__ = [
-    "LEVELS",
-    "MapBasis",
-    "changed_inputs",
-    "fine_columns",
-    "make_basis",
-    "proportional_map",
-    "replaced_map",
-]
-
 LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3), (19, 8, 5), (28, 10, 5))
 """Gaussians over T alone, and over T × dT/dt, from coarse to fine."""
 

@@ -40,18 +40,6 @@ from .refit import terms_of
 from .single_cycle import Cycle, memories
 from .wide_memory import WideMemory
 
-__all__ = [
-    "VERDICTS",
-    "holds",
-    "looks_like",
-    "next_steps",
-    "not_testable",
-    "result_of",
-    "sentence_of",
-    "shows_as",
-    "verdict_of",
-]
-
 VERDICTS: dict[DiagnosisVerdict, str] = {
     "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
     "explained": "The causes listed account for what the simulation gets wrong.",

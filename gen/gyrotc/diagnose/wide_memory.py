@@ -31,9 +31,6 @@ from .gains import Gains
 from .joined import ratio_of
 from .rivals import EQUIVALENT
 
-__all__ = ["WideMemory", "outlasts", "rate_independent"]
-
-
 _STEPS, _SOFT = 7, 0.85
 """Steps of the strength over the envelope, and the width of each in distances: 14 C over an envelope of 100 C. That is
 as fine as the coarsest static map, beside which a loop is seen."""

@@ -28,8 +28,6 @@ from ..tables.quantise import NUMERICS, quantise
 from ..verify.emitted import left_out_of, made_again, texts_again
 from .unit import ENTRY, PAYLOADS
 
-__all__ = ["CATALOGUE", "SCHEMA", "catalogued", "enter", "export", "withdraw"]
-
 CATALOGUE = "catalogue"
 _FILE = "catalogue.sqlite"
 _EXPECTED = "a catalogue as gyrotc fleet wrote it"

@@ -21,8 +21,6 @@ from ..common.arrays import FloatArray
 from ..recordings.noise_copies import FASTEST_SIGNS, SLOWEST
 from ..results.fleet import Copy, FleetEntry, NoiseSigns
 
-__all__ = ["copies", "with_copies"]
-
 _DIGITS = 16  # of a hash
 _LEAST_COMMON = 2  # hashes; one alone might be chance among 100,000 gyros
 _CROWD = 16  # gyros of which one hash is known: enough to name

@@ -20,8 +20,6 @@ from ..store.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.options import options_in
 
-__all__ = ["SUMMARY", "Fleet", "Share", "Unit", "load_manifest", "mine", "printable", "share_of"]
-
 #: Files of a summary, beside the folders of the units.
 SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")
 

@@ -20,20 +20,6 @@ from ..results.fleet import (
     Spread,
 )
 
-__all__ = [
-    "BINS",
-    "BIN_C",
-    "FIGURES",
-    "FIRST_C",
-    "NOISY_RUN",
-    "PROFILE_S",
-    "facts_of",
-    "mirrored_units",
-    "outliers",
-    "spread",
-    "step_in",
-]
-
 FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
 NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at
 _LEAST_IN_BIN = 3  # means, for a mean of them

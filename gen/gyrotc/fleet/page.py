@@ -22,8 +22,6 @@ from .manifest import SUMMARY
 from .outliers import FIGURES, outliers, spread
 from .reasons import reasons, with_reasons
 
-__all__ = ["summary_of", "write_summary"]
-
 _COLUMNS = (
     "name", "serial", "axis", "status", "verdict", "limits_met", "limits_held", "date", "outlier_reason", "judged_on",
     "before_rms_dph", "after_rms_dph", "expanded_uncertainty_dph", "rms_over_floor", "noise_floor_dph", "bias_dph",

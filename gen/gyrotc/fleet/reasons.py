@@ -16,9 +16,6 @@ from ..common.metrics import MAD_TO_SIGMA
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
 from .outliers import NOISY_RUN, PROFILE_S, mirrored_units
 
-__all__ = ["reasons", "with_reasons"]
-
-
 _LEAST = 8  # gyros of a kind; fewer do not say what is usual
 _FAR = 5.0  # robust standard deviations beyond which one is an outlier
 _NEAR = 3.0  # and within which a supposed fault must bring it back

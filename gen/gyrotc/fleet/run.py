@@ -33,8 +33,6 @@ from .manifest import SUMMARY, Fleet, Share, mine, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
-__all__ = ["Cluster", "gather", "on_dask", "on_processes", "run_fleet", "run_share", "tasks_of"]
-
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
 _STOPPED = "the fleet was stopped before it: give the command again"

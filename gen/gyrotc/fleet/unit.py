@@ -31,18 +31,6 @@ from ..store.marker import KINDS, faults, read_marker, survey
 from .manifest import Fleet, Unit, printable
 from .outliers import facts_of
 
-__all__ = [
-    "ENTRY",
-    "PAYLOADS",
-    "Task",
-    "clean_units",
-    "do_unit",
-    "failed",
-    "made_before",
-    "move_away",
-    "write_entry",
-]
-
 
 def move_away(place: Path) -> str:
     """A result in which somebody changed a file makes room for a new one, under a name of its own.

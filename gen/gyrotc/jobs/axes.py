@@ -23,8 +23,6 @@ from ..verify.job import verify
 from ..verify.signatures import check_signature, load_public_key
 from ..verify.toolchain import all_targets, compile_c, run_program
 
-__all__ = ["axes_in", "check_emitted", "join_axes", "joint_texts", "verify_axes"]
-
 AXES = ("x", "y", "z")
 
 _HOST = "host-gcc-O2"

@@ -39,8 +39,6 @@ from ..verify.job import chosen_targets, verify
 from .axes import join_axes
 from .recalibration import refuse_together, with_prior
 
-__all__ = ["Built", "build", "build_into"]
-
 _TRACE_ROWS = 2**18  # of a run: thousands for each point of a picture
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 

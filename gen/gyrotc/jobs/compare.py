@@ -28,8 +28,6 @@ from ..train.options import DEFAULTS, METHODS, BuildOptions
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 
-__all__ = ["compare"]
-
 _JudgedOn = Literal["exam", "left_out"]
 
 

@@ -37,8 +37,6 @@ from ..train.fitting import FitOptions
 if TYPE_CHECKING:
     from ..diagnose.diagnosis import Diagnosis
 
-__all__ = ["Kept", "diagnosed", "extended_scenario"]
-
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
 

@@ -25,8 +25,6 @@ from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
 from ..train.means import means_of
 
-__all__ = ["posterior_in", "prior_from", "refuse_together", "unit_in", "with_prior"]
-
 
 def prior_from(
     folder: Path, dataset: Dataset, *, ageing_dph: float | None = None, limits: Limits | None = None

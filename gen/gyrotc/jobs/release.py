@@ -16,8 +16,6 @@ from ..store.marker import check_intact, sha256
 from ..tables.record import RECORD
 from .axes import axes_in
 
-__all__ = ["accepted", "release_of", "unit_of"]
-
 _LONGEST = 300  # characters of a reason: a line or two of a certificate
 
 

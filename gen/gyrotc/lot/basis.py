@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..results.lot import LotFunctions
 
-__all__ = ["CONSTANT", "PARAMETERS", "PRIOR_LOG", "LotBasis", "fitted_parameters"]
-
-
 PARAMETERS = (
     "constant",
     "short",

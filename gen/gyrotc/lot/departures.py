@@ -17,8 +17,6 @@ from ..train.means import UnitMeans
 from .learn import FALSE_ALARM
 from .prior import MapPosterior, MapPrior
 
-__all__ = ["Departures", "within"]
-
 Span = tuple[float, float]
 
 _CENTERS = 17  # of regions over the run's temperatures: at half of the narrowest one's width

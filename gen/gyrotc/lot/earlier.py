@@ -29,14 +29,6 @@ from .learn import Envelope, sums_of, that_count
 from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
 from .use import curve_of, followed, known_map, seen_alone
 
-__all__ = [
-    "EarlierPrior",
-    "posterior_of_known",
-    "posterior_of_means",
-    "stated_sigma_dph",
-    "widened",
-]
-
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
 _SHAPE = (
     0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape

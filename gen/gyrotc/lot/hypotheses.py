@@ -21,8 +21,6 @@ from ..train.means import UnitMeans
 from .basis import PRIOR_LOG
 from .prior import MapPosterior, MapPrior
 
-__all__ = ["Hypothesis", "revised", "updated"]
-
 _SIZES = np.logspace(0.0, 5.0, 21)  # of a change, over 1 sigma of the earlier map: five decades, four to each
 _GRID = (61, 25)  # points of T and of dT/dt over the envelope, as for the distance of two maps
 _RIDGE = 1e-9  # of a line written in the functions: their sines nearly repeat one another inside the envelope

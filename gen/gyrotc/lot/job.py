@@ -24,9 +24,6 @@ from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, learn
 from .prior import process_result, rounded
 from .use import prior_of
 
-__all__ = ["checksum_of", "load_lot", "lot_from", "lot_of"]
-
-
 _CELLS = (
     33,
     13,

@@ -26,27 +26,6 @@ from ..common.arrays import FloatArray, Progress
 from ..train.means import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 
-__all__ = [
-    "FALSE_ALARM",
-    "LEAST_UNITS",
-    "Envelope",
-    "Learned",
-    "LotState",
-    "UnitSums",
-    "evidence",
-    "fitted",
-    "folds_of",
-    "freedom_of",
-    "inflation",
-    "learn",
-    "of_few",
-    "p_value",
-    "predictive",
-    "scores",
-    "sums_of",
-    "that_count",
-]
-
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
 _STRANGE = (
     16.0  # an unrelated unit's variance over the lot's, where the test has most power: four times as far away

@@ -28,21 +28,6 @@ from .basis import CONSTANT, PRIOR_LOG, LotBasis
 from .prior import MapPosterior
 from .use import LotPrior, prior_of
 
-__all__ = [
-    "AVERAGE_S",
-    "HOLDS",
-    "RATES",
-    "MapQuestion",
-    "Price",
-    "extremes_of",
-    "hours_of",
-    "inputs_of",
-    "next_run",
-    "plan_with_lot",
-    "programme_csv",
-    "programme_text",
-]
-
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end
 AVERAGE_S = 100.0  # the paper's means, as `fit` has it where nothing else is asked for

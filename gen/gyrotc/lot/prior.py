@@ -14,16 +14,6 @@ from ..train.means import UnitMeans
 from .basis import PARAMETERS, LotBasis
 from .learn import evidence, of_few, p_value, scores, sums_of
 
-__all__ = [
-    "MapPosterior",
-    "MapPrior",
-    "check_positive",
-    "process_result",
-    "processed",
-    "rounded",
-    "triangle",
-]
-
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
 

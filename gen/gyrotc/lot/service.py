@@ -13,8 +13,6 @@ from ..model import BiasSpread, Learning
 from ..tables.learning import service_prior
 from ..target.learning import Learner, Stop
 
-__all__ = ["PowerOn", "fitted_spread"]
-
 _LOG_SPREAD = 0.5  # standard deviation of a logarithm about its start: an order of magnitude is 4.6 of them
 _STEPS = 40  # of the search: it ends before
 

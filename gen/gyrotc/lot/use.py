@@ -25,8 +25,6 @@ from .basis import LotBasis
 from .learn import FALSE_ALARM, freedom_of, of_few
 from .prior import MapPosterior, MapPrior, check_positive, process_result, processed, rounded, triangle
 
-__all__ = ["LotPrior", "curve_of", "followed", "known_map", "prior_of", "seen_alone"]
-
 _CURVE = 41  # points of the picture
 _KEPT_DIGITS = 6  # of its numbers
 

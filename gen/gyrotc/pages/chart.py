@@ -22,20 +22,6 @@ from .images import Image, image_svg
 from .marks import Drawn, mark_svg, sample, text_svg
 from .scales import AxisScale, power, scale_of
 
-__all__ = [
-    "ACCENT",
-    "AFTER",
-    "BEFORE",
-    "COLOURS",
-    "COVERED",
-    "FULL",
-    "HALF",
-    "Panel",
-    "drawing",
-    "side_by_side",
-    "stacked",
-]
-
 FULL, HALF, THIRD = 960.0, 470.0, 310.0  # widths of a picture over the page, and of two and three in a row
 BEFORE, AFTER, COVERED, ACCENT = "before", "after", "covered", "accent"
 COLOURS = {

@@ -15,8 +15,6 @@ from ..store.folder import write_result
 from .chart import ACCENT, AFTER, BEFORE, COVERED, Panel, drawing
 from .report import page_environment
 
-__all__ = ["picture", "write_check_page"]
-
 _NARROW = 0.004  # of the picture's width: spans below it get a mark above
 _MOST_OTHERS = 40  # curves: more are a grey area
 

@@ -15,17 +15,6 @@ from ..results.evaluation import Comparison, Group, Method, Published
 from .chart import AFTER, BEFORE, COVERED, Panel, drawing, stacked
 from .scales import power
 
-__all__ = [
-    "AFTER_DPH",
-    "BEFORE_DPH",
-    "ENVIRONMENTS",
-    "NEURONS",
-    "RUNNING_S",
-    "comparison_picture",
-    "comparison_tables",
-    "with_published",
-]
-
 ENVIRONMENTS = ("-40 C", "20 C", "60 C", "1 C/min", "3 C/min", "5 C/min")
 
 BEFORE_DPH = dict(

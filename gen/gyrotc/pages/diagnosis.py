@@ -32,8 +32,6 @@ from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .report import page_environment, page_from, write_page
 from .thermal import sorted_by_rate
 
-__all__ = ["PICTURES", "SERIES", "draw", "is_diagnosis", "write_diagnosis_page"]
-
 PICTURES, SERIES = "pictures", "series.json"
 
 

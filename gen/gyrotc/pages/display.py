@@ -17,8 +17,6 @@ from ..results.fleet import FleetOutlier
 from ..results.release import Contribution, Instrument, Limit
 from .scales import significant
 
-__all__ = ["DISPLAYS", "NATIVE", "check_display", "displayed", "in_unit", "rate_unit", "shown", "shown_text"]
-
 NATIVE = "deg/h"
 DISPLAYS = {NATIVE: 1.0, "deg/s": 1.0 / 3600.0, "mdps": 1.0 / 3.6, "arcsec/s": 1.0}
 """Units by name, and how many of one are 1 deg/h: an hour has 3600 s, a degree 3600 arcsec, mdps is 1e-3 deg/s."""

@@ -12,8 +12,6 @@ from ..results.fleet import Facts, FleetEntry, Reason, ResidualSeries
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
 from .display import in_unit, rate_unit
 
-__all__ = ["curves_of_units", "rms_of_units", "why_outlier"]
-
 _IN_TIME = (
     "step",
     "outliers",

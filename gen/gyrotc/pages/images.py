@@ -15,8 +15,6 @@ from ..common.arrays import FloatArray
 from .marks import Box, text_svg
 from .scales import AxisScale, scale_of
 
-__all__ = ["Image", "image_svg"]
-
 _CIVIDIS = ("#00224e", "#35456c", "#666970", "#948e77", "#c8b866", "#fee838")
 """Steps of cividis, which looks alike to people who see few colours (Nuñez, Anderton and Renslow 2018)."""
 

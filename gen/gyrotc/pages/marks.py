@@ -13,8 +13,6 @@ from ..common.arrays import FloatArray
 from ..common.texts import picture_text
 from .scales import AxisScale
 
-__all__ = ["Box", "Drawn", "mark_svg", "sample", "text_svg"]
-
 Box = tuple[float, float, float, float]
 """Left, top, width and height, points."""
 _MOST = 4000  # points of a line: four for each column of the widest picture, more cannot be seen

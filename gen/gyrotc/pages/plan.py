@@ -14,15 +14,6 @@ from ..store.folder import result_folder
 from .chart import AFTER, BEFORE, Panel, drawing
 from .report import page_environment, page_from, write_page
 
-__all__ = [
-    "accuracy_by_hours",
-    "is_plan",
-    "separability_matrix",
-    "temperatures",
-    "write_plan",
-    "write_plan_page",
-]
-
 _FULL = 30.0  # d from which a pair counts as inseparable
 _LEAST = 10.0**0.5  # d below which a pair has no colour: well separated
 

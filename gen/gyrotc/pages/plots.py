@@ -19,10 +19,6 @@ from ..results.training import Training
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import in_unit, rate_unit
 
-__all__ = [
-    "bias_over_time", "calibrations_over_time", "curve_by_size", "map_with_centers", "prior_and_posterior",
-]  # fmt: skip
-
 _CURVES = (
     ("unexplained", "1 − Σ error-reduction ratio"),
     ("departure", "squared departure from the smooth estimate ÷ noise variance"),

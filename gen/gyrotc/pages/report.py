@@ -46,8 +46,6 @@ from .words import (
     words_of_candidate,
 )
 
-__all__ = ["axes_page", "page_environment", "page_from", "thermal_picture", "write_page", "write_report"]
-
 _ORDER = ("FAIL", "CONDITIONAL PASS", "", "PASS")  # of axes on their common page
 _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
 _LEAST_ROW_BYTES = 12  # six cells and their commas

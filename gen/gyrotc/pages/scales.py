@@ -9,8 +9,6 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 
-__all__ = ["AxisScale", "is_plain", "power", "scale_of", "significant"]
-
 _ROUND = (
     1.0,
     2.0,

@@ -15,8 +15,6 @@ from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by
 from .display import in_unit, rate_unit
 from .words import sci
 
-__all__ = ["MOVING_C_PER_MIN", "allan_deviation", "bias_against_temperature", "slopes", "sorted_by_rate"]
-
 MOVING_C_PER_MIN = 0.1
 """Slower than that temperature stands still: no chamber's programme asks for less, and a hold drifts by less."""
 _DOT = 2.5  # points, across

@@ -16,8 +16,6 @@ from ..results.verification import Verification
 from .display import NATIVE, shown
 from .words import limit_words, plain, words
 
-__all__ = ["UnitResults", "failed_checks", "unit_in"]
-
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
     "guard_band": "a guard band of w = U; PASS up to the limit less w, CONDITIONAL PASS from there up to the limit, "

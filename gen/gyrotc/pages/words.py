@@ -9,11 +9,6 @@ from ..results.release import Limit
 from .display import NATIVE, rate_unit
 from .scales import is_plain, power, significant
 
-__all__ = [
-    "Digits", "bound_words", "digits_of", "limit_words", "measured_words", "plain", "rounded", "sci",
-    "with_uncertainty", "words", "words_of_candidate",
-]  # fmt: skip
-
 _UNITS = (
     ("_dph_per_c_per_min", "deg/h/(C/min)"),
     ("_dph_per_sqrt_h", "deg/h/√h"),

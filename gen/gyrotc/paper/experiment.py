@@ -23,18 +23,6 @@ from ..train.fitting import front_end, samples_of
 from ..train.methods import fit, trained
 from ..train.result import Fit, predict
 
-__all__ = [
-    "AVERAGE_S",
-    "LITERAL_RHO",
-    "METHODS",
-    "Cell",
-    "Experiment",
-    "PaperGroup",
-    "experiment",
-    "groups_of",
-]
-
-
 AVERAGE_S = 100.0  # the paper's means
 LITERAL_RHO = 3.0e-4  # the paper's "sum of errors", taken as 1 - sum of the error reductions: eq. (16)
 METHODS = {

@@ -24,8 +24,6 @@ from ..simulate.noise import CELL_S
 from ..store.files import write_atomically
 from .experiment import AVERAGE_S
 
-__all__ = ["AFTER", "BEFORE", "FIGURES", "Series", "checksum", "draw", "draw_run", "png"]
-
 BEFORE, AFTER, COVERED = (COLOURS[name][0] for name in ("before", "after", "covered"))
 STYLE: Any = {
     "font.family": "sans-serif",

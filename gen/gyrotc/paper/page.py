@@ -20,8 +20,6 @@ from ..simulate.campaign import Noise
 from .experiment import METHODS, Experiment, experiment
 from .figures import Series, checksum
 
-__all__ = ["SEEDS", "TOLERANCE", "departures", "filled", "made_with", "measured", "parts"]
-
 Figures = Mapping[str, Any]
 """Those of one gyro, as `Experiment.figures` gives them."""
 Gyros = Mapping[str, Mapping[str, Figures]]

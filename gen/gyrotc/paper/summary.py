@@ -9,8 +9,6 @@ from typing import Any
 
 from ..store.files import write_atomically
 
-__all__ = ["keep", "recorded", "shortened"]
-
 _FILE = Path("results/summary.json")
 _WIDTH = 500  # of a line: most records are shorter
 

@@ -30,19 +30,6 @@ from ..diagnose.signature_bank import SignatureBank, bank_of
 from ..simulate.campaign import Noise, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, Thermometer, read
 
-__all__ = [
-    "NodeTemperatures",
-    "Programme",
-    "Row",
-    "Sensitivity",
-    "additions",
-    "library",
-    "node_temperatures",
-    "programme_of",
-    "separability",
-]
-
-
 _BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
 """What of a scenario is left out where the map alone is asked about."""
 _ROW_CELLS = 10  # simulated seconds in a row

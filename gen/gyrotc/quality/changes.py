@@ -32,8 +32,6 @@ from .fits import (
     maps_of,
 )
 
-__all__ = ["Change", "changes_of"]
-
 Kind = Literal["step", "transition", "drift", "gain"]
 Limits = tuple[float, float, float]
 

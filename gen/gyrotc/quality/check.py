@@ -22,14 +22,6 @@ from ..results.recordings import Checked, CheckedRun, MarkedRows, Problem, Suspe
 from .facts import RunFacts
 from .findings import CheckWarning, Envelope, looked_at, warnings_of_data_set, where_of
 
-__all__ = [
-    "CheckResult",
-    "CheckWarning",
-    "Envelope",
-    "check",
-    "envelope_of",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:

@@ -27,8 +27,6 @@ from .facts import facts_of
 from .outliers import departing_rows
 from .thermometers import stuck_stretches
 
-__all__ = ["Event", "accepted", "events_of", "evidence_beside_memories"]
-
 Limits = tuple[float, float, float]
 
 _BURST_ROWS = 10  # fewer are outliers

@@ -15,8 +15,6 @@ from ..common.metrics import MAD_TO_SIGMA, median, median_of_parts, middle_of_fi
 from ..common.statistics import cell_means
 from ..recordings.records import EarthRate, Rows, Run
 
-__all__ = ["Jump", "Outlier", "RunFacts", "displaced", "facts_of"]
-
 _GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
 _CELL_ROWS = 5  # fewer do not average the resolution of a thermometer

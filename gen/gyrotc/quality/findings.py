@@ -33,8 +33,6 @@ from .recorded import (
 from .thermometers import thermometer_findings
 from .timing import time_findings
 
-__all__ = ["CheckWarning", "Envelope", "advice_of", "looked_at", "warnings_of_data_set", "where_of"]
-
 _ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
     "coarse_temperature": "Record more digits of the thermometer, or one with a finer resolution.",

@@ -21,8 +21,6 @@ from scipy.signal import lfilter
 from ..common.arrays import FloatArray
 from ..common.statistics import cell_means, orthonormal, running_mean
 
-__all__ = ["Noise", "Rows", "RunCells", "SmoothFit", "cells_of", "knots_of", "likeliest_noise", "maps_of"]
-
 Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
 

@@ -17,8 +17,6 @@ from ..common.arrays import FloatArray
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark
 
-__all__ = ["orientation_findings"]
-
 Finding = dict[str, Any]
 
 _NEXT = (

@@ -24,8 +24,6 @@ from ..results.training import LeftOutRows, Outliers
 if TYPE_CHECKING:
     from ..recordings.records import Rows
 
-__all__ = ["departing", "departing_rows", "outliers_of", "stretches_left_out"]
-
 _JOINED = 10  # rows between two that make them one stretch
 _LISTED = 200  # stretches; beyond, they are counted only
 

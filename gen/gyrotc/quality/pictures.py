@@ -17,8 +17,6 @@ from .check import CheckResult
 from .facts import RunFacts
 from .findings import CheckWarning
 
-__all__ = ["Columned", "Compared", "Covered", "Picture", "Seen", "Strip", "pictures_of"]
-
 Span = tuple[float, float]
 
 _POINTS = 600  # of a strip; a picture has about as many columns

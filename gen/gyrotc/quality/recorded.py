@@ -22,24 +22,6 @@ from ..recordings.records import Dataset, Mark, Rows, Run, SharedRows
 from .facts import RunFacts
 from .thermometers import stuck_stretches
 
-__all__ = [
-    "Finding",
-    "coarse_rate_findings",
-    "contradiction_findings",
-    "copied_channel_findings",
-    "counter_findings",
-    "earth_rate_findings",
-    "finding",
-    "held_findings",
-    "jump_findings",
-    "outlier_findings",
-    "shared_axes_findings",
-    "shared_rows_findings",
-    "sign_findings",
-    "stuck_temperature_findings",
-    "temperature_findings",
-]
-
 Finding = dict[str, Any]
 
 _GROSS_OUTLIER = 100.0  # times the noise of a row: no noise of a gyro, whatever its tails

@@ -22,8 +22,6 @@ from .facts import RunFacts, facts_of
 from .orientation import orientation_findings
 from .recorded import sign_findings
 
-__all__ = ["another_gain_throughout", "found_events", "reversed_runs"]
-
 _Means = tuple[FloatArray, FloatArray, FloatArray]
 
 _LEAST_OTHERS = 2  # of two runs nobody knows which one differs; the others need two others each

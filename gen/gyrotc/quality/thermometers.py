@@ -16,9 +16,6 @@ from ..common.arrays import FloatArray
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 
-__all__ = ["stuck_stretches", "thermometer_findings"]
-
-
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
 _CELL_S = 60.0  # of a mean: below it the lags of thermometers themselves show
 _SETTLED_S = 3600.0  # self-heating has set in by then; a third of a shorter run

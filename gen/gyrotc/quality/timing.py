@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..recordings.records import Mark, Rows, Run
 
-__all__ = ["time_findings"]
-
 Finding = dict[str, Any]
 
 _GAP = 1.5  # row periods

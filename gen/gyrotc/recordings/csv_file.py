@@ -25,8 +25,6 @@ from ..common.inputs import need_memory, open_input, refuse_above
 from .files import Prefix, Source
 from .values import Fault
 
-__all__ = ["CsvFile", "blocks_of_lines", "parsed"]
-
 _BLOCK_BYTES = 2**21  # of a read: bounds memory; its whole lines are parsed at once
 _LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
 _COPIES = 2.0  # of the columns while they are checked

@@ -25,18 +25,6 @@ from ..common.inputs import read_toml, refuse_above
 from ..common.texts import toml_key, toml_value
 from .records import Mark
 
-__all__ = [
-    "FILE",
-    "Columns",
-    "Description",
-    "Problems",
-    "RunEntry",
-    "check_serial",
-    "dataset_toml",
-    "exclude_line",
-    "parse_description",
-]
-
 
 class Problems:
     """Problems found so far.

@@ -15,8 +15,6 @@ from ..common.errors import InputError
 from ..common.inputs import open_input
 from .values import Fault
 
-__all__ = ["Prefix", "Source"]
-
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 _KEPT_BYTES = 2**25  # of columns in memory: forty runs of the paper's size
 

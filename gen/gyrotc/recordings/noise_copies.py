@@ -25,17 +25,6 @@ from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, median
 from ..results.fleet import NoiseSigns
 
-__all__ = [
-    "AXES_ALIKE",
-    "FASTEST_SIGNS",
-    "SLOWEST",
-    "NoiseCopy",
-    "NoisePrint",
-    "noise_copies",
-    "noise_of",
-    "noise_signs",
-]
-
 _MOST_ROWS = 2**14  # that are kept of a recording, means of several rows of a longer one
 _LEAST = 64  # values: of fewer no correlation stands out
 _STEPS = 4  # grids of time in an octave: no run is averaged over much more than its own rows

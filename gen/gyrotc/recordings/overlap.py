@@ -20,8 +20,6 @@ from .records import Exclusion, Run, SharedAxes, SharedRows
 from .shared_rows import windows_in_common
 from .values import MIN_ROWS
 
-__all__ = ["counted_once", "shared_axes", "shared_rows"]
-
 _PART = 2**20  # rows that are compared at once
 _MOST = 20  # stretches of two runs that are reported
 _TOLERANCE = 2.0**-22  # relative; rows are compared as float32

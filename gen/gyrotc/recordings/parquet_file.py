@@ -15,8 +15,6 @@ from ..common.inputs import ceiling, need_memory, open_input, refuse_above
 from .files import Source
 from .values import Fault
 
-__all__ = ["ParquetBatches", "ParquetFile"]
-
 _BATCH_ROWS = 2**16  # of a read: half a MiB a column
 _HARMLESS_BYTES = 2**26  # 64 MiB, which any host has: below it no ratio of packing is asked about
 _COPIES = 2.0  # of the columns while they are checked

@@ -20,16 +20,6 @@ from .records import Curve, EarthRate, Run
 from .units import Conversion
 from .values import Layout
 
-__all__ = [
-    "EARTH_RATE_DPH",
-    "Suspicion",
-    "curves_of",
-    "earth_rate",
-    "earth_rate_warning",
-    "earth_suspicion",
-    "suspicions",
-]
-
 EARTH_RATE_DPH = 15.04106717866910  # 7.2921150e-5 rad/s (WGS 84), deg/h
 
 _LARGEST_DPH = 15.05  # of a component of Earth's rate, rounded up

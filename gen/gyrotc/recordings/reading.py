@@ -21,8 +21,6 @@ from .shared_rows import Fingerprints, fingerprints_of
 from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, Layout, arrange, faults, rate_faults
 
-__all__ = ["Evidence", "Reader", "Recording", "in_time", "open_file", "open_recording"]
-
 _PART = 2**16  # rows that are looked at together
 _MOST_CELLS = 2**12  # even, so that cells can be merged in pairs
 

@@ -23,8 +23,6 @@ from .._core import windows_of
 from ..common.arrays import FloatArray
 from .records import Run
 
-__all__ = ["Fingerprints", "fingerprints_of", "sketch", "windows_in_common"]
-
 Words = NDArray[np.uint64]
 
 _LENGTHS = (128, 1024)  # of windows, rows; the longer ones for coarse rates

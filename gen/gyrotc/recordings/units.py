@@ -18,18 +18,6 @@ from typing import Literal
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 
-__all__ = [
-    "NATIVE",
-    "Conversion",
-    "Kind",
-    "UnitError",
-    "channel_kind",
-    "channel_unit",
-    "conversion",
-    "declared",
-    "kind_of",
-]
-
 Kind = Literal["time", "temperature", "rate"]
 
 NATIVE: Mapping[str, str] = {"time": "s", "temperature": "degC", "rate": "deg/h"}

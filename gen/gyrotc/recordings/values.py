@@ -13,8 +13,6 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from .description import Columns, Problems
 
-__all__ = ["MIN_ROWS", "Fault", "Layout", "arrange", "faults", "likely_temperature", "rate_faults"]
-
 PULSES = "pulses"
 AXES = {"rate_x_dph": "x", "rate_y_dph": "y", "rate_z_dph": "z"}
 _LONGEST_NAME = 64  # characters: fits a line of a page and of a terminal

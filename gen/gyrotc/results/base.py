@@ -13,11 +13,6 @@ from ..common.inputs import checked, read_json
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = [
-    "Amount", "Arithmetic", "Axis", "Count", "Figure", "Numbered", "Part", "Positive", "Result", "checked_result",
-    "read_optional", "read_result",
-]  # fmt: skip
-
 # Far above any figure, and products of two figures of pages still have a square root in float64
 _LARGEST = 1e300
 

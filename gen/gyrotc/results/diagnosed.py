@@ -10,32 +10,6 @@ from pydantic import Field
 from .base import Count, Figure, Part, Result, UnitResult
 from .planned import DetectionLimit
 
-__all__ = [
-    "Baseline",
-    "ComparedStatistic",
-    "ConsideredCause",
-    "CycleResult",
-    "Diagnosed",
-    "DiagnosisSeries",
-    "DiagnosisVerdict",
-    "Estimate",
-    "EventSize",
-    "ExtendedModel",
-    "FoundEvent",
-    "GainOnUnseen",
-    "NamedCause",
-    "ParameterLikelihood",
-    "RunSeries",
-    "ScoredRun",
-    "SearchScores",
-    "ShippingTrial",
-    "StaticRate",
-    "Statistic",
-    "TriedMemories",
-    "Unexplained",
-    "WithoutRate",
-]  # fmt: skip
-
 DiagnosisVerdict = Literal[
     "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"
 ]

@@ -13,35 +13,6 @@ from ..common.ranges import AverageLength
 from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .release import HeldLimits
 
-__all__ = [
-    "PARTS",
-    "RMS_OVER_FLOOR",
-    "AsFound",
-    "At",
-    "Calibration",
-    "Changes",
-    "Comparison",
-    "Envelopes",
-    "EvaluatedRun",
-    "Evaluation",
-    "FigureChange",
-    "FigureUncertainty",
-    "FileChanges",
-    "FoundIn",
-    "Group",
-    "MapDifference",
-    "Method",
-    "ModelSizes",
-    "NameChanges",
-    "Pooled",
-    "Published",
-    "RangeChange",
-    "ResidualTest",
-    "RunStatistics",
-    "Statistics",
-    "TextChange",
-]
-
 
 class Published(Part):
     """Figures of Ding et al. 2014, Table 1."""

@@ -9,25 +9,6 @@ from pydantic import Field, PrivateAttr
 from .base import Amount, Axis, Count, Figure, Part, Result, Share
 from .release import Verdict
 
-__all__ = [
-    "CatalogueAnswer",
-    "Catalogued",
-    "CataloguedFile",
-    "ComparedRun",
-    "Copy",
-    "Facts",
-    "FleetEntry",
-    "FleetOutlier",
-    "FleetSummary",
-    "FleetUnit",
-    "LikelyStep",
-    "NoiseSigns",
-    "OwnEvent",
-    "Reason",
-    "ResidualSeries",
-    "Spread",
-]
-
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 

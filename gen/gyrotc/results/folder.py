@@ -11,8 +11,6 @@ from .base import Amount, Axis, Part, Result
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-__all__ = ["MapOfAxis", "MapOnGrid", "Marker"]
-
 
 class MapOfAxis(Part):
     """The static map of one axis at the points of a grid."""

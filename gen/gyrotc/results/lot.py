@@ -8,19 +8,6 @@ from pydantic import Field
 
 from .base import Amount, Axis, Count, Figure, Part, Positive, Result, Share
 
-__all__ = [
-    "AtRest",
-    "CrossValidation",
-    "KnownMap",
-    "Lot",
-    "LotCluster",
-    "LotFunctions",
-    "LotProcess",
-    "LotUnit",
-    "LotUse",
-    "UnitCurve",
-]
-
 Celsius = Annotated[float, Field(ge=-400.0, le=800.0)]
 Rate = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Numbers = tuple[float, ...]

@@ -8,27 +8,6 @@ from pydantic import Field
 
 from .base import Amount, Count, Figure, Part, Positive, Result, Share, UnitResult
 
-__all__ = [
-    "Accuracy",
-    "Additions",
-    "AssumedNoise",
-    "ChamberStep",
-    "DetectionLimit",
-    "Hard",
-    "LotPlan",
-    "LotProgramme",
-    "NextRun",
-    "Plan",
-    "PlanLimit",
-    "PlannedRun",
-    "ProposedRun",
-    "Separability",
-    "Shortest",
-    "Temperature",
-    "ThermometerPlace",
-    "TriedRun",
-]
-
 
 class ChamberStep(Part):
     """A ramp and the hold after it."""

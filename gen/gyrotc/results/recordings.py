@@ -8,20 +8,6 @@ from pydantic import Field
 
 from .base import Axis, Count, Figure, Numbered, Part, Result, Share
 
-__all__ = [
-    "Checked",
-    "CheckedRun",
-    "ImportedFile",
-    "ImportedFiles",
-    "MarkedRows",
-    "OriginalFile",
-    "Problem",
-    "SimulatedTruth",
-    "Suspected",
-    "TrueLot",
-    "TrueRun",
-]
-
 
 class MarkedRows(Part):
     """Rows that something is reported of."""

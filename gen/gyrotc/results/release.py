@@ -8,23 +8,6 @@ from pydantic import Field
 
 from .base import Amount, Axis, Figure, Part, Positive, Result, UnitResult
 
-__all__ = [
-    "NEED_REASON",
-    "RELEASED",
-    "STATED",
-    "Budget",
-    "Contribution",
-    "DecisionRule",
-    "HeldLimits",
-    "Instrument",
-    "JudgedOn",
-    "Limit",
-    "Release",
-    "ReleasedUnit",
-    "Value",
-    "Verdict",
-]
-
 
 class Instrument(Part):
     """What the calibration was made with, as `[[meta.instrument]]` or the limits file state it."""

@@ -10,27 +10,6 @@ from .base import Amount, Count, Figure, Part, UnitResult
 from .evaluation import FoundIn, MapDifference, Pooled
 from .lot import KnownMap, LotUse, UnitCurve
 
-__all__ = [
-    "AllanPoint",
-    "BiasPlane",
-    "CandidateModel",
-    "ChangeKind",
-    "ChannelTried",
-    "CheckedCell",
-    "DeclaredUnits",
-    "EarlierUse",
-    "LeftOutRows",
-    "Manifest",
-    "MapChange",
-    "MapMeans",
-    "NoiseLimits",
-    "NoiseTerms",
-    "Outliers",
-    "SpanLeftOut",
-    "Training",
-    "TriedChange",
-]
-
 
 class CheckedCell(Part):
     """What the earlier model left of the check run in a part of the envelope, and what it may have left."""

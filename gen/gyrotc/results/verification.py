@@ -9,25 +9,6 @@ from pydantic import Field
 from .base import Arithmetic, Axis, Count, Part, Result, UnitResult
 from .release import Verdict
 
-__all__ = [
-    "CallCost",
-    "Emitted",
-    "EmittedTable",
-    "EmittedWith",
-    "FunctionCost",
-    "JointVerification",
-    "LearnedCalls",
-    "LogPart",
-    "MapError",
-    "ReadLog",
-    "ReplayedRows",
-    "SignatureCheck",
-    "Verification",
-    "VerifiedFile",
-    "VerifiedTarget",
-    "WorstError",
-]
-
 
 class EmittedTable(Part):
     """Size and error bound of one table."""

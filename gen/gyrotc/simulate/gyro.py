@@ -40,24 +40,6 @@ from ..target.recursions import first_order
 from .noise import CELL_S
 from .scenario import Channel, Laser, Scenario, Thermometer
 
-__all__ = [
-    "BiasMap",
-    "Internal",
-    "LaserStates",
-    "channel_readings",
-    "channel_values",
-    "draw",
-    "internal_of",
-    "internal_readings",
-    "laser_bias",
-    "laser_readings",
-    "laser_states",
-    "made",
-    "quantised_c",
-    "shape_over_range",
-    "thermometer_readings",
-]
-
 T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
 R_LIMIT_C_PER_MIN = 2.5  # half of the fastest ramp of a chamber: the cavity follows slowly
 

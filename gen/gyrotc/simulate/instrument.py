@@ -28,8 +28,6 @@ from .gyro import BiasMap, channel_readings, channel_values, internal_of, intern
 from .noise import CELL_S
 from .scenario import Chamber, Gyro, Profile, Scenario
 
-__all__ = ["SimulatedRecord", "ThermalNetwork", "chamber_air", "record", "thermal_network"]
-
 
 def chamber_air(
     chamber: Chamber, programme_c: FloatArray, dt_s: float, rng: np.random.Generator

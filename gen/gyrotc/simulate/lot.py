@@ -22,8 +22,6 @@ from .campaign import Noise, RowForm, SimulatedGyro, with_noise, write_gyro
 from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .scenario import Gyro, Scenario, read
 
-__all__ = ["LotOrder", "draw_lot", "simulate_lot"]
-
 Scores = dict[str, float]
 
 _KNOTS = 7  # as in `draw`

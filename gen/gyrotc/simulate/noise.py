@@ -18,9 +18,6 @@ from ..common.arrays import FloatArray
 if TYPE_CHECKING:
     from .scenario import NoiseLevels
 
-__all__ = ["CELL_S", "CellNoise", "bridge_arcsec", "cell_noise", "quantised", "white_sigma_arcsec"]
-
-
 CELL_S = 1.0  # s: noise is drawn once a second and bridged between (docs/simulation.md)
 _SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
 _REFERENCE_C = 20.0  # room temperature, at which data sheets state a noise

@@ -14,8 +14,6 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from ..common.errors import InputError
 
-__all__ = ["Step", "corners", "sample"]
-
 Celsius = Annotated[float, Field(ge=-90.0, le=200.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 

@@ -18,20 +18,6 @@ from ..common.errors import InputError
 from ..common.inputs import read_toml, refuse_above
 from .profile import Step
 
-__all__ = [
-    "Chamber",
-    "Channel",
-    "Laser",
-    "NodeDifference",
-    "NoiseLevels",
-    "Profile",
-    "Scenario",
-    "ScenarioCause",
-    "Thermometer",
-    "names",
-    "read",
-]
-
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]

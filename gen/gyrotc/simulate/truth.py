@@ -18,8 +18,6 @@ from ..common.inputs import read_input
 from ..results.base import read_optional
 from ..results.recordings import SimulatedTruth
 
-__all__ = ["FILE", "Truth", "read_truth", "simulated_floor"]
-
 FILE = "truth.json"
 # What numpy.save writes of one dimension (NEP 1); matched, not evaluated.
 _HEAD = re.compile(

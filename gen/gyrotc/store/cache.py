@@ -28,8 +28,6 @@ from ..common.runtime import runtime_folders
 from .files import digest_of, write_atomically
 from .marker import sha256
 
-__all__ = ["clear", "folder", "held", "inputs_of", "keep", "kept", "limit", "program_of", "set_limit"]
-
 _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures come out of
 
 

@@ -17,22 +17,6 @@ from typing import Any, BinaryIO
 from ..common.errors import InputError
 from .interrupts import deferred
 
-__all__ = [
-    "Lock",
-    "canonical_json",
-    "check_own",
-    "check_replaceable",
-    "create",
-    "digest_of",
-    "json_text",
-    "open_or_create",
-    "open_stream",
-    "sync_folder",
-    "unfinished",
-    "write_atomically",
-    "write_own",
-]
-
 _NESTED = (dict, list, tuple)
 
 

@@ -33,8 +33,6 @@ from .marker import (
 )
 from .update import Update, can_exchange, exchange, write_marker
 
-__all__ = ["Stage", "clean", "kept_by_hash", "leftovers", "result_folder", "share_by_hash", "write_result"]
-
 _open: list[_Job] = []
 _EARLIER = ".old"
 

@@ -20,29 +20,6 @@ from ..results.base import checked_result
 from ..results.folder import Marker
 from .files import json_text
 
-__all__ = [
-    "KINDS",
-    "MARKER",
-    "NEW",
-    "OWN",
-    "SCHEMA",
-    "check_contents",
-    "check_intact",
-    "check_separate",
-    "check_serial",
-    "faults",
-    "final_place",
-    "is_inside",
-    "marker_of",
-    "marker_text",
-    "prefix_of",
-    "read_marker",
-    "remove_listed",
-    "sha256",
-    "survey",
-    "walk",
-]
-
 MARKER = ".gyrotc-result.json"
 SCHEMA = Marker.schema_id()
 KINDS = {

@@ -14,8 +14,6 @@ from ..results.folder import Marker
 from .files import create, sync_folder, write_own
 from .marker import MARKER, NEW, OWN, marker_text, sha256, walk
 
-__all__ = ["Update", "can_exchange", "exchange", "write_marker"]
-
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fcntl.h, linux/fs.h
 _RENAME_SWAP = 2  # sys/stdio.h of macOS
 _NOT_HERE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)

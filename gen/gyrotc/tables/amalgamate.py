@@ -11,8 +11,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["ARITHMETICS", "LEARNING", "amalgamate"]
-
 _HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc_angle.h", "gtc.h")
 ARITHMETICS = ("f32", "q31")
 LEARNING = "gtc_learn.h"

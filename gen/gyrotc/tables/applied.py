@@ -16,8 +16,6 @@ from ..target.table import Table
 from ..train.samples import missed_before
 from .quantise import NUMERICS, quantise
 
-__all__ = ["applied_of", "channels_of"]
-
 _PART = 2**18  # rows that are looked at together: bounds memory
 
 

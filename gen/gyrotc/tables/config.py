@@ -15,8 +15,6 @@ from ..common.texts import c_environment
 from ..model import Model, RuntimePart
 from .rounding import channel_names
 
-__all__ = ["COSTS", "SWITCHES", "config_text", "needs_of"]
-
 COSTS = Path(__file__).resolve().parent / "costs.json"
 #: Options of gtc_config.h by the part that a product may leave out.
 SWITCHES: dict[RuntimePart, str] = {

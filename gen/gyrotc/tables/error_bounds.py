@@ -36,17 +36,6 @@ from ..target.recursions import TableKind
 from ..target.table import Numeric, Table, f32_words
 from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient
 
-__all__ = [
-    "MARGIN",
-    "Axis",
-    "Bounds",
-    "channel_error_dph",
-    "handover_error_dph",
-    "regions",
-    "unbounded",
-    "with_authority",
-]
-
 #: Share of the range of the map, and of the terms, that is granted beyond it at either end.
 MARGIN = 0.25
 _LARGEST_DPH = 1.5e7  # twice the largest rate that anything here takes for one

@@ -18,8 +18,6 @@ from ..target.table import Table, Words, f32_words
 from .error_bounds import Axis, handover_error_dph, regions, unbounded
 from .rounding import STEEPEST, f32_terms, guard_words, largest_gradient, shared, sigma_values
 
-__all__ = ["table_of"]
-
 _UNIT = 2.0**-24  # largest relative error of one rounding
 _GRID = 2.0**-20  # centers lie on it
 _INPUT_GRID = 2.0**-21  # largest error of a normalised input by its rounding to the grid

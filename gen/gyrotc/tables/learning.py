@@ -12,8 +12,6 @@ from ..model import BiasSpread, Learning
 from ..target.learning import KNOTS, ServicePrior, packed
 from .text import float_text
 
-__all__ = ["data_sheet_spread", "learning_text", "service_prior"]
-
 _MONTH_H = 30.44 * 24.0  # the mean month
 _COMMENTS = {
     "low_c": "first knot, C",

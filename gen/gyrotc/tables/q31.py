@@ -36,17 +36,6 @@ from .rounding import (
     term_size_dph,
 )
 
-__all__ = [
-    "POSITIONS",
-    "InputScale",
-    "Inputs",
-    "Surface",
-    "difference",
-    "position_scale",
-    "surface_of",
-    "table_of",
-]
-
 POSITIONS = 65536  # 16 bits of an input: docs/numerics.md, section 3
 _UNITS_PER_C = 65536.0  # fixed point holds a temperature in 2^-16 C: docs/FORMAT.md
 _GAIN_BITS = 27  # position = offset · gain · 2^-27: docs/numerics.md, section 3

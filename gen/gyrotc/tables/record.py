@@ -20,11 +20,6 @@ from ..results.base import Axis, Numbered
 from ..store.files import json_text
 from ..target.table import Numeric
 
-__all__ = [
-    "BESIDES", "RECORD", "RELEASE", "SIGNATURE", "EmissionRecord", "Options", "joint_record_text", "read_options",
-    "record_text",
-]  # fmt: skip
-
 RECORD = "emission.json"
 RELEASE = "release.json"
 SIGNATURE = "release.json.sig"

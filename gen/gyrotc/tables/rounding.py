@@ -26,26 +26,6 @@ from ..target.recursions import TableKind
 from ..target.table import SERIAL_WORDS, Numeric, Words, f32_words
 from ..train.samples import PLAUSIBLE_C
 
-__all__ = [
-    "STEEPEST",
-    "TEMPERATURE",
-    "Shared",
-    "channel_names",
-    "coverage_words",
-    "exp2_of_minus",
-    "f32_terms",
-    "gram",
-    "guard_of",
-    "guard_words",
-    "largest_gradient",
-    "q31_terms",
-    "shared",
-    "sigma_cells",
-    "sigma_values",
-    "solve",
-    "term_size_dph",
-]
-
 _S_PER_MIN = 60.0  # a minute
 _S_PER_H = 3600.0  # an hour
 

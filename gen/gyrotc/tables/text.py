@@ -14,8 +14,6 @@ from ..target.recursions import TableKind
 from ..target.table import LAYOUT, SERIAL_WORDS, Table
 from .rounding import channel_names, guard_of
 
-__all__ = ["TableText", "example_period_us", "example_samples", "example_values", "float_text", "table_text"]
-
 _EXAMPLE_US = 10000  # 100 samples a second
 
 

@@ -23,8 +23,6 @@ from ..target.front_end import period_us
 from ..target.history import Calls
 from .rounding import channel_names, guard_of
 
-__all__ = ["MISSING", "Calls", "Segment", "Vectors", "answers_text", "make_vectors"]
-
 N_RANDOM = 20000  # a fault that shows in one input of a thousand is missed with a chance of 2e-9
 SAMPLES_PER_BLOCK = 8  # short blocks, so that a few thousand samples make hundreds of corrections
 # A quiet NaN, and the word that fixed point has for no value (docs/FORMAT.md)

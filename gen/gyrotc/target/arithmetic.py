@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["F32", "FLOAT64", "Q31", "Arithmetic", "Bells", "Operations"]
-
 Numbers = NDArray[Any]
 Bells = tuple[tuple[Any, Any], tuple[Any, Any]]
 

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from .table import Table, Words
 
-__all__ = ["ENTRIES", "FUSIBLE", "Fused", "biases", "cells", "exp2_table", "gauss", "normalise", "stand_in"]
-
 Fused = frozenset[str]
 #: Sums of the map that take a product: the grid of the inputs, the linear part, the squared distance (either of its
 #: products), the polynomial of the Gaussian, the weighted sum.

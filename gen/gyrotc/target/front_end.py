@@ -17,21 +17,6 @@ from .recursions import Course
 from .samples import HELD, RESTART, Guarded, judge_readings
 from .status import WARMING
 
-__all__ = [
-    "FALLBACK",
-    "KEEP",
-    "MAP",
-    "Settings",
-    "Steps",
-    "Stream",
-    "expand_missed",
-    "follow",
-    "period_us",
-    "positions",
-    "samples_per_block",
-    "with_missing",
-]
-
 MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _LARGEST = 2**31 - 1  # of a number in fixed point

@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import f32
 from .sigma import Squares
 
-__all__ = ["KEPT_WORDS", "KNOTS", "Learner", "ServicePrior", "Stop", "packed"]
-
 Numbers = NDArray[Any]  # of the learner's type: float32 or float64
 
 KNOTS, STATES = 8, 13  # of include/gtc_learn.h, as all numbers here

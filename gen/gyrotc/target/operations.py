@@ -16,8 +16,6 @@ from .arithmetic import Bells, Numbers, Operations
 from .recursions import Recursion, TableKind, recursion_of
 from .table import Table
 
-__all__ = ["recursions"]
-
 _SINE_F32 = tuple(
     np.float32(float.fromhex(c))
     for c in ("0x1.3c4b2cp-13", "-0x1.3232fap-8", "0x1.46676ep-4", "-0x1.4abbb6p-1", "0x1.921fb4p+0")

@@ -15,19 +15,6 @@ from ..common.arrays import IntArray
 from .arithmetic import divided
 from .table import Table
 
-__all__ = [
-    "CUT",
-    "ENTRIES",
-    "GAUSS_ERROR",
-    "Points",
-    "biases",
-    "cells",
-    "exp2",
-    "exp2_table",
-    "normalise",
-    "stand_in",
-]
-
 ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"
 CUT = 32 << 24  # u in 2^-24
 _H = np.uint64(1557473452)  # 2^-24

@@ -21,18 +21,6 @@ from ..common.arrays import FloatArray
 from .arithmetic import Numbers, Operations
 from .status import CLAMPED
 
-__all__ = [
-    "Course",
-    "CourseChannel",
-    "Recursion",
-    "TableKind",
-    "TermOutcome",
-    "delayed",
-    "first_order",
-    "play",
-    "recursion_of",
-]
-
 Number = TypeVar("Number", bound=np.generic)
 
 _UNIFORM = 1e-6  # largest departure of a row period from their mean that still counts as even, relative

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from .arithmetic import Arithmetic, Numbers
 
-__all__ = ["ACCEPTED", "HELD", "RESTART", "Guarded", "judge_readings"]
-
 HELD, ACCEPTED, RESTART = 0, 1, 2  # any three numbers
 _PART = 2**18  # readings that are looked at together: bounds memory
 _LONGEST_US = 2**32 - 1  # that the target counts

@@ -23,8 +23,6 @@ from .recursions import Course, TableKind, TermOutcome
 from .status import FALLBACK, UNCOVERED, WARMING
 from .table import Table, Words
 
-__all__ = ["RULES", "Rule", "SigmaEvidence", "evidence_of", "sigma_bits", "variances"]
-
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
 RULES = 11
 

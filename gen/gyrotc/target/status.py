@@ -2,24 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "CHANNEL_LOST",
-    "CLAMPED",
-    "E_ABSENT",
-    "E_ARG",
-    "E_ID",
-    "E_IMAGE",
-    "E_LAYOUT",
-    "E_PERIOD",
-    "E_REST",
-    "E_SELF_TEST",
-    "FALLBACK",
-    "HELD",
-    "OK",
-    "UNCOVERED",
-    "WARMING",
-]
-
 # Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
 OK = 0
 WARMING = 1

@@ -13,19 +13,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "ARRAYS",
-    "LAYOUT",
-    "MAGIC",
-    "MISSING_Q31",
-    "SERIAL_WORDS",
-    "Numeric",
-    "Table",
-    "Words",
-    "crc32",
-    "f32_words",
-]
-
 LAYOUT = 2  # docs/FORMAT.md, section 3
 MAGIC = 0x47544331  # "GTC1" in ASCII
 MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)

@@ -47,20 +47,6 @@ from .result import predict, rescaled, snapped
 from .samples import Blocks
 from .uncertainty import of_few
 
-__all__ = [
-    "SHAPES",
-    "ChannelChoice",
-    "ChannelShape",
-    "ShapeId",
-    "StandIn",
-    "channel_shown",
-    "chosen_channels",
-    "seen_by_target",
-    "shape_of",
-    "stand_in_of",
-    "with_channels",
-]
-
 ShapeId = Literal["line", "product", "curve"]
 
 #: The simplest first, and the kind of the record of each.

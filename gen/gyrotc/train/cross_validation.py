@@ -24,21 +24,6 @@ from ..common.arrays import FloatArray
 from ..recordings.records import Run
 from ..results.training import SpanLeftOut
 
-__all__ = [
-    "LIKELIER",
-    "Fold",
-    "Span",
-    "edges_of",
-    "more_than_its_error",
-    "pieces",
-    "surely_above_0",
-    "t_statistic",
-    "training_spans",
-    "turning_points",
-    "unseen_log_likelihood",
-    "whole_runs",
-]
-
 LIKELIER = 3.0  # of log-likelihoods on unseen means: twenty to one for what is richer
 
 _SIGNIFICANCE = 0.025  # of the t test: docs/training.md, section 2

@@ -12,22 +12,6 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import median
 
-__all__ = [
-    "Bins",
-    "Cells",
-    "Scaling",
-    "TrainingData",
-    "average",
-    "bin_of",
-    "cells_of",
-    "cleaned",
-    "gather",
-    "joined",
-    "scaling_of",
-    "weighted_mean",
-]
-
-
 # Floors of the scale, so that a constant input is not divided by 0.
 _MIN_HALF_RANGE_C = 1.0
 _MIN_HALF_RANGE_C_PER_MIN = 0.05  # rates of a chamber at rest must not be blown up to a whole range

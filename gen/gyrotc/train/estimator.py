@@ -22,9 +22,6 @@ from .data import Scaling, TrainingData
 from .evidence import MEAN_S
 from .mrbf import fit_mrbf
 
-__all__ = ["RBFNetworkRegressor"]
-
-
 _WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # times the square root of the number of inputs
 _CANDIDATES = 300  # samples as centers, drawn at random: bounds time and memory of the normal equations
 _MOST_CENTERS = 60  # bounds the time of a fit

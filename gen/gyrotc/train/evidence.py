@@ -23,18 +23,6 @@ from ..common.metrics import MAD_TO_SIGMA, median
 from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
 from .noise import difference_sigma
 
-__all__ = [
-    "MEAN_S",
-    "Asked",
-    "MapModel",
-    "Process",
-    "TrainingFailed",
-    "conditioned",
-    "conditioned_on",
-    "fit_process",
-]
-
-
 MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
 _TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
 _TRIMS = 3  # rounds of dropping and fitting again

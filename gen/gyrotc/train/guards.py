@@ -12,8 +12,6 @@ from ..recordings.records import Run
 from .data import Scaling, TrainingData, average
 from .result import Outcome, networks_dph
 
-__all__ = ["AGREE_S", "channel_guard", "longest_same_s", "objection", "stuck_after_s"]
-
 # Points of T and of dT/dt: what passes between them is narrower than a sixteenth of the range
 _GRID = (33, 17)
 _SIGMAS = 4.0  # of the process at a point and of a mean's noise: nothing that a compression loses comes near

@@ -14,9 +14,6 @@ from .data import Scaling, TrainingData, average, gather
 from .evidence import MEAN_S, Process
 from .noise import difference_sigma
 
-__all__ = ["UnitMeans", "means_of", "unit_means"]
-
-
 _GRID = 2.0**30  # of a spread: as many digits as a file holds
 
 

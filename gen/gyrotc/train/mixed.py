@@ -21,8 +21,6 @@ from .cross_validation import edges_of, turning_points
 from .data import Scaling, TrainingData, average, cells_of
 from .evidence import MEAN_S, TrainingFailed
 
-__all__ = ["Mixed", "fit_mixed_model"]
-
 _CELLS = 500  # means in all: more of them move the coefficients by less than a tenth of their own error
 _LEAST_WHITE = 1e-3  # of the spread: a drift is known no better
 _GRID = (

@@ -31,8 +31,6 @@ from .noise import not_white
 from .result import Outcome, network
 from .simple import FLAT, without_rate
 
-__all__ = ["BesideSmooth", "Bumps", "beside_smooth", "find_bumps", "fit_mrbf", "fit_mrbf_t"]
-
 _WIDTHS_C = (1.0, 1.4, 2.0)  # tried; one wider bump in the place of two narrow ones would stay there
 _LIMITS_C = (0.6, 3.5)  # refined; blocks of 10 s at 5 C/min are 0.8 C long, wider ones the process follows
 _BEYOND_C = 5.0  # a bump's middle may lie so far outside the samples

@@ -21,16 +21,6 @@ from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
 from ..results.training import AllanPoint, BiasPlane, NoiseLimits, NoiseTerms
 from .data import TrainingData, average
 
-__all__ = [
-    "allan_variance",
-    "difference_sigma",
-    "floor_dph",
-    "noise_terms",
-    "not_white",
-    "sensitivities",
-    "stretches",
-]
-
 _FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
 _ROUNDS = 3  # the first weights each point by what it is, which favours those that came out small
 _LEAST_EXPECTED = 0.1  # of a point: bounds the weight of one that no term explains

@@ -20,18 +20,6 @@ from ..common.ranges import MOST_CENTERS, AverageLength, BlockLength
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-__all__ = [
-    "AUTO",
-    "DEFAULTS",
-    "METHODS",
-    "NETWORK_METHODS",
-    "SIMPLE",
-    "BuildOptions",
-    "flag_of",
-    "help_of",
-    "options_in",
-]
-
 SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "constant": ((0, 0),),
     "linear": ((0, 0), (1, 0)),

@@ -31,8 +31,6 @@ from .mrbf import fit_mrbf
 from .noise import floor_dph
 from .result import Outcome, network
 
-__all__ = ["RIDGE", "SIZE_RULES", "fit_bank", "fit_mlr", "fit_ols", "fit_poly", "fit_poly_slope"]
-
 _HOLD = 0.1  # |dT/dt| of a hold, share of the half range; the hold's region reaches to twice that
 _MIN_SAMPLES = 100  # a quarter of an hour in blocks of 10 s: with fewer a region has no map of its own
 

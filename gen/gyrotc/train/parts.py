@@ -31,8 +31,6 @@ from .data import Scaling, TrainingData, average
 from .evidence import MEAN_S, Process, conditioned, fit_process
 from .noise import difference_sigma
 
-__all__ = ["Parts", "PartsTrial", "bent_parts", "chosen_parts"]
-
 _ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
 
 

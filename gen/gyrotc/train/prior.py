@@ -10,8 +10,6 @@ from ..results.training import EarlierUse
 from .data import Scaling, TrainingData
 from .result import Outcome
 
-__all__ = ["Given", "Prior"]
-
 
 @dataclass(frozen=True, slots=True)
 class Given:

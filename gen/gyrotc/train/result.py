@@ -15,8 +15,6 @@ from ..results.training import EarlierUse
 from .data import Scaling
 from .evidence import Process
 
-__all__ = ["Fit", "Outcome", "network", "networks_dph", "predict", "rescaled", "snapped"]
-
 Network = Mapping[str, Any]
 
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)

@@ -27,8 +27,6 @@ from ..target.samples import Guarded
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
 
-__all__ = ["Blocks", "blocks_since_power_on", "missed_before", "run_blocks"]
-
 PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
 _PART = 2**18  # rows that are looked at together: bounds memory
 _GAP = 1.5  # median row periods

@@ -50,16 +50,6 @@ from .noise import difference_sigma
 from .result import Outcome
 from .simple import all_solved, fit_simple, outcome_of, powers_of, triangle_of
 
-__all__ = [
-    "CANDIDATES",
-    "CandidateScores",
-    "Chosen",
-    "Rest",
-    "chosen_by_cross_validation",
-    "compare_candidates",
-    "fit_mixed",
-]  # fmt: skip
-
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
 _SIMPLE = (*_FEW_COLUMNS, "mixed")
 CANDIDATES = ("nothing", *_SIMPLE, "mrbf")

@@ -17,18 +17,6 @@ from .noise import floor_dph
 from .options import SIMPLE
 from .result import Network, Outcome, network
 
-__all__ = [
-    "all_solved",
-    "design",
-    "fit_simple",
-    "outcome_of",
-    "powers_of",
-    "solve",
-    "triangle_of",
-    "without_rate",
-]
-
-
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 _POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt
 _FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}

@@ -37,8 +37,6 @@ from .data import TrainingData, average, cleaned
 from .evidence import MEAN_S, Process, fit_process
 from .result import Fit, predict
 
-__all__ = ["Known", "coverage", "of_few", "rezero_dph", "rules_of", "start_sigma", "uncertainty"]
-
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
 _AT_REST_C_PER_MIN = 0.01  # a temperature at rest may go on like this: a tenth of what chambers hold
 _STEP = 0.05  # of a range, for gradients

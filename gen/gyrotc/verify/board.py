@@ -43,17 +43,6 @@ from .toolchain import (
     writable_bytes,
 )
 
-__all__ = [
-    "BoardComparison",
-    "Job",
-    "board_entries",
-    "check_identity",
-    "compared_words",
-    "log_entries",
-    "log_parts",
-    "read_output",
-]
-
 Words = NDArray[np.uint32]
 Line = tuple[int, str]
 _GROUP = 256  # results to a CRC: BOARD_CRC of board_test.c

@@ -37,8 +37,6 @@ from .flow import (
 from .sizes import TERM_CODES, functions_of, linked_name
 from .toolchain import Object, Target, compile_objects, disassembly, link, symbols
 
-__all__ = ["Paths", "Program", "instruction_bounds"]
-
 STAND_IN = "is_shown"  # the function that asks the network of a fallback model
 _ROUNDING = 1e-3  # of the solver (its tolerance is 1e-7 of a flow), far below one instruction
 

@@ -29,18 +29,6 @@ from ..tables.amalgamate import ARITHMETICS, LEARNING, amalgamate
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
 
-__all__ = [
-    "EDITABLE",
-    "board_files",
-    "c_hash",
-    "checked_sources",
-    "file_entries",
-    "left_out_of",
-    "made_again",
-    "table_files",
-    "texts_again",
-]
-
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})
 _SHOWN = 160  # characters of a line

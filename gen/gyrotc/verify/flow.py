@@ -14,21 +14,6 @@ from dataclasses import dataclass, field, replace
 from ..common.errors import CheckFailed
 from ..target.table import ARRAYS, Table
 
-__all__ = [
-    "MEMORY",
-    "POWER",
-    "SHORT_QUOTIENTS",
-    "Block",
-    "Counts",
-    "Flow",
-    "Instruction",
-    "Loop",
-    "LoopText",
-    "counts_of",
-    "parse_flows",
-    "totals",
-]
-
 _FUNCTION = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
 _INSTRUCTION = re.compile(r"^ *([0-9a-f]+):\t(\S+)(?:\t(.*))?$")
 _LINE = re.compile(r"^\S*?([^/\s]+):(\d+)(?: \(discriminator \d+\))?$")

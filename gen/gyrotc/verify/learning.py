@@ -21,8 +21,6 @@ from ..store.files import write_own
 from ..target.learning import KEPT_WORDS, Learner, ServicePrior, Stop
 from .toolchain import Target, compile_objects, link, run_program
 
-__all__ = ["drawn_calls", "expected_words", "learned_on"]
-
 Words = NDArray[np.uint32]
 _SEED = 20140904  # of the calls: the same for every table
 _SHOWN = 5  # mismatches

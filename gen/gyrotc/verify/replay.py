@@ -34,8 +34,6 @@ from .board import Job
 from .emitted import checked_sources, table_files
 from .toolchain import Target, compile_objects, link, run_program, runtime_object
 
-__all__ = ["ReplayCase", "ReplayedPart", "history_of", "replay_dataset", "replay_on", "replay_program"]
-
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _PART = 2**16  # rows that are answered together: bounds memory
 _MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts

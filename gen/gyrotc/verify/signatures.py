@@ -25,8 +25,6 @@ from ..tables.record import RECORD, RELEASE, SIGNATURE
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
-__all__ = ["check_signature", "load_private_key", "load_public_key", "sign_record"]
-
 _LARGEST_KEY = 2**16  # bytes of a PEM file
 _LARGEST_RELEASE = 2**22  # bytes: a thousand limits are a tenth of it
 _LENGTH = 64  # bytes of a signature

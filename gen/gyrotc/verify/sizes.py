@@ -23,11 +23,6 @@ from ..target.table import Table
 from .emitted import checked_sources, table_files
 from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
 
-__all__ = [
-    "PUBLIC", "TERM_CODES", "Footprint", "Graph", "footprint", "function_costs", "functions_of", "linked_name",
-    "parse_graph",
-]  # fmt: skip
-
 _TARGETS = ("cortex-m4f", "host-gcc-O2")  # the first that can be built here
 _STATE = "footprint_state"
 

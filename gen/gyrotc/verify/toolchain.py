@@ -36,30 +36,6 @@ from ..store import cache
 from ..store.files import canonical_json, digest_of, write_own
 from ..store.scratch import scratch_folder
 
-__all__ = [
-    "C_FLAGS",
-    "LIMIT_S",
-    "Object",
-    "ProgramRun",
-    "Symbol",
-    "Target",
-    "all_targets",
-    "compile_c",
-    "compile_objects",
-    "compiler_version",
-    "confined",
-    "disassembly",
-    "end_all",
-    "link",
-    "load_target",
-    "run_program",
-    "run_to_end",
-    "runtime_object",
-    "shared_object",
-    "symbols",
-    "writable_bytes",
-]
-
 LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).
 # Addresses: qemu-user reserves the 4 GiB of a 32-bit processor, which are addresses without memory behind them.

@@ -10,8 +10,6 @@ from ..grade import Row, alarmed, family_right, in_set, shipped_worse, wrong_fam
 from ..table import proportion, reliability, worse_on_the_exam
 from .record import Recording, reported
 
-__all__ = ["answers", "graded", "table"]
-
 
 def graded(recording: Recording, result: dict[str, Any]) -> Row:
     """Truth and answer side by side."""

@@ -27,8 +27,6 @@ from .grade import answers, graded, table
 from .mechanisms import CATALOGUE
 from .record import draw_recording, reported, write
 
-__all__ = ["orders", "run", "write_page"]
-
 _TELLS = 10  # recordings between two writings of the page
 _SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
 _HEAD = """## Hidden effects in a world that is no sibling (`make blind-other`)

@@ -20,8 +20,6 @@ from .names import words
 from .stamps import Stamps, forms_of
 from .tables import Chunk, Column, LoggerTable
 
-__all__ = ["Clock", "form_of_parts", "fraction_of", "parts_of", "text_of"]
-
 _CODES = {
     "year": "%Y", "month": "%m", "day": "%d", "hour": "%H", "hours": "%H", "hr": "%H", "minute": "%M", "minutes": "%M",
     "min": "%M", "second": "%S", "seconds": "%S", "sec": "%S",

@@ -16,22 +16,6 @@ from ...common.errors import InputError
 from ..units import kind_of
 from .stamps import forms_of
 
-__all__ = [
-    "HEXADECIMAL",
-    "MISSING",
-    "Dialect",
-    "cells_of",
-    "dialect_of",
-    "facts_above",
-    "header_of",
-    "in_comments",
-    "is_number",
-    "kind_of_cells",
-    "plain_lines",
-    "plain_number",
-    "thousands_of",
-]
-
 MISSING = (
     "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
 )  # fmt: skip

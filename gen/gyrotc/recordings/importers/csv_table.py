@@ -26,8 +26,6 @@ from .csv_dialect import (
 )
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
-__all__ = ["CsvTable", "open_csv"]
-
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
     yield from enumerate(lines.decode("utf-8", "replace").split("\n"), start=number)

@@ -13,8 +13,6 @@ import numpy as np
 from ...common.errors import InputError
 from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, part_of
 
-__all__ = ["open_dataflash"]
-
 _MESSAGES = ("IMU", "GYR", "IMU2", "IMU3")
 _FIELDS: dict[str, str] = {
     "GyrX": "rad/s", "GyrY": "rad/s", "GyrZ": "rad/s", "T": "degC", "TimeUS": "us", "SampleUS": "us", "TimeMS": "ms",

@@ -13,8 +13,6 @@ from ...common.errors import InputError
 from .parquet import column_of, values_of
 from .tables import CHUNK_ROWS, Chunk, LoggerFile, LoggerTable
 
-__all__ = ["open_feather"]
-
 _SAMPLE_ROWS = 20  # enough to distinguish text that is a date, a number or a hexadecimal count
 
 

@@ -16,8 +16,6 @@ from .map_file import Map
 from .parser_process import Parser, open_confined
 from .tables import LoggerFile
 
-__all__ = ["open_logger_file"]
-
 _MAGIC = (
     (b"MATLAB 5.0", "mat"),
     (b"MATLAB 7.3", "hdf5"),

@@ -11,8 +11,6 @@ import numpy as np
 from ...common.errors import InputError
 from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
 
-__all__ = ["open_hdf5"]
-
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
 _MOST_COLUMNS = 64  # of a two-dimensional set that is split into columns: wider ones are pictures
 

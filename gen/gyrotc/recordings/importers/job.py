@@ -27,21 +27,6 @@ from .propose import Ask, propose
 from .rows import NAMES, Format, ImportedRows, RunFile
 from .tables import LoggerFile
 
-__all__ = [
-    "ImportOptions",
-    "Imported",
-    "description_of",
-    "import_files",
-    "kept_map",
-    "preview",
-    "proposal",
-    "run_name",
-    "serial_of",
-    "sha256_of",
-    "size_of",
-    "summary",
-]
-
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 
 

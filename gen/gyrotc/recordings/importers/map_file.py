@@ -13,18 +13,6 @@ from ...common.inputs import read_toml
 from ..description import dataset_toml
 from .tables import Column, LoggerTable
 
-__all__ = [
-    "MAP_FILE",
-    "Choice",
-    "ColumnMap",
-    "CsvMap",
-    "ImportPlan",
-    "Map",
-    "TimeMap",
-    "load_map",
-    "map_text",
-]
-
 MAP_FILE = "map.toml"
 
 Text = Annotated[str, Field(min_length=1, max_length=256)]

@@ -8,8 +8,6 @@ from typing import Any
 from ...common.errors import InputError
 from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
-__all__ = ["open_mdf"]
-
 
 def open_mdf(path: Path) -> LoggerFile:
     """A measurement file: each channel group a table, its master channel the time in s.

@@ -11,8 +11,6 @@ from functools import cache
 
 from ..units import Kind, UnitError, conversion, kind_of
 
-__all__ = ["Meaning", "axis_of", "meaning", "split_unit", "words"]
-
 _LONGEST = 256  # characters of a name that is searched for a unit: the search takes the square of it or more
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({<]\s*(?P<unit>[^\])}>]+?)\s*[\])}>]\s*$")
 _AFTER_SIGN = re.compile(r"^(?P<base>[^/,]*[^/,\s])\s*(?:/|,|\bin\b)\s*(?P<unit>\S.*)$")

@@ -11,8 +11,6 @@ import numpy as np
 from ...common.errors import InputError
 from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
 
-__all__ = ["open_netcdf"]
-
 _MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
 
 

@@ -12,8 +12,6 @@ from ...common.errors import InputError
 from ...common.inputs import need_memory
 from .tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
 
-__all__ = ["open_numpy"]
-
 _MOST_COLUMNS = 64  # of a matrix that is split into columns: wider ones are pictures
 
 

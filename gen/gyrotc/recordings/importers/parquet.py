@@ -14,8 +14,6 @@ from ..parquet_file import ParquetBatches
 from .csv_dialect import kind_of_cells
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
-__all__ = ["column_of", "open_parquet", "values_of"]
-
 _SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count
 
 

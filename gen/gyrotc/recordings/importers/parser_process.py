@@ -38,8 +38,6 @@ from ...store.scratch import scratch_folder
 from .sandbox import confine
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
-__all__ = ["Parser", "open_confined", "serve"]
-
 _HEAD = struct.Struct(">cQ")  # kind and length of a message
 _JSON, _ROWS, _REFUSED = b"j", b"r", b"e"
 _FORK, _WAIT = b"f", b"w"  # what a server is asked for

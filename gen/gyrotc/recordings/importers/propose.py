@@ -17,20 +17,6 @@ from .map_file import Choice, ImportPlan, Map
 from .names import Meaning, meaning, split_unit, words
 from .tables import Column, LoggerFile, LoggerTable
 
-__all__ = [
-    "OPTIONS",
-    "Ask",
-    "Units",
-    "asked",
-    "in_text",
-    "increments",
-    "listed",
-    "name_it",
-    "nameless",
-    "propose",
-    "said",
-]
-
 Ask = Callable[[str], str | None]
 """Asks a person on a terminal; None where there is none."""
 

@@ -16,8 +16,6 @@ import numpy as np
 from ...common.errors import InputError
 from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, library
 
-__all__ = ["open_rosbag"]
-
 _WHY = "the definition of {} (REP 103)"
 _KINDS: dict[str, dict[str, tuple[str, str | None]]] = {
     "sensor_msgs/msg/Imu": {

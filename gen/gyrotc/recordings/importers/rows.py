@@ -24,8 +24,6 @@ from .map_file import Choice, ImportPlan, TimeMap
 from .names import meaning
 from .tables import Chunk, Column, LoggerTable
 
-__all__ = ["NAMES", "Format", "ImportedRows", "RunFile", "conversion_of"]
-
 NAMES = {
     "temperature": "temperature_c",
     "rate": "rate_dph",

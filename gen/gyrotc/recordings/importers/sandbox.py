@@ -17,8 +17,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["confine", "landlock_version"]
-
 _CREATE, _ADD_RULE, _RESTRICT = 444, 445, 446  # system calls, the same on every processor
 _VERSION = 1  # flag of _CREATE: only asks for the version
 _PATH_BENEATH = 1  # kind of a rule: what lies in a folder, or is a file

@@ -13,8 +13,6 @@ from ...common.errors import InputError
 from .csv_table import open_csv
 from .tables import LoggerFile, LoggerTable, library
 
-__all__ = ["open_spreadsheet"]
-
 _MOST_SHEETS = 20  # of a workbook that is a recording
 
 

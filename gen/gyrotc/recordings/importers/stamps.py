@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from ...common.arrays import IntArray
 from ...common.errors import InputError
 
-__all__ = ["MONTHS", "Stamps", "forms_of", "pattern_of", "zone_of"]
-
 _CODES = {
     "Y": r"(?P<Y>\d{4})",
     "y": r"(?P<y>\d{2})",

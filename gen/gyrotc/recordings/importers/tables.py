@@ -20,20 +20,6 @@ from numpy.typing import NDArray
 
 from ...common.errors import InputError, install_command
 
-__all__ = [
-    "CHUNK_ROWS",
-    "ArrayTable",
-    "Chunk",
-    "Column",
-    "LoggerFile",
-    "LoggerTable",
-    "Part",
-    "grouped",
-    "library",
-    "part_of",
-    "rate_of",
-]
-
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
 Array = NDArray[Any]
 ColumnKind = Literal["number", "stamp", "text"]

@@ -11,8 +11,6 @@ import numpy as np
 from ...common.errors import InputError
 from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
-__all__ = ["open_tdms"]
-
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
 

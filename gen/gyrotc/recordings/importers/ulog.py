@@ -8,8 +8,6 @@ from typing import Any
 from ...common.errors import InputError
 from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, numbers, part_of
 
-__all__ = ["open_ulog"]
-
 _WHY = "PX4's definition of the message"
 _UNITS: dict[str, dict[str, str]] = {
     "sensor_gyro": {"x": "rad/s", "y": "rad/s", "z": "rad/s", "temperature": "degC"},
