@@ -16,17 +16,42 @@ import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+from typer.core import TyperGroup
 
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
 from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
-from .groups import GroupedCommands
 from .words import GyroAxis, completing
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
     from ..recordings.records import Applied
+
+
+GROUPS = {
+    "Record": ("plan", "simulate", "import", "check"),
+    "Calibrate": ("build", "diagnose", "compare", "fit", "emit"),
+    "Judge": ("evaluate", "verify", "report"),
+    "Many units": ("fleet", "catalogue", "lot"),
+    "Share": ("certificate", "sign", "export", "stamp"),
+    "This machine": ("completion", "cache", "schema"),
+}
+"""Names of commands by what a user does; a test holds that each stands once."""
+_MARGIN = 6  # blanks around a name, as click's own list has them
+
+
+class GroupedCommands(TyperGroup):
+    """A group of commands whose help has a list for each step of the work."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Writes the lists."""
+        limit = formatter.width - _MARGIN - max(len(name) for name in self.commands)
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                known = ((name, self.commands[name]) for name in names)
+                formatter.write_dl([(name, one.get_short_help_str(limit)) for name, one in known])
+
 
 _SILENT_S = 2.0  # before a time left is reported
 

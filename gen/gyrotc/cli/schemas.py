@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from ..model import Model
+from ..results.base import MapOnGrid, Marker
 from ..results.diagnosed import Diagnosed, DiagnosisSeries
 from ..results.evaluation import Changes, Comparison, Evaluation
 from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
-from ..results.folder import MapOnGrid, Marker
 from ..results.lot import Lot
 from ..results.planned import LotPlan, NextRun, Plan
 from ..results.recordings import Checked, ImportedFiles, SimulatedTruth

@@ -22,7 +22,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.texts import c_comment, c_literal, toml_comment
 from ..model import Model
-from ..results.folder import MapOfAxis, MapOnGrid
+from ..results.base import MapOfAxis, MapOnGrid
 
 GRID = (61, 25)  # temperatures and rates of a table: finer than any map of a gyro
 _WITHIN = 4  # parts of a cell at which the loss is measured: its middle and two more in each direction

@@ -21,7 +21,7 @@ from ..results.training import ChangeKind, EarlierUse, TriedChange
 from ..train.data import Scaling, TrainingData
 from ..train.evidence import Asked
 from ..train.means import UnitMeans
-from ..train.prior import Given
+from ..train.result import Given
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, within
 from .hypotheses import Hypothesis, revised, updated

@@ -19,8 +19,7 @@ from ..train.evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
 from ..train.guards import objection
 from ..train.means import UnitMeans, unit_means
 from ..train.mrbf import fit_mrbf
-from ..train.prior import Given
-from ..train.result import Outcome
+from ..train.result import Given, Outcome
 from .basis import LotBasis
 from .learn import FALSE_ALARM, freedom_of, of_few
 from .prior import MapPosterior, MapPrior, check_positive, process_result, processed, rounded, triangle

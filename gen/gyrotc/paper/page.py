@@ -19,6 +19,7 @@ from ..pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 from ..simulate.campaign import Noise
 from .experiment import METHODS, Experiment, experiment
 from .figures import Series, checksum
+from .summary import rounded
 
 Figures = Mapping[str, Any]
 """Those of one gyro, as `Experiment.figures` gives them."""
@@ -254,7 +255,7 @@ def measured(seeds: Sequence[int] = SEEDS) -> tuple[dict[str, Any], Series]:
         for noise in _NOISES:
             for seed in seeds:
                 found = experiment(seed, noise, Path(folder) / f"{noise}-{seed}")
-                gyros[noise][str(seed)] = _rounded(found.figures(whole=seed == SEEDS[0]))
+                gyros[noise][str(seed)] = rounded(found.figures(whole=seed == SEEDS[0]), _DIGITS)
                 series = series or _series(found)
     samples = len(series["measured"][ENVIRONMENTS[0]])
     return {"made_with": made_with(), "gyros": gyros, "samples": samples, "figures": checksum(series)}, series
@@ -272,12 +273,6 @@ def _series(result: Experiment) -> Series:
         }
         for name, of in cells.items()
     }
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _rounded(inner) for key, inner in value.items()}
-    return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value
 
 
 def departures(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:

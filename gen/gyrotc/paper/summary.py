@@ -36,14 +36,15 @@ def shortened(record: Any, section: Callable[[Any], str]) -> Any:
     """A record whose numbers have as few significant digits, three at least, as give the same section."""
     text = section(record)
     digits = range(3, 18)  # with 17 a float64 is itself
-    return next(short for n in digits if section(short := _rounded(record, n)) == text)
+    return next(short for n in digits if section(short := rounded(record, n)) == text)
 
 
-def _rounded(value: Any, digits: int) -> Any:
+def rounded(value: Any, digits: int) -> Any:
+    """A record with its numbers to so many significant digits."""
     if isinstance(value, dict):
-        return {key: _rounded(inner, digits) for key, inner in value.items()}
+        return {key: rounded(inner, digits) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_rounded(inner, digits) for inner in value]
+        return [rounded(inner, digits) for inner in value]
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
 
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
-from ..results.folder import Marker
+from ..results.base import Marker
 from .files import Lock, check_replaceable, sync_folder, unfinished, write_atomically, write_own
 from .interrupts import deferred
 from .marker import (

@@ -34,8 +34,7 @@ from .methods import fit
 from .mrbf import Bumps
 from .noise import noise_terms, sensitivities, stretches
 from .options import AUTO, SIMPLE, BuildOptions
-from .prior import Prior
-from .result import Fit, predict, snapped
+from .result import Fit, Prior, predict, snapped
 from .samples import Blocks, run_blocks
 from .uncertainty import coverage, rezero_dph, uncertainty
 

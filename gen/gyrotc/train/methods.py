@@ -16,8 +16,7 @@ from .mrbf import fit_mrbf, fit_mrbf_t
 from .noise import floor_dph
 from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOptions
 from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
-from .prior import Prior
-from .result import Fit, Outcome, network, predict
+from .result import Fit, Outcome, Prior, network, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .uncertainty import coverage, uncertainty

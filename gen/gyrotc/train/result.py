@@ -1,10 +1,13 @@
-"""What training gives: networks in the shape of `model.json`, and what is known about them."""
+"""What training gives: networks in the shape of `model.json`, and what is known about them.
+
+Or known before: what training takes of a unit from units of its type, or from its earlier model (`Prior`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..common.arrays import FloatArray
 from ..results.lot import KnownMap, LotUse
 from ..results.training import EarlierUse
-from .data import Scaling
+from .data import Scaling, TrainingData
 from .evidence import Process
 
 Network = Mapping[str, Any]
@@ -227,3 +230,46 @@ def _network_dph(
         u = u + ((r - c_r / scaling.half_range_c_per_min) / d_r) ** 2
         bias = bias + weight * np.exp(-u)
     return np.asarray(bias, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a prior made of a unit's samples.
+
+    Attributes:
+        map: Networks and scaling over both envelopes; None: the prior was not used.
+        findings: What a user should know.
+        reason: Why the map was chosen.
+        lot, prior: For `training.json`: what a lot did, or an earlier model.
+        known: What the map follows, for `training.json`; None: the prior was not used.
+    """
+
+    map: tuple[Outcome, Scaling] | None
+    findings: list[dict[str, Any]]
+    reason: str = ""
+    lot: LotUse | None = None
+    prior: EarlierUse | None = None
+    known: KnownMap | None = None
+
+
+class Prior(Protocol):
+    """Knowledge of a unit's map that does not come from its own samples."""
+
+    @property
+    def key(self) -> str:
+        """Hash of what it was made from."""
+
+    def check_axis(self, axis: str | None) -> None:
+        """Raises InputError where it is not of this axis."""
+
+    def with_samples(
+        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
+    ) -> Given:
+        """Tests whether cleaned samples agree with it, and makes a map of both if they do.
+
+        Args:
+            own: Scaling of the samples.
+            serial: The unit's.
+            seed: Of the Kohonen network.
+            average_s: Averaging of RMS figures, s.
+        """

@@ -19,9 +19,8 @@ import pytest
 from conftest import Command, invoked, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, StageLine, folded, time_left
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, StageLine, folded, time_left
 from gyrotc.cli.commands import app
-from gyrotc.cli.groups import GROUPS
 from gyrotc.cli.main import _hoisted, run
 from gyrotc.cli.words import ExportFormat, GyroAxis, NoiseLevel, RunFormat, Shell
 from gyrotc.deliver import export

@@ -17,10 +17,9 @@ from gyrotc.cli.commands import app
 from gyrotc.cli.schemas import KINDS, tables
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
-from gyrotc.results.base import Numbered, checked_result
+from gyrotc.results.base import Marker, Numbered, checked_result
 from gyrotc.results.evaluation import At, MapDifference
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.folder import Marker
 from gyrotc.results.release import HeldLimits, Limit
 from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError

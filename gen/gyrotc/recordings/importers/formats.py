@@ -43,7 +43,7 @@ _PARSERS = {
     "mat": Parser(".matfile", "open_mat", "scipy.io"),
     "hdf5": Parser(".hdf5", "open_hdf5", "h5py"),
     "parquet": Parser(".parquet", "open_parquet", "pyarrow.parquet"),
-    "feather": Parser(".feather", "open_feather", "pyarrow.feather"),
+    "feather": Parser(".parquet", "open_feather", "pyarrow.feather"),
     "numpy": Parser(".numpy_file", "open_numpy", "numpy"),
     "spreadsheet": Parser(".spreadsheet", "open_spreadsheet", "openpyxl", unpacks=True),
     "netcdf": Parser(".netcdf", "open_netcdf", "xarray"),
