@@ -1,4 +1,7 @@
-"""The unit in which pages and terminals show rates. Results and files keep deg/h; what people read changes."""
+"""The unit in which pages and terminals show rates. Results and files keep deg/h; what people read changes.
+
+numpy, pydantic and the results are imported where they are used: the command line's help does without them.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,15 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..common.errors import InputError
-from ..results.fleet import FleetOutlier
-from ..results.release import Contribution, Instrument, Limit
-from .scales import significant
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from pydantic import BaseModel
+
+    from ..common.arrays import FloatArray
 
 NATIVE = "deg/h"
 DISPLAYS = {NATIVE: 1.0, "deg/s": 1.0 / 3600.0, "mdps": 1.0 / 3.6, "arcsec/s": 1.0}
@@ -63,8 +65,10 @@ def rate_unit() -> str:
     return _CURRENT.get()
 
 
-def in_unit(values_dph: ArrayLike) -> NDArray[np.float64]:
+def in_unit(values_dph: ArrayLike) -> FloatArray:
     """Rates in deg/h in the unit in which they are shown; any shape."""
+    import numpy as np
+
     return np.asarray(values_dph, dtype=np.float64) * DISPLAYS[rate_unit()]
 
 
@@ -81,6 +85,8 @@ def shown_text(text: str) -> str:
 
 
 def _converted(found: re.Match[str]) -> str:
+    from .scales import significant
+
     number = found[0].replace(",", "")
     digits = len(re.sub(r"^[+-]?[0.]*|[.]|e.*$", "", number)) or 1
     sign = "+" if number.startswith("+") else ""
@@ -88,6 +94,8 @@ def _converted(found: re.Match[str]) -> str:
 
 
 def _shown(value: Any, *, rate: bool) -> Any:
+    from pydantic import BaseModel
+
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, float):
@@ -102,6 +110,9 @@ def _shown(value: Any, *, rate: bool) -> Any:
 
 
 def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
+    from ..results.fleet import FleetOutlier
+    from ..results.release import Contribution, Instrument, Limit
+
     rates = {
         name for name in type(part).model_fields if _RATE.search(name) or (rate and name not in _NO_RATES)
     }

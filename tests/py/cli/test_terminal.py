@@ -172,6 +172,13 @@ def test_ctrl_c_before_anything_is_begun_is_silent() -> None:
     assert subprocess.run([sys.executable, "-c", light], check=False).returncode == 0
 
 
+def test_help_loads_none_of_the_libraries_that_compute() -> None:
+    heavy = {"numpy", "pyarrow", "pydantic", "scipy", "jinja2"}
+    code = f"import sys, gyrotc.cli.commands; sys.exit(' '.join({heavy} & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
     code = "import warnings, gyrotc.cli.main as c; c.run = lambda _: (warnings.warn('of a library'), 0)[1]; c.main()"
     plain = os.environ | {"PYTHONWARNINGS": ""}
