@@ -8,7 +8,7 @@ The command does the whole job (`gyrotc --help`, or `python -m gyrotc --help`):
     gyrotc diagnose data --out diagnosis    what the model does not explain, and the cause
     gyrotc simulate paper --out data        a data set to try it with
 
-From Python (`gyrotc.api`):
+From Python (`gyrotc.jobs.api`):
 
     data = gyrotc.load("data")              recordings, or gyrotc.Dataset.from_pandas(frame, rate_unit="deg/s")
     result = gyrotc.build(data)             what the command does; result.plot(), result.to_xarray()
@@ -21,7 +21,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import Dataset, Result, build, load
+    from .jobs.api import Dataset, Result, build, load
     from .train.estimator import RBFNetworkRegressor
 
 __all__ = ["Dataset", "RBFNetworkRegressor", "Result", "__version__", "build", "load"]
@@ -38,7 +38,7 @@ def __getattr__(name: str) -> Any:
         ModuleNotFoundError: scikit-learn is not installed; the message says what to install.
     """
     if name in _API:
-        from . import api
+        from .jobs import api
 
         return getattr(api, name)
     if name != "RBFNetworkRegressor":

@@ -24,21 +24,21 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.feather
 
-from .common.errors import InputError, install_command
-from .common.texts import file_stem
-from .jobs.build import Built
-from .jobs.build import build as _build
-from .model import Model
-from .pages.report import thermal_picture
-from .pages.unit import UnitResults, unit_in
-from .pages.words import sci
-from .recordings import records
-from .recordings.importers.job import ImportOptions, import_files
-from .recordings.importers.map_file import Map
-from .recordings.load import load as _load
-from .results.evaluation import Evaluation
-from .store.scratch import scratch_folder
-from .train.fitting import FitOptions
+from ..common.errors import InputError, install_command
+from ..common.texts import file_stem
+from ..model import Model
+from ..pages.report import thermal_picture
+from ..pages.unit import UnitResults, unit_in
+from ..pages.words import sci
+from ..recordings import records
+from ..recordings.importers.job import ImportOptions, import_files
+from ..recordings.importers.map_file import Map
+from ..recordings.load import load as _load
+from ..results.evaluation import Evaluation
+from ..store.scratch import scratch_folder
+from ..train.fitting import FitOptions
+from .build import Built
+from .build import build as _build
 
 __all__ = ["Dataset", "Picture", "Result", "build", "load"]
 
