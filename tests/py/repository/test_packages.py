@@ -209,11 +209,6 @@ function(zephyr_compile_definitions)
   target_compile_definitions(image PRIVATE ${ARGN})
   target_compile_definitions(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
 endfunction()
-function(zephyr_compile_definitions_ifdef feature)
-  if(${${feature}})
-    zephyr_compile_definitions(${ARGN})
-  endif()
-endfunction()
 function(idf_component_register)
   cmake_parse_arguments(ARG "" "" "SRCS;INCLUDE_DIRS" ${ARGN})
   set(COMPONENT_LIB gyrotc PARENT_SCOPE)
@@ -257,10 +252,16 @@ def test_zephyr_finds_the_module_and_its_options(tmp_path: Path, ramp: str) -> N
     options = _kconfig(ROOT / named["kconfig"])
     assert _asked(ROOT / named["cmake"] / "CMakeLists.txt") == set(options)
     chosen = {key: "1" if value in ("y", "n") else value for key, value in options.items()}
-    assert (
-        _run(_image(ROOT / named["cmake"], tmp_path / "image", **chosen | {"CONFIG_GYROTC_MAX_TERMS": "6"}))
-        == ramp
+    module, terms = ROOT / named["cmake"], {"CONFIG_GYROTC_MAX_TERMS": "6"}
+    assert _run(_image(module, tmp_path / "image", **chosen | terms)) == ramp
+    unused = dict.fromkeys(
+        ("CONFIG_GYROTC_WITH_IMAGE", "CONFIG_GYROTC_WITH_SAVE", "CONFIG_GYROTC_WITH_TIME"), "0"
     )
+    assert _run(_image(module, tmp_path / "least", **chosen | unused)) == ramp
+    image, least = (
+        (tmp_path / name / "build" / "gyrotc" / "libgyrotc.a").stat().st_size for name in ("image", "least")
+    )
+    assert least < 0.9 * image
 
 
 @pytest.mark.slow
@@ -294,15 +295,13 @@ def test_espressifs_tool_packs_all_sources(tmp_path: Path) -> None:
         assert f"{path.parent.name}/{path.name}\n" in listed, path.name
 
 
-@pytest.mark.slow
 def test_defaults_of_kconfig_are_those_of_the_runtime() -> None:
     text = (ROOT / "include" / "gtc_config.h").read_text()
-    defaults = dict(re.findall(r"#ifndef GTC_(\w+)\n#define GTC_\w+ (\d+)", text))
+    defaults = dict(re.findall(r"#ifndef GTC_(\w+)\n#define GTC_\w+ (\w+)", text))
     options = _kconfig(PACKAGES / "Kconfig")
-    for name, value in defaults.items():
-        if name.startswith("WITH_") and name != "WITH_BANK":
-            continue  # parts that a build by hand may leave out
-        assert options.get(f"CONFIG_GYROTC_{name}") == {"0": "n"}.get(value, value), name
+    words = {"0": "n", "1": "y", "GTC_WITH_UNCERTAINTY": "y"}  # a part of a part that is there by default
+    for name in defaults.keys() - {"HALF_MULTIPLY", "UNROLL", "ASSERT"}:  # those follow the compiler
+        assert options.get(f"CONFIG_GYROTC_{name}") == words.get(defaults[name], defaults[name]), name
 
 
 @pytest.mark.slow
