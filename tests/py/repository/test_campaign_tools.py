@@ -141,7 +141,7 @@ def test_without_the_tests_of_a_file_its_lines_are_reported(tmp_path: Path) -> N
     for folder in ("include", "libc", "tests/c"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     for test in (tmp_path / "tests/c").glob("test_*.c"):
-        if test.stem not in ("test_map", "test_broken"):
+        if test.stem not in ("test_map", "test_broken", "test_least"):  # the script names the last two
             test.unlink()
     (tmp_path / "tools").mkdir()
     shutil.copy(ROOT / "tools" / "coverage.sh", tmp_path / "tools")
