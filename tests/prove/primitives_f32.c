@@ -76,7 +76,7 @@ static void curve(uint32_t every)
         }
         for (bits = 0; bits <= 0xFFFFFFFFU; bits += every) {
             const float x = of_bits((uint32_t)bits);
-            const float found = gtc_f32_bells(x, words);
+            const float found = gtc_f32_gaussians_of_channel(x, words);
             const float want = rounded((double)one_bell(x, r[0], r[1], r[2]) + one_bell(x, r[0], r[3], r[4]));
             wrong += (gtc_f32_bits(found) != gtc_f32_bits(want)) || !isfinite(found);
             if (isfinite(x) && (visited % 16U == 0U)) {

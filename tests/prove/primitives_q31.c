@@ -212,7 +212,7 @@ static void curve(uint64_t every)
         }
         for (reading = -2147483647; reading <= 2147483647; reading += (int64_t)every) {
             const int64_t x = reading > 1073741824 ? 1073741824 : reading < -1073741824 ? -1073741824 : reading;
-            const int64_t found = gtc_q31_bells((int32_t)gtc_q31_limited(reading), words);
+            const int64_t found = gtc_q31_gaussians_of_channel((int32_t)x, words);
             const int64_t sum = r[2] * one_bell(table, x - r[1], r[0]) + r[4] * one_bell(table, x - r[3], r[0]);
             wrong += (found != sum / 536870912 - ((sum % 536870912) < 0));
             if (visited % 16U == 0U) {
