@@ -14,21 +14,22 @@ What the map may be wrong by at (T, dT/dt), noise of the gyro not included:
 
     σ² = κ² variance of the evidence process + (map − mean of the process)² + τ²
 
-κ and τ come from runs left out in turn: the squares of the mean residuals that the process has there are explained by
-its own variance (factor κ²), by a variance between runs (τ²), and by noise. ln κ² is known beforehand to 0.3: over
+κ and τ come from runs left out in turn: the mean residuals that the process has there are explained by its own
+variance (factor κ²), by a constant of each run (variance τ²), and by noise. ln κ² is known beforehand to 0.3: over
 many gyros the process is right about itself, and six runs say little of it. τ = 0 unless the runs left out speak
 against it (likelihood ratio, 5 %); of few runs it is what the next one may differ by (Student's t).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, stdtrit
+from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
 from ..target.recursions import play
@@ -247,7 +248,6 @@ _NOISES = np.exp(
 )  # of its variance over a patch, beside white noise
 _SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
 _LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
-_SIGNIFICANT = float(chdtri(2, 0.05))  # a level and a run that differs most: two degrees of freedom
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
@@ -395,35 +395,25 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
         ]
     if not rows:
         return 1.0, 0.0
-    squares, variance, noise = np.concatenate(rows, axis=1)
-    plain, scale = _likeliest(squares, variance, noise, 0.0)
-    best, its_scale, between = np.inf, scale, 0.0
-    for level in float(np.mean(variance + noise)) * _LEVELS:
-        if _least_deviance(squares, level) <= best:
-            found = (*_likeliest(squares, variance, noise, level), level)
-            best, its_scale, between = min((best, its_scale, between), found)
-    if plain - best <= _SIGNIFICANT:
-        return scale, 0.0
-    return its_scale, float(between) * of_few(len(rows))
+    scale, between = _likeliest(rows)
+    return scale, between * of_few(len(rows))
 
 
-def _least_deviance(squares: FloatArray, between: float) -> float:
-    """What no deviance lies below for a variance between runs: a square is best explained by itself, or by that."""
-    total = np.maximum(squares, between)
-    return float(np.sum(squares / total + np.log(total)))
+def _likeliest(rows: Sequence[FloatArray]) -> tuple[float, float]:
+    """κ² and the variance between runs of least deviance; of each run `_surprises`.
 
-
-def _likeliest(
-    squares: FloatArray, variance: FloatArray, noise: FloatArray, between: float
-) -> tuple[float, float]:
-    """Least deviance and its κ² for a variance between runs.
-
+    A run has one constant, common to all its patches, so what differs from patch to patch is the map's error or noise.
     Means over a patch keep more of the noise than white noise would leave: its level is free, else κ² takes the rest.
     """
-    total = (_SCALES[:, None] * variance) + (between + _NOISES[:, None] * noise)[:, None]
-    deviance = np.sum(squares / total + np.log(total), axis=2) + (np.log(_SCALES) / _SCALE_SD) ** 2
-    level, k = np.unravel_index(np.argmin(deviance), deviance.shape)
-    return float(deviance[level, k]), float(_SCALES[k])
+    levels = np.append(0.0, np.mean([np.mean(row[1:].sum(axis=0)) for row in rows]) * _LEVELS)[:, None, None]
+    deviance = np.zeros((levels.size, _NOISES.size, _SCALES.size)) + (np.log(_SCALES) / _SCALE_SD) ** 2
+    for residual, variance, noise in rows:
+        total = _SCALES[:, None] * variance + _NOISES[:, None, None] * noise
+        deviance += np.sum(residual**2 / total + np.log(total), axis=-1)
+        precision, sum_ = np.sum(1.0 / total, axis=-1), np.sum(residual / total, axis=-1)
+        deviance += np.log1p(levels * precision) - levels * sum_**2 / (1.0 + levels * precision)
+    level, _, k = np.unravel_index(np.argmin(deviance), deviance.shape)
+    return float(_SCALES[k]), float(levels[level, 0, 0])
 
 
 def of_few(runs: int) -> float:
@@ -432,7 +422,7 @@ def of_few(runs: int) -> float:
 
 
 def _surprises(process: Process, held: TrainingData, fit: Fit) -> FloatArray:
-    """Of patches of the input plane: squared mean residual, variance of the process, variance by noise."""
+    """Of patches of the input plane: mean residual, variance of the process, variance by noise; shape (3, patches)."""
     patch = _index(held.temperature_c, fit.scaling.temperature_c, _PATCHES[0])
     patch = patch + _PATCHES[0] * _index(held.slope_c_per_min, fit.scaling.slope_c_per_min, _PATCHES[1])
     _, index = np.unique(patch, return_inverse=True)
@@ -443,4 +433,4 @@ def _surprises(process: Process, held: TrainingData, fit: Fit) -> FloatArray:
     center_r = np.bincount(index, held.weight * r) / weight
     seconds = np.bincount(index, held.duration_s)
     noise = process.noise_dph**2 * process.seconds / seconds
-    return np.stack([residual**2, process.variance_dph2(center_t, center_r), noise])
+    return np.stack([residual, process.variance_dph2(center_t, center_r), noise])
