@@ -108,7 +108,8 @@ GTC_MUST_CHECK int gtc_f32_check(const gtc_f32_table_t *table);
 GTC_MUST_CHECK int gtc_q31_check(const gtc_q31_table_t *table);
 
 /* Makes a table from a binary image (gtc_<id>.bin) in flash: a new calibration without a new executable. `table`
- * gets pointers into `words`, which must stay in place. `expected_id` is GTC_<ID>_ID of the emitted header. Nothing
+ * gets pointers into `words`, which must stay in place, aligned as 32-bit words are; the file is little-endian, and a
+ * core of the other byte order swaps the octets of each word first. `expected_id` is GTC_<ID>_ID of the emitted header. Nothing
  * is written unless the whole image is sound; then no function traps or reads outside, whoever made it. A CRC does
  * not authenticate: that the numbers are this gyro's, the firmware must know.
  * Returns 0, GTC_E_ARG, GTC_E_IMAGE (magic, byte order, length, CRC), GTC_E_LAYOUT (layout, options of the build, a
