@@ -1,13 +1,15 @@
 """What a program takes of the runtime: flash and RAM of six programs, beside a map and a cubic written by hand.
 
 `python -m bench docs --only sizes`; docs/results.md has the table. Everything that the linker keeps counts: code,
-constants, the table with its uncertainties, helpers of the compiler; not start-up code or stack.
+constants, the table with its uncertainties, helpers of the compiler; not start-up code or stack. "Before" is the runtime
+of the commit that a review measured, with the table of the same model; git has both.
 """
 
 from __future__ import annotations
 
 import subprocess
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,16 @@ CORES = {
     "Cortex-M7": ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
 }
 LEVELS = ("-Os", "-O2")
-COMPILER = ("arm-none-eabi-gcc", "-std=c99", "-ffp-contract=off", "-mthumb", "-ffunction-sections", "-fdata-sections", "-fno-tree-loop-distribute-patterns")
+BEFORE = "3e1e809"  # the commit whose runtime a review measured
+COMPILER = (
+    "arm-none-eabi-gcc",
+    "-std=c99",
+    "-ffp-contract=off",
+    "-mthumb",
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-fno-tree-loop-distribute-patterns",
+)
 LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
 
 _MAIN = """#include "gtc_{id}.h"
@@ -131,7 +142,9 @@ PROGRAMS = (
     Program("init, sample, bias; all else left out", is_least=True),
     Program("with check", ("check",)),
     Program("with check and snapshot", ("check", "snapshot")),
-    Program("with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")),
+    Program(
+        "with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")
+    ),
     Program("every function, default options", tuple(_CALLS), is_fitted=False),
     Program("by hand: mean, slope, four Gaussians", text=_MAP),
     Program("by hand: a cubic of each sample", text=_CUBIC),
@@ -149,12 +162,20 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
         model = model.model_copy(update={"left_out": tuple(SWITCHES)})
     for name, data in emit_texts(model, quantise_all(model, None)).items():
         (folder / name).write_bytes(data)
-    calls = "\n".join(f"    status = {_CALLS[name].format(symbol=model.symbol)};" for name in program.calls)
-    text = program.text.format(id=model.id, symbol=model.symbol, calls=calls)
-    (folder / "program.c").write_text(text, encoding="ascii")
     if not program.is_fitted:
         (folder / "gtc_config.h").write_text("")
+    (folder / "program.c").write_text(_text(program), encoding="ascii")
     sources = ["program.c", *(("gtc.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
+    return _linked(sources, core, level, folder)
+
+
+def _text(program: Program) -> str:
+    model = load_model(MODEL)
+    calls = "\n".join(f"    status = {_CALLS[name].format(symbol=model.symbol)};" for name in program.calls)
+    return program.text.format(id=model.id, symbol=model.symbol, calls=calls)
+
+
+def _linked(sources: Sequence[str], core: str, level: str, folder: Path) -> tuple[int, int]:
     command = [*COMPILER, *CORES[core], level, *sources, *LINKED, "-o", "program.elf"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     reported = subprocess.run(
@@ -164,15 +185,37 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
     return text_bytes + data_bytes, data_bytes + zero_bytes
 
 
+def _before(folder: Path) -> Iterator[dict[str, Any]]:
+    """The same programs with the runtime and the table of `BEFORE`, which had no parts to leave out."""
+    places = ("libc", "include", "examples/nav_loop")
+    archive = subprocess.run(["git", "-C", ROOT, "archive", BEFORE, *places], check=True, capture_output=True)
+    subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
+    sources = [
+        "program.c",
+        "libc/gtc_f32.c",
+        "libc/gtc_crc.c",
+        f"examples/nav_loop/gtc_{load_model(MODEL).id}.c",
+    ]
+    folders = ("-Iinclude", "-Iexamples/nav_loop")
+    for program in PROGRAMS:
+        if program.text is _MAIN and program.calls != () or program == PROGRAMS[0]:
+            text = _text(program).replace(
+                "gtc_f32_sample(&state, 1000000UL, &c)", "gtc_f32_sample(&state, &c)"
+            )
+            (folder / "program.c").write_text(text, encoding="ascii")
+            name = f"{BEFORE}: {program.name.removesuffix(', default options').removesuffix('; default options')}"
+            yield {"name": name, **_everywhere(lambda c, v: _linked([*folders, *sources], c, v, folder))}
+
+
+def _everywhere(measure: Callable[[str, str], tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    return {f"{core} {level}": measure(core, level) for core in CORES for level in LEVELS}
+
+
 def sizes() -> dict[str, Any]:
-    """Every program on every core at every level."""
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for program in PROGRAMS:
-            found = {
-                f"{core} {level}": size(program, core, level, Path(folder)) for core in CORES for level in LEVELS
-            }
-            rows.append({"name": program.name, **found})
+    """Every program on every core at every level, and those of `BEFORE`."""
+    with tempfile.TemporaryDirectory() as now, tempfile.TemporaryDirectory() as before:
+        rows = [{"name": p.name, **_everywhere(lambda c, v, p=p: size(p, c, v, Path(now)))} for p in PROGRAMS]
+        rows += _before(Path(before))
     version = subprocess.run([COMPILER[0], "-dumpversion"], check=True, capture_output=True, text=True).stdout
     return {"centers": len(load_model(MODEL).networks[0].centers), "compiler": version.strip(), "rows": rows}
 
