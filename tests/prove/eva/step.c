@@ -1,6 +1,6 @@
 /* step.c - one call of every step function, with every argument, on every state that the invariant allows.
  *
- * `n` of the mean is at least 1, because 2 valid >= samples_per_block >= 1 there.
+ * `n` of the mean is at least 1, because a block with a mean has two readings, or half of samples_per_block >= 1.
  *
  * The invariant: the intervals below. It holds after `init`; that a call keeps it is checked at the end, but for three
  * facts that relate two numbers, which no interval can say (docs/proof.md gives the argument): valid <= position <=
@@ -73,8 +73,8 @@ static void any_state(uint_least32_t least_valid, uint_least32_t most_valid)
     state.bias = any_number(0);
     state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
     state.off_blocks = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    state.is_stamped = Frama_C_unsigned_long_interval(0, 1);
-    state.time_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    state.late_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    state.unused = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     any_input(least_valid, most_valid);
     for (k = 0; k < GTC_MAX_SLOPE_BLOCKS; k++) {
         state.window[k] = ANY_PLAUSIBLE();

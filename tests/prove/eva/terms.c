@@ -98,7 +98,7 @@ static void one_hook(unsigned i, unsigned hook)
         effect.added = Frama_C_long_long_interval(-0x1000000000000000LL, 0x1000000000000000LL);
 #endif
         code->apply(&state, i, ANY_PLAUSIBLE(), &effect);
-        (void)NAME(saturate)(effect.added, MEMBER(THE_TABLE.effect[0]), MEMBER(THE_TABLE.effect[1]), &effect.remarks);
+        (void)NAME(saturate)(effect.added, MEMBER_NUMBER(THE_TABLE.effect[0]), MEMBER_NUMBER(THE_TABLE.effect[1]), &effect.remarks);
     }
     invariant_holds(i, hook);
 }
