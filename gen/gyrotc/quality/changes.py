@@ -63,7 +63,7 @@ _AROUND_S = 240.0  # in which a place is sought anew
 _EDGE = 3  # cells at the ends of a run in which a change cannot be distinguished from noise
 _HOUR_S = 3600.0  # by definition
 _PLACED_95 = 7.35  # of a likelihood ratio of places: Hansen, Econometrica 68 (2000) 575, table 1
-_LEAST_JUMP = 0.5  # of a step, what its rows have to show by themselves: else it is a transition
+_LEAST_ODDS = 4.0  # that a change is over within 30 s: four of five of the steps that are reported are steps
 _NEAR_CELLS = 8  # on either side of a step, in which its rows are looked at
 _PLACES = 240  # that are tried around a change
 _PARTS = (0.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of a cell, that a change may begin beside its edge
@@ -321,7 +321,11 @@ class _Search:
         return others + own
 
     def _best(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> _At:
-        """The place and duration of the largest likelihood; of those nearly as likely the shortest."""
+        """The likeliest place and duration.
+
+        Of steps and transitions it is a step where the odds are, each of both kinds being as likely beforehand and all
+        durations of a kind alike; a drift where it is nearly as likely as they are.
+        """
         cells = self._cells[at.run]
         reach = _HOUR_S if at.kind in ("drift", "gain") else max(_AROUND_S, at.duration_s, 3.0 * cells.cell_s)
         near = cells.time_s[np.abs(cells.time_s - at.middle_s) <= reach]
@@ -341,7 +345,17 @@ class _Search:
             gains = self._gains(fit, tried, others)
             best.append((float(gains.max()), tried[int(np.argmax(gains))]))
         most = max(gain for gain, _ in best)
-        return next(one for gain, one in best if gain >= most - CHI2_95_ONE)
+        if at.kind == "drift":
+            gain, drift = best.pop(0)
+            if gain >= most - CHI2_95_ONE:
+                return drift
+        over = [pair for pair in best if pair[1].duration_s <= _over_s(cells)]
+        lasting = best[len(over) :]
+        mean = [
+            np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind
+        ]
+        steps = len(mean) == 1 or mean[0] >= _LEAST_ODDS * mean[1]
+        return max(over if steps else lasting, key=lambda pair: pair[0])[1]
 
     def _gains(self, fit: SmoothFit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
         """Twice the gain of log-likelihood of each of some changes of one kind and run, beside others of it."""
@@ -393,9 +407,9 @@ class _Search:
             time = self._begins(at, fit, others)
         else:
             near = rows[2] - np.interp(rows[0], cells.time_s, fit.curve[at.run])
-            time, jump = _placed(at, near, rows[0], _NEAR_CELLS * cells.cell_s)
-            if at.duration_s > _over_s(cells) or jump / size < _LEAST_JUMP:
-                kind, duration = "transition", max(at.duration_s, _NEAR_CELLS * cells.cell_s)
+            time = _placed(at, near, rows[0], _NEAR_CELLS * cells.cell_s)
+            if at.duration_s > _over_s(cells):
+                kind, duration = "transition", at.duration_s
                 half = 0.5 * duration + cells.cell_s
                 time = at.middle_s, at.middle_s - half, at.middle_s + half
         sigmas = abs(size) / error
@@ -428,15 +442,15 @@ def _across_gap(at: _At, rows: Rows, around_s: float) -> Limits:
     return float(rows[0][behind]), float(rows[0][behind - 1]), float(rows[0][behind])
 
 
-def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> tuple[Limits, float]:
-    """First row behind a step, the times between which it lies, and its size: where two levels leave least of rows."""
+def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> Limits:
+    """First row behind a step, and the times between which it lies: where two levels leave least of rows."""
     first, end = np.searchsorted(time, (at.middle_s - around_s, at.middle_s + around_s))
     y, t = rate[first:end], time[first:end]
     n = len(y)
     inside = np.flatnonzero(np.abs(t - at.middle_s) <= 0.5 * around_s)
     inside = inside[(inside > 0) & (inside < n)]
     if len(inside) == 0:
-        return (at.middle_s, at.middle_s - around_s, at.middle_s + around_s), 0.0
+        return at.middle_s, at.middle_s - around_s, at.middle_s + around_s
     y = y - y.mean()
     total = np.concatenate([[0.0], np.cumsum(y)])
     left = np.array([y @ y - total[k] ** 2 / k - (total[n] - total[k]) ** 2 / (n - k) for k in inside])
@@ -444,9 +458,8 @@ def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> tup
     noise = max(float(left[best]) / max(n - 2, 1), 1e-300)
     likely = inside[left <= left[best] + _PLACED_95 * noise]
     k = int(inside[best])
-    jump = float((total[n] - total[k]) / (n - k) - total[k] / k)
     # One row more on either side: a row that is a mean may hold the step, and bear the time of its end or its start
-    return (float(t[k]), float(t[max(likely[0] - 2, 0)]), float(t[min(likely[-1] + 1, n - 1)])), jump
+    return float(t[k]), float(t[max(likely[0] - 2, 0)]), float(t[min(likely[-1] + 1, n - 1)])
 
 
 _Tried = tuple[str, float]
