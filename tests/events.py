@@ -21,8 +21,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from gyrotc.quality.check import check
-from gyrotc.quality.sign_and_gain import found_events
+from gyrotc.quality.events import found_events
 from gyrotc.recordings.load import load
+from gyrotc.results.findings import Finding
 
 from .blind.chamber import Array, draw_unit, expose, steps
 from .blind.noise import Noise, draw
@@ -152,10 +153,14 @@ KINDS: dict[str, tuple[Plant | None, str, tuple[str, ...]]] = {
         "run",
         ("gain_changed", "unit_changed", "unit"),
     ),
-    "thermometer +1.5 C": (warmer(1.5), "any", ("thermometer_jump",)),
-    "lost contact": (lost_contact, "any", ("thermometer_jump", "thermometer_lost", "thermometer_changed")),
-    "stuck": (stuck, "ramp", ("thermometer_lost",)),
-    "burst": (burst, "any", ("burst", "rate_outliers")),
+    "thermometer +1.5 C": (warmer(1.5), "any", ("jump_in_temperature",)),
+    "lost contact": (
+        lost_contact,
+        "any",
+        ("jump_in_temperature", "stuck_temperature", "thermometer_changed"),
+    ),
+    "stuck": (stuck, "ramp", ("stuck_temperature",)),
+    "burst": (burst, "any", ("rate_outliers",)),
     "dropout": (dropout, "any", ("dropout", "restart")),
 }
 
@@ -254,15 +259,21 @@ class Score:
     other: tuple[str, ...]
 
 
+def intervals(event: Finding) -> list[tuple[float, float]]:
+    """Times of an event: the limits of its own, and of spikes of every stretch."""
+    if event.id == "rate_outliers":
+        return list(event.leave_out_s)
+    return [] if event.time_s is None else [(event.time_s.low or 0.0, event.time_s.high or 0.0)]
+
+
 def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
     """What gyrotc tells of a folder, beside what was planted."""
     near, other = [], []
     for event in found_events(load(folder, trust_units=True)):
         here = event.file == f"{planted.run}.parquet" and bool(planted.names)
         if here and planted.at_s is not None and not event.whole_run:
-            low, high = event.time_s[1:]
-            here = low - NEAR_S <= planted.at_s <= high + NEAR_S
-        (near if here else other).append((event.id, event.time_s))
+            here = any(low - NEAR_S <= planted.at_s <= high + NEAR_S for low, high in intervals(event))
+        (near if here else other).append((event.id, intervals(event)))
     ids = [id for id, _ in near]
     if warnings:
         result = check(folder)
@@ -270,7 +281,7 @@ def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
         ids += [d.id for d in result.warnings if d.id in WARNINGS and f"{planted.run}.parquet" in d.where]
     right = [time for id, time in near if id in planted.names]
     at = planted.at_s
-    holds = at is not None and any(low <= at <= high for _, low, high in right)
+    holds = at is not None and any(low <= at <= high for of_event in right for low, high in of_event)
     return Score(bool(ids), any(id in planted.names for id in ids), holds, tuple(id for id, _ in other))
 
 
@@ -283,9 +294,7 @@ def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
         runs, planted = draw_set(kind, resolution, rng)
         with tempfile.TemporaryDirectory(prefix="events-") as name:
             write(runs, row_s, bool(rng.integers(2)), Path(name))
-            yield judge(
-                Path(name), planted, warnings=planted.at_s is None or kind in ("burst", "lost contact")
-            )
+            yield judge(Path(name), planted, warnings=planted.at_s is None or kind == "lost contact")
 
 
 def line(job: tuple[str, int, int]) -> str:

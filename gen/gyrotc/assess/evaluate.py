@@ -19,6 +19,7 @@ from ..common.arrays import Progress
 from ..common.errors import CheckFailed, GyrotcError
 from ..common.metrics import Averager, Averages, statistics, time_statistics
 from ..model import Model, load_model
+from ..quality.check import findings_of_run
 from ..quality.facts import RunFacts, facts_of
 from ..quality.outliers import departing_rows
 from ..recordings.records import Dataset, Rows, Run
@@ -27,13 +28,13 @@ from ..results.evaluation import (
     EvaluatedRun,
     Evaluation,
     FigureUncertainty,
-    FoundIn,
     ModelSizes,
     Pooled,
     ResidualTest,
     RunStatistics,
     Statistics,
 )
+from ..results.findings import Finding
 from ..results.training import Training
 from ..simulate.truth import simulated_floor
 from ..tables.emit import emitted_tables
@@ -85,6 +86,7 @@ class _Part:
     averages: Averages
     mismatches: int | None
     facts: RunFacts
+    findings: tuple[Finding, ...]
     squares: tuple[float, int]
     robust: Averages
     outlier_rows: int
@@ -154,9 +156,10 @@ def evaluate(
     if result.exam is None and training:
         result = result.model_copy(update={"left_out": training.left_out})
     result = _with_what_is_known(result, parts, training)
-    found = findings_of(dataset, [p.facts for p in parts], model, result.content(), training)
+    of_runs = [found for p in parts for found in p.findings]
+    found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), training)
     found += residual_findings(result, [(p.run, p.averages) for p in parts])
-    return result.model_copy(update={"findings": tuple(FoundIn(**finding) for finding in found)})
+    return result.model_copy(update={"findings": tuple(found)})
 
 
 def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Training | None) -> Evaluation:
@@ -295,7 +298,8 @@ def _one_run(
             squares.append(squares_of(None if part.sigma_dph is None else part.sigma_dph[span][plain]))
             wrong = None if part.mismatches is None else (wrong or 0) + part.mismatches
     facts, together = facts_of(run, rows), squares_in_all(squares)
-    return _Part(run, averager.averages(), wrong, facts, together, robust.averages(), int(wild.size))
+    found = tuple(findings_of_run(run, rows, facts, wild))
+    return _Part(run, averager.averages(), wrong, facts, found, together, robust.averages(), int(wild.size))
 
 
 def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:

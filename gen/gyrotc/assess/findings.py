@@ -13,23 +13,11 @@ import numpy as np
 
 from ..common.metrics import MAD_TO_SIGMA
 from ..model import Model
+from ..quality.check import findings_of_data_set
 from ..quality.facts import RunFacts
-from ..quality.recorded import (
-    Finding,
-    contradiction_findings,
-    counter_findings,
-    earth_rate_findings,
-    finding,
-    held_findings,
-    jump_findings,
-    outlier_findings,
-    shared_axes_findings,
-    shared_rows_findings,
-    sign_findings,
-    temperature_findings,
-)
-from ..quality.thermometers import thermometer_findings
+from ..quality.findings import finding, temperature_findings
 from ..recordings.records import Dataset
+from ..results.findings import Finding
 from ..results.training import Training
 
 _UNSEEN_TO_SEEN = 2.0  # RMS of spans not seen over RMS in training
@@ -52,6 +40,7 @@ _POLYNOMIALS = ("cubic", "cubic_slope", "mixed")
 def findings_of(
     dataset: Dataset,
     facts: Sequence[RunFacts],
+    of_runs: Sequence[Finding],
     model: Model,
     result: Mapping[str, Any],
     training: Training | None = None,
@@ -60,6 +49,7 @@ def findings_of(
 
     Args:
         facts: What was seen in each run that was evaluated.
+        of_runs: What its rows show by themselves.
         model: The model that was evaluated.
         result: Figures as in the result of `evaluate`: runs, train, exam, noise_floor_dph.
         training: What `training.json` says, for figures of spans left out of training.
@@ -69,16 +59,8 @@ def findings_of(
         found += _of_training(training)
         found += _unseen(result, training)
         found += _coverage(model)
-    found += jump_findings(facts)
-    found += counter_findings(facts)
-    found += held_findings(facts)
-    found += outlier_findings(facts)
-    found += contradiction_findings(facts)
-    found += shared_rows_findings(dataset)
-    found += shared_axes_findings(dataset)
-    found += sign_findings(facts)
-    found += thermometer_findings(dataset)
-    found += earth_rate_findings(dataset, facts)
+    found += of_runs
+    found += findings_of_data_set(dataset, facts)
     found += _weights(model)
     found += _outliers(result)
     return found
@@ -88,7 +70,7 @@ def _of_training(training: Training | None) -> Iterator[Finding]:
     """What the choice of the correction found; `fit` wrote it."""
     for said in training.findings if training else ():
         if said.id in _OF_TRAINING:
-            yield said.content()
+            yield said
 
 
 def _unseen(result: Mapping[str, Any], training: Training | None) -> Iterator[Finding]:
@@ -175,8 +157,7 @@ def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:
         yield finding(
             "run_outlier",
             f"{runs[k]['file']} differs from the other runs after compensation: {what}, usually {usually}.",
-            file=runs[k]["file"],
-            from_s=runs[k].get("from_s"),
+            runs[k]["file"],
             mean_dph=float(mean[k]),
             std_dph=float(scatter[k]),
             median_mean_dph=float(np.median(mean)),

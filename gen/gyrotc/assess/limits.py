@@ -188,7 +188,7 @@ Finding = Literal[
     "does_not_generalise", "map_refused", "map_beyond_data",
     "not_of_its_lot", "prior_does_not_hold",
     "shared_rows", "shared_axes", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
-    "sign_reversed",
+    "sign_reversed", "axes_exchanged", "gain_changed", "unit_changed", "thermometer_changed", "stuck_temperature",
 ]  # fmt: skip
 Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
 

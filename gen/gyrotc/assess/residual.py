@@ -15,9 +15,10 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.metrics import Averages, median
-from ..quality.recorded import Finding, finding
+from ..quality.findings import finding
 from ..recordings.records import Run
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
+from ..results.findings import Finding
 from ..train.noise import robust_sigma
 
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
@@ -151,8 +152,7 @@ def _late(runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
                 "temperature_late",
                 f"The temperature of {run.file} was recorded {abs(late):.3g} s {word} against the rate than in the "
                 f"other runs (1 sigma {sigma:.2g} s): its clock, its wiring, or the pairing of its files.",
-                file=run.file,
-                from_s=run.from_s,
+                run,
                 late_s=late,
                 sigma_s=sigma,
             )

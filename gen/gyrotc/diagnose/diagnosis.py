@@ -11,10 +11,10 @@ import numpy as np
 from ..common.arrays import Progress
 from ..common.metrics import LEAST_SPAN_C
 from ..model import Model
-from ..quality.events import Event, accepted
-from ..quality.sign_and_gain import found_events
+from ..quality.events import accepted, found_events
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.diagnosed import Diagnosed
+from ..results.findings import Finding
 from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.cross_validation import training_spans
@@ -82,14 +82,14 @@ def diagnose(
     found = _diagnosed(
         accepted(whole, events) if accept_events else whole, options or _options_of(model), say
     )
-    reported = {"events": tuple(event.result() for event in events), "events_accepted": accept_events}
+    reported = {"events": tuple(events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
 
 
-def _about(events: Sequence[Event], accept: bool) -> list[str]:
+def _about(events: Sequence[Finding], accept: bool) -> list[str]:
     """What to do about events before anything else."""
-    if accept or not any(event.leave_out for event in events):
+    if accept or not any(event.leave_out_s or event.whole_run for event in events):
         return []
     return [
         "First look at the events: what is named may stand for them. Paste their exclude lines into dataset.toml, or "

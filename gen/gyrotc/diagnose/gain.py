@@ -17,7 +17,8 @@ from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages, average, time_statistics
 from ..model import Model
 from ..recordings.records import Run
-from ..results.diagnosed import Estimate, GainOnUnseen
+from ..results.diagnosed import GainOnUnseen
+from ..results.findings import Estimate
 from ..tables.emit import quantise_all
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike

@@ -11,21 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.special import fdtrc, ndtr, pdtrc
 
 from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA
 from ..common.statistics import orthonormal
-from .blocks import Records, centred_slope
+from ..quality.facts import SPIKE_SIGMAS
+from ..quality.outliers import BLOCK_S, departing
+from ..target.front_end import samples_per_block
+from .blocks import Record, Records, centred_slope
 
-_MEDIAN_ROWS = (
-    15  # odd; a median over 15 rows follows a ramp; up to seven outliers in a row do not carry it away
-)
-_SCALE_ROWS = 241  # odd; 40 minutes at 10 s: the scale of the noise is known to 8 % and follows a ramp
-_OUTLIER = 4.5  # robust standard deviations
-_ALIKE = 0.01  # of the noise of a row: values that are nearer are the same step of a converter
-_P_OUTLIERS, _MANY = 1e-7, 8  # eight or more, and hardly by chance: single ones are left out in silence
+_MANY = 8  # single outliers are left out in silence
 _P_VARIANCE = (
     1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
 )
@@ -40,73 +35,40 @@ class Screened:
     Attributes:
         masks: Per run, rows that are kept, shape (n,).
         n_outliers: Rows left out.
-        expected_outliers: How many normal noise would have had.
         sigma: Factor of the noise of every block, median 1, shape (N,); None: even.
         findings: Causes of the family `noise` found here: id, p-value, parameters.
     """
 
     masks: tuple[NDArray[np.bool_], ...]
     n_outliers: int
-    expected_outliers: float
     sigma: FloatArray | None
     findings: tuple[tuple[str, float, dict[str, float]], ...]
 
 
 def screen(records: Records) -> Screened:
     """Runs all screens."""
-    masks, found, expected = _outliers(records)
+    masks = tuple(_without_outliers(run) for run in records.runs)
+    kept = sum(int(mask.sum()) for mask in masks)
+    rows = sum(int(run.usable.sum()) for run in records.runs)
     findings: list[tuple[str, float, dict[str, float]]] = []
-    p_outliers = float(pdtrc(found - 1, expected)) if found else 1.0
-    if found >= _MANY and p_outliers < _P_OUTLIERS:
-        share = found / max(sum(int(m.sum()) for m in masks) + found, 1)
-        findings.append(("outliers", p_outliers, {"count": float(found), "share": share}))
+    if (found := rows - kept) >= _MANY:
+        by_chance = float(pdtrc(found - 1, 2.0 * float(ndtr(-SPIKE_SIGMAS)) * rows))
+        findings.append(("outliers", by_chance, {"count": float(found), "share": found / rows}))
     sigma, p_variance, ratio = _variance(records, masks)
     if sigma is not None:
         findings.append(("noise_variance", p_variance, {"ratio": ratio}))
     step = _temperature_step(records)
     if step is not None:
         findings.append(("temperature_quantisation", 0.0, {"step_c": step}))
-    return Screened(masks, found, expected, sigma, tuple(findings))
+    return Screened(masks, found, sigma, tuple(findings))
 
 
-def _detrended(rate: FloatArray) -> FloatArray:
-    """Rows less their running median."""
-    return np.asarray(rate - median_filter(rate, _MEDIAN_ROWS, mode="reflect"))
-
-
-def _step(rate: FloatArray, noise: float) -> float:
-    """What lies between two neighbouring values that occur, in the middle of all; of fine rows next to nothing.
-
-    What is printed, or a mean of rounded rows, is beside its step by a trace of the noise: that is the same value.
-    """
-    gaps = np.diff(np.sort(rate))
-    distinct = gaps[gaps > _ALIKE * noise]
-    return float(np.median(distinct)) if distinct.size else 0.0
-
-
-def _outliers(records: Records) -> tuple[tuple[NDArray[np.bool_], ...], int, float]:
-    """Hampel's rule with a scale that follows slow changes of the noise.
-
-    The median of rows that a converter has rounded is one of its steps, and may be half a step short of the noise.
-    """
-    masks, found, expected = [], 0, 0.0
-    tail = 2.0 * float(ndtr(-_OUTLIER))
-    for run in records.runs:
-        usable = run.usable
-        rate = run.rate_dph[usable]
-        keep = usable.copy()
-        if rate.size > 4 * _MEDIAN_ROWS:
-            rest = np.abs(_detrended(rate))
-            window = min(_SCALE_ROWS, rate.size // 2 * 2 - 1)
-            mean = float(rest.mean())
-            rounded = 0.5 * _step(rate, mean)
-            scale = MAD_TO_SIGMA * (median_filter(rest, window, mode="reflect") + rounded)
-            far = rest > _OUTLIER * np.maximum(scale, 0.5 * mean)
-            keep[np.flatnonzero(usable)[far]] = False
-            found += int(far.sum())
-            expected += 3.0 * tail * rate.size  # the running median and scale add to the tails
-        masks.append(keep)
-    return tuple(masks), found, expected
+def _without_outliers(run: Record) -> NDArray[np.bool_]:
+    """Usable rows of a run that are no spikes and no parts of bursts, by the rule that training has."""
+    keep: NDArray[np.bool_] = run.usable.copy()
+    at = np.flatnonzero(keep)
+    keep[at[departing(run.rate_dph[at], samples_per_block(BLOCK_S, run.row_s))]] = False
+    return keep
 
 
 def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray | None, float, float]:

@@ -16,7 +16,6 @@ from ..results.diagnosed import (
     CycleResult,
     Diagnosed,
     DiagnosisVerdict,
-    Estimate,
     ExtendedModel,
     GainOnUnseen,
     NamedCause,
@@ -26,6 +25,7 @@ from ..results.diagnosed import (
     Unexplained,
     WithoutRate,
 )
+from ..results.findings import Estimate
 from ..results.planned import DetectionLimit
 from ..train.fitting import FitOptions, front_end
 from .attribution import Attribution

@@ -91,9 +91,8 @@ def _series(file: str, a: Averages) -> ResidualSeries:
 
 
 def _edge_s(a: Averages, index: int) -> float:
-    """Time between the means before and after a step, from the start of the run, s."""
-    start = a.time_s[0]
-    return float(0.5 * (a.time_s[index - 1] + a.time_s[index]) - start) if index else 0.0
+    """Time between the means before and after a step, s."""
+    return float(a.time_s[max(index - 1, 0) : index + 1].mean())
 
 
 def _curve(runs: Sequence[Averages]) -> tuple[float | None, ...]:

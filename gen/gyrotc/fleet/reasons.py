@@ -34,6 +34,7 @@ _NOT_CALIBRATED = frozenset({"sign_reversed", "axes_exchanged", "scale", "gain_c
 _OF_RUN = (
     "sign_reversed",
     "axes_exchanged",
+    "unit_changed",
     "gain_changed",
 )  # what a run is as a whole comes before what happened in it
 _IN_RUN = (
@@ -41,8 +42,9 @@ _IN_RUN = (
     "step",
     "step_and_recover",
     "ramp",
-    "thermometer_jump",
-    "thermometer_lost",
+    "transition",
+    "jump_in_temperature",
+    "stuck_temperature",
     "run_outlier",
 )
 _PER_H = 3600.0  # s in an hour
@@ -168,7 +170,8 @@ def _own(entries: Sequence[FleetEntry], ids: Sequence[str]) -> Iterator[Reason]:
         known = [event for event in (entry.facts.own if entry.facts else ()) if event.id in ids]
         if known:
             first = min(known, key=lambda event: ids.index(event.id))
-            yield _reason(entry, first.id, first.text, first.file, first.time_s)
+            at = first.time_s.value if first.time_s else None
+            yield _reason(entry, first.id, first.text, first.file, at)
 
 
 def _late(kind: _Kind) -> Iterator[Reason]:

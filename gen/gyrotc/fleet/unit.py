@@ -18,12 +18,12 @@ from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.build import Built, build_into
-from ..quality.sign_and_gain import found_events
+from ..quality.events import found_events
 from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
 from ..results.evaluation import Evaluation
-from ..results.fleet import Facts, FleetEntry, OwnEvent
+from ..results.fleet import Facts, FleetEntry
 from ..store.cache import inputs_of, program_of
 from ..store.files import Lock, digest_of, json_text, write_atomically
 from ..store.folder import clean, leftovers, result_folder, share_by_hash
@@ -292,19 +292,8 @@ def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]])
     facts = facts_of(runs)
     if not built.evaluation.structure_left:
         return facts
-    starts = {run.file: float(run.rows().time_s[0]) for run in dataset.runs}
-    events = [
-        OwnEvent(
-            id=e.id, text=e.text, file=e.file, time_s=None if e.whole_run else e.time_s[0] - starts[e.file]
-        )
-        for e in found_events(dataset)
-    ]
-    named = [
-        OwnEvent(id=f.id, text=f.text, file=str(f.evidence["file"]), time_s=None)
-        for f in built.evaluation.findings
-        if f.id == "run_outlier"
-    ]
-    return facts.model_copy(update={"own": (*events, *named)})
+    named = (f for f in built.evaluation.findings if f.id == "run_outlier")
+    return facts.model_copy(update={"own": (*found_events(dataset), *named)})
 
 
 def _expanded(evaluation: Evaluation) -> float | None:

@@ -18,7 +18,6 @@ from ..results.diagnosed import (
     ComparedStatistic,
     Diagnosed,
     DiagnosisSeries,
-    FoundEvent,
     GainOnUnseen,
     NamedCause,
     ParameterLikelihood,
@@ -28,6 +27,7 @@ from ..results.diagnosed import (
     Statistic,
     Values,
 )
+from ..results.findings import Finding
 from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .report import page_environment, page_from, write_page
 from .thermal import sorted_by_rate
@@ -114,7 +114,7 @@ def _drawn(panels: Sequence[Panel]) -> Markup:
     return drawing(panels, columns=min(3, len(panels)), height=115.0, share_y=True)
 
 
-def _events(runs: Sequence[RunSeries], events: Sequence[FoundEvent]) -> Markup | None:
+def _events(runs: Sequence[RunSeries], events: Sequence[Finding]) -> Markup | None:
     """The rate of every run with an event, as block means, and where the events lie."""
     files = {event.file for event in events}
     shown = [run for run in runs if run.file in files][:_MOST_PANELS]
@@ -124,8 +124,9 @@ def _events(runs: Sequence[RunSeries], events: Sequence[FoundEvent]) -> Markup |
     for panel, run in zip(panels, shown, strict=True):
         panel.title = run.name
         panel.line(np.array(run.hours) + run.first_s / 3600.0, np.array(run.rate_dph), BEFORE)
-        for event in (e for e in events if e.file == run.file):
-            panel.vertical(event.time_s.value / 3600.0, AFTER, width=1.2)
+        for event in events:
+            if event.file == run.file and event.time_s is not None:
+                panel.vertical(event.time_s.value / 3600.0, AFTER, width=1.2)
     return _drawn(panels)
 
 

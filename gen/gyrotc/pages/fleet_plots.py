@@ -87,7 +87,7 @@ def _over_time(series: ResidualSeries, reason: Reason) -> Panel:
     time = np.array(series.time_s)
     panel.line((time - time[0]) / 3600.0, in_unit(series.rate_dph), AFTER, series.file, width=1.0)
     if reason.time_s is not None and reason.file == series.file:
-        panel.vertical(reason.time_s / 3600.0, BEFORE, "step", dash="5 3", width=1.2)
+        panel.vertical((reason.time_s - time[0]) / 3600.0, BEFORE, reason.id, dash="5 3", width=1.2)
     return panel
 
 

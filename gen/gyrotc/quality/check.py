@@ -7,20 +7,45 @@ can be checked: its unfinished last line is left out, and that is a warning.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 from ..common.errors import InputError
 from ..model import Model
 from ..recordings.description import Problems
 from ..recordings.load import asked_axes, survey
-from ..recordings.records import Applied, Dataset, Mark
-from ..results.recordings import Checked, CheckedRun, MarkedRows, Problem, Suspected
-from .facts import RunFacts
-from .findings import CheckWarning, Envelope, looked_at, warnings_of_data_set, where_of
+from ..recordings.records import Applied, Dataset, Mark, Rows, Run
+from ..results.findings import Finding, MarkedRows
+from ..results.recordings import Checked, CheckedRun, Problem
+from .curves import contradiction_findings, curve_findings
+from .facts import RunFacts, facts_of
+from .findings import (
+    coarse_rate_findings,
+    constant_findings,
+    copied_channel_findings,
+    counter_findings,
+    earth_rate_findings,
+    finding,
+    held_findings,
+    shared_axes_findings,
+    shared_rows_findings,
+    temperature_findings,
+)
+from .outliers import departing_rows, spike_findings
+from .thermometers import temperature_findings_of, thermometer_findings
+from .timing import time_findings
+
+Envelope = tuple[tuple[float, float], tuple[float, float]]
+"""Lowest and highest temperature (C), lowest and highest temperature rate (C/min)."""
+
+_HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
+_PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample rate by more
+_ENVELOPE_CELLS = (20, 8)  # of T and of dT/dt: 5 C and 1.25 C/min of the paper's range
+_ENVELOPE_MARGIN = 0.05  # share of the range: chambers do not reach their ends to the degree
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +65,7 @@ class CheckResult:
     serial: str | None
     axis: str | None
     problems: tuple[InputError, ...]
-    warnings: tuple[CheckWarning, ...]
+    warnings: tuple[Finding, ...]
     facts: tuple[tuple[str | None, RunFacts], ...]
     marks: Mapping[str, tuple[Mark, ...]]
     datasets: tuple[tuple[str | None, Dataset], ...]
@@ -51,8 +76,10 @@ class CheckResult:
             yield f"problem: {problem}"
         for warning in self.warnings:
             yield f"warning: {warning}"
-            if warning.advice:
-                yield f"  next: {warning.advice}"
+            if warning.next:
+                yield f"  next: {warning.next}"
+            if warning.exclude:
+                yield f"  paste: {warning.exclude}"
         for axis, f in self.facts:
             yield _run_line(axis, f)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
@@ -70,10 +97,7 @@ class CheckResult:
                 )
                 for p in self.problems
             ),
-            warnings=tuple(
-                Suspected(id=d.id, where=d.where, text=d.text, next=d.advice, rows=_rows(d.marks))
-                for d in self.warnings
-            ),
+            warnings=self.warnings,
             runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
         )
 
@@ -118,7 +142,7 @@ def check(
     """
     problems: dict[str, InputError] = {}
     marks: dict[str, tuple[Mark, ...]] = {}
-    warnings: dict[CheckWarning, list[str | None]] = {}
+    warnings: dict[tuple[str, str, str], tuple[Finding, list[str | None]]] = {}
     facts: list[tuple[str | None, RunFacts]] = []
     datasets: list[tuple[str | None, Dataset]] = []
     axes = _axes(folder, axis)
@@ -134,13 +158,13 @@ def check(
             looked = []
             for k, run in enumerate(dataset.runs, 1):
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")
-                looked.append(looked_at(run))
+                looked.append(_looked_at(run))
             of_axis = [f for f, _ in looked]
-            together = warnings_of_data_set(dataset, of_axis, envelope, earlier)
+            together = _of_all_runs(dataset, of_axis, envelope, earlier)
             for warning in (*together, *(warning for _, of_run in looked for warning in of_run)):
-                warnings.setdefault(warning, []).append(one)
+                warnings.setdefault((warning.id, warning.where, warning.text), (warning, []))[1].append(one)
             facts += [(one, f) for f in of_axis]
-    named = (_of_axes(warning, seen, len(axes)) for warning, seen in warnings.items())
+    named = (_of_axes(warning, seen, len(axes)) for warning, seen in warnings.values())
     serial = datasets[-1][1].serial if datasets else None
     return CheckResult(
         serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets)
@@ -151,11 +175,12 @@ def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:
     return tuple(MarkedRows(file=m.file, rows=m.rows, span_s=m.span_s) for m in marks)
 
 
-def _of_axes(warning: CheckWarning, seen: Sequence[str | None], axes: int) -> CheckWarning:
+def _of_axes(warning: Finding, seen: Sequence[str | None], axes: int) -> Finding:
     """Says for which axes a warning holds, where that is not for all."""
     if len(seen) == axes:
-        return replace(warning, axes=tuple(seen))
-    return replace(warning, where=f"{warning.where}, axis {', '.join(map(str, seen))}", axes=tuple(seen))
+        return warning
+    named = tuple(map(str, seen))
+    return warning.model_copy(update={"axes": named, "where": f"{warning.where}, axis {', '.join(named)}"})
 
 
 def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
@@ -169,7 +194,8 @@ def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
 def _run_line(axis: str | None, f: RunFacts) -> str:
     earth = f", Earth's rate {f.earth.rate_dph:.4f} +- {f.earth.sigma_dph:.4f} deg/h off" if f.earth else ""
     return (
-        f"{where_of(f.file, f.from_s)}{f', axis {axis}' if axis else ''} ({f.role}): {f.rows} rows of "
+        f"{f.file}{'' if f.from_s is None else f' from {f.from_s:.6g} s'}{f', axis {axis}' if axis else ''} "
+        f"({f.role}): {f.rows} rows of "
         f"{f.row_period_s:.4g} s, {f.temperature_c[0]:.4g} ... {f.temperature_c[1]:.4g} C, "
         f"mean {f.mean_dph:.4g} deg/h, noise {f.noise_dph:.2g} deg/h a row{earth}"
     )
@@ -190,3 +216,103 @@ def _refuse_another(models: Mapping[str, Model], dataset: Dataset) -> None:
         if model.serial != dataset.serial:
             axis = f", axis {model.axis}" if model.axis else ""
             raise InputError("--previous", f"is of gyro {model.serial}{axis}", f"gyro {dataset.serial}{axis}")
+
+
+def findings_of_run(run: Run, rows: Rows, f: RunFacts, wild: NDArray[np.int64]) -> Iterator[Finding]:
+    """What the rows of a run show by themselves of its thermometer, its rate and its counter.
+
+    Args:
+        wild: Its rows that are spikes or parts of bursts.
+    """
+    yield from temperature_findings_of(run, rows, f)
+    yield from counter_findings(f)
+    yield from held_findings(f)
+    yield from spike_findings(run, rows, wild)
+
+
+def findings_of_data_set(
+    dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None = None
+) -> Iterator[Finding]:
+    """What all runs together show.
+
+    Args:
+        earlier: Models of an earlier calibration, by axis.
+    """
+    yield from earth_rate_findings(dataset, facts)
+    yield from contradiction_findings(facts)
+    yield from thermometer_findings(dataset)
+    yield from shared_rows_findings(dataset)
+    yield from shared_axes_findings(dataset)
+    yield from curve_findings(dataset, facts, earlier)
+
+
+def _looked_at(run: Run) -> tuple[RunFacts, list[Finding]]:
+    """Facts of a run, and the warnings that its rows alone raise."""
+    rows = run.rows()
+    f = facts_of(run, rows)
+    coarse = list(coarse_rate_findings(run, rows))
+    found = [
+        *constant_findings(f, rows, coarse=bool(coarse)),
+        *time_findings(run, rows),
+        *coarse,
+        *copied_channel_findings(run, rows),
+        *findings_of_run(run, rows, f, departing_rows(rows, run)),
+    ]
+    return f, found
+
+
+def _of_all_runs(
+    dataset: Dataset,
+    facts: Sequence[RunFacts],
+    envelope: Envelope | None,
+    earlier: Mapping[str, Model] | None,
+) -> Iterator[Finding]:
+    """What all runs together raise."""
+    for warning in dataset.warnings:
+        where, _, text = warning.partition(": ")
+        yield finding("left_out", text, where)
+    isothermal = list(temperature_findings(facts))
+    yield from isothermal
+    yield from findings_of_data_set(dataset, facts, earlier)
+    yield from _between_runs(facts)
+    training = [f for f in facts if f.role == "train" and len(f.slopes_c_per_min)]
+    if training and not isothermal:
+        yield from _of_holds(training)
+    if envelope is not None:
+        yield from _of_coverage(training, envelope)
+
+
+def _between_runs(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    first: dict[str, str] = {}
+    for f in facts:
+        other = first.setdefault(f.sha256, f.file)
+        if other != f.file:
+            yield finding("same_recording_twice", f"holds the same bytes as {other}", f.file)
+    periods = [f.row_period_s for f in facts]
+    if periods and max(periods) > (1.0 + _PERIODS) * min(periods):
+        yield finding("row_periods_differ", f"row periods from {min(periods):.4g} to {max(periods):.4g} s")
+
+
+def _of_holds(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    holds = float(np.average([f.hold_share for f in facts], weights=[len(f.slopes_c_per_min) for f in facts]))
+    if holds > _HOLDS:
+        text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
+        yield finding("mostly_holds", text)
+
+
+def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[Finding]:
+    """What the training runs do not show of the requested envelope."""
+    slopes = np.concatenate([f.slopes_c_per_min for f in facts] or [np.zeros(0)])
+    temperatures = np.concatenate([f.temperatures_c for f in facts] or [np.zeros(0)])
+    for name, unit, values, (low, high) in (
+        ("temperature", "C", temperatures, envelope[0]),
+        ("temperature rate", "C/min", slopes, envelope[1]),
+    ):
+        margin = _ENVELOPE_MARGIN * (high - low)
+        reached = (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+        if not (reached[0] <= low + margin and reached[1] >= high - margin):
+            text = f"{name} covers {reached[0]:.4g} ... {reached[1]:.4g} of {low:.4g} ... {high:.4g} {unit}"
+            yield finding("envelope_not_reached", text)
+    seen, *_ = np.histogram2d(temperatures, slopes, bins=_ENVELOPE_CELLS, range=envelope)
+    text = f"{np.mean(seen > 0):.0%} of the cells of temperature and its rate hold training data"
+    yield finding("envelope_coverage", text)

@@ -1,37 +1,25 @@
-"""Warnings about recordings: each with its place, its rows, and what to do next."""
+"""Findings that a run's rows, or the facts of all runs, show by themselves, each with what to do next.
+
+Findings follow from figures alone: no name of a file, folder or serial plays a part. They never stop a job.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any, Protocol
 
 import numpy as np
 
-from ..model import Model
+from ..common.metrics import LEAST_SPAN_C
 from ..recordings.description import exclude_line
+from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Mark, Rows, Run
-from ..target.front_end import samples_per_block
-from .facts import RunFacts, facts_of
-from .orientation import orientation_findings
-from .outliers import departing_rows, stretches_left_out
-from .recorded import (
-    coarse_rate_findings,
-    contradiction_findings,
-    copied_channel_findings,
-    counter_findings,
-    earth_rate_findings,
-    held_findings,
-    jump_findings,
-    outlier_findings,
-    shared_axes_findings,
-    shared_rows_findings,
-    sign_findings,
-    stuck_temperature_findings,
-    temperature_findings,
-)
-from .thermometers import thermometer_findings
-from .timing import time_findings
+from ..results.findings import Estimate, Finding, MarkedRows, Size
+from .facts import RunFacts
+
+Limits = tuple[float, float, float]
+"""A figure and its 95 % limits."""
 
 _ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
@@ -50,8 +38,8 @@ _ADVICE = {
     "left_out": "Nothing, if it is meant so.",
     "mostly_holds": "Record ramps at several rates, up and down.",
     "no_temperature_information": "Record runs in a chamber, over the temperatures that the product will see.",
-    "rate_outliers": "Look for what disturbed the gyro at these times; paste the exclude lines, where offered, "
-    "into the run's [[run]] of dataset.toml.",
+    "rate_outliers": "Look for what disturbed the gyro at these times; paste the exclude line into the run's [[run]] "
+    "of dataset.toml to leave them out of every figure, too.",
     "row_periods_differ": "Nothing, if the logger was set so; else look which of the files has a wrong time unit.",
     "runs_contradict": "Compare serial, mounting, mode and software of this run with the others; leave out what is not "
     "the same gyro in the same state. gyrotc diagnose looks for turn-on offsets and ageing.",
@@ -60,190 +48,151 @@ _ADVICE = {
     "rate_held": "Record at the gyro's own rhythm, or keep every row of it once.",
     "shared_axes": "Look at the wiring of the channels and at the columns of the logger.",
     "stuck_rate": "Look at the logger and the gyro's data line there; leave the stretch out by exclude.",
+    "stuck_temperature": "Look at the thermometer's wiring; paste the exclude line.",
     "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --rate-hz R.",
     "time_jumps": "Number the rows instead, gyrotc import FILE --rate-hz R, or cut the file there into two runs by "
     "to_s and from_s.",
     "time_since_epoch": "State power_on_s of the run, or subtract the time of power-on; gyrotc import does that.",
 }
-
-
-def advice_of(id: str) -> str:
-    """What to do next; empty where the warning's own text says it."""
-    return _ADVICE.get(id, "")
-
-
-Envelope = tuple[tuple[float, float], tuple[float, float]]
-"""Lowest and highest temperature (C), lowest and highest temperature rate (C/min)."""
+_LINES = 20  # stretches that a line holds: more are a fault of the recording
 
 _COARSE_STEP_C = 0.25  # at 1 C/min a slope over 100 s then rests on fewer than seven steps
-_HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
-_STUCK_S = 60.0  # longer than any thermometer waits between two readings
+_STUCK_S = 60.0  # longer than a gyro waits between two readings
 _STUCK_ROWS = 30  # and not fewer rows, so that slow loggers are not questioned
 _LATE_S = 3.0e8  # ten years: a time since some epoch, not since power-on
 _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
-_PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample rate by more
-_ENVELOPE_CELLS = (20, 8)  # of T and of dT/dt: 5 C and 1.25 C/min of the paper's range
-_ENVELOPE_MARGIN = 0.05  # share of the range: chambers do not reach their ends to the degree
-_BLOCK_S = 10.0  # as `fit` has it where nothing else is asked for
-_LINES = 20  # that are offered to be pasted: more are a fault of the recording
+_MOVED_ROWS = 60  # that differ from the one before: fewer do not show the steps of a rate
+_FEWEST_VALUES = 10  # a channel of fewer values says nothing
+_COARSE_ROWS = 2**17  # rows that the resolution is recognised from
+_REPEATS = 0.6  # share of rows that repeat the one before: the noise is below a third of a step
+_ONE_STEP = 1.5  # a reading that moves by less at a time moves by one step of its resolution
 
 
-@dataclass(frozen=True, slots=True)
-class CheckWarning:
-    """Something suspect: a stable id, where, what, the rows, and the axes that show it."""
-
-    id: str
-    where: str
-    text: str
-    marks: tuple[Mark, ...] = ()
-    axes: tuple[str | None, ...] = ()
+class _OfFile(Protocol):
+    """A run or its facts."""
 
     @property
-    def advice(self) -> str:
-        """What to do next; empty where the text says it."""
-        return advice_of(self.id)
-
-    def __str__(self) -> str:
-        return f"{self.where}: {self.text}"
+    def file(self) -> str: ...
+    @property
+    def from_s(self) -> float | None: ...
 
 
-def where_of(file: str, from_s: float | None) -> str:
-    """The run as messages name it."""
-    return file if from_s is None else f"{file} from {from_s:.6g} s"
+def finding(
+    id: str,
+    text: str,
+    run: _OfFile | str | None = None,
+    *,
+    marks: Sequence[Mark] = (),
+    time_s: Limits | None = None,
+    size: tuple[Limits, str] | None = None,
+    leave_out: Sequence[tuple[float, float]] = (),
+    whole_run: bool = False,
+    **evidence: Any,
+) -> Finding:
+    """A finding as results hold it; what does not apply is absent.
+
+    Args:
+        run: What it is about: a run, its facts, or a file; None: the data set or the model.
+        size: With its unit.
+        leave_out: Times to leave out, s; the first ones stand in the line to paste.
+    """
+    file, from_s = (run, None) if run is None or isinstance(run, str) else (run.file, run.from_s)
+    given: dict[str, Any] = {} if from_s is None else {"from_s": from_s}
+    if time_s is not None:
+        given["time_s"] = Estimate.of(time_s)
+    if size is not None:
+        given["size"] = Size.of(size[0], unit=size[1])
+    if leave_out:
+        given["leave_out_s"] = tuple(leave_out)
+    if whole_run:
+        given["whole_run"] = True
+    return Finding(
+        id=id,
+        where=(file or "data set") + ("" if from_s is None else f" from {from_s:.6g} s"),
+        text=text,
+        next=_ADVICE.get(id, ""),
+        file=file,
+        exclude=exclude_line(leave_out[:_LINES], id) if leave_out else None,
+        rows=tuple(MarkedRows(file=m.file, rows=m.rows, span_s=m.span_s) for m in marks[:_LINES]),
+        evidence=evidence,
+        **given,
+    )
 
 
-def looked_at(run: Run) -> tuple[RunFacts, list[CheckWarning]]:
-    """Facts of a run, and the warnings that its rows alone raise."""
-    rows = run.rows()
-    f = facts_of(run, rows)
-    where = where_of(f.file, f.from_s)
-    found = [
-        *time_findings(run, rows),
-        *coarse_rate_findings(run, rows),
-        *copied_channel_findings(run, rows),
-        *stuck_temperature_findings(run, rows),
-    ]
-    warnings = [
-        *_of_temperature(f, where),
-        *_of_rate(f, rows, where, coarse=any(one["id"] == "coarse_rate" for one in found)),
-        *_of_time(f, where),
-        *(CheckWarning(one["id"], where, one["text"], one.get("marks", ())) for one in found),
-        *_of_counter(f, rows, where),
-        *(CheckWarning(one["id"], where, one["text"]) for one in held_findings([f])),
-        *_of_outliers(run, rows, f, where),
-    ]
-    return f, warnings
-
-
-def _of_counter(f: RunFacts, rows: Rows, where: str) -> Iterator[CheckWarning]:
-    for one in counter_findings([f]):
-        yield CheckWarning(
-            one["id"], where, one["text"], (_mark_at(f.file, rows, one["evidence"]["time_s"]),)
-        )
-
-
-def _mark_at(file: str, rows: Rows, time_s: float) -> Mark:
-    """The row of a time, and the one before it."""
-    k = int(np.searchsorted(rows.time_s, time_s))
-    first, end = max(k - 1, 0), min(k + 1, len(rows) - 1)
-    return Mark(file, (first + 1, k + 1), (float(rows.time_s[first]), float(rows.time_s[end])))
-
-
-def _of_outliers(run: Run, rows: Rows, f: RunFacts, where: str) -> Iterator[CheckWarning]:
-    """Spikes and bursts, with the lines that leave them out."""
-    wild = departing_rows(rows, run, samples_per_block(_BLOCK_S, run.row_period_s))
-    stretches = stretches_left_out(run, rows.time_s[wild])
-    texts = [one["text"] for one in outlier_findings([f])]
-    if f.outlier is not None and not texts:
-        texts = [
-            f"{f.outliers} rows depart from those around them by more than 8 times the noise, most at "
-            f"{f.outlier.time_s:.10g} s: {f.outlier.rate_dph:.4g} deg/h"
-        ]
-    if stretches:
-        line = exclude_line([(s.from_s, s.to_s) for s in stretches[:_LINES]], "outlier")
-        more = f" ({len(stretches) - _LINES} more stretches)" if len(stretches) > _LINES else ""
-        texts.append(
-            f"{len(wild)} rows in {len(stretches)} stretches are spikes or bursts and do not reach the fit; to leave "
-            f"them out of every figure: {line}{more}"
-        )
-    marks = [_mark(run.file, rows, s.from_s, s.to_s) for s in stretches[:_LINES]]
-    if f.outlier is not None and not marks:
-        marks = [_mark_at(run.file, rows, f.outlier.time_s)]
-    if texts:
-        yield CheckWarning(
-            "rate_outliers", where, "; ".join(text.rstrip(".") for text in texts), tuple(marks)
-        )
-
-
-def _mark(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
+def mark_of(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
+    """The rows from one time to another, the end exclusive, one at least."""
     first, end = np.searchsorted(rows.time_s, (from_s, to_s))
     return Mark(file, (int(first) + 1, int(max(end, first + 1))), (from_s, to_s))
 
 
-def warnings_of_data_set(
-    dataset: Dataset,
-    facts: Sequence[RunFacts],
-    envelope: Envelope | None,
-    earlier: Mapping[str, Model] | None = None,
-) -> Iterator[CheckWarning]:
-    """What all runs together raise.
+def temperature_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """Nothing can be learnt about temperature where it hardly changes over all training runs."""
+    runs = [f for f in facts if f.role == "train"]
+    if not runs:
+        return
+    low, high = min(f.temperature_c[0] for f in runs), max(f.temperature_c[1] for f in runs)
+    if high - low < LEAST_SPAN_C:
+        yield finding(
+            "no_temperature_information",
+            f"Temperature spans {high - low:.3g} C in training: nothing can be learnt about temperature, "
+            "and the model is a constant.",
+            span_c=high - low,
+            required_c=LEAST_SPAN_C,
+        )
+
+
+def counter_findings(f: RunFacts) -> Iterator[Finding]:
+    """Counts of pulses that step by the whole range of a counter: it passed its end, and nobody added that."""
+    if f.wrapped is not None:
+        time_s, bits, places = f.wrapped
+        yield finding(
+            "counter_wrapped",
+            f"Pulses in {f.file} step by 2^{bits}, the range of a counter of {bits} bits ({places} places), first at "
+            f"{time_s:.10g} s: it passed its end, or negative counts were stored without their sign.",
+            f,
+            marks=(Mark(f.file, None, (time_s - f.row_period_s, time_s)),),
+            time_s=(time_s,) * 3,
+            bits=bits,
+            places=places,
+        )
+
+
+def held_findings(f: RunFacts) -> Iterator[Finding]:
+    """Rates that are held for several rows: there are fewer than rows, and their noise is not what it seems."""
+    if f.held_rows > 1:
+        yield finding(
+            "rate_held",
+            f"{f.file} holds each rate for {f.held_rows} rows: the gyro answers every "
+            f"{f.held_rows * f.row_period_s:.4g} s, the rows come every {f.row_period_s:.4g} s.",
+            f,
+            held_rows=f.held_rows,
+            row_period_s=f.row_period_s,
+        )
+
+
+def constant_findings(f: RunFacts, rows: Rows, *, coarse: bool) -> Iterator[Finding]:
+    """Columns of one value, coarse temperatures, rates that are tiny or stay, a clock that began long ago.
 
     Args:
-        earlier: Models of an earlier calibration, by axis.
+        coarse: Whether the rate comes in coarse steps, and so repeats.
     """
-    for warning in dataset.warnings:
-        where, _, text = warning.partition(": ")
-        yield CheckWarning("left_out", where, text)
-    isothermal = list(temperature_findings(facts))
-    for one in (*isothermal, *jump_findings(facts), *earth_rate_findings(dataset, facts)):
-        yield CheckWarning(one["id"], "data set", one["text"], _of_jumps(one))
-    for one in (*contradiction_findings(facts), *thermometer_findings(dataset)):
-        yield _of_run(one)
-    for shared, one in zip(dataset.shared, shared_rows_findings(dataset), strict=True):
-        yield CheckWarning(one["id"], shared.file, one["text"], shared.marks)
-    for one in shared_axes_findings(dataset):
-        yield CheckWarning(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
-    reversed_files = {one["evidence"]["file"]: one for one in sign_findings(facts)}
-    reversed_files |= {one["evidence"]["file"]: one for one in orientation_findings(dataset, earlier)}
-    for one in reversed_files.values():
-        yield CheckWarning(one["id"], one["evidence"]["file"], one["text"], (Mark(one["evidence"]["file"]),))
-    yield from _between_runs(facts)
-    training = [f for f in facts if f.role == "train" and len(f.slopes_c_per_min)]
-    if training and not isothermal:
-        yield from _of_holds(training)
-    if envelope is not None:
-        yield from _of_coverage(training, envelope)
-
-
-def _of_run(one: dict[str, Any]) -> CheckWarning:
-    evidence = one["evidence"]
-    where = where_of(evidence["file"], evidence["from_s"])
-    return CheckWarning(one["id"], where, one["text"], (Mark(evidence["file"]),))
-
-
-def _of_jumps(one: dict[str, Any]) -> tuple[Mark, ...]:
-    jumps = one["evidence"].get("jumps", [])[:_LINES]
-    return tuple(Mark(j["file"], None, (j["time_s"], j["time_s"])) for j in jumps)
-
-
-def _of_temperature(f: RunFacts, where: str) -> Iterator[CheckWarning]:
     for column in f.constant:
-        yield CheckWarning("constant_channel", where, f"{column} holds one value in all {f.rows} rows")
+        yield finding("constant_channel", f"{column} holds one value in all {f.rows} rows", f)
     step = f.temperature_step_c
     if step >= _COARSE_STEP_C:
         what = "whole degrees" if step % 1.0 == 0.0 else f"steps of {step:.3g} C"
         text = f"temperature comes in {what}: its rate is the difference of two such steps"
-        yield CheckWarning("coarse_temperature", where, text)
-
-
-def _of_rate(f: RunFacts, rows: Rows, where: str, *, coarse: bool) -> Iterator[CheckWarning]:
+        yield finding("coarse_temperature", text, f)
     if 0.0 < f.largest_dph < _SMALL_DPH:
         text = f"no rate exceeds {f.largest_dph:.3g} deg/h; are they in deg/s or rad/s?"
-        yield CheckWarning("small_rates", where, text)
+        yield finding("small_rates", text, f)
     stuck = f.stuck_s > max(_STUCK_S, _STUCK_ROWS * f.row_period_s)
     if stuck and not coarse and "rate" not in f.constant:
-        marks = (_stuck(f.file, rows),)
-        yield CheckWarning("stuck_rate", where, f"the rate stays at one value for {f.stuck_s:.4g} s", marks)
+        text = f"the rate stays at one value for {f.stuck_s:.4g} s"
+        yield finding("stuck_rate", text, f, marks=(_stuck(f.file, rows),))
+    if abs(f.first_s) > _LATE_S:
+        text = f"time starts at {f.first_s:.10g} s; it should count from power-on"
+        yield finding("time_since_epoch", text, f)
 
 
 def _stuck(file: str, rows: Rows) -> Mark:
@@ -255,45 +204,81 @@ def _stuck(file: str, rows: Rows) -> Mark:
     return Mark(file, (first + 1, last + 1), (float(rows.time_s[first]), float(rows.time_s[last])))
 
 
-def _of_time(f: RunFacts, where: str) -> Iterator[CheckWarning]:
-    if abs(f.first_s) > _LATE_S:
-        text = f"time starts at {f.first_s:.10g} s; it should count from power-on"
-        yield CheckWarning("time_since_epoch", where, text)
+def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator[Finding]:
+    """A mean rate that could be Earth's rate, and no word whether that is still in the data."""
+    if not facts:
+        return
+    mean = float(np.average([f.mean_dph for f in facts], weights=[f.rows for f in facts]))
+    warning = earth_rate_warning(dataset.earth_rate, mean)
+    if warning:
+        yield finding("earth_rate_not_stated", warning, mean_dph=mean)
 
 
-def _between_runs(facts: Sequence[RunFacts]) -> Iterator[CheckWarning]:
-    first: dict[str, str] = {}
-    for f in facts:
-        other = first.setdefault(f.sha256, f.file)
-        if other != f.file:
-            yield CheckWarning("same_recording_twice", f.file, f"holds the same bytes as {other}")
-    periods = [f.row_period_s for f in facts]
-    if periods and max(periods) > (1.0 + _PERIODS) * min(periods):
-        text = f"row periods from {min(periods):.4g} to {max(periods):.4g} s"
-        yield CheckWarning("row_periods_differ", "data set", text)
+def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
+    """Rows that several training runs, or several exams, hold, or one run twice: they count twice."""
+    for shared in dataset.shared:
+        rows = shared.rows[1] - shared.rows[0] + 1
+        same = (
+            "are also"
+            if shared.likeness is None
+            else f"have the noise (correlation {shared.likeness:.2f}) of"
+        )
+        other = "the same file" if shared.other_file == shared.file else shared.other_file
+        text = (
+            f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} {same} rows {shared.other_rows[0]} to "
+            f"{shared.other_rows[1]} of {other}: these {rows} rows would count twice, so the former are left out. To "
+            f"state it: {exclude_line([shared.span_s], f'also in {shared.other_file}')}"
+        )
+        yield finding("shared_rows", text, shared.file, marks=shared.marks, **asdict(shared))
 
 
-def _of_holds(facts: Sequence[RunFacts]) -> Iterator[CheckWarning]:
-    holds = float(np.average([f.hold_share for f in facts], weights=[len(f.slopes_c_per_min) for f in facts]))
-    if holds > _HOLDS:
-        text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
-        yield CheckWarning("mostly_holds", "data set", text)
+def shared_axes_findings(dataset: Dataset) -> Iterator[Finding]:
+    """Axes of a recording that hold the same noise."""
+    for shared in dataset.shared_axes:
+        one, other = shared.axes
+        text = (
+            f"Axes {one} and {other} of {shared.file} hold the same noise (correlation {shared.likeness:.2f}): one of "
+            "them is a copy of the other."
+        )
+        yield finding("shared_axes", text, shared.file, **asdict(shared))
 
 
-def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[CheckWarning]:
-    """What the training runs do not show of the requested envelope."""
-    slopes = np.concatenate([f.slopes_c_per_min for f in facts] or [np.zeros(0)])
-    temperatures = np.concatenate([f.temperatures_c for f in facts] or [np.zeros(0)])
-    for name, unit, values, (low, high) in (
-        ("temperature", "C", temperatures, envelope[0]),
-        ("temperature rate", "C/min", slopes, envelope[1]),
-    ):
-        margin = _ENVELOPE_MARGIN * (high - low)
-        reached = (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
-        if not (reached[0] <= low + margin and reached[1] >= high - margin):
-            text = f"{name} covers {reached[0]:.4g} ... {reached[1]:.4g} of {low:.4g} ... {high:.4g} {unit}"
-            yield CheckWarning("envelope_not_reached", "data set", text)
-    seen, *_ = np.histogram2d(temperatures, slopes, bins=_ENVELOPE_CELLS, range=envelope)
-    share = float(np.mean(seen > 0))
-    text = f"{share:.0%} of the cells of temperature and its rate hold training data"
-    yield CheckWarning("envelope_coverage", "data set", text)
+def copied_channel_findings(run: Run, rows: Rows) -> Iterator[Finding]:
+    """Channels that hold the very values of another column: a logger's wiring, or a column written twice."""
+    columns = {"temperature": rows.temperature_c, "rate": rows.rate_dph} | {
+        f"channel {name}": values for name, values in rows.channels.items()
+    }
+    names = list(columns)
+    for k, name in enumerate(names):
+        for other in names[:k]:
+            same = np.array_equal(columns[name], columns[other], equal_nan=True)
+            if same and len(np.unique(columns[name][:: max(1, len(rows) // 1000)])) >= _FEWEST_VALUES:
+                text = (
+                    f"{name} of {run.file} is a copy of the {other}, row by row: it tells nothing of its own. Record "
+                    "the sensor that was meant, or take the column out."
+                )
+                yield finding("channel_copy", text, run, column=name, copy_of=other)
+
+
+def coarse_rate_findings(run: Run, rows: Rows) -> Iterator[Finding]:
+    """Rates whose steps are far above the noise: what lies between two steps cannot be learnt by averaging.
+
+    Counted pulses carry what is left over into the next row, and pass.
+    """
+    if run.pulse_weight_arcsec is not None:
+        return
+    rate = rows.rate_dph[run.in_span(rows.time_s)][:_COARSE_ROWS]
+    rate = rate[np.isfinite(rate)]
+    move = np.abs(np.diff(rate))
+    moved = move[move > 0.0]
+    if len(moved) < _MOVED_ROWS or len(moved) > (1.0 - _REPEATS) * len(move):
+        return
+    levels = np.unique(rate)
+    step = float(np.median(np.diff(levels)))
+    if float(np.median(moved)) > _ONE_STEP * step:
+        return
+    text = (
+        f"the rate comes in steps of {step:.4g} deg/h, far above its noise: {1.0 - len(moved) / len(move):.0%} of the "
+        f"rows repeat the one before, and means can be off by up to {0.5 * step:.2g} deg/h, which no averaging mends"
+    )
+    yield finding("coarse_rate", text, run)

@@ -1,7 +1,7 @@
 """Rows of a rate that no noise of the gyro makes: spikes and bursts at the native rate, and the rows left out for them.
 
-The level is the running median, over five blocks, of the blocks' medians: a spike, or a burst of up to two blocks, does
-not move it, and a lasting step is followed. The scale is that of the rows themselves around that level, and of their
+The level is the running median of the blocks' medians: a spike, or a burst of up to ten rows or two blocks, does not
+move it, and a lasting step is followed. The scale is that of the rows themselves around that level, and of their
 first differences, whichever is larger, so that noise that a filter made slow is not taken for outliers; it follows
 noise that stays changed. Rows beyond seven times the scale are left out (Gaussian noise: one in 4e11), so that what one
 row can do to a mean is bounded: Hampel's rejection, see Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993) 1273.
@@ -9,17 +9,22 @@ row can do to a mean is bounded: Hampel's rejection, see Rousseeuw and Croux, J.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..common.arrays import BoolArray, FloatArray
-from ..common.metrics import MAD_TO_SIGMA, median_of_parts, middle_of_five
+from ..common.metrics import MAD_TO_SIGMA, median_of_parts, middle_of_five, quantile_of_parts
 from ..recordings.records import Run
+from ..results.findings import Finding
 from ..results.training import LeftOutRows, Outliers
+from ..target.front_end import samples_per_block
+from .facts import SPIKE_SIGMAS
+from .findings import finding, mark_of
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows
@@ -59,8 +64,7 @@ def outliers_of(stretches: Sequence[LeftOutRows], kept: float) -> Outliers:
     return Outliers(rows=rows, share=rows / (rows + kept), stretches=tuple(stretches[:_LISTED]))
 
 
-_SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
-_AROUND = 5  # blocks of a running median
+_AROUND = 5  # blocks of a running median, at least
 _PART = 2**18  # rows that are looked at together: bounds memory
 _GROUP = 200  # rows, at least, of one scale
 _GROUP_BLOCKS = 10  # blocks, at least, of one scale: the same where rows are few to a block
@@ -68,10 +72,56 @@ _BURST = 0.1  # share of departing rows from which a block is left out whole
 _BURST_ROWS = 10  # with fewer rows a block, one spike alone would be a tenth of it
 _SLACK = 3.0  # changes of the level from block to block that the bias itself may make
 _FEW = 5  # rows a block from which its median means something
+_USUAL, _ALIKE = (
+    0.9,
+    0.01,
+)  # share of steps that are no larger, and of it: nearer rows are at one step of a converter
+_TOGETHER = 10  # rows of a burst that do not move the level; a longer departure is a piece of record
 
 
-def departing_rows(rows: Rows, run: Run, rows_per_block: int) -> NDArray[np.int64]:
+def spike_findings(run: Run, rows: Rows, wild: NDArray[np.int64]) -> Iterator[Finding]:
+    """Spikes and bursts of a run (`departing_rows`): how many, where, and the largest."""
+    if len(wild) == 0:
+        return
+    stretches = stretches_left_out(run, rows.time_s[wild])
+    rate = rows.rate_dph[wild]
+    departure = np.nan_to_num(np.abs(rate - _beside(rows.rate_dph, wild)))
+    k = int(np.argmax(departure))
+    at, size = float(rows.time_s[wild[k]]), float(departure[k])
+    spans = [(s.from_s, s.to_s) for s in stretches]
+    text = (
+        f"{len(wild)} rows of {run.file} depart from those around them, most at {at:.10g} s: by {size:.4g} deg/h, "
+        f"where {SPIKE_SIGMAS:g} times their noise is the limit ({len(spans)} stretches). They do not reach the fit."
+    )
+    yield finding(
+        "rate_outliers",
+        text,
+        run,
+        marks=[mark_of(run.file, rows, *span) for span in spans],
+        time_s=(at, spans[0][0], spans[-1][1]),
+        size=((size, size, size), "deg/h"),
+        leave_out=spans,
+        stretches=len(spans),
+        rows=len(wild),
+        rate_dph=float(rate[k]),
+    )
+
+
+def _beside(rate: FloatArray, wild: NDArray[np.int64]) -> FloatArray:
+    """The mean of the nearest rows on both sides of each spike that are none; at an end of one side."""
+    first = np.flatnonzero(np.diff(wild, prepend=-2) > 1)
+    count = np.diff(np.r_[first, len(wild)])
+    before, after = wild[first] - 1, wild[first + count - 1] + 1
+    before, after = np.where(before < 0, after, before), np.where(after >= len(rate), before, after)
+    return np.repeat(0.5 * (rate[before] + rate[after]), count)
+
+
+BLOCK_S = 10.0  # around a row, where no model says how long its blocks are
+
+
+def departing_rows(rows: Rows, run: Run, rows_per_block: int | None = None) -> NDArray[np.int64]:
     """Rows of a run's file (0 is the first) that are spikes or parts of bursts."""
+    rows_per_block = rows_per_block or samples_per_block(BLOCK_S, run.row_period_s)
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
     if counted.all():
         return np.flatnonzero(departing(rows.rate_dph, rows_per_block))
@@ -86,12 +136,13 @@ def departing(rate: FloatArray, rows_per_block: int) -> BoolArray:
     wild = np.zeros(len(rate), dtype=bool)
     if whole < _AROUND * n or len(rate) < 2 * _AROUND:
         return wild
-    level = _running(_medians(lambda a, b: rate[a:b], whole, n))
-    slack = _SLACK * _largest_around(np.abs(np.gradient(level)))
+    around = max(_AROUND, 2 * -(-_TOGETHER // n) + 1)
+    level = _running(_medians(lambda a, b: rate[a:b], whole, n), around)
+    slack = _SLACK * _largest_around(np.abs(np.gradient(level)), around)
     sigma, group = _scale(rate, level, n)
 
     def limit(rows: NDArray[np.int64]) -> FloatArray:
-        return np.asarray(_SIGMAS * _of_rows(sigma, group, rows) + _of_rows(slack, n, rows))
+        return np.asarray(SPIKE_SIGMAS * _of_rows(sigma, group, rows) + _of_rows(slack, n, rows))
 
     for a in range(0, len(rate), _PART):
         part = rate[a : a + _PART]
@@ -121,19 +172,19 @@ def _of_rows(of_blocks: FloatArray, n: int, rows: NDArray[np.int64]) -> FloatArr
     return np.asarray(of_blocks[np.minimum(rows // n, len(of_blocks) - 1)])
 
 
-def _running(values: FloatArray) -> FloatArray:
-    """Median of each value and its four neighbours; at the ends of those that there are, mirrored."""
-    half = _AROUND // 2
-    if len(values) <= half:
+def _running(values: FloatArray, around: int = _AROUND) -> FloatArray:
+    """Median of each value and those around it; at the ends of those that there are, mirrored."""
+    if len(values) <= around // 2:
         return np.full(len(values), np.median(values))
-    windows = sliding_window_view(np.pad(values, half, mode="reflect"), _AROUND)
+    if around > _AROUND:
+        return np.asarray(median_filter(values, around, mode="mirror"))
+    windows = sliding_window_view(np.pad(values, around // 2, mode="reflect"), around)
     return middle_of_five(*windows.T)
 
 
-def _largest_around(values: FloatArray) -> FloatArray:
-    """Largest of each value and its four neighbours."""
-    windows = sliding_window_view(np.pad(values, _AROUND // 2, mode="edge"), _AROUND)
-    return np.asarray(windows.max(axis=1))
+def _largest_around(values: FloatArray, around: int) -> FloatArray:
+    """Largest of each value and those around it."""
+    return np.asarray(maximum_filter1d(values, around, mode="nearest"))
 
 
 def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int]:
@@ -145,9 +196,13 @@ def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int
     def rest(a: int, b: int) -> FloatArray:
         return np.abs(rate[a:b] - _of_rows(level, n, np.arange(a, b)))
 
+    def all_steps() -> Iterable[FloatArray]:
+        return (steps(a, min(a + _PART, len(rate))) for a in range(0, len(rate), _PART))
+
+    alike = _ALIKE * quantile_of_parts(all_steps, _USUAL)
+
     def moved() -> Iterable[FloatArray]:
-        parts = (steps(a, min(a + _PART, len(rate))) for a in range(0, len(rate), _PART))
-        return (part[part > 0.0] for part in parts)
+        return (part[part > alike] for part in all_steps())
 
     group = min(max(_GROUP, _GROUP_BLOCKS * n), len(rate))
     whole = len(rate) // group * group
@@ -160,7 +215,15 @@ def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int
 
 
 def _beyond_neighbours(rate: FloatArray, at: NDArray[np.int64]) -> FloatArray:
-    """How far these rows lie outside the range of the two rows before and the two after, mirrored at the ends."""
-    around = np.abs(at[:, None] + np.array([-2, -1, 1, 2]))
+    """How far these rows lie outside the range of the two rows before and the two after their stretch.
+
+    At the ends every row stands for itself, and the record is mirrored: the start of a warm-up is no burst.
+    """
+    starts = np.flatnonzero(np.diff(at, prepend=-2) > 1)
+    count = np.diff(np.r_[starts, len(at)])
+    first, last = (np.repeat(at[k], count) for k in (starts, starts + count - 1))
+    end = (first < 2) | (last > len(rate) - 3)
+    first, last = np.where(end, at, first), np.where(end, at, last)
+    around = np.abs(np.stack([first - 2, first - 1, last + 1, last + 2], axis=1))
     near = rate[np.minimum(around, 2 * (len(rate) - 1) - around)]
     return np.asarray(np.abs(rate[at] - np.clip(rate[at], near.min(axis=1), near.max(axis=1))))

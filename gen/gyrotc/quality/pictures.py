@@ -13,9 +13,9 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.reading import open_file
 from ..recordings.records import Curve, Dataset, Mark
+from ..results.findings import Finding
 from .check import CheckResult
 from .facts import RunFacts
-from .findings import CheckWarning
 
 Span = tuple[float, float]
 
@@ -121,12 +121,12 @@ def _column(folder: Path, mark: Mark) -> Columned | None:
     return Columned(mark.file, mark.column, np.arange(first, end) + 1, values[first:end], wrong + 1)
 
 
-def _of_warning(result: CheckResult, warning: CheckWarning) -> Iterator[Picture]:
-    axis = warning.axes[0] if warning.axes else None
+def _of_warning(result: CheckResult, warning: Finding) -> Iterator[Picture]:
+    axis = warning.axes[0] if warning.axes else result.datasets[0][0]
     dataset = dict(result.datasets)[axis]
     facts = [f for of, f in result.facts if of == axis]
-    files = list(dict.fromkeys(mark.file for mark in warning.marks)) or [
-        f.file for f in facts if warning.where.startswith(f.file)
+    files = list(dict.fromkeys(mark.file for mark in warning.rows)) or [
+        f.file for f in facts if f.file == warning.file
     ]
     if warning.id in _COVERED:
         yield _covered(facts)
@@ -135,7 +135,10 @@ def _of_warning(result: CheckResult, warning: CheckWarning) -> Iterator[Picture]
         yield Compared(named, tuple(c for c in dataset.curves if c.file not in files))
     else:
         for file in files[:_MOST_FILES]:
-            yield from _file_rows(dataset, [m for m in warning.marks if m.file == file] or [Mark(file)])
+            yield from _file_rows(
+                dataset,
+                [Mark(m.file, m.rows, m.span_s) for m in warning.rows if m.file == file] or [Mark(file)],
+            )
 
 
 def _covered(facts: Sequence[RunFacts]) -> Covered:

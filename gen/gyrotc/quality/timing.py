@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..recordings.records import Mark, Rows, Run
-
-Finding = dict[str, Any]
+from ..results.findings import Finding
+from .findings import finding
 
 _GAP = 1.5  # row periods
 _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
@@ -30,7 +29,7 @@ _HOUR_S = 3600.0  # a change of summer time
 
 
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
-    """What is suspect about the times of a run; `evidence` has the file, the rows as marks, and figures."""
+    """What is suspect about the times of a run."""
     inside = run.in_span(rows.time_s)
     time, temperature, at = rows.time_s, rows.temperature_c, range(len(rows))
     together: NDArray[np.bool_] = np.broadcast_to(np.True_, max(len(rows) - 1, 0))
@@ -68,15 +67,11 @@ def _gaps(run: Run, time: FloatArray, at: Sequence[int], gaps: NDArray[np.int64]
     missing = int(np.sum(np.round(step / run.row_period_s) - 1.0))
     longest = int(gaps[np.argmax(step)])
     places = sorted(gaps.tolist(), key=lambda k: time[k] - time[k + 1])[:_REPORTED]
-    return {
-        "id": "gaps",
-        "text": (
-            f"{len(gaps)} gaps; {missing} rows of {run.row_period_s:.4g} s are missing; the longest from "
-            f"{time[longest]:.10g} to {time[longest + 1]:.10g} s (rows {at[longest] + 1} and {at[longest + 1] + 1})"
-        ),
-        "evidence": {"file": run.file, "from_s": run.from_s},
-        "marks": _marks(run, time, at, places),
-    }
+    text = (
+        f"{len(gaps)} gaps; {missing} rows of {run.row_period_s:.4g} s are missing; the longest from "
+        f"{time[longest]:.10g} to {time[longest + 1]:.10g} s (rows {at[longest] + 1} and {at[longest + 1] + 1})"
+    )
+    return finding("gaps", text, run, marks=_marks(run, time, at, places))
 
 
 def _jumps(run: Run, time: FloatArray, at: Sequence[int], jumps: list[int]) -> Finding:
@@ -84,16 +79,12 @@ def _jumps(run: Run, time: FloatArray, at: Sequence[int], jumps: list[int]) -> F
     hours = round(by / _HOUR_S)
     whole = abs(by - hours * _HOUR_S) < 2.0 * run.row_period_s and hours
     clock = f", {hours} h: a clock that was set" if whole else ""
-    return {
-        "id": "time_jumps",
-        "text": (
-            f"the time jumps by {by:.10g} s between rows {at[jumps[0]] + 1} and {at[jumps[0] + 1] + 1}, from "
-            f"{time[jumps[0]]:.10g} to {time[jumps[0] + 1]:.10g} s{clock}, and the temperature goes on as if one row "
-            f"had passed" + (f" ({len(jumps)} such places)" if len(jumps) > 1 else "")
-        ),
-        "evidence": {"file": run.file, "from_s": run.from_s},
-        "marks": _marks(run, time, at, jumps),
-    }
+    text = (
+        f"the time jumps by {by:.10g} s between rows {at[jumps[0]] + 1} and {at[jumps[0] + 1] + 1}, from "
+        f"{time[jumps[0]]:.10g} to {time[jumps[0] + 1]:.10g} s{clock}, and the temperature goes on as if one row "
+        f"had passed" + (f" ({len(jumps)} such places)" if len(jumps) > 1 else "")
+    )
+    return finding("time_jumps", text, run, marks=_marks(run, time, at, jumps))
 
 
 def _clock_was_set(time: FloatArray, temperature: FloatArray, k: int, period_s: float) -> bool:
@@ -135,15 +126,11 @@ def _coarse(run: Run, step: FloatArray) -> Finding | None:
     odd = float(np.mean(np.abs(short - run.row_period_s) > 0.25 * run.row_period_s))
     if not whole or unit < _COARSE * run.row_period_s or odd < _COARSE_SHARE or not _regular(some, unit):
         return None
-    return {
-        "id": "coarse_time",
-        "text": (
-            f"time stamps come in steps of {unit:.4g} s, which is about the row period ({short.mean():.4g} s in the "
-            f"mean): {odd:.0%} of the rows seem to come early or after missing ones"
-        ),
-        "evidence": {"file": run.file, "from_s": run.from_s},
-        "marks": (),
-    }
+    text = (
+        f"time stamps come in steps of {unit:.4g} s, which is about the row period ({short.mean():.4g} s in the "
+        f"mean): {odd:.0%} of the rows seem to come early or after missing ones"
+    )
+    return finding("coarse_time", text, run)
 
 
 def _regular(step: FloatArray, unit: float) -> bool:
@@ -196,15 +183,16 @@ def _drifting(
 ) -> Finding:
     """The finding, of the steps of a span; `every`: s from row to row, usually and there."""
     first, last = span
-    return {
-        "id": "time_drifts",
-        "text": (
-            f"the time stamps drift against the row count: rows come every {every[0]:.6g} s, but every "
-            f"{every[1]:.6g} s from row {at[first] + 1} to {at[last] + 1} ({time[first]:.10g} to "
-            f"{time[last]:.10g} s); in all stamps and rows part by {total:.4g} s"
-        ),
-        "evidence": {"file": run.file, "from_s": run.from_s},
-        "marks": (
+    text = (
+        f"the time stamps drift against the row count: rows come every {every[0]:.6g} s, but every "
+        f"{every[1]:.6g} s from row {at[first] + 1} to {at[last] + 1} ({time[first]:.10g} to "
+        f"{time[last]:.10g} s); in all stamps and rows part by {total:.4g} s"
+    )
+    return finding(
+        "time_drifts",
+        text,
+        run,
+        marks=(
             Mark(run.file, (int(at[first]) + 1, int(at[last]) + 1), (float(time[first]), float(time[last]))),
         ),
-    }
+    )

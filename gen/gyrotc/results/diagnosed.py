@@ -8,19 +8,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .base import Count, Figure, Part, Result, UnitResult
+from .findings import Estimate, Finding
 from .planned import DetectionLimit
 
 DiagnosisVerdict = Literal[
     "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"
 ]
-
-
-class Estimate(Part):
-    """A figure with its 95 % interval."""
-
-    value: float = Field(description="the likeliest")
-    low: Figure = Field(description="lower end; null where there is no interval")
-    high: Figure = Field(description="upper end; null where there is no interval")
 
 
 _WHOLE = 0.995  # a share of the removable error that shows as 100 %
@@ -206,32 +199,6 @@ class Unexplained(Part):
     looks_like: str | None = Field(description="in words")
 
 
-class EventSize(Part):
-    """How large an event is, with its 95 % interval."""
-
-    value: float = Field(description="the likeliest")
-    low: float = Field(description="lower end")
-    high: float = Field(description="upper end")
-    unit: str = Field(description="of these figures")
-
-
-class FoundEvent(Part):
-    """Something that happened to a recording at a time."""
-
-    id: str = Field(
-        description="`step`, `step_and_recover`, `transition`, `ramp` (a drift that begins), `restart`, "
-        "`gain_changed`, `unit_changed`, "
-        "`sign_reversed`, `axes_exchanged`, `burst`, `dropout`, `thermometer_jump`, `thermometer_lost`"
-    )
-    file: str = Field(description="of its run")
-    time_s: Estimate = Field(description="on the file's clock, s")
-    size: EventSize = Field(description="how large it is")
-    text: str = Field(description="what it is, in words")
-    exclude: str | None = Field(
-        description="line of dataset.toml that leaves it out; null: nothing has to be left out"
-    )
-
-
 class Diagnosed(UnitResult):
     """What the static map does not explain, and why (`gyrotc diagnose`)."""
 
@@ -256,7 +223,7 @@ class Diagnosed(UnitResult):
     text: str = Field(description="the finding in words")
     meaning: str = Field(description="what the verdict means")
     next: tuple[str, ...] = Field(description="what to do, the most telling first")
-    events: tuple[FoundEvent, ...] = Field(
+    events: tuple[Finding, ...] = Field(
         default=(), description="what happened to the recordings, by run and time"
     )
     events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +11,7 @@ from pydantic import Field
 from ..common.metrics import Averages, statistics
 from ..common.ranges import AverageLength
 from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
+from .findings import Finding
 from .release import HeldLimits
 
 
@@ -129,14 +130,6 @@ class FigureUncertainty(Part):
     method: str = Field(description="what it rests on")
 
 
-class FoundIn(Part):
-    """Something that a person should know, with the figures behind it."""
-
-    id: str = Field(description="its stable name")
-    text: str = Field(description="what was found, and what to do")
-    evidence: dict[str, Any] = Field(description="the figures that it rests on")
-
-
 class ModelSizes(Part):
     """What was evaluated, and its sizes on a target."""
 
@@ -206,7 +199,7 @@ class Evaluation(UnitResult):
     runs: tuple[EvaluatedRun, ...] = Field(description="every run")
     train: Pooled | None = Field(description="all training runs; null where there are none")
     exam: Pooled | None = Field(description="all exam runs; null where there are none")
-    findings: tuple[FoundIn, ...] = Field(description="what a person should know, the gravest first")
+    findings: tuple[Finding, ...] = Field(description="what a person should know, the gravest first")
     model: ModelSizes = Field(description="what was evaluated")
     left_out: Pooled | None = Field(
         default=None, description="without exam runs: spans left out of training in turn"

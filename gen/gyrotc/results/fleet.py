@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr
 
 from .base import Amount, Axis, Count, Figure, Part, Result, Share
+from .findings import Finding
 from .release import Verdict
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -66,6 +67,7 @@ BARRING = frozenset(
         "shared_axes",
         "scale",
         "gain_changed",
+        "unit_changed",
         "warm_up",
     }
 )
@@ -141,7 +143,7 @@ class FleetUnit(Part):
 class LikelyStep(Part):
     """The likeliest step in what compensation leaves of a run."""
 
-    time_s: float = Field(description="from the start of the run, s")
+    time_s: float = Field(description="on the file's clock, s")
     size_dph: float = Field(description="how far the mean moves, deg/h")
     score: Amount = Field(description="in standard deviations of the move for white noise")
 
@@ -157,15 +159,6 @@ class ComparedRun(Part):
         default=0.0, description="part of what remains that fades with 15 minutes from the start, deg/h"
     )
     profile_c: tuple[float, ...] = Field(default=(), description="temperature every 10 minutes, C")
-
-
-class OwnEvent(Part):
-    """What a gyro's recordings show by themselves, by the rules of `check` and `diagnose`."""
-
-    id: str = Field(description="of the event or finding")
-    text: str = Field(description="what it is")
-    file: str | None = Field(description="run in which it is; null: in all")
-    time_s: float | None = Field(description="from the start of that run, s; null: all the time")
 
 
 class ResidualSeries(Part):
@@ -184,7 +177,7 @@ class Facts(Part):
     )
     runs: tuple[ComparedRun, ...] = Field(description="every run")
     series: ResidualSeries | None = Field(description="of the run whose step is the clearest")
-    own: tuple[OwnEvent, ...] = Field(
+    own: tuple[Finding, ...] = Field(
         default=(), description="events of its runs; sought where more than noise is left"
     )
 
@@ -259,9 +252,7 @@ class Reason(Part):
     )
     text: str = Field(description="the reason in words")
     file: str | None = Field(default=None, description="run in which it shows; null: in all")
-    time_s: float | None = Field(
-        default=None, description="from the start of that run, s; null: all the time"
-    )
+    time_s: float | None = Field(default=None, description="on the clock of that file, s; null: all the time")
 
 
 class Copy(Part):

@@ -7,14 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from .base import Axis, Count, Figure, Numbered, Part, Result, Share
-
-
-class MarkedRows(Part):
-    """Rows that something is reported of."""
-
-    file: str = Field(description="as in `dataset.toml`")
-    rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not stated")
-    span_s: tuple[float, float] | None = Field(description="their times on the file's clock, s")
+from .findings import Finding, MarkedRows
 
 
 class Problem(Part):
@@ -24,16 +17,6 @@ class Problem(Part):
     found: str = Field(description="what stands there")
     expected: str = Field(description="what should stand there; empty where `found` says it all")
     rows: tuple[MarkedRows, ...] = Field(description="rows that it is about")
-
-
-class Suspected(Part):
-    """What a person should look at."""
-
-    id: str = Field(description="stable name of the warning")
-    where: str = Field(description="file, or `data set`")
-    text: str = Field(description="what is suspect")
-    next: str = Field(description="what to do next; empty where `text` says it")
-    rows: tuple[MarkedRows, ...] = Field(description="rows that it is about, the first ones")
 
 
 class CheckedRun(Part):
@@ -65,7 +48,7 @@ class Checked(Result):
     serial: str | None = Field(description="null where it could not be read")
     axis: str | None = Field(description="as asked for: `x`, `y`, `z`, `all`, or null")
     problems: tuple[Problem, ...] = Field(description="what `fit` refuses")
-    warnings: tuple[Suspected, ...] = Field(description="what it takes, and a person should look at")
+    warnings: tuple[Finding, ...] = Field(description="what it takes, and a person should look at")
     runs: tuple[CheckedRun, ...] = Field(description="every run that could be read")
 
 

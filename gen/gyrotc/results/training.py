@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from .base import Amount, Count, Figure, Part, UnitResult
-from .evaluation import FoundIn, MapDifference, Pooled
+from .evaluation import MapDifference, Pooled
+from .findings import Finding
 from .lot import KnownMap, LotUse, UnitCurve
 
 
@@ -245,7 +246,7 @@ class Training(UnitResult):
     generalises: bool | None = Field(
         description="whether it was shown to hold on history that it had not seen; null: not asked"
     )
-    findings: tuple[FoundIn, ...] = Field(description="what a person should know")
+    findings: tuple[Finding, ...] = Field(description="what a person should know")
     curves: dict[str, Any] = Field(
         description="figures of the method; `sizes` and `chosen` where it chose a number of centers"
     )

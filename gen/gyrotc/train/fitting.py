@@ -22,7 +22,8 @@ from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Run, joined_runs
-from ..results.evaluation import FoundIn, Pooled
+from ..results.evaluation import Pooled
+from ..results.findings import Finding
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
 from .cross_validation import Span, training_spans, whole_runs
@@ -445,7 +446,7 @@ def training_of(
         candidates=tuple(CandidateModel(**row) for row in fitted.candidates),
         reason=fitted.reason,
         generalises=_generalises(fitted),
-        findings=tuple(FoundIn(**f) for f in fitted.findings),
+        findings=tuple(Finding(**f) for f in fitted.findings),
         curves=dict(fitted.curves),
     )
 

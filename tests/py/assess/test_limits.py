@@ -16,12 +16,12 @@ from gyrotc.model import Guard, Model, Term
 from gyrotc.results.evaluation import (
     EvaluatedRun,
     Evaluation,
-    FoundIn,
     ModelSizes,
     Pooled,
     RunStatistics,
     Statistics,
 )
+from gyrotc.results.findings import Finding
 from gyrotc.results.verification import MapError, Verification, VerifiedTarget, WorstError
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise
@@ -67,7 +67,7 @@ EVALUATION = Evaluation(
         improvement=10.0,
         samples=2,
     ),
-    findings=(FoundIn(id="run_outlier", text="", evidence={}),),
+    findings=(Finding(id="run_outlier", text="", evidence={}),),
     model=ModelSizes(
         method="mrbf", centers=4, table_bytes=104, rom_bytes=4000, ram_bytes=236, sizes_on="cortex-m4f",
         sum_abs_weights_dph=0.02,

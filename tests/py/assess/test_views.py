@@ -22,7 +22,8 @@ from gyrotc.model import Model
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
 from gyrotc.recordings.records import Dataset
-from gyrotc.results.evaluation import Evaluation, FigureUncertainty, FoundIn, Pooled, ResidualTest, Statistics
+from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, ResidualTest, Statistics
+from gyrotc.results.findings import Finding
 from gyrotc.results.release import HeldLimits
 from gyrotc.results.training import Training
 from test_limits import EVALUATION, VERIFICATION
@@ -178,7 +179,7 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
 def test_structure_that_is_left_leads_to_a_diagnosis(
     over_floor: float, finding: str, left: bool, model_dict: dict[str, Any]
 ) -> None:
-    found = (FoundIn(id=finding, text="", evidence={}),)
+    found = (Finding(id=finding, text="", evidence={}),)
     residual = ResidualTest(
         autocorrelation=0.0,
         autocorrelation_limit=0.03,

@@ -16,9 +16,10 @@ from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
 from gyrotc.quality.check import CheckResult, check, envelope_of
-from gyrotc.quality.findings import CheckWarning, advice_of
 from gyrotc.quality.findings import __file__ as findings_file
+from gyrotc.quality.findings import finding
 from gyrotc.recordings.plausibility import earth_rate
+from gyrotc.results.findings import Finding
 from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
 from recordings import ROWS, RUN, Columns, columns, described, toml, write_csv
@@ -256,7 +257,7 @@ def swapped(table: Columns, columns_of: str) -> Columns:
     return table | {f"rate_{a}_dph": values for a, values in zip(AXES, held, strict=True)}
 
 
-def oriented(result: CheckResult) -> list[CheckWarning]:
+def oriented(result: CheckResult) -> list[Finding]:
     return [d for d in result.warnings if d.id in ORIENTED]
 
 
@@ -278,7 +279,7 @@ def test_against_the_other_runs(held: str, id: str, words: str, tmp_path: Path) 
     for warning in reported:
         assert warning.where == "2.csv"
         assert words in warning.text
-        assert "mounting and wiring" in warning.advice + warning.text
+        assert "mounting and wiring" in warning.next + warning.text
 
 
 @pytest.mark.parametrize(
@@ -345,7 +346,7 @@ CHANGES: dict[str, Callable[[Columns], Columns]] = {
 def test_time_stamps_are_reported_with_their_rows(id: str, tmp_path: Path) -> None:
     write_csv(tmp_path / "R" / "a.csv", CHANGES[id](columns(600)))
     [warning] = [d for d in check(tmp_path / "R").warnings if d.id == id]
-    [mark, *_] = warning.marks
+    [mark, *_] = warning.rows
     assert mark.rows == ((50, 51) if id != "time_drifts" else mark.rows)
     if id == "time_jumps":
         assert "jumps by 3600 s between rows 50 and 51" in warning.text
@@ -378,20 +379,13 @@ def test_stamps_of_a_computer_that_tremble_are_in_order(scatter: float, tmp_path
 
 
 def test_every_warning_says_what_to_do_next() -> None:
-    """By `advice`, or, with the line to paste or the place to look, in its own text."""
-    reported_in_text = {"shared_rows", "sign_reversed", "axes_exchanged", "stuck_temperature", "channel_copy"}
-    reported_in_text |= {"thermometer_changed"}
-    judge = Path(findings_file).parent
-    texts = "".join(
-        (judge / f"{name}.py").read_text("utf-8")
-        for name in ("findings", "recorded", "thermometers", "timing", "orientation")
-    )
-    ids = set(re.findall(r'(?:CheckWarning\(|"id": )"(\w+)"', texts)) | {
-        "axes_exchanged",
-        "jump_in_temperature",
-    }
+    """By `next`, or, with the line to paste or the place to look, in its own text."""
+    reported_in_text = {"shared_rows", "channel_copy", "thermometer_changed"}
+    of_events = {"step_and_recover", "restart", "dropout"}
+    texts = "".join(path.read_text("utf-8") for path in Path(findings_file).parent.glob("*.py"))
+    ids = set(re.findall(r'finding\(\s*"(\w+)"', texts))
     assert len(ids) > 20
-    assert {id for id in ids if not advice_of(id)} <= reported_in_text
+    assert {id for id in ids if not finding(id, "").next} <= reported_in_text | of_events
 
 
 def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
@@ -538,8 +532,8 @@ def test_a_stuck_thermometer_is_reported_and_the_line_mends_it(tmp_path: Path) -
     table["temperature_c"][200:280] = table["temperature_c"][200]
     write_csv(tmp_path / "R" / "a.csv", table)
     [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "stuck_temperature"]
-    assert "from 2000 to 2790 s (80 rows)" in warning.text
-    assert 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "thermometer stuck"}]' in warning.text
+    assert "for 800 s from 2000 s on" in warning.text
+    assert warning.exclude == 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "stuck_temperature"}]'
 
 
 @pytest.mark.parametrize("step", [0.25, 1.0])

@@ -14,10 +14,14 @@ import numpy as np
 import pytest
 from gyrotc.assess.findings import findings_of
 from gyrotc.model import Model
+from gyrotc.quality.check import findings_of_run
 from gyrotc.quality.facts import facts_of
+from gyrotc.quality.outliers import departing_rows
+from gyrotc.quality.thermometers import jumps_of
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
 from gyrotc.results.evaluation import Pooled
+from gyrotc.results.findings import Finding
 from recordings import Columns, columns, toml, write_csv
 
 
@@ -58,8 +62,19 @@ def _left_out(rms: float) -> SimpleNamespace:
 
 
 def ids(dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: Any = None) -> set[str]:
+    return {f.id for f in found_in(dataset, model, result, training)}
+
+
+def found_in(
+    dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: Any = None
+) -> list[Finding]:
     facts = [facts_of(run, run.rows()) for run in dataset.runs]
-    return {f["id"] for f in findings_of(dataset, facts, Model.from_dict(model), result, training)}
+    of_runs = [
+        found
+        for run, f in zip(dataset.runs, facts, strict=True)
+        for found in findings_of_run(run, run.rows(), f, departing_rows(run.rows(), run))
+    ]
+    return findings_of(dataset, facts, of_runs, Model.from_dict(model), result, training)
 
 
 @pytest.fixture
@@ -144,7 +159,7 @@ def test_a_coarse_thermometer_that_wavers_jumps_where_it_jumps(wavering: float, 
         read = step * np.round((slow + size * (np.arange(n) >= 3000)) / step)
         table = columns(n) | {"time_s": np.arange(n) * 1.0, "temperature_c": read}
         run = dataset_of(tmp_path / f"R{size}", table).runs[0]
-        assert [jump.time_s for jump in facts_of(run, run.rows()).jumps] == found
+        assert [jump.time_s for jump in jumps_of(table["time_s"], run.rows().temperature_c, step)] == found
 
 
 def test_weights_that_cancel(plain: Dataset, model_dict: dict[str, Any]) -> None:
@@ -174,33 +189,30 @@ def test_a_run_that_differs_from_the_others(plain: Dataset, model_dict: dict[str
 def test_findings_are_json(tmp_path: Path, model_dict: dict[str, Any]) -> None:
     table = _jump(columns(600), 10.0) | {"rate_dph": np.full(600, 3.0)}
     dataset = dataset_of(tmp_path / "R", table)
-    facts = [facts_of(run, run.rows()) for run in dataset.runs]
     usual = [(0.0, 0.001)] * 5
-    model = Model.from_dict(model_dict | {"coverage": {"cells": [4, 2], "rows": ["1000", "0000"]}})
-    found = findings_of(dataset, facts, model, result_of(*usual, (1.0, 0.001), exam=0.5))
+    model = model_dict | {"coverage": {"cells": [4, 2], "rows": ["1000", "0000"]}}
+    found = found_in(dataset, model, result_of(*usual, (1.0, 0.001), exam=0.5))
     assert len(found) == 5
-    for finding in json.loads(json.dumps(found, allow_nan=False)):
-        assert set(finding) == {"id", "text", "evidence"}
+    for finding in json.loads(json.dumps([f.content() for f in found], allow_nan=False)):
+        assert {"id", "text", "evidence"} <= set(finding)
         assert finding["text"].endswith(".")
 
 
 def test_outliers_that_no_noise_makes(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    def reported(*rows: int, size: float = 7e6) -> list[dict[str, Any]]:
+    def reported(*rows: int, size: float = 7e6) -> list[Finding]:
         table = columns(600)
         table["rate_dph"][list(rows)] += size
-        dataset = dataset_of(tmp_path / "R", table)
-        facts = [facts_of(run, run.rows()) for run in dataset.runs]
-        found = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
-        return [f for f in found if f["id"] != "earth_rate_not_stated"]
+        found = found_in(dataset_of(tmp_path / "R", table), model_dict, result_of())
+        return [f for f in found if f.id != "earth_rate_not_stated"]
 
     assert reported() == []
     for rows in ((300,), (0,), (599,), (300, 301), (300, 301, 302), tuple(range(300, 310)), (100, 300, 500)):
         for size in (7e6, -7e6, 1.0):
             [finding] = reported(*rows, size=size)
-            assert (finding["id"], finding["evidence"]["rows"]) == ("rate_outliers", len(rows))
-            assert finding["evidence"]["time_s"] in [10.0 * k for k in rows]
+            assert (finding.id, finding.evidence["rows"]) == ("rate_outliers", len(rows))
+            assert finding.time_s is not None and finding.time_s.value in [10.0 * k for k in rows]
+            assert finding.size is not None and finding.size.value == pytest.approx(abs(size), rel=0.1)
     assert reported(*range(300, 400)) == [], "a hundred rows are a piece of record"
-    assert reported(300, size=0.02) == [], "a warning of check, no finding"
 
 
 def test_an_outlier_among_rates_that_repeat(tmp_path: Path) -> None:
@@ -208,8 +220,7 @@ def test_an_outlier_among_rates_that_repeat(tmp_path: Path) -> None:
     rate = np.repeat(np.arange(200.0) % 3.0, 5)
     rate[77] = 7e6
     [run] = dataset_of(tmp_path / "R", columns(1000) | {"rate_dph": rate}).runs
-    facts = facts_of(run, run.rows())
-    assert facts.outlier is not None and facts.outlier.time_s == 770.0
+    assert departing_rows(run.rows(), run).tolist() == [77]
 
 
 @pytest.mark.parametrize("bits", [8, 16, 24])
@@ -224,28 +235,26 @@ def test_a_counter_that_wraps(bits: int, kind: str, tmp_path: Path, model_dict: 
     counted = small if kind == "unsigned" else cumulative
     head = 'schema = 1\nserial = "A"\nearth_rate = "none"\npulse_weight_arcsec = 0.01'
 
-    def found(pulses: np.ndarray) -> list[dict[str, Any]]:
+    def found(pulses: np.ndarray) -> list[Finding]:
         dataset = dataset_of(tmp_path / "R", table | {"pulses": pulses}, head=head)
-        facts = [facts_of(run, run.rows()) for run in dataset.runs]
-        every = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
-        return [f for f in every if f["id"] == "counter_wrapped"]
+        every = found_in(dataset, model_dict, result_of())
+        return [f for f in every if f.id == "counter_wrapped"]
 
     assert found(counted) == []
     [finding] = found(counted % 2**bits)
-    assert finding["evidence"]["bits"] == bits
-    row = int(finding["evidence"]["time_s"] / 10.0)
+    assert finding.evidence["bits"] == bits and finding.time_s is not None
+    row = int(finding.time_s.value / 10.0)
     assert abs((counted % 2**bits)[row] - (counted % 2**bits)[row - 1]) > 2 ** (bits - 1)
 
 
 def test_training_runs_that_contradict_one_another(tmp_path: Path, model_dict: dict[str, Any]) -> None:
-    def reported(*shifts: float) -> list[str]:
+    def reported(*shifts: float) -> list[str | None]:
         tables = [columns(1800, seed=k) for k in range(len(shifts))]
         for table, shift in zip(tables, shifts, strict=True):
             table["rate_dph"] = table["rate_dph"] + shift
         dataset = dataset_of(tmp_path / "R", *tables)
-        facts = [facts_of(run, run.rows()) for run in dataset.runs]
-        found = findings_of(dataset, facts, Model.from_dict(model_dict), result_of())
-        return [f["evidence"]["file"] for f in found if f["id"] == "runs_contradict"]
+        found = found_in(dataset, model_dict, result_of())
+        return [f.file for f in found if f.id == "runs_contradict"]
 
     floor = 0.001 / np.sqrt(10.0)  # of 100 s
     assert reported(0.0) == reported(0.0, 0.0) == reported(0.0, 2.0 * floor) == []
