@@ -23,8 +23,7 @@ from ..train.evidence import Asked
 from ..train.means import UnitMeans
 from ..train.result import Given
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
-from .departures import Departures, within
-from .hypotheses import Hypothesis, revised, updated
+from .departures import Departures, Hypothesis, revised, updated, within
 from .learn import Envelope, sums_of, that_count
 from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
 from .use import curve_of, followed, known_map, seen_alone

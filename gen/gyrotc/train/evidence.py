@@ -36,7 +36,7 @@ _LEAST_NOISE = (
     0.25  # of what differences show: smooth structure makes them larger than the noise, hardly smaller
 )
 _LEAST_SIGMA = 1e-4  # of the spread: below it the normal equations lose their last digits
-_GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
+GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
 
 
 class TrainingFailed(GyrotcError):
@@ -141,7 +141,7 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
     center = weighted_mean(means.bias_dph, weight)
     spread = float(np.sqrt(weighted_mean((means.bias_dph - center) ** 2, weight)))
     spread = spread if spread > 0.0 else 1.0
-    y = np.round((means.bias_dph - center) / spread * _GRID) / _GRID
+    y = np.round((means.bias_dph - center) / spread * GRID) / GRID
     kept = np.ones(len(y), dtype=bool)
     scale = difference_sigma(means, y, weight)
     least = max(_LEAST_NOISE * scale, _LEAST_SIGMA)

@@ -44,11 +44,10 @@ from .cross_validation import (
 from .data import Scaling, TrainingData, average, cells_of, gather, weighted_mean
 from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, fit_process
 from .guards import objection
-from .mixed import Mixed, fit_mixed_model
 from .mrbf import fit_mrbf
 from .noise import difference_sigma
 from .result import Outcome
-from .simple import all_solved, fit_simple, outcome_of, powers_of, triangle_of
+from .simple import Mixed, all_solved, fit_mixed_model, fit_simple, outcome_of, powers_of, triangle_of
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
 _SIMPLE = (*_FEW_COLUMNS, "mixed")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
-from gyrotc.lot.departures import Departures, within
+from gyrotc.lot.departures import Departures, Hypothesis, revised, updated, within
 from gyrotc.lot.earlier import (
     EarlierPrior,
     known_map,
@@ -21,7 +21,6 @@ from gyrotc.lot.earlier import (
     posterior_of_means,
     widened,
 )
-from gyrotc.lot.hypotheses import Hypothesis, revised, updated
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation

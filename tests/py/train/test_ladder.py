@@ -20,11 +20,10 @@ from gyrotc.train.evidence import conditioned, fit_process
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.guards import objection
 from gyrotc.train.methods import METHODS, NETWORK_METHODS, fit
-from gyrotc.train.mixed import fit_mixed_model
 from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
-from gyrotc.train.simple import all_solved, design, fit_simple, powers_of, solve, triangle_of
+from gyrotc.train.simple import all_solved, design, fit_mixed_model, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 
