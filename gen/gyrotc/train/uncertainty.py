@@ -16,8 +16,9 @@ What the map may be wrong by at (T, dT/dt), noise of the gyro not included:
 
 κ and τ come from runs left out in turn: the mean residuals that the process has there are explained by its own
 variance (factor κ²), by a constant of each run (variance τ²), and by noise. ln κ² is known beforehand to 0.3: over
-many gyros the process is right about itself, and six runs say little of it. τ = 0 unless the runs left out speak
-against it (likelihood ratio, 5 %); of few runs it is what the next one may differ by (Student's t).
+many gyros the process is right about itself, and six runs say little of it. τ is the likeliest, times what the next
+run may differ by after few (Student's t). No test asks whether it is there: five runs prove an offset only where it is
+large, and without it sigma may be too small by multiples, with it a little too large.
 """
 
 from __future__ import annotations
