@@ -199,6 +199,10 @@ blind-other: setup
 events: setup
 	@$(PYTHON) -m tests.events --workers 2 --each "$$SET_EACH" $${SET_SEED:+"--seed=$$SET_SEED"}
 
+## the same recordings handed over in other ways (constant, clock, cuts, units, blocks, means): same diagnosis? (30 minutes)
+invariance: setup
+	@$(PYTHON) -m tests.invariance --real "$$SET_REAL" --docs docs
+
 ## training on 2,000 odd but valid data sets, minutes (SETS=2000; SEED=n begins with the n-th: shares)
 odd: setup
 	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/train/test_odd_training.py
@@ -238,4 +242,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events invariance odd cycles packages dist release lock offline site clean

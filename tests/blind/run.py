@@ -32,7 +32,7 @@ from . import campaign as campaigns
 from .draw import Order, campaign_of, orders, recording_of
 from .grade import Row, grade
 from .page import write_page
-from .table import text
+from .table import ended, table, text
 
 PER_CAMPAIGN = 32
 ROOT = Path(__file__).resolve().parents[2]
@@ -256,6 +256,7 @@ def main() -> None:
     rows = run(plan, arguments.folder, workers=arguments.workers, after=after)
     after(rows)
     print(text(rows))
+    sys.exit(ended(table(rows)))
 
 
 def _replay(plan: Plan, number: int, folder: Path) -> str:

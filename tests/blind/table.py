@@ -174,6 +174,14 @@ def proportion(name: str, goal: str, hits: Sequence[bool], bound: float, kind: s
     return [{**entry, "low": low, "high": high, "met": met}]
 
 
+def ended(entries: Sequence[dict[str, Any]]) -> int:
+    """Exit status of a run: 1, and what is missed in print, where a published requirement is not met."""
+    missed = [entry["name"] for entry in entries if entry["goal"] != "-" and not entry["met"]]
+    for name in missed:
+        print(f"missed: {name}")
+    return 1 if missed else 0
+
+
 def _value(name: str, goal: str, value: float, met: bool, of: int) -> list[dict[str, Any]]:
     return [{"name": name, "goal": goal, "value": value, "met": bool(met), "of": of}]
 

@@ -32,6 +32,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "growth": _MANY,
     "formats": ("gen/gyrotc/recordings/importers",),
     "import": ("gen/gyrotc/recordings",),
+    "invariance": _DIAGNOSE,
     "kills": ("gen/gyrotc/store",),
     "lot": ("gen/gyrotc/fleet", "gen/gyrotc/quality"),
     "lot-prior": ("gen/core/posteriors.cpp", "gen/gyrotc/lot"),

@@ -281,7 +281,7 @@ class Extension:
 
     Attributes:
         steps: Gain of every cause, taken one after the other.
-        total: Gain of all shipped causes together; None if none is shipped.
+        total: Gain of all shipped causes together: on an exam that of the emitted tables; None if none is shipped.
         rate_left_out: Gain with one ramp rate left out of everything, and its environment.
         forward: Gain on runs later than everything that was learnt from; None without dates.
         extended: Fit with the shipped causes, None if none is shipped.
@@ -379,17 +379,12 @@ def _rms(runs: Sequence[Averages]) -> float:
 def _shipped(
     refitting: Refitting, effects: list[Effect], worthy: list[Effect], chain: Chain, floor: float
 ) -> tuple[list[Effect], Gain | None]:
-    """The effects that are shipped, and what they gain together where it is measured."""
-    if not worthy:
-        return [], None
-    if worthy == effects:
-        both = [chain[0], chain[-1]]
-    elif refitting.exam:
-        both = refitting.on_exam([[], worthy])
-    else:
-        both = [chain[0], chain[1 + max(k for k, e in enumerate(effects) if e in worthy)]]
-    total = gain_of(both[0], both[1], floor, refitting.average_s)
-    return (worthy, total) if refitting.exam or total.positive else ([], None)
+    """The effects that are shipped, and what they gain together on parts left out (on an exam, see `diagnosis`)."""
+    if not worthy or refitting.exam:
+        return worthy, None
+    last = 1 + max(k for k, e in enumerate(effects) if e in worthy)
+    total = gain_of(chain[0], chain[last], floor, refitting.average_s)
+    return (worthy, total) if total.positive else ([], None)
 
 
 def _crossed(refitting: Refitting, count: int) -> Chain:

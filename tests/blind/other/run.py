@@ -13,6 +13,7 @@ import argparse
 import json
 import secrets
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -22,7 +23,7 @@ from typing import Any
 from ..grade import Row
 from ..page import answer_lines, run_lines, write_section
 from ..run import ROOT, Tool, code_version, commit, rows_of
-from ..table import markdown
+from ..table import ended, markdown
 from .grade import answers, graded, table
 from .mechanisms import CATALOGUE
 from .record import draw_recording, reported, write
@@ -171,6 +172,7 @@ def main() -> None:
     rows = run(seed, arguments.records, arguments.folder, after=after)
     after(rows)
     print(markdown(table(rows)))
+    sys.exit(ended(table(rows)))
 
 
 if __name__ == "__main__":

@@ -29,12 +29,13 @@ from gyrotc.diagnose.search import open_search
 from gyrotc.diagnose.single_cycle import cycle_of
 from gyrotc.diagnose.summary import verdict_of
 from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Run, joined_runs
+from gyrotc.recordings.records import Dataset, joined_runs
 from gyrotc.train.fitting import FitOptions
 from recordings import write_csv
 
 from tests.blind import campaign as blind
 from tests.blind.noise import Noise
+from tests.invariance import VARIATIONS
 
 SEED = 20260301
 LEVEL = Noise(7e-4, 3e-5)
@@ -137,25 +138,17 @@ def answer_of(dataset: Dataset) -> Answer:
     return answer(records_of(runs, "train", block_s=10.0, average_s=100.0), declared_noise(runs))
 
 
-@pytest.mark.parametrize("constant_dph", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
-def test_a_constant_in_the_rate_changes_nothing(made: Callable[[str], Case], constant_dph: float) -> None:
-    """Earth's rate that was left in, a hundred times the effect and more."""
+QUICK = ("rate + 10 deg/h", "clock + 1e5 s", "runs in another order", "spans cut in two")
+SLOW = ("rate + 1000 deg/h", "each run twice", "rates in deg/s")
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_another_way_to_hand_over_the_recordings_changes_nothing(
+    made: Callable[[str], Case], name: str
+) -> None:
+    """`make invariance` asks the same of whole diagnoses of many sets, with figures."""
     case = made("hysteresis")
-    dataset = load(case.folder)
-
-    def shifted(run: Run) -> Run:
-        rows = run.rows()
-        return replace(run, reader=lambda: replace(rows, rate_dph=rows.rate_dph + constant_dph))
-
-    same_answer(answer_of(replace(dataset, runs=tuple(shifted(run) for run in dataset.runs))), case)
-
-
-@pytest.mark.slow
-def test_a_run_that_was_handed_over_twice_counts_once(made: Callable[[str], Case]) -> None:
-    case = made("hysteresis")
-    dataset = load(case.folder)
-    copies = tuple(replace(run, file=f"copy-{run.file}") for run in dataset.runs)
-    same_answer(answer_of(replace(dataset, runs=(*dataset.runs, *copies))), case)
+    same_answer(answer_of(VARIATIONS[name].change(load(case.folder))), case)
 
 
 def same_answer(found: Answer, case: Case) -> None:
@@ -174,14 +167,6 @@ def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) 
     assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
     was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
     assert now["amplitude_dph_per_c"].value == pytest.approx(-was["amplitude_dph_per_c"].value, rel=1e-6)
-
-
-def test_the_order_of_the_runs_does_not_matter(made: Callable[[str], Case]) -> None:
-    case = made("hysteresis")
-    order = np.random.default_rng(3).permutation(len(case.records.runs))
-    runs = [case.records.runs[k] for k in order]
-    turned = [replace(r, history=replace(r.history, run=k)) for k, r in enumerate(runs)]
-    same_answer(answer(Records(tuple(turned), case.records.block_s), case.declared), case)
 
 
 def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(

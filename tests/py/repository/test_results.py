@@ -27,7 +27,7 @@ from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
-from tests.blind.table import _gains  # noqa: E402
+from tests.blind.table import _gains, ended  # noqa: E402
 from tests.kills.driver import ACTIONS  # noqa: E402
 
 WRITING = {
@@ -264,6 +264,15 @@ def test_a_blind_run_written_again_takes_the_place_of_itself_alone(
     assert again[1].pop("written") == "in another year"
     runs[1].pop("written")
     assert again == runs
+
+
+def test_a_blind_run_fails_by_its_published_requirements(capsys: pytest.CaptureFixture[str]) -> None:
+    met, missed, free = (
+        {"name": n, "goal": g, "met": m}
+        for n, g, m in (("a", "0", True), ("b", "0", False), ("c", "-", False))
+    )
+    assert ended([met, free]) == 0
+    assert ended([met, missed, free]) == 1 and capsys.readouterr().out == "missed: b\n"
 
 
 def _row(named: list[str], before2: float, after2: float) -> dict[str, object]:

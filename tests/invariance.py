@@ -1,0 +1,342 @@
+"""What must not change a diagnosis, and whether it does: `make invariance`.
+
+    python -m tests.invariance [--real FOLDER] [--only "chamber x, hysteresis"] [--docs docs]
+
+Every set (packaged scenarios, axes of measured recordings) is diagnosed as it is, then with a constant added to the
+rate, another clock, seed or order of runs, each run twice, spans cut in two, rates that were written in deg/s, other
+lengths of a block, and means in place of its rows. Verdict and causes must be the same; the table says by how much
+parameters and figures move.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset, Exclusion, Rows, Run
+from gyrotc.results.diagnosed import Diagnosed
+from gyrotc.simulate.campaign import simulate
+from gyrotc.train.fitting import FitOptions
+
+sys.path.insert(0, str(Path(__file__).resolve().parent / "py"))
+from results import table, write
+
+SCENARIOS = ("paper", "thermal-gradient", "hysteresis", "cavity-lag", "warm-up", "supply-voltage")
+CYCLE, HEATING, RAMP = "mpu6000-chamber-cycle", "atoms3-mpu6886-heating", "pan-lsm6dsm-cold"
+MEASURED = (*((name, axis) for name in (CYCLE, HEATING) for axis in "xyz"), (RAMP, "x"))
+PARAMETERS, OF_BLOCKS, FIGURES = 0.01, 0.05, 0.02
+"""Shares by which parameters (with another length of a block) and figures may move."""
+
+Change = Callable[[Dataset], Dataset]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One way to hand over the same recordings; it is asked of rows of at most `finest_s`."""
+
+    change: Change = lambda dataset: dataset
+    options: FitOptions = field(default_factory=FitOptions)
+    parameters: float = PARAMETERS
+    finest_s: float = np.inf
+
+
+def of_rows(change: Callable[[Rows], Rows], **moved: Any) -> Change:
+    """Every run with its rows changed."""
+
+    def one(run: Run) -> Run:
+        rows = change(run.rows())
+        return replace(run, reader=lambda: rows, n_rows=len(rows), **moved)
+
+    return lambda dataset: replace(dataset, runs=tuple(map(one, dataset.runs)))
+
+
+def shifted(constant_dph: float) -> Change:
+    return of_rows(lambda rows: replace(rows, rate_dph=rows.rate_dph + constant_dph))
+
+
+def in_degrees_per_second(rows: Rows) -> Rows:
+    """As they come back from a file with nine digits."""
+    return replace(rows, rate_dph=np.array([float(f"{v / 3600.0:.9g}") * 3600.0 for v in rows.rate_dph]))
+
+
+def later(by_s: float) -> Change:
+    """All clocks moved."""
+
+    def moved(at_s: float | None) -> float | None:
+        return None if at_s is None else at_s + by_s
+
+    def one(run: Run) -> Run:
+        rows = run.rows()
+        return replace(
+            run,
+            reader=lambda: replace(rows, time_s=rows.time_s + by_s),
+            power_on_s=moved(run.power_on_s),
+            from_s=moved(run.from_s),
+            to_s=moved(run.to_s),
+            exclude=tuple(Exclusion(e.from_s + by_s, e.to_s + by_s, e.reason) for e in run.exclude),
+        )
+
+    return lambda dataset: replace(dataset, runs=tuple(map(one, dataset.runs)))
+
+
+def twice(dataset: Dataset) -> Dataset:
+    copies = tuple(replace(run, file=f"copy-{run.file}") for run in dataset.runs)
+    return replace(dataset, runs=(*dataset.runs, *copies))
+
+
+def cut(dataset: Dataset) -> Dataset:
+    """Every run as two spans that touch at the middle of its rows, the second first."""
+    spans = []
+    for run in dataset.runs:
+        time = run.rows().time_s
+        time = time[run.in_span(time)]
+        middle = float(time[time.size // 2])
+        spans += [replace(run, from_s=middle), replace(run, to_s=middle)]
+    return replace(dataset, runs=tuple(spans))
+
+
+def averaged(seconds: float) -> Change:
+    """Means over so many seconds in place of rows."""
+
+    def one(run: Run) -> Run:
+        rows = run.rows()
+        group = max(round(seconds / run.row_period_s), 1)
+        count = len(rows) // group
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            return np.asarray(values[: count * group].reshape(count, group).mean(axis=1))
+
+        means = Rows(
+            mean(rows.time_s),
+            mean(rows.temperature_c),
+            mean(rows.rate_dph),
+            {name: mean(values) for name, values in rows.channels.items()},
+        )
+        return replace(run, reader=lambda: means, n_rows=count, row_period_s=group * run.row_period_s)
+
+    return lambda dataset: replace(dataset, runs=tuple(map(one, dataset.runs)))
+
+
+VARIATIONS = {
+    **{f"rate + {c:g} deg/h": Variation(shifted(c)) for c in (1.0, 10.0, 1000.0)},
+    "clock + 1e5 s": Variation(later(1e5)),
+    "seed 2": Variation(options=FitOptions(seed=2)),
+    "runs in another order": Variation(lambda dataset: replace(dataset, runs=dataset.runs[::-1])),
+    "each run twice": Variation(twice),
+    "spans cut in two": Variation(cut),
+    "rates in deg/s": Variation(of_rows(in_degrees_per_second)),
+    **{
+        f"blocks of {s:g} s": Variation(options=FitOptions(block_s=s), parameters=OF_BLOCKS, finest_s=s)
+        for s in (1.0, 2.0, 5.0, 20.0)
+    },
+    **{f"means over {s:g} s": Variation(averaged(s), finest_s=s / 2.0) for s in (10.0, 30.0, 60.0)},
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is compared of a diagnosis."""
+
+    verdict: str
+    causes: tuple[str, ...]
+    parameters: dict[str, float]
+    figures: dict[str, float]
+
+    @staticmethod
+    def of(result: Diagnosed) -> Answer:
+        parameters = {
+            f"{cause.id}.{name}": value.value
+            for cause in result.physical
+            for name, value in cause.parameters.items()
+        }
+        figures = {"noise floor": result.noise_floor_dph or 0.0}
+        if result.baseline is not None:
+            figures["RMS without"] = result.baseline.exam_rms_dph
+        if result.extended is not None:
+            figures["RMS with"] = result.extended.exam_rms_dph
+        return Answer(result.verdict, tuple(c.id for c in result.physical), parameters, figures)
+
+
+def moved(was: dict[str, float], now: dict[str, float]) -> dict[str, float]:
+    """By which share each value has moved; values that one of them lacks have moved by infinity."""
+    return {
+        name: abs(now[name] / was[name] - 1.0) if name in was and name in now and was[name] else np.inf
+        for name in was.keys() | now.keys()
+        if was.get(name) != now.get(name)
+    }
+
+
+def answers_of(dataset: Dataset, names: Sequence[str]) -> Iterator[tuple[str, Answer | str]]:
+    """The plain answer under "", then that of each variation; a text where the diagnosis failed."""
+    row_s = max(run.row_period_s for run in dataset.runs)
+    for name in ("", *names):
+        variation = VARIATIONS.get(name, Variation())
+        if row_s > variation.finest_s:
+            continue
+        try:
+            yield name, Answer.of(diagnose(variation.change(dataset), options=variation.options).result)
+        except Exception:
+            yield name, traceback.format_exc()
+
+
+def compared(was: Answer, name: str, now: Answer | str) -> dict[str, Any]:
+    """A record of one variation."""
+    record: dict[str, Any] = {"variation": name}
+    if isinstance(now, str):
+        return {**record, "failed": now}
+    parameters, figures = moved(was.parameters, now.parameters), moved(was.figures, now.figures)
+    same = (was.verdict, was.causes) == (now.verdict, now.causes)
+    allowed = VARIATIONS[name].parameters
+    kept = (
+        same
+        and all(v <= allowed for v in parameters.values())
+        and all(v <= FIGURES for v in figures.values())
+    )
+    return {
+        **record,
+        "same": same,
+        "kept": kept,
+        "verdict": [was.verdict, now.verdict],
+        "causes": [list(was.causes), list(now.causes)],
+        "parameters": parameters,
+        "figures": figures,
+    }
+
+
+def of_set(task: tuple[str, str, str, tuple[str, ...]]) -> list[dict[str, Any]]:
+    """Records of all variations of one set."""
+    label, folder, axis, names = task
+    dataset = load(Path(folder), axis=axis or None)
+    found = list(answers_of(dataset, names))
+    was = found[0][1]
+    if isinstance(was, str):
+        return [{"set": label, "variation": "as it is", "failed": was}]
+    plain = {"verdict": was.verdict, "causes": was.causes, **was.parameters, **was.figures}
+    return [{"set": label, **compared(was, *one), "plain": plain} for one in found[1:]]
+
+
+def line(record: dict[str, Any]) -> str:
+    """A record as a line of the terminal."""
+    head = f"{record['set']:24s} {record['variation']:22s}"
+    if "failed" in record:
+        return f"{head} FAILED: {record['failed'].splitlines()[-1]}"
+    (was, now), (causes, others) = record["verdict"], record["causes"]
+    worst = [max(record[kind].values(), default=0.0) for kind in ("parameters", "figures")]
+    text = f"{head} {'ok ' if record['kept'] else 'NOT'} parameters {worst[0]:7.2%} figures {worst[1]:7.2%}"
+    return text if record["same"] else f"{text} {was} {causes} -> {now} {others}"
+
+
+def sets(source: Path, work: Path) -> Iterator[tuple[str, Path, str]]:
+    """Label, folder and axis of every set."""
+    for name in SCENARIOS:
+        folder = work / name
+        simulate(name, seed=1, out=folder)
+        yield name, folder, ""
+    for name, axis in MEASURED:
+        if not (source / name).is_dir():
+            print(f"{name} {axis} is absent in {source}: skipped")
+            continue
+        folder = source / name
+        if not (folder / "dataset.toml").is_file():
+            folder = work / name
+            folder.mkdir(exist_ok=True)
+            data = next((source / name).glob("*.csv"))
+            (folder / data.name).write_bytes(data.read_bytes())
+            run = f'[[run]]\nfile = "{data.name}"\npower_on_s = "unknown"\n'
+            (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{run}', "utf-8")
+        yield f"{name} {axis}", folder, axis
+
+
+def diagnosed(
+    source: Path, only: Sequence[str], names: tuple[str, ...], workers: int
+) -> list[dict[str, Any]]:
+    """Records of all sets whose names have one of the parts `only` (none: of all)."""
+    records: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as work, ProcessPoolExecutor(workers) as pool:
+        tasks = [
+            (label, str(folder), axis, names)
+            for label, folder, axis in sets(source, Path(work))
+            if not only or any(part in label for part in only)
+        ]
+        for found in pool.map(of_set, tasks):
+            records += found
+            for record in found:
+                print(line(record), flush=True)
+    return records
+
+
+def rows_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For each variation: how many sets keep verdict and causes, how many all figures too, and the worst of them."""
+    rows = []
+    for name in VARIATIONS:
+        own = [r for r in records if r["variation"] == name]
+        if not own:
+            continue
+        done = [r for r in own if "failed" not in r]
+        worst = {
+            kind: max((v for r in done if r["same"] for v in r[kind].values()), default=0.0)
+            for kind in ("parameters", "figures")
+        }
+        same, kept = (sum(bool(r.get(key)) for r in own) for key in ("same", "kept"))
+        rows.append({"variation": name, "sets": len(own), "same": same, "kept": kept, **worst})
+    return rows
+
+
+def section(record: dict[str, Any]) -> str:
+    """Its table."""
+    head = (
+        "variation",
+        "sets ",
+        "same verdict and causes ",
+        "all within bounds ",
+        "parameters, worst ",
+        "figures, worst ",
+    )
+    rows = [
+        (r["variation"], r["sets"], r["same"], r["kept"], f"{r['parameters']:.1%}", f"{r['figures']:.1%}")
+        for r in record["rows"]
+    ]
+    return f"Sets: {', '.join(record['sets'])}.\n\n{table(head, rows)}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--real", type=Path, default=Path("../shared/data/real"))
+    parser.add_argument("--only", default="", help="parts of the names of sets")
+    parser.add_argument("--variations", default="", help="parts of the names of variations")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--docs", type=Path, help="the folder docs, whose record is written")
+    parser.add_argument(
+        "--json", type=Path, help="records of an earlier call in place of diagnoses; else written there"
+    )
+    given = parser.parse_args()
+    only = [part.strip() for part in given.only.split(",") if part.strip()]
+    wanted = [part.strip() for part in given.variations.split(",") if part.strip()]
+    names = tuple(n for n in VARIATIONS if not wanted or any(w in n for w in wanted))
+    if given.json and given.json.exists():
+        records = json.loads(given.json.read_text("utf-8"))
+    else:
+        records = diagnosed(given.real, only, names, given.workers)
+    kept = [r for r in records if r.get("kept")]
+    print(f"{len(kept)} of {len(records)} variations keep verdict, causes, parameters and figures")
+    if given.json:
+        given.json.write_text(json.dumps(records, indent=1), "utf-8")
+    if given.docs:
+        record = {"sets": sorted({r["set"] for r in records}), "rows": rows_of(records)}
+        write(given.docs, "invariance", record, section)
+    sys.exit(0 if len(kept) == len(records) else 1)
+
+
+if __name__ == "__main__":
+    main()
