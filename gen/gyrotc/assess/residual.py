@@ -14,8 +14,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..common.metrics import Averages, median
+from ..common.metrics import Averages
 from ..quality.findings import finding
+from ..quality.thermometers import late_findings
 from ..recordings.records import Run
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.findings import Finding
@@ -25,10 +26,8 @@ _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
 _SIGMAS = 4.0  # of each figure's distribution: one clean residual in ten thousand
 _DRAWS = 400  # which tell a standard deviation to 4 %
 _MOST = 2**23  # numbers drawn in all: half a second
-_LEAST = 20  # means: fewer have no autocorrelation to speak of, and do not tell a lag from a curve
+_LEAST = 20  # means: fewer have no autocorrelation to speak of
 _SEED = 1  # any; the same recordings have the same limits
-_LATE_SIGMAS = 6.0  # of a run among dozens
-_LEAST_LATE_S = 10.0  # a block: the front end gives temperature and rate no finer
 
 
 def residual_test(
@@ -102,7 +101,7 @@ def _correlation(judged: Sequence[FloatArray]) -> float | None:
 def residual_findings(result: Evaluation, runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
     """Findings about the residual of the runs that were evaluated."""
     yield from _beyond_noise(result)
-    yield from _late(runs)
+    yield from late_findings(runs)
 
 
 def _beyond_noise(result: Evaluation) -> Iterator[Finding]:
@@ -131,52 +130,3 @@ def _beyond_noise(result: Evaluation) -> Iterator[Finding]:
         ratio=test.rms_over_floor,
         limits=[low, high],
     )
-
-
-def _late(runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
-    """Runs whose residual goes with the change of their correction: T was recorded later, or earlier, than in others.
-
-    A correction at T(t - late) instead of T(t) leaves late times its change. What all runs have in common is no fault
-    of one of them, and the model may hold it.
-    """
-    found = [(run, _lag(averages)) for run, averages in runs]
-    lags = [(run, *lag) for run, lag in found if lag is not None]
-    if len(lags) < 2:
-        return
-    usual = median(np.array([lag for _, lag, _ in lags]))
-    for run, lag, sigma in lags:
-        late = lag - usual
-        if abs(late) > max(_LATE_SIGMAS * sigma, _LEAST_LATE_S, run.row_period_s):
-            word = "later" if late > 0.0 else "earlier"
-            yield finding(
-                "temperature_late",
-                f"The temperature of {run.file} was recorded {abs(late):.3g} s {word} against the rate than in the "
-                f"other runs (1 sigma {sigma:.2g} s): its clock, its wiring, or the pairing of its files.",
-                run,
-                late_s=late,
-                sigma_s=sigma,
-            )
-
-
-def _lag(averages: Averages) -> tuple[float, float] | None:
-    """By how much the temperature of a run is late, s, with its 1 sigma; None where nothing changes."""
-    time, after = averages.time_s, averages.after_dph
-    if len(time) < _LEAST:
-        return None
-    change = np.gradient(averages.before_dph - after, time)
-    power = float(change @ change)
-    if power == 0.0:
-        return None
-    left = after - after.mean()
-    lag = float(change @ left) / power
-    return lag, _sigma_of(left - lag * change, change, power)
-
-
-def _sigma_of(left: FloatArray, change: FloatArray, power: float) -> float:
-    """1 sigma of a slope; what is left may be correlated, so products of neighbours count (Newey and West 1987)."""
-    product = left * change
-    depth = int(np.ceil(len(left) ** 0.25)) + 1
-    total = float(product @ product)
-    for k in range(1, depth):
-        total += 2.0 * (1.0 - k / depth) * float(product[k:] @ product[:-k])
-    return float(np.sqrt(max(total, float(left @ left) / len(left) * power))) / power

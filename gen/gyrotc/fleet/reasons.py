@@ -13,6 +13,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
+from ..quality.thermometers import lag_of
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, Reason
 from .outliers import NOISY_RUN, PROFILE_S, mirrored_units
 
@@ -196,9 +197,9 @@ def _lateness(facts: Sequence[Facts], number: int) -> float:
         usual = np.median([profile[:length] for profile in others], axis=0)
         change = np.gradient(usual) / PROFILE_S
         difference = np.array(run.profile_c[:length]) - usual
-        change, difference = change - change.mean(), difference - difference.mean()
-        if float(np.ptp(usual)) > _LEAST_SHIFT_C and float(change @ change) > 0.0:
-            late.append(-float(change @ difference) / float(change @ change))
+        lag = lag_of(change, difference)
+        if lag is not None and float(np.ptp(usual)) > _LEAST_SHIFT_C:
+            late.append(-lag[0])
     return float(np.median(late)) if late else float("nan")
 
 

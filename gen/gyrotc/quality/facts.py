@@ -124,7 +124,7 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         largest_dph=float(max(rate.max(), -rate.min())) if len(rate) else 0.0,
         noise_dph=float(noise),
         wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
-        stuck_s=_longest_stretch(rate) * run.row_period_s,
+        stuck_s=longest_stretch(rate)[1] * run.row_period_s,
         held_rows=_held(rate),
         constant=_constant(rows, inside, rate),
         earth=run.earth,
@@ -215,16 +215,20 @@ def _wrapped(rows: Rows, finite: BoolArray, weight_arcsec: float | None) -> tupl
     return None
 
 
-def _longest_stretch(values: FloatArray) -> int:
-    """Number of rows in the longest stretch of one identical value."""
-    if len(values) == 0:
-        return 0
-    longest = begun = 0
-    for start in range(1, len(values), PART):
+def longest_stretch(values: FloatArray) -> tuple[int, int]:
+    """First row and number of rows of the longest stretch of one value; a missing one is as no other."""
+    first = rows = begun = 0
+    for start in range(1, len(values) + 1, PART):
         part = values[start : start + PART]
-        at = np.r_[begun, start + np.flatnonzero(part != values[start - 1 : start - 1 + len(part)])]
-        longest, begun = max(longest, int(np.diff(at).max(initial=0))), int(at[-1])
-    return max(longest, len(values) - begun)
+        ends = start + np.flatnonzero(part != values[start - 1 : start - 1 + len(part)])
+        if start + PART > len(values):
+            ends = np.r_[ends, len(values)]
+        lengths = np.diff(ends, prepend=begun)
+        k = int(np.argmax(lengths)) if len(lengths) else 0
+        if len(lengths) and lengths[k] > rows:
+            first, rows = int(ends[k] - lengths[k]), int(lengths[k])
+        begun = int(ends[-1]) if len(ends) else begun
+    return first, rows
 
 
 def _held(rate: FloatArray) -> int:

@@ -16,7 +16,7 @@ from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..results.findings import Estimate, Finding, MarkedRows, Size
-from .facts import RunFacts
+from .facts import RunFacts, longest_stretch
 
 Limits = tuple[float, float, float]
 """A figure and its 95 % limits."""
@@ -189,19 +189,12 @@ def constant_findings(f: RunFacts, rows: Rows, *, coarse: bool) -> Iterator[Find
     stuck = f.stuck_s > max(_STUCK_S, _STUCK_ROWS * f.row_period_s)
     if stuck and not coarse and "rate" not in f.constant:
         text = f"the rate stays at one value for {f.stuck_s:.4g} s"
-        yield finding("stuck_rate", text, f, marks=(_stuck(f.file, rows),))
+        first, count = longest_stretch(rows.rate_dph)
+        span = float(rows.time_s[first]), float(rows.time_s[first + count - 1])
+        yield finding("stuck_rate", text, f, marks=(Mark(f.file, (first + 1, first + count), span),))
     if abs(f.first_s) > _LATE_S:
         text = f"time starts at {f.first_s:.10g} s; it should count from power-on"
         yield finding("time_since_epoch", text, f)
-
-
-def _stuck(file: str, rows: Rows) -> Mark:
-    """The longest stretch of one rate in a file."""
-    starts = np.flatnonzero(np.r_[True, rows.rate_dph[1:] != rows.rate_dph[:-1]])
-    length = np.diff(np.r_[starts, len(rows)])
-    k = int(np.argmax(length))
-    first, last = int(starts[k]), int(starts[k] + length[k] - 1)
-    return Mark(file, (first + 1, last + 1), (float(rows.time_s[first]), float(rows.time_s[last])))
 
 
 def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator[Finding]:

@@ -6,7 +6,7 @@ agree on is held against the run.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -14,7 +14,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA, median, median_of_parts, middle_of_five, quantile_of_parts
+from ..common.metrics import (
+    MAD_TO_SIGMA,
+    Averages,
+    median,
+    median_of_parts,
+    middle_of_five,
+    quantile_of_parts,
+)
 from ..common.statistics import cell_means
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..recordings.units import channel_kind
@@ -29,6 +36,8 @@ _LEAST_CELLS = 20  # for three numbers
 _LEAST_RANGE_C = 5.0  # over less neither share nor lag of a run is known
 _SIGMAS = 5.0  # of what the other runs differ by among themselves
 _LEAST_S = 60.0  # a cell
+_LATE_SIGMAS = 6.0  # of a run among dozens
+_LEAST_LATE_S = 10.0  # a block: the front end gives temperature and rate no finer
 
 
 _STUCK_S = 60.0  # a thermometer that stands still for longer; readings come faster
@@ -343,3 +352,47 @@ def _odd_ones(name: str, runs: list[_Followed]) -> Iterator[Finding]:
                 usual_c=usual,
                 lag_s=one.lag_s,
             )
+
+
+def late_findings(runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
+    """Runs whose residual goes with the change of their correction: T was recorded later, or earlier, than in others.
+
+    A correction at T(t - late) instead of T(t) leaves late times its change. What all runs have in common is no fault
+    of one of them, and the model may hold it.
+    """
+    lags = []
+    for run, a in runs:
+        if len(a.time_s) >= _LEAST_CELLS:
+            lag = lag_of(np.gradient(a.before_dph - a.after_dph, a.time_s), a.after_dph)
+            lags += [] if lag is None else [(run, *lag)]
+    if len(lags) < 2:
+        return
+    usual = median(np.array([lag for _, lag, _ in lags]))
+    for run, lag_s, sigma in lags:
+        late = lag_s - usual
+        if abs(late) > max(_LATE_SIGMAS * sigma, _LEAST_LATE_S, run.row_period_s):
+            word = "later" if late > 0.0 else "earlier"
+            text = (
+                f"The temperature of {run.file} was recorded {abs(late):.3g} s {word} against the rate than in the "
+                f"other runs (1 sigma {sigma:.2g} s): its clock, its wiring, or the pairing of its files."
+            )
+            yield finding("temperature_late", text, run, late_s=late, sigma_s=sigma)
+
+
+def lag_of(change: FloatArray, left: FloatArray) -> tuple[float, float] | None:
+    """By how much what was left, beside a constant, follows from a change that came late, s, with its 1 sigma.
+
+    None where nothing changes. What is left may be correlated, so products of neighbours count (Newey and West 1987).
+    """
+    change, left = change - change.mean(), left - left.mean()
+    power = float(change @ change)
+    if power == 0.0:
+        return None
+    lag = float(change @ left) / power
+    left = left - lag * change
+    product = left * change
+    depth = int(np.ceil(len(left) ** 0.25)) + 1
+    total = float(product @ product)
+    for k in range(1, depth):
+        total += 2.0 * (1.0 - k / depth) * float(product[k:] @ product[:-k])
+    return lag, float(np.sqrt(max(total, float(left @ left) / len(left) * power))) / power

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quality.facts import longest_stretch
 from ..recordings.records import Run
 from .data import Scaling, TrainingData, average
 from .result import Outcome, networks_dph
@@ -86,10 +87,7 @@ def longest_same_s(readings: NDArray[Any], period_s: float) -> float:
     """
     if period_s > _LONGEST_READING_S:
         return float("inf")
-    if readings.size == 0:
-        return 0.0
-    starts = np.flatnonzero(np.concatenate([[True], readings[1:] != readings[:-1]]))
-    return float(np.diff(np.append(starts, readings.size)).max()) * period_s
+    return longest_stretch(readings)[1] * period_s
 
 
 def stuck_after_s(longest_s: float) -> float:
