@@ -26,8 +26,8 @@ from gyrotc.recordings.importers import names
 from gyrotc.recordings.importers.job import ImportOptions, import_files
 from gyrotc.recordings.importers.map_file import Map, load_map
 from gyrotc.recordings.importers.stamps import Stamps
-from gyrotc.recordings.importers.tables import LoggerFile
 from gyrotc.recordings.load import load
+from gyrotc.recordings.tables import LoggerFile
 from gyrotc.results.base import read_result
 from gyrotc.results.recordings import ImportedFiles
 from logger_analysis import ANALYSIS_CASES

@@ -10,13 +10,16 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.importers import formats
 from gyrotc.recordings.importers.map_file import Map
-from gyrotc.recordings.importers.parser_process import Parser, open_confined
-from gyrotc.recordings.importers.sandbox import landlock_version
-from gyrotc.recordings.importers.tables import LoggerFile
+from gyrotc.recordings.parquet_file import ParquetFile
+from gyrotc.recordings.parser_process import Parser, open_confined
+from gyrotc.recordings.sandbox import landlock_version
+from gyrotc.recordings.tables import LoggerFile
 from logger_binaries import BINARY_CASES
 from logger_files import Case, truth
 
@@ -129,7 +132,7 @@ def test_a_process_hands_back_what_the_library_reads(
 
     monkeypatch.setattr(formats, "open_confined", confined)
     with closing(formats.open_logger_file(path, Map())) as there:
-        module = importlib.import_module(parsers[0].module, "gyrotc.recordings.importers")
+        module = importlib.import_module(parsers[0].module, "gyrotc.recordings")
         with closing(getattr(module, parsers[0].function)(path)) as here:
             assert (there.format, there.facts, there.since_power_on) == (
                 here.format,
@@ -144,3 +147,37 @@ def test_a_process_hands_back_what_the_library_reads(
                     assert (got.first, got.done) == (expected.first, expected.done)
                     for name in names:
                         np.testing.assert_array_equal(got.columns[name], expected.columns[name], strict=True)
+
+
+def _recording(folder: Path) -> Path:
+    columns = {name: np.arange(600.0) for name in ("time_s", "temperature_c", "rate_dph")}
+    pq.write_table(pa.table(columns), folder / "run.parquet")
+    return folder / "run.parquet"
+
+
+def test_a_parquet_recording_is_read_in_a_process_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before: pyarrow read it in the job."""
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("read in this process")
+
+    path = _recording(tmp_path)
+    monkeypatch.setattr(pq, "ParquetFile", never)
+    file = ParquetFile("sub/run.parquet", path)
+    assert file.names == ("time_s", "temperature_c", "rate_dph")
+    assert file.read(["rate_dph"])["rate_dph"].tolist() == list(range(600))
+    path.write_bytes(path.read_bytes()[:-300] + bytes(300))
+    with pytest.raises(InputError, match=r"^sub/run.parquet: cannot be read as Parquet"):
+        ParquetFile("sub/run.parquet", path)
+
+
+@pytest.mark.parametrize("rows", [599, 601])
+def test_rows_that_were_not_stated_are_refused(
+    rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = ParquetFile("run.parquet", _recording(tmp_path))
+    monkeypatch.setattr(file, "_rows", rows)
+    with pytest.raises(InputError, match="states"):
+        file.read(file.names)

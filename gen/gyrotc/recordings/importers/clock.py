@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
+from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, conversion
 from .map_file import TimeMap
 from .names import words
 from .stamps import Stamps, forms_of
-from .tables import Chunk, Column, LoggerTable
 
 _CODES = {
     "year": "%Y", "month": "%m", "day": "%d", "hour": "%H", "hours": "%H", "hr": "%H", "minute": "%M", "minutes": "%M",

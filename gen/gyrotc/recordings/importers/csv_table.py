@@ -14,6 +14,7 @@ import pyarrow as pa
 
 from ...common.errors import InputError
 from ..csv_file import blocks_of_lines, parsed
+from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .csv_dialect import (
     HEXADECIMAL,
     MISSING,
@@ -24,7 +25,6 @@ from .csv_dialect import (
     plain_lines,
     plain_number,
 )
-from .tables import Chunk, Column, LoggerFile, LoggerTable
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:

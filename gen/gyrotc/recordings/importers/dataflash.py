@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, part_of
+from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, library, part_of
 
 _MESSAGES = ("IMU", "GYR", "IMU2", "IMU3")
 _FIELDS: dict[str, str] = {

@@ -11,10 +11,10 @@ from pathlib import Path
 from ...common.errors import InputError
 from ...common.inputs import open_input, refuse_above
 from ...store.scratch import scratch_folder
+from ..parser_process import Parser, open_confined
+from ..tables import LoggerFile
 from .csv_table import open_csv
 from .map_file import Map
-from .parser_process import Parser, open_confined
-from .tables import LoggerFile
 
 _MAGIC = (
     (b"MATLAB 5.0", "mat"),
@@ -40,18 +40,18 @@ _NAMED = {".mat": "mat"}
 _SHEETS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
 """How the name of the first file in a spreadsheet begins."""
 _PARSERS = {
-    "mat": Parser(".matfile", "open_mat", "scipy.io"),
-    "hdf5": Parser(".hdf5", "open_hdf5", "h5py"),
-    "parquet": Parser(".parquet", "open_parquet", "pyarrow.parquet"),
-    "feather": Parser(".parquet", "open_feather", "pyarrow.feather"),
-    "numpy": Parser(".numpy_file", "open_numpy", "numpy"),
-    "spreadsheet": Parser(".spreadsheet", "open_spreadsheet", "openpyxl", unpacks=True),
-    "netcdf": Parser(".netcdf", "open_netcdf", "xarray"),
-    "tdms": Parser(".tdms", "open_tdms", "nptdms"),
-    "ulog": Parser(".ulog", "open_ulog", "pyulog"),
-    "dataflash": Parser(".dataflash", "open_dataflash", "pymavlink.DFReader"),
-    "rosbag": Parser(".rosbag", "open_rosbag", "rosbags.highlevel", unpacks=True, beside=True),
-    "mdf": Parser(".mdf", "open_mdf", "asammdf", unpacks=True),
+    "mat": Parser(".importers.matfile", "open_mat", "scipy.io"),
+    "hdf5": Parser(".importers.hdf5", "open_hdf5", "h5py"),
+    "parquet": Parser(".importers.parquet", "open_parquet", "pyarrow.parquet"),
+    "feather": Parser(".importers.parquet", "open_feather", "pyarrow.feather"),
+    "numpy": Parser(".importers.numpy_file", "open_numpy", "numpy"),
+    "spreadsheet": Parser(".importers.spreadsheet", "open_spreadsheet", "openpyxl", unpacks=True),
+    "netcdf": Parser(".importers.netcdf", "open_netcdf", "xarray"),
+    "tdms": Parser(".importers.tdms", "open_tdms", "nptdms"),
+    "ulog": Parser(".importers.ulog", "open_ulog", "pyulog"),
+    "dataflash": Parser(".importers.dataflash", "open_dataflash", "pymavlink.DFReader"),
+    "rosbag": Parser(".importers.rosbag", "open_rosbag", "rosbags.highlevel", unpacks=True, beside=True),
+    "mdf": Parser(".importers.mdf", "open_mdf", "asammdf", unpacks=True),
 }
 """Formats that a library reads: each in a process of its own. CSV is split into lines and cells here."""
 _GZIP, _ZIP, _ZIP_NAME = b"\x1f\x8b", b"PK\x03\x04", 30  # 30: where a name begins (APPNOTE.TXT, 4.3.7)

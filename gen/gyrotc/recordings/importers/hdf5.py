@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
+from ..tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
 _MOST_COLUMNS = 64  # of a two-dimensional set that is split into columns: wider ones are pictures

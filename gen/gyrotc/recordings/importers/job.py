@@ -20,12 +20,12 @@ from ...store.files import write_own
 from ...store.folder import result_folder
 from ..description import FILE, check_serial, dataset_toml
 from ..plausibility import Suspicion, suspicions
+from ..tables import LoggerFile
 from ..values import MIN_ROWS
 from .formats import open_logger_file
 from .map_file import MAP_FILE, Choice, ImportPlan, Map, TimeMap, map_text
 from .propose import Ask, propose
 from .rows import NAMES, Format, ImportedRows, RunFile
-from .tables import LoggerFile
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from ...common.errors import InputError
 from ...common.inputs import read_toml
 from ..description import dataset_toml
-from .tables import Column, LoggerTable
+from ..tables import Column, LoggerTable
 
 MAP_FILE = "map.toml"
 

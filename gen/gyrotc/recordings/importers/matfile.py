@@ -15,7 +15,7 @@ import scipy.io
 
 from ...common.errors import InputError
 from ...common.inputs import need_memory
-from .tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
+from ..tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
 
 _NUMBER_BYTES = 8  # of a float64, the widest number that is read
 _DEEPEST = 4  # structures within one another: deeper ones are no tables

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError
-from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
+from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
 
 def open_mdf(path: Path) -> LoggerFile:

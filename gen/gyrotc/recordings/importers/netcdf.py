@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
+from ..tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
 
 _MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from ...common.inputs import need_memory
-from .tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
+from ..tables import Column, LoggerFile, Part, grouped, numbers, part_of, rate_of
 
 _MOST_COLUMNS = 64  # of a matrix that is split into columns: wider ones are pictures
 

@@ -10,13 +10,91 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.feather
+import pyarrow.parquet as pq
 
 from ...common.errors import InputError
-from ..parquet_file import ParquetBatches
+from ...common.inputs import ceiling, open_input, refuse_above
+from ..tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 from .csv_dialect import kind_of_cells
-from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 
 _SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count
+_HARMLESS_BYTES = 2**26  # 64 MiB, which any host has: below it no ratio of packing is asked about
+_DAMAGE = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)  # of whatever pyarrow meets
+
+
+class ParquetBatches:
+    """A Parquet file of any program, as it was when it was opened.
+
+    Attributes:
+        name: Name in messages.
+        path: Where it is.
+        size: Bytes.
+        schema: Its columns.
+        rows: Number of rows.
+
+    Raises:
+        InputError: It cannot be read, is no Parquet, or unpacks to more than is allowed.
+    """
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name, self.path = name, path
+        opened, self.size = open_input(path, name, "a Parquet file")
+        refuse_above("recording_mib", self.size / 2**20, name, "MiB")
+        try:
+            with opened, pq.ParquetFile(opened) as file:
+                self.schema: pa.Schema = file.schema_arrow
+                self.rows: int = file.metadata.num_rows
+                unpacked = _unpacked(file.metadata)
+        except _DAMAGE as error:
+            raise InputError(
+                name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
+            ) from error
+        refuse_above("columns", len(self.schema), name, "columns")
+        refuse_above("rows", self.rows, name, "rows")
+        _refuse_bomb(name, self.size, max(unpacked, 8 * self.rows * len(self.schema)))
+
+    def batches(self, columns: Sequence[str], most: int = CHUNK_ROWS) -> Iterator[pa.RecordBatch]:
+        """Batches of columns, at most so many rows each.
+
+        Raises:
+            InputError: The file is damaged.
+        """
+        opened, _ = open_input(self.path, self.name, "a Parquet file")
+        at = 0
+        with opened:
+            try:
+                with pq.ParquetFile(opened, pre_buffer=False) as file:
+                    for batch in file.iter_batches(most, columns=list(columns), use_threads=False):
+                        at += len(batch)
+                        yield batch
+                if at != self.rows:
+                    raise ValueError(f"{at} rows instead of {self.rows}")
+            except _DAMAGE as error:
+                found = f"is damaged ({_short(error)})"
+                raise InputError(self.name, found, "a whole Parquet file") from error
+
+
+def _unpacked(metadata: pq.FileMetaData) -> int:
+    """Bytes of all pages once unpacked, as the file states them.
+
+    Of row groups, not of columns: pyarrow ends the process where a damaged file lacks the description of a column.
+    """
+    return sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
+
+
+def _refuse_bomb(name: str, size: int, unpacked: int) -> None:
+    """A small file that unpacks to gigabytes.
+
+    Raises:
+        InputError: It is one.
+    """
+    if unpacked > _HARMLESS_BYTES and unpacked > ceiling("parquet_ratio") * size:
+        found = f"{size} bytes that unpack to {unpacked} or more"
+        raise InputError(name, found, f"at most {ceiling('parquet_ratio'):g} times (--max parquet_ratio=...)")
+
+
+def _short(error: Exception) -> str:
+    return " ".join(str(error).split())[:120]
 
 
 def open_parquet(path: Path) -> LoggerFile:
@@ -27,8 +105,23 @@ def open_parquet(path: Path) -> LoggerFile:
     """
     file = ParquetBatches(path.name, path)
     sample = next(file.batches(file.schema.names, _SAMPLE_ROWS), None)
-    columns = tuple(one for typed in file.schema if (one := _column_of(typed, sample)) is not None)
-    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file),))
+    columns = tuple(column for one in file.schema if (column := _column_of(one, sample)) is not None)
+    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file, rows=file.rows),))
+
+
+def open_numbers(path: Path) -> LoggerFile:
+    """A Parquet file of numbers alone: a recording of a data set.
+
+    Raises:
+        InputError: As `open_parquet`, or a column holds no numbers.
+    """
+    file = ParquetBatches(path.name, path)
+    for one in file.schema:
+        if not (pa.types.is_integer(one.type) or pa.types.is_floating(one.type)):
+            expected = "numbers; `gyrotc import` reads stamps and more"
+            raise InputError(f"{path.name}, column {one.name}", f"holds {one.type}", expected)
+    columns = tuple(Column(name) for name in file.schema.names)
+    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file, rows=file.rows),))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +200,6 @@ class ArrowTable(LoggerTable):
     """Rows of Arrow in memory."""
 
     table: pa.Table = field(default_factory=lambda: pa.table({}))
-    rows: int = 0
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`."""

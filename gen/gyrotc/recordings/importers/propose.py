@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...common.errors import InputError
+from ..tables import Column, LoggerFile, LoggerTable
 from ..units import NATIVE, UnitError, channel_unit, conversion
 from .clock import fraction_of, parts_of
 from .map_file import Choice, ImportPlan, Map
 from .names import Meaning, meaning, split_unit, words
-from .tables import Column, LoggerFile, LoggerTable
 
 Ask = Callable[[str], str | None]
 """Asks a person on a terminal; None where there is none."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, library
+from ..tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, library
 
 _WHY = "the definition of {} (REP 103)"
 _KINDS: dict[str, dict[str, tuple[str, str | None]]] = {
@@ -77,7 +77,6 @@ class BagTable(LoggerTable):
 
     path: Path = Path()
     kind: str = ""
-    rows: int = 0
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`."""

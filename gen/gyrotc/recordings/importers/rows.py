@@ -17,12 +17,12 @@ from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...store.files import create
 from ..reading import Evidence
+from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, UnitError, channel_unit, conversion
 from ..values import Layout, faults, likely_temperature
 from .clock import Clock
 from .map_file import Choice, ImportPlan, TimeMap
 from .names import meaning
-from .tables import Chunk, Column, LoggerTable
 
 NAMES = {
     "temperature": "temperature_c",

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError
+from ..tables import LoggerFile, LoggerTable, library
 from .csv_table import open_csv
-from .tables import LoggerFile, LoggerTable, library
 
 _MOST_SHEETS = 20  # of a workbook that is a recording
 

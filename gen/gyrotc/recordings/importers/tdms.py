@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from .tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
+from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 

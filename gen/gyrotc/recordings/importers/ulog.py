@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...common.errors import InputError
-from .tables import ArrayTable, Column, LoggerFile, LoggerTable, library, numbers, part_of
+from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, library, numbers, part_of
 
 _WHY = "PX4's definition of the message"
 _UNITS: dict[str, dict[str, str]] = {

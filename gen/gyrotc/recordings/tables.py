@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...common.errors import InputError, install_command
+from ..common.errors import InputError, install_command
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
 Array = NDArray[Any]
@@ -73,6 +73,7 @@ class LoggerTable(ABC):
         why_rate: Where that stands.
         started: Time of the first row where the format states it.
         notes: What a user should know of how the table was read.
+        rows: Number of rows where the format states it, else 0.
     """
 
     name: str
@@ -81,6 +82,7 @@ class LoggerTable(ABC):
     why_rate: str = ""
     started: datetime | None = None
     notes: tuple[str, ...] = field(default=())
+    rows: int = 0
 
     @abstractmethod
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
@@ -153,11 +155,9 @@ class ArrayTable(LoggerTable):
     """Columns that can be read from any row on.
 
     Attributes:
-        rows: Number of rows.
         parts: Reads a part of each column.
     """
 
-    rows: int = 0
     parts: Mapping[str, Part] = field(default_factory=dict)
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:

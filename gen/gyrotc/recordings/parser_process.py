@@ -32,9 +32,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ...common.errors import InputError
-from ...common.inputs import ENVIRONMENT, ceiling, refuse_above
-from ...store.scratch import scratch_folder
+from ..common.errors import InputError
+from ..common.inputs import ENVIRONMENT, ceiling, refuse_above
+from ..store.scratch import scratch_folder
 from .sandbox import confine
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
@@ -102,7 +102,6 @@ class _Rows(LoggerTable):
 
     file: str = ""
     index: int = 0
-    rows: int = 0
     worker: Any = None
 
     @staticmethod
@@ -422,7 +421,7 @@ def _stated(table: LoggerTable) -> dict[str, Any]:
         "why_rate": table.why_rate,
         "started": table.started.isoformat() if table.started else None,
         "notes": list(table.notes),
-        "rows": int(getattr(table, "rows", 0)),
+        "rows": table.rows,
     }
 
 

@@ -77,7 +77,7 @@ def _data_bytes() -> int:
 
 def _of_python() -> Iterator[Path]:
     """Where modules and libraries lie that may be loaded later."""
-    yield Path(__file__).resolve().parents[2]
+    yield Path(__file__).resolve().parents[1]
     for name in ("stdlib", "platstdlib", "purelib", "platlib"):
         yield Path(sysconfig.get_path(name))
     yield from (Path(entry) for entry in sys.path if Path(entry).name.endswith("-packages"))
