@@ -122,7 +122,7 @@ class AllanPoint(Part):
 
 
 class NoiseLimits(Part):
-    """What terms of noise that are not resolved are below (k = 2, about 95 %); null: resolved, or not known."""
+    """What terms of noise that are not resolved are below (95 %); null: resolved, or not known."""
 
     quantisation_arcsec: Figure = Field(default=None, description="Q, arcsec")
     arw_deg_per_sqrt_h: Figure = Field(default=None, description="angle random walk N, deg/√h")
@@ -139,7 +139,7 @@ class NoiseTerms(Part):
     rate_random_walk_dph_per_sqrt_h: Figure = Field(description="K, deg/h/√h")
     allan: tuple[AllanPoint, ...] = Field(description="at octaves of the block")
     below: NoiseLimits = Field(
-        default=NoiseLimits(), description="what terms that are not resolved are below (k = 2)"
+        default=NoiseLimits(), description="what terms that are not resolved are below (95 %)"
     )
 
 

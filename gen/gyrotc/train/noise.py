@@ -21,10 +21,12 @@ from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
 from ..results.training import AllanPoint, BiasPlane, NoiseLimits, NoiseTerms
 from .data import TrainingData, average
 
-_FLICKER = 2.0 * np.log(2.0) / np.pi  # 2 ln 2/π: IEEE Std 952-2020, annex C
-_ROUNDS = 3  # the first weights each point by what it is, which favours those that came out small
-_LEAST_EXPECTED = 0.1  # of a point: bounds the weight of one that no term explains
-_COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
+_ROUNDS = 50  # at most; a few are usual
+_LEAST_SHARE, _LEAST_GAIN = 1e-2, 1e-2  # of a step; of -2 log likelihood, of which 4 decides
+_LEAST_EXPECTED = 1e-3  # of the least mean square: bounds weights
+_BANDS = 4.0  # to an octave
+_FALL = 5.0  # of -2 log likelihood: below it lie 4 % of a chi-square of one degree of freedom, less of more
+_LIMIT_DIGITS = 0.05  # of the logarithm of a limit's square
 _LEAST_PAIRS = 8  # independent differences behind a point, which then scatters by a quarter: 1/√(2·8)
 _LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
 _S_PER_H = 3600.0  # s in an hour
@@ -68,18 +70,16 @@ def _differences(rates: FloatArray, factor: int) -> FloatArray:
 
 
 def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
-    """Q, N, B and K of residuals by least squares with non-negative squares, and the Allan deviation itself.
+    """Q, N, B and K of residuals with non-negative squares, and the Allan deviation itself.
 
-    Each square of an Allan deviation is weighted by its scatter, 2 σ⁴ / freedom, σ that of the terms found before.
-    A term that the record does not show is 0, and `below` is what it is less than (k = 2); all are None where the
-    record is too short. Neighbouring points share differences, so that the scatter of terms is a little too small.
+    They are the likeliest by the coefficients of a cosine transform, which are independent. A term is resolved where
+    the likelihood of zero lies far below the top; else it is 0, and `below` is where the likelihood has fallen as far
+    above the top (95 %). All are None where the record is too short.
 
     Args:
         residuals: Mean rates over `step_s`, one array for each gap-free stretch, deg/h.
         step_s: Length of a mean, s.
     """
-    from scipy.optimize import nnls  # 0.2 s to import, which who fits nothing need not wait for
-
     points = allan_variance(residuals, step_s)
     names = (
         "quantisation_arcsec",
@@ -90,43 +90,91 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
     terms: dict[str, float | None] = dict.fromkeys(names)
     below: dict[str, float] = {}
     if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):
-        tau = np.array([p.tau_s for p in points])
-        square = np.array([p.deviation_dph for p in points]) ** 2
-        freedom = np.array([p.freedom for p in points])
-        # 1 arcsec/s is 1 deg/h, so that Q in arcsec goes with τ in s, and N, K with τ in h.
-        shapes = np.stack(
-            [3.0 / tau**2, _S_PER_H / tau, np.full(len(tau), _FLICKER), tau / _S_PER_H / 3.0], axis=1
-        )
-        scale = shapes.max(axis=0)
-        expected = square
-        for _ in range(_ROUNDS):
-            weight = np.sqrt(freedom / 2.0) / expected
-            squares, _ = nnls(weight[:, None] * shapes / scale, weight * square)
-            expected = np.maximum(shapes / scale @ squares, _LEAST_EXPECTED * square)
-        spread = _spread(weight[:, None] * shapes / scale, squares > 0.0)
-        resolved = squares > _COVERAGE * spread
-        terms = dict(
-            zip(names, (float(v) for v in np.sqrt(np.where(resolved, squares, 0.0) / scale)), strict=True)
-        )
-        most = np.sqrt((squares + _COVERAGE * spread) / scale)
-        below = {name: float(v) for name, v, known in zip(names, most, resolved, strict=True) if not known}
+        shapes, square, freedom = _bands(residuals, step_s)
+        squares, top = _likeliest(shapes, square, freedom)
+        for k, name in enumerate(names):
+            terms[name] = float(np.sqrt(squares[k]))
+            if squares[k] == 0.0 or _profile(shapes, square, freedom, k, 0.0) - top < _FALL:
+                terms[name] = 0.0
+                below[name] = _limit(shapes, square, freedom, k, float(squares[k]), top)
     return NoiseTerms(**terms, allan=tuple(points), below=NoiseLimits(**below))
 
 
-def _spread(design: FloatArray, used: NDArray[np.bool_]) -> FloatArray:
-    """Standard uncertainty of each coefficient beside those that are used, itself among them; shape (columns,).
+def _bands(residuals: Sequence[FloatArray], step_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What each term gives, the mean square, and the number, of coefficients of narrow bands of frequency.
 
-    Args:
-        design: Columns over the standard uncertainty of each row, shape (rows, columns).
-        used: Columns that a fit has kept.
+    Coefficients are those of the cosine transform of a stretch, the constant left out. With ω = 2 sin(π f step) their
+    variance is, of Q, N, B, K: (Q ω/step)², N²/step, B²/ω, K² step/ω²; of N and K exactly so, and independent.
     """
-    found = np.zeros(design.shape[1])
-    for k in range(design.shape[1]):
-        kept = np.flatnonzero(used | (np.arange(design.shape[1]) == k))
-        part = design[:, kept]
-        inverse = np.linalg.pinv(part.T @ part)
-        found[k] = np.sqrt(inverse[np.searchsorted(kept, k), np.searchsorted(kept, k)])
-    return found
+    found = []
+    for stretch in (s for s in residuals if s.size > 1):
+        n = stretch.size
+        k = np.arange(1, n)
+        turned = np.fft.rfft(np.concatenate([stretch, stretch[::-1]]))[1:n] * np.exp(-0.5j * np.pi * k / n)
+        found.append(np.stack([2.0 * np.sin(0.5 * np.pi * k / n), turned.real**2 / (2.0 * n)]))
+    omega, square = np.concatenate(found, axis=1)
+    _, band = np.unique(np.floor(_BANDS * np.log2(omega)), return_inverse=True)
+    step_h = step_s / _S_PER_H  # N and K go with h; 1 arcsec/s is 1 deg/h, so that Q in arcsec goes with s
+    terms = ((omega / step_s) ** 2, np.full(omega.size, 1.0 / step_h), 1.0 / omega, step_h / omega**2)
+    count = np.bincount(band).astype(np.float64)
+    *shapes, square = (np.bincount(band, weights=v) / count for v in (*terms, square))
+    return np.stack(shapes, axis=1), square, count
+
+
+def _likeliest(
+    shapes: FloatArray, square: FloatArray, freedom: FloatArray, known: FloatArray | float = 0.0
+) -> tuple[FloatArray, float]:
+    """Squares of the terms beside a part that is known, and -2 log likelihood of mean squares.
+
+    Fisher's scoring: non-negative least squares with weights of the sum found before, its steps halved while they do
+    not gain.
+    """
+    from scipy.optimize import nnls  # 0.2 s to import, which who fits nothing need not wait for
+
+    least = _LEAST_EXPECTED * float(square[square > 0.0].min())
+
+    def unlikelihood(squares: FloatArray) -> float:
+        expected = np.maximum(shapes @ squares + known, least)
+        return float(np.sum(freedom * (np.log(expected) + square / expected)))
+
+    squares = np.zeros(shapes.shape[1])
+    expected = np.maximum(square, median(square))
+    best = np.inf
+    for _ in range(_ROUNDS):
+        weighted = shapes * (np.sqrt(freedom) / expected)[:, None]
+        scale = weighted.max(axis=0)
+        found, _ = nnls(weighted / scale, np.sqrt(freedom) / expected * (square - known))
+        step, share = found / scale - squares, 1.0
+        while (reached := unlikelihood(squares + share * step)) > best and share > _LEAST_SHARE:
+            share *= 0.5
+        if not reached < best - _LEAST_GAIN:
+            break
+        squares, best = squares + share * step, reached
+        expected = np.maximum(shapes @ squares + known, least)
+    return squares, best
+
+
+def _profile(shapes: FloatArray, square: FloatArray, freedom: FloatArray, k: int, value: float) -> float:
+    """-2 log likelihood with the square of a term given and the others the likeliest."""
+    others = np.delete(shapes, k, axis=1)
+    return _likeliest(others, square, freedom, value * shapes[:, k])[1]
+
+
+def _limit(
+    shapes: FloatArray, square: FloatArray, freedom: FloatArray, k: int, value: float, top: float
+) -> float:
+    """The term, not its square, above the likeliest at which the likelihood has fallen far."""
+    from scipy.optimize import brentq
+
+    def fallen(log: float) -> float:
+        return _profile(shapes, square, freedom, k, float(np.exp(log))) - top - _FALL
+
+    low = high = float(np.log(max(value, 0.1 * np.min(square[square > 0.0] / shapes[square > 0.0, k]))))
+    while fallen(low) >= 0.0:
+        low -= 2.0
+    while fallen(high) < 0.0:
+        low, high = high, high + 1.5
+    return float(np.exp(0.5 * brentq(fallen, low, high, xtol=_LIMIT_DIGITS)))
 
 
 def sensitivities(

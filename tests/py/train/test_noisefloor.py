@@ -55,6 +55,22 @@ def test_quantisation_is_found() -> None:
     assert terms.quantisation_arcsec == pytest.approx(quantum / np.sqrt(6.0), rel=0.05), f"seed {SEED}"
 
 
+@pytest.mark.parametrize(("lengths", "walk"), [((1800,), 0.01), ((360,) * 6, 0.03)])
+def test_a_term_that_is_not_resolved_lies_below_its_limit(lengths: tuple[int, ...], walk: float) -> None:
+    """95 of 100 records with a random walk that some of them show and some do not."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    sigma, step = 0.002 / np.sqrt(STEP_S / 3600.0), walk * np.sqrt(STEP_S / 3600.0)
+    wrong = 0
+    for _ in range(100):
+        made = [rng.normal(0.0, sigma, n) + np.cumsum(rng.normal(0.0, step, n)) for n in lengths]
+        terms = noise_terms(made, STEP_S)
+        limit = terms.below.rate_random_walk_dph_per_sqrt_h
+        assert (limit is None) == bool(terms.rate_random_walk_dph_per_sqrt_h), "a value, or a limit"
+        wrong += limit is not None and walk > limit
+    assert wrong <= 5
+
+
 def test_terms_scale_with_the_rate() -> None:
     one = noise_terms(runs(2), STEP_S)
     ten = noise_terms([10.0 * r for r in runs(2)], STEP_S)
