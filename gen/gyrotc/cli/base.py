@@ -364,12 +364,16 @@ def verbose() -> bool:
 
 
 def tell(text: str, *, wrong: bool = False) -> None:
-    """A line of the result on stdout, with `--json -` on stderr.
+    """A line of the result on stdout, with `--json -` on stderr; rates as they are shown, errors as they are.
 
     On a terminal it is broken between words; with --quiet only what went wrong is printed.
     """
     if _Loudness.quiet and not wrong:
         return
+    if "deg/h" in text and not wrong:
+        from ..pages.display import shown_text  # with the results: not for who states no rate
+
+        text = shown_text(text)
     line = terminal_line(text)
     OUT.print(folded(line, OUT.width) if OUT.is_terminal else line, highlight=False, soft_wrap=True)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
+from ..pages.words import sci, words
 from .base import (
     LOT,
     JsonOption,
@@ -162,7 +163,7 @@ def catalogue(
     write_json(json_file, answer.content())
     for one in answer.found:
         until = f" to {one.valid_until}" if one.valid_until else ""
-        spread = f", U {one.expanded_dph:.2g} deg/h" if one.expanded_dph is not None else ""
+        spread = f", U {sci(one.expanded_dph, 1)} deg/h" if one.expanded_dph is not None else ""
         tell(
             f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
             f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
@@ -189,15 +190,14 @@ def _day(text: str | None) -> str:
 
 def _tell_comparison(summary: FleetSummary) -> None:
     """A line for what each gyro was found by, when it was compared with the others."""
-    from ..pages.words import words
 
     for reason in summary.reasons:
         tell(f"outlier: {reason.name}: {reason.text}")
     named = {reason.name for reason in summary.reasons}
     for outlier in (outlier for outlier in summary.outliers if outlier.name not in named):
         tell(
-            f"outlier: {outlier.name}: {words(outlier.figure)}: {outlier.value:.3g}, median of its "
-            f"axis {outlier.median:.3g} ({outlier.sigmas:.0f} robust standard deviations)"
+            f"outlier: {outlier.name}: {words(outlier.figure)}: {sci(outlier.value)}, median of its "
+            f"axis {sci(outlier.median)} ({outlier.sigmas:.0f} robust standard deviations)"
         )
     for copy in summary.copies:
         tell(
@@ -229,7 +229,7 @@ def _tell_entry(entry: FleetEntry) -> None:
     if entry.after_rms_dph is not None:
         floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
         text += (
-            f"; RMS {entry.before_rms_dph:.3e} -> {entry.after_rms_dph:.3e} deg/h{floor}, "
+            f"; RMS {sci(entry.before_rms_dph, 3)} -> {sci(entry.after_rms_dph, 3)} deg/h{floor}, "
             f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
     if entry.status != "done":
@@ -264,6 +264,6 @@ def lot(
     checked = found.cross_validation
     tell(f"{out}: {found.text}")
     tell(
-        f"a new unit, before any run: {checked.left_rms_dph:.3g} deg/h about the lot's map, "
-        f"{checked.constant_rms_dph:.3g} about its own mean"
+        f"a new unit, before any run: {sci(checked.left_rms_dph)} deg/h about the lot's map, "
+        f"{sci(checked.constant_rms_dph)} about its own mean"
     )

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..pages.display import NATIVE, displayed, rate_unit, shown
+from ..pages.display import NATIVE, check_display, displayed, rate_unit, shown
+from ..pages.words import sci, words
 from ..train.options import BuildOptions
 from .base import (
     BUILD,
@@ -74,8 +75,8 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     for d in result.discrepancies:
         if d.p_value < _RARE:
             yield (
-                f"  {d.statistic.replace('_', ' ')}: measured {d.measured:.4g}, "
-                f"simulated {d.simulated_low:.4g} ... {d.simulated_high:.4g}"
+                f"  {words(d.statistic)}: measured {sci(d.measured, 3)}, "
+                f"simulated {sci(d.simulated_low, 3)} … {sci(d.simulated_high, 3)}"
             )
     for cause in result.causes:
         yield from _cause_lines(cause)
@@ -92,7 +93,7 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
 
 def unexplained_text(left: Unexplained) -> str:
     """What is known of structure that has no name."""
-    parts = [f"p = {left.p_value:.2g}"]
+    parts = [f"p = {sci(left.p_value, 1)}"]
     if left.best_partial_match:
         names = " and ".join(left.best_partial_match).replace("_", " ")
         parts.append(f"{names} would account for {left.share_explained:.0%} of the structure")
@@ -135,14 +136,14 @@ def _limit_text(considered: ConsideredCause) -> str:
     limit = considered.detection_limit
     if limit is None or limit.value is None:
         return f"{name}: not visible at any {limit.parameter if limit else 'size'} in this gyro"
-    return f"{name}: {limit.value:.3g} {limit.unit}"
+    return f"{name}: {sci(limit.value)} {limit.unit}"
 
 
 def _cause_lines(cause: NamedCause) -> Iterator[str]:
     yield f"cause: {cause.name} ({cause.id}, family {cause.family})"
     for name, p in cause.parameters.items():
-        interval = "" if p.low is None else f", 95 % {p.low:.4g} ... {p.high:.4g}"
-        yield f"  {name} = {p.value:.4g}{interval}"
+        interval = "" if p.low is None else f", 95 % {sci(p.low)} … {sci(p.high)}"
+        yield f"  {words(name)}: {sci(p.value)}{interval}"
     if cause.equivalent:
         channels = f" ({', '.join(cause.equivalent_channels)})" if cause.equivalent_channels else ""
         yield f"  as likely on these runs: {', '.join(cause.equivalent)}{channels}"
@@ -161,18 +162,17 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
 def _gain_lines(gain: GainOnUnseen) -> Iterator[str]:
     """RMS and angle without and with, on runs not fitted to."""
     share, removed = gain.share_of_excess_removed, gain.rms_removed_dph
-    part = (
-        "" if share is None else f"; {share:.0%} of the removable error ({gain.low:.0%} ... {gain.high:.0%})"
-    )
+    part = "" if share is None else f"; {share:.0%} of the removable error ({gain.low:.0%} … {gain.high:.0%})"
+    before, after = sci(gain.exam_rms_before_dph), sci(gain.exam_rms_after_dph)
     yield (
-        f"  RMS on runs not fitted to: {gain.exam_rms_before_dph:.4g} -> {gain.exam_rms_after_dph:.4g} {rate_unit()}, "
-        f"95 % {removed.low:.2g} ... {removed.high:.2g} less{part}"
+        f"  RMS on runs not fitted to: {before} -> {after} {rate_unit()}, "
+        f"95 % {sci(removed.low, 1)} … {sci(removed.high, 1)} less{part}"
     )
     angle = gain.angle_1h_removed_arcsec
     if angle is not None:
         yield (
-            f"  angle after one hour: {gain.angle_1h_before_arcsec:.4g} -> {gain.angle_1h_after_arcsec:.4g} "
-            f"arcsec, 95 % {angle.low:.2g} ... {angle.high:.2g} less"
+            f"  angle after one hour: {sci(gain.angle_1h_before_arcsec)} -> {sci(gain.angle_1h_after_arcsec)} "
+            f"arcsec, 95 % {sci(angle.low, 1)} … {sci(angle.high, 1)} less"
         )
 
 
@@ -353,6 +353,7 @@ def diagnose(
         bool,
         typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings."),
     ] = False,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
@@ -366,6 +367,7 @@ def diagnose(
     from ..store.folder import result_folder
     from ..train.fitting import FitOptions
 
+    check_display(display)
     if lot is not None and model is not None:
         raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
@@ -377,7 +379,7 @@ def diagnose(
 
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
-        with progress(DIAGNOSE) as say:
+        with displayed(display or NATIVE), progress(DIAGNOSE) as say:
             results[name or ""] = diagnosed(
                 recordings,
                 into,
@@ -398,7 +400,8 @@ def diagnose(
     contents = {name: result.content() for name, result in results.items()}
     write_json(json_file, contents if several else next(iter(contents.values())))
     for name, result in results.items():
-        for line in diagnosis_lines(result):
-            tell(line)
+        with displayed(display or NATIVE):
+            for line in diagnosis_lines(shown(result)):
+                tell(line)
         if out is not None:
             tell(f"report: {(out / name if several else out) / 'report.html'}")

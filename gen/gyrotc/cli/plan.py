@@ -12,6 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..common.errors import InputError
+from ..pages.words import plain, sci
 from .base import PLAN, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .words import NoiseLevel
 
@@ -59,7 +60,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
     low, high = result.bias_range_dph
     yield (
         f"{result.scenario}: {len(result.runs)} runs, {result.hours:g} h; "
-        f"noise {result.noise.arw_deg_per_sqrt_h:.3g} deg/sqrt(h); simulated bias {low:.3g} ... {high:.3g} deg/h"
+        f"noise {sci(result.noise.arw_deg_per_sqrt_h)} deg/sqrt(h); simulated bias {sci(low)} … {sci(high)} deg/h"
     )
     yield _limits(result)
     for id, why in result.not_testable.items():
@@ -82,9 +83,9 @@ def _places(found: Sequence[ThermometerPlace]) -> Table:
     title = "Where a further thermometer would add most"
     table = _table(title, "node", "difference, C", "not seen so far, C", "shows from, deg/h/C")
     for place in found:
-        limit = "never" if place.limit_dph_per_c is None else f"{place.limit_dph_per_c:.2g}"
+        limit = "never" if place.limit_dph_per_c is None else sci(place.limit_dph_per_c, 1)
         name = f"{place.node} (there is one)" if place.there else place.node
-        table.add_row(name, f"{place.difference_c:.3g}", f"{place.unseen_c:.2g}", limit)
+        table.add_row(name, sci(place.difference_c), sci(place.unseen_c, 1), limit)
     table.caption = (
         "difference: RMS difference to the gyro's own thermometer; not seen: by map and those that are there"
     )
@@ -105,7 +106,7 @@ def _limits(result: Plan) -> Table:
     )
     for entry in result.limits:
         limit = entry.detection_limit
-        value = "never" if limit.value is None else f"{limit.value:.3g}"
+        value = "never" if limit.value is None else sci(limit.value)
         table.add_row(entry.id, value, limit.unit, _over(entry.id, limit))
     return table
 
@@ -119,7 +120,7 @@ def _over(id: str, limit: DetectionLimit) -> str:
     if not points:
         return ""
     shown = (points[0], points[len(points) // 2], points[-1])
-    return f"{limit.parameter}: " + ", ".join(f"{v:.2g} at {p:.4g}" for p, v in shown)
+    return f"{limit.parameter}: " + ", ".join(f"{sci(v, 1)} at {plain(p)}" for p, v in shown)
 
 
 def _separability(result: Plan) -> Table:
@@ -130,7 +131,7 @@ def _separability(result: Plan) -> Table:
     title = "d at which a cause (row) is separated from another (column); detection itself takes d = 6"
     table = _table(title, "cause", *(CATALOGUE[o].words.short for o in others))
     for row in rows:
-        at = "" if row.value is None else f" {row.value:.4g}"
+        at = "" if row.value is None else f" {plain(row.value)}"
         cells = []
         for o in others:
             d = row.d.get(o)
@@ -148,7 +149,7 @@ def _accuracy(result: Plan) -> Table:
     )
     for entry, run in zip(result.accuracy, result.runs, strict=True):
         table.add_row(
-            run.profile, f"{entry.hours:g}", f"{entry.map_error_dph:.1e}", f"{entry.rms_dph:.2e}",
+            run.profile, f"{entry.hours:g}", sci(entry.map_error_dph, 1), sci(entry.rms_dph),
             f"{entry.rms_over_floor:.3f}",
         )  # fmt: skip
     return table
@@ -161,7 +162,7 @@ def _shortest(found: Shortest) -> Iterator[str]:
         return
     counted = {name: found.runs.count(name) for name in found.runs}
     runs = ", ".join(f"{n} x {name}" if n > 1 else name for name, n in counted.items())
-    reached = ", ".join(f"{i} {v:.2g}" for i, v in found.reached.items())
+    reached = ", ".join(f"{i} {sci(v, 1)}" for i, v in found.reached.items())
     yield f"shortest profile for {wanted}: {found.hours:g} h: {runs} (reaches {reached})"
 
 
@@ -280,10 +281,10 @@ def _next_run(
             write_atomically(stage.folder / "programme.csv", programme_csv(best))
             write_atomically(stage.folder / "programme.txt", programme_text(best))
     write_json(json_file, result.content())
-    tell(f"{result.serial} as it is known now: {result.before_dph:.3g} deg/h (1 sigma over the envelope)")
+    tell(f"{result.serial} as it is known now: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
     for k, one in enumerate(result.proposals):
         tell(
-            f"{one.programme.hours:.1f} h, price {one.price:.4g}: {one.programme.sigma_dph:.3g} deg/h, "
+            f"{one.programme.hours:.1f} h, price {plain(one.price)}: {sci(one.programme.sigma_dph)} deg/h, "
             f"{one.removed_share:.0%} of the variance removed{', most for its price' if k == result.best else ''}"
         )
     for line in programme_text(best).splitlines():
@@ -311,11 +312,11 @@ def _plan_with_lot(
             write_atomically(stage.folder / "programme.csv", programme_csv(result.with_lot))
             write_atomically(stage.folder / "programme.txt", programme_text(result.with_lot))
     write_json(json_file, result.content())
-    tell(f"the lot alone, before any run: {result.before_dph:.3g} deg/h (1 sigma over the envelope)")
+    tell(f"the lot alone, before any run: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
     for name, found in (("with the lot", result.with_lot), ("without", result.without)):
         short = "" if found.reached else ", which is all that a day reaches"
         tell(
-            f"{name}: {found.hours:.1f} h for {found.sigma_dph:.3g} deg/h, RMS {found.rms_over_floor:.3f} x noise "
+            f"{name}: {found.hours:.1f} h for {sci(found.sigma_dph)} deg/h, RMS {found.rms_over_floor:.3f} x noise "
             f"floor{short}"
         )
     for line in programme_text(result.with_lot).splitlines():

@@ -13,6 +13,7 @@ from .base import (
     AppliedOption,
     AxisOption,
     DatasetArg,
+    DisplayOption,
     JsonOption,
     OutOption,
     SeedOption,
@@ -277,6 +278,7 @@ def check(
             "--plots", callback=written_place, help="Write a page with a picture of every finding here."
         ),
     ] = None,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Report all errors and warnings of recordings at once, also while they still grow.
@@ -284,10 +286,11 @@ def check(
     Example: gyrotc check recordings --plots check.html
     """
     from ..assess.changes import earlier_models
+    from ..pages.display import NATIVE, displayed
     from ..quality.check import check as run
     from ..quality.check import envelope_of
 
-    with progress() as say:
+    with displayed(display or NATIVE), progress() as say:
         result = run(
             dataset,
             axis=axis,
@@ -304,7 +307,8 @@ def check(
             say("drawing")
             write_check_page(plots, result.result(), pictures_of(dataset, result), str(dataset))
     write_json(json_file, result.result().content())
-    for line in result.lines():
-        tell(line, wrong=bool(result.problems))
+    with displayed(display or NATIVE):
+        for line in result.lines():
+            tell(line, wrong=bool(result.problems))
     if result.problems:
         raise typer.Exit(2)

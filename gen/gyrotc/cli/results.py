@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
 from ..pages.display import rate_unit
+from ..pages.words import COVERAGE, bound_words, measured_words, plain, rounded, sci, with_uncertainty
 
 if TYPE_CHECKING:
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
     from ..results.release import HeldLimits
     from ..results.training import Training
     from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
-
-
-def _e(value: float | None, digits: int = 2) -> str:
-    return "-" if value is None else f"{value:.{digits}e}"
 
 
 def evaluation_table(result: Evaluation) -> RichTable:
@@ -41,7 +38,7 @@ def evaluation_table(result: Evaluation) -> RichTable:
 
 
 def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
-    return _e(part.before.rms_dph), _e(part.after.rms_dph), _e(part.after.std_dph)
+    return sci(part.before.rms_dph), sci(part.after.rms_dph), sci(part.after.std_dph)
 
 
 def training_lines(training: Training) -> Iterator[str]:
@@ -56,7 +53,7 @@ def training_lines(training: Training) -> Iterator[str]:
     if training.candidates:
         yield f"correction {training.method}: {training.reason}"
         tried = (
-            f"{r.id} {r.left_out_rms_dph:.3g}" for r in training.candidates if r.left_out_rms_dph is not None
+            f"{r.id} {sci(r.left_out_rms_dph)}" for r in training.candidates if r.left_out_rms_dph is not None
         )
         yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
     yield from _channel_lines(training)
@@ -73,8 +70,8 @@ def _lot_lines(training: Training) -> Iterator[str]:
             if not cell.within:
                 (t0, t1), (r0, r1) = cell.temperature_c, cell.slope_c_per_min
                 yield (
-                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {cell.found_dph:+.2g} {rate_unit()}, "
-                    f"limit {cell.limit_dph:.2g}"
+                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {sci(cell.found_dph, 1)} {rate_unit()}, "
+                    f"limit {sci(cell.limit_dph, 1)}"
                 )
 
 
@@ -92,17 +89,18 @@ def _channel_lines(training: Training) -> Iterator[str]:
             yield f"channel {tried.name}: {tried.verdict}: {tried.reason}"
             continue
         before, after = tried.left_out_rms_before_dph, tried.left_out_rms_after_dph
-        slope = f"{tried.slope_dph_per_unit:.4g} {rate_unit()} per unit{'' if tried.shape == 'line' else ' on average'}"
+        average = "" if tried.shape == "line" else " on average"
+        slope = f"{sci(tried.slope_dph_per_unit)} {rate_unit()} per unit{average}"
         yield (
-            f"channel {tried.name}: taken{_SHAPES[tried.shape or 'line']}, {slope}; left-out RMS {before:.4g} -> "
-            f"{after:.4g} {rate_unit()}, {tried.share_of_variance:.0%} of the variance of the bias"
+            f"channel {tried.name}: taken{_SHAPES[tried.shape or 'line']}, {slope}; left-out RMS {sci(before)} -> "
+            f"{sci(after)} {rate_unit()}, {tried.share_of_variance:.0%} of the variance of the bias"
         )
 
 
 def prediction_line(training: Training) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
     ratio = training.predicted_rms_ratio
-    floor = f"noise floor {training.noise_floor_dph:.3g} {rate_unit()}"
+    floor = f"noise floor {sci(training.noise_floor_dph)} {rate_unit()}"
     if ratio is None:
         return f"{floor}; no prediction of RMS over it: {training.prediction_withheld}"
     return f"{floor}; predicted RMS over it: {ratio:.4f}"
@@ -163,8 +161,8 @@ def verify_notes(result: Verification) -> Iterator[str]:
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (
-            f"{error.numeric}: worst error {error.worst_dph:.2e} {rate_unit()} of {error.inputs_visited} inputs "
-            f"visited; the bound is {error.bound_dph:.2e}"
+            f"{error.numeric}: worst error {sci(error.worst_dph)} {rate_unit()} of {error.inputs_visited} inputs "
+            f"visited; the bound is {sci(error.bound_dph)}"
             + (" and is EXCEEDED" if error.worst_dph > error.bound_dph else "")
         )
 
@@ -243,13 +241,20 @@ def summary(result: Evaluation) -> str:
     floor, rms = result.noise_floor_dph, part.after.rms_dph
     if floor and rms is not None:
         text += (
-            f"; RMS {rms:.3e} {rate_unit()} = {rms / floor:.4f} x noise floor ({result.noise_floor_source})"
+            f"; RMS {_known_to(result, 'rms_dph', rms)} {rate_unit()} = {rms / floor:.4f} x noise floor "
+            f"({result.noise_floor_source})"
         )
     if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
         role = "exam" if result.exam else "train"
         rows = sum(run.outlier_rows for run in result.runs if run.role == role)
-        text += f"; {robust.rms_dph:.3e} without {rows} rows that are outliers"
+        text += f"; {sci(robust.rms_dph)} without {rows} rows that are outliers"
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
+
+
+def _known_to(result: Evaluation, figure: str, value: float) -> str:
+    """A figure that the model is judged by, rounded to what is known of it."""
+    known = (result.uncertainty or {}).get(figure)
+    return with_uncertainty(value, COVERAGE * known.standard if known else None)
 
 
 def _of_a_constant(result: Evaluation, judged: Pooled) -> float | None:
@@ -279,12 +284,9 @@ def limit_lines(limits: HeldLimits) -> Iterator[str]:
     yield from (f"  CONDITIONAL PASS at most: {why}" for why in limits.capped)
     for check in limits.limits:
         kind, _, figure = check.limit.partition(".")
-        sign = {"at_most": "<= ", "at_least": ">= "}.get(kind, "")
-        name, bound = figure if sign else check.limit, _plain(check.bound)
-        known = check.expanded_uncertainty
-        spread = f" +- {known:.2g}" if known else ""
+        sign = kind in ("at_most", "at_least")
         mark = "" if check.decision == "PASS" else f", {check.decision}"
-        yield f"  {name} {sign}{bound}: {_plain(check.measured)}{spread}{mark}"
+        yield f"  {figure if sign else check.limit} {bound_words(check)}: {measured_words(check)}{mark}"
 
 
 def change_lines(changes: Changes) -> Iterator[str]:
@@ -298,15 +300,15 @@ def change_lines(changes: Changes) -> Iterator[str]:
         share = f" = {moved.rms_over_floor:.2g} x noise floor" if moved.rms_over_floor else ""
         if moved.expanded_uncertainty_dph is not None:
             more = "significant: more than" if moved.significant else "not significant: no more than"
-            share += f", {more} U = {moved.expanded_uncertainty_dph:.2g}"
+            share += f", {more} U = {rounded(moved.expanded_uncertainty_dph)}"
         yield (
-            f"against the earlier result: maps {moved.rms_dph:.3e} {rate_unit()} RMS difference{share}, at most "
-            f"{moved.max_abs_dph:.3e} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
+            f"against the earlier result: maps {sci(moved.rms_dph)} {rate_unit()} RMS difference{share}, at most "
+            f"{sci(moved.max_abs_dph)} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
     yield from _as_found_lines(changes)
     for name, figure in changes.figures.items():
-        if not isinstance(figure, str) and _plain(figure.before) != _plain(figure.after):
-            yield f"  {name}: {_plain(figure.before)} -> {_plain(figure.after)}"
+        if not isinstance(figure, str) and plain(figure.before) != plain(figure.after):
+            yield f"  {name}: {plain(figure.before)} -> {plain(figure.after)}"
     for kind, part in changes.named:
         for what, names in part:
             if names:
@@ -323,15 +325,4 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
             yield f"  as found: not known ({changes.as_found_missing})"
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
-    yield f"  as found: RMS {_e(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
-
-
-def _plain(value: Any) -> str:
-    """A figure of any kind as text."""
-    if value is None:
-        return "not measured"
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list | tuple):
-        return " ... ".join(_plain(v) for v in value) if value else "none"
-    return str(value)
+    yield f"  as found: RMS {sci(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"

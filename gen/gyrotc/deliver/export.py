@@ -76,8 +76,8 @@ def _cubics(models: Sequence[Model], format: Autopilot, options: Exporting) -> t
         raise InputError("--axis-as", repr(options.axis_as), ", ".join(AXES))
     cubics = {model.axis or options.axis_as: best_cubic(model, format) for model in models}
     lost = [
-        f"axis {axis}: the cubic is {c.rms_dph:.2e} deg/h RMS from the map, at most {c.largest_dph:.2e}; the map "
-        f"takes off {c.flat_dph:.2e}"
+        f"axis {axis}: the cubic is {c.rms_dph:.2e} deg/h RMS from the map, at most {c.largest_dph:.2e} deg/h; "
+        f"the map takes off {c.flat_dph:.2e} deg/h"
         for axis, c in cubics.items()
     ]
     return parameters(models[0].serial, format, cubics, lost, options.device), lost
@@ -100,5 +100,5 @@ def _lost(grid: MapGrid) -> str:
     shape = f"{grid.temperature_c.size} x {grid.slope_c_per_min.size}"
     return (
         f"{axis}{shape} points; linear between them it is {grid.rms_dph:.2e} deg/h RMS from the map, at most "
-        f"{grid.largest_dph:.2e}{without}"
+        f"{grid.largest_dph:.2e} deg/h{without}"
     )

@@ -46,7 +46,6 @@ _IN_RUN = (
     "transition",
     "jump_in_temperature",
     "stuck_temperature",
-    "run_outlier",
 )
 _PER_H = 3600.0  # s in an hour
 

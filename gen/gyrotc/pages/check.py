@@ -13,6 +13,7 @@ from ..recordings.records import Curve
 from ..results.recordings import Checked
 from ..store.folder import write_result
 from .chart import ACCENT, AFTER, BEFORE, COVERED, Panel, drawing
+from .display import in_unit, rate_unit, shown
 from .report import page_environment
 
 _NARROW = 0.004  # of the picture's width: spans below it get a mark above
@@ -34,10 +35,15 @@ def _seen(shown: Seen) -> Markup:
     if shown.near is not None:
         strips.append((shown.near, "around the first mark"))
     panels = []
-    for name, rates in (("rate, deg/h", True), ("temperature, C", False)):
+    for name, rates in ((f"rate, {rate_unit()}", True), ("temperature, C", False)):
         for k, (strip, title) in enumerate(strips):
             panel = Panel(x="" if rates else "time, s", y="" if k else name, title=title if rates else "")
-            _band(panel, strip, strip.rate_dph if rates else strip.temperature_c, BEFORE if rates else AFTER)
+            _band(
+                panel,
+                strip,
+                (in_unit(strip.rate_dph[0]), in_unit(strip.rate_dph[1])) if rates else strip.temperature_c,
+                BEFORE if rates else AFTER,
+            )
             _marks(panel, strip, shown.spans_s)
             panels.append(panel)
     return drawing(panels, columns=len(strips), height=110.0)
@@ -75,7 +81,7 @@ def _columned(shown: Columned) -> Markup:
 def _compared(shown: Compared) -> Markup:
     every = (*shown.named, *shown.others)
     count = max((max(len(c.axes), 1) for c in every), default=1)
-    panels = [Panel(x="temperature, C", y="" if k else "mean rate, deg/h") for k in range(count)]
+    panels = [Panel(x="temperature, C", y="" if k else f"mean rate, {rate_unit()}") for k in range(count)]
     for curve in shown.others[:_MOST_OTHERS]:
         _curve(panels, curve, COVERED, "the other runs")
     for curve in shown.named[:_MOST_OTHERS]:
@@ -85,8 +91,9 @@ def _compared(shown: Compared) -> Markup:
 
 def _curve(panels: Sequence[Panel], curve: Curve, color: str, label: str) -> None:
     for k in range(curve.rates_dph.shape[1]):
-        panels[k].line(curve.temperature_c, curve.rates_dph[:, k], color, label)
-        panels[k].dots(curve.temperature_c, curve.rates_dph[:, k], color, size=4.0)
+        rates = in_unit(curve.rates_dph[:, k])
+        panels[k].line(curve.temperature_c, rates, color, label)
+        panels[k].dots(curve.temperature_c, rates, color, size=4.0)
         if curve.axes:
             panels[k].title = f"axis {curve.axes[k]}"
 
@@ -101,7 +108,7 @@ _MOST = 100  # pictures of one page
 
 
 def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Picture]], title: str) -> None:
-    """Writes the page of a check.
+    """Writes the page of a check, rates as they are shown.
 
     Args:
         pictures: Of each problem, then of each warning.
@@ -110,11 +117,11 @@ def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Pi
     Raises:
         InputError: There is a file at `path` that gyrotc did not write.
     """
-    left = _MOST
+    result, left = shown(result), _MOST
     drawn: list[list[Markup]] = []
-    for shown in pictures:
-        drawn.append([picture(one) for one in shown[: max(left, 0)]])
-        left -= len(shown)
+    for some in pictures:
+        drawn.append([picture(one) for one in some[: max(left, 0)]])
+        left -= len(some)
     problems = list(zip(result.problems, drawn, strict=False))
     warnings = list(zip(result.warnings, drawn[len(problems) :], strict=True))
     page = page_environment().get_template("check.html.j2")

@@ -1,10 +1,11 @@
-"""The unit in which pages and terminals show rates. Results and files keep deg/h; what people read changes.
+"""The unit and form in which pages and terminals show numbers. Results and files keep deg/h; what people read changes.
 
 numpy, pydantic and the results are imported where they are used: the command line's help does without them.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -73,20 +74,19 @@ def in_unit(values_dph: ArrayLike) -> FloatArray:
 
 
 def shown(part: T) -> T:
-    """A result with its rates, known by the ends of their names, in the unit in which they are shown."""
-    return part if rate_unit() == NATIVE else _shown(part, rate=False)
+    """A result as people read it: its rates, known by the ends of their names, in the unit in which they are shown."""
+    made: T = _shown(part, rate=False)
+    return made
 
 
 def shown_text(text: str) -> str:
-    """A sentence with its rates in the unit in which they are shown, with as many digits as they have."""
-    if rate_unit() == NATIVE or NATIVE not in text:
+    """A sentence with its rates in the unit and form in which they are shown, with as many digits as they have."""
+    if NATIVE not in text:
         return text
     return _STATED.sub(lambda found: re.sub(_NUMBER, _converted, found[1]) + f" {rate_unit()}", text)
 
 
 def _converted(found: re.Match[str]) -> str:
-    from .scales import significant
-
     number = found[0].replace(",", "")
     digits = len(re.sub(r"^[+-]?[0.]*|[.]|e.*$", "", number)) or 1
     sign = "+" if number.startswith("+") else ""
@@ -99,18 +99,21 @@ def _shown(value: Any, *, rate: bool) -> Any:
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, float):
-        return value * DISPLAYS[rate_unit()] if rate else value
+        return value * DISPLAYS[rate_unit()] if rate and rate_unit() != NATIVE else value
     if isinstance(value, str):
         return shown_text(value)
     if isinstance(value, tuple | list):
-        return type(value)(_shown(one, rate=rate) for one in value)
+        made = type(value)(_shown(one, rate=rate) for one in value)
+        return value if all(a is b for a, b in zip(made, value, strict=True)) else made
     if isinstance(value, Mapping):
         return {key: _shown(one, rate=rate or bool(_RATE.search(str(key)))) for key, one in value.items()}
     return _shown_object(value, rate=rate) if isinstance(value, BaseModel) else value
 
 
 def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
+    from ..results.diagnosed import ComparedStatistic, EventSize, ParameterLikelihood
     from ..results.fleet import FleetOutlier
+    from ..results.planned import DetectionLimit
     from ..results.release import Contribution, Instrument, Limit
 
     rates = {
@@ -122,9 +125,42 @@ def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
         rates |= {"value", "median"}
     elif isinstance(part, Instrument) and part.quantity == "rate":
         rates.add("expanded_uncertainty")
+    elif isinstance(part, ComparedStatistic) and _RATE.search(part.statistic):
+        rates |= {name for name in type(part).model_fields if name.startswith(("measured", "simulated"))}
+    elif isinstance(part, ParameterLikelihood) and _RATE.search(part.parameter):
+        rates |= {"values", "low", "high"}
     elif isinstance(part, Contribution):
         rates.add("standard_uncertainty" if part.unit == NATIVE else "sensitivity")
+    elif isinstance(part, EventSize | DetectionLimit) and part.unit.startswith(NATIVE):
+        rates |= {"value", "low", "high"}
     update = {name: _shown(getattr(part, name), rate=name in rates) for name in type(part).model_fields}
-    if isinstance(part, Contribution) and part.unit == NATIVE:
-        update["unit"] = rate_unit()
-    return part.model_copy(update={k: v for k, v in update.items() if v is not getattr(part, k)})
+    if isinstance(part, Contribution | EventSize | DetectionLimit) and part.unit.startswith(NATIVE):
+        update["unit"] = part.unit.replace(NATIVE, rate_unit())
+        if isinstance(part, DetectionLimit):
+            update["over"] = tuple((at, _shown(limit, rate=True)) for at, limit in part.over)
+    changed = {k: v for k, v in update.items() if v is not getattr(part, k)}
+    return part.model_copy(update=changed) if changed else part
+
+
+_PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
+
+
+def power(exponent: int) -> str:
+    """A power of ten: 10⁻⁴."""
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def is_plain(exponent: int) -> bool:
+    """Whether a number of this power of ten is written without one: 0.01 to 99999, on axes, in tables, in sentences."""
+    return _PLAIN[0] < exponent < _PLAIN[1]
+
+
+def significant(value: float, digits: int) -> str:
+    """A number with so many significant digits, those before the point whole: 1303, 2764.2, 0.0215, 7.00·10⁻⁴."""
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if is_plain(exponent):
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+    mantissa, _, exact = f"{value:.{digits - 1}e}".partition("e")
+    return f"{mantissa}·{power(int(exact))}".replace("-", "−")

@@ -12,6 +12,7 @@ from ..results.planned import Plan
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
 from .chart import AFTER, BEFORE, Panel, drawing
+from .display import rate_unit, shown
 from .report import page_environment, page_from, write_page
 
 _FULL = 30.0  # d from which a pair counts as inseparable
@@ -57,7 +58,7 @@ def accuracy_by_hours(result: Plan) -> Markup:
     """Predicted RMS over the noise floor, and error of the map, over chamber hours."""
     hours = [a.hours for a in result.accuracy]
     left = Panel(x="chamber hours", y="RMS of 100 s means ÷ noise floor")
-    right = Panel(x="chamber hours", y="error of the map, deg/h", y_log=True)
+    right = Panel(x="chamber hours", y=f"error of the map, {rate_unit()}", y_log=True)
     left.horizontal(1.0, dash="5 3")
     for panel, color, values in (
         (left, AFTER, [a.rms_over_floor for a in result.accuracy]),
@@ -87,7 +88,7 @@ def write_plan_page(folder: Path) -> Path:
     Raises:
         InputError: `plan.json` is missing or broken.
     """
-    result = read_result(folder / "plan.json", Plan)
+    result = shown(read_result(folder / "plan.json", Plan))
     with page_from(folder / "plan.json"):
         text = (
             page_environment()

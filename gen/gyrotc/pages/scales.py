@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..common.arrays import FloatArray
+from .display import is_plain, power
 
 _ROUND = (
     1.0,
@@ -16,28 +17,6 @@ _ROUND = (
     10.0,
     20.0,
 )  # steps whose multiples people read at a glance; 10 begins the next decade
-_PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
-
-
-def power(exponent: int) -> str:
-    """A power of ten: 10⁻⁴."""
-    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
-def is_plain(exponent: int) -> bool:
-    """Whether a number of this power of ten is written without one: 0.01 to 99999, on axes, in tables, in sentences."""
-    return _PLAIN[0] < exponent < _PLAIN[1]
-
-
-def significant(value: float, digits: int) -> str:
-    """A number with so many significant digits, those before the point whole: 1303, 2764.2, 0.0215, 7.00·10⁻⁴."""
-    if value == 0.0:
-        return "0"
-    exponent = math.floor(math.log10(abs(value)))
-    if is_plain(exponent):
-        return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
-    mantissa, _, exact = f"{value:.{digits - 1}e}".partition("e")
-    return f"{mantissa}·{power(int(exact))}".replace("-", "−")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,11 @@ from ..model import Model
 from ..results.training import NoiseTerms
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
 from .display import in_unit, rate_unit
-from .words import sci
+from .words import COVERAGE, sci
 
 MOVING_C_PER_MIN = 0.1
 """Slower than that temperature stands still: no chamber's programme asks for less, and a hold drifts by less."""
 _DOT = 2.5  # points, across
-_COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
 _FLOOR_OVER_B = float(np.sqrt(2.0 * np.log(2.0) / np.pi))  # IEEE Std 952-2020, annex C
 _TAU_OVER_Q = float(np.sqrt(3.0))  # Allan deviation times averaging time over Q: the same annex
 
@@ -80,9 +79,7 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
     sigma = _sigma_at_rest(model, t)
     if sigma is not None:
         sigma = in_unit(sigma)
-        panel.band(
-            t, rest - _COVERAGE * sigma, rest + _COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2"
-        )
+        panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2")
     panel.line(t, rest, ACCENT, "map at rest", width=1.4)
     for label, color, of in kinds:
         if label != "held":

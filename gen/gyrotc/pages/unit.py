@@ -14,7 +14,7 @@ from ..results.release import Budget, HeldLimits, Limit, Verdict
 from ..results.training import CandidateModel, Manifest, Training
 from ..results.verification import Verification
 from .display import NATIVE, shown
-from .words import limit_words, plain, words
+from .words import COVERAGE, limit_words, plain, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
@@ -25,7 +25,6 @@ _RULES = {
 }
 _SHOWN_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # entries of `[meta]`
 _GRAVEST = ("FAIL", "CONDITIONAL PASS", "PASS")
-_COVERAGE = 2.0  # k of about 95 % of a normal distribution (JCGM 100:2008, G.1)
 
 
 def unit_in(folder: Path) -> UnitResults:
@@ -127,7 +126,7 @@ class UnitResults:
     def spread(self, figure: str) -> float | None:
         """Expanded uncertainty (k = 2) of a figure."""
         known = (self.evaluation.uncertainty or {}).get(figure)
-        return _COVERAGE * known.standard if known else None
+        return COVERAGE * known.standard if known else None
 
     @property
     def about_the_mean(self) -> float | None:

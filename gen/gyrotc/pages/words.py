@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..results.release import Limit
-from .display import NATIVE, rate_unit
-from .scales import is_plain, power, significant
+from .display import NATIVE, is_plain, power, rate_unit, significant
+
+if TYPE_CHECKING:
+    from ..results.release import Limit
+
+COVERAGE = 2.0
+"""k of about 95 % of a normal distribution (JCGM 100:2008, G.1)."""
 
 _UNITS = (
     ("_dph_per_c_per_min", "deg/h/(C/min)"),

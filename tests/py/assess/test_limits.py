@@ -220,7 +220,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
         "c/gtc_rlg_1.c" in changes["files"]["other_bytes"]
         and "c/gtc.c" not in changes["files"]["other_bytes"]
     )
-    assert "maps 1.000e-02 deg/h RMS difference" in done.stdout
+    assert "maps 0.0100 deg/h RMS difference" in done.stdout
     assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     assert json.loads((tmp_path / "two" / "model.json").read_text())["q31_bias_frac_bits"] == 30
     assert "left out of tables and runtime: uncertainty, rezero, image" in done.stderr + done.stdout
@@ -232,7 +232,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert found["judged_on"] == "train" and found["limits"]["met"] is True
     assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"
     assert [c["moved_rms_dph"] is None for c in changes["history"]] == [True, False]
-    assert changes["map"]["significant"] is True and "as found: RMS 1.0" in done.stdout
+    assert changes["map"]["significant"] is True and "as found: RMS 0.01" in done.stdout
     page = (tmp_path / "two" / "report.html").read_text()
     assert "All calibrations that are known" in page and 'aria-label="all calibrations over time' in page
     names = json.loads((tmp_path / "two" / "manifest.json").read_text())["files"]

@@ -7,9 +7,11 @@ import re
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text
-from gyrotc.pages.scales import AxisScale, scale_of, significant
+from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text, significant
+from gyrotc.pages.scales import AxisScale, scale_of
 from gyrotc.pages.words import sci, with_uncertainty, words
+from gyrotc.results.diagnosed import ComparedStatistic, EventSize, ParameterLikelihood
+from gyrotc.results.planned import DetectionLimit
 from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
 
@@ -41,7 +43,7 @@ def test_figures_change_by_the_factor_of_the_unit_and_other_numbers_stay(name: s
         assert shown(bytes_) == bytes_
         assert words("before_rms_dph").endswith(f", {name}") and rate_unit() == name
         assert in_unit([3.6, 7.2]) == pytest.approx(np.array([3.6, 7.2]) * factor)
-    assert rate_unit() == "deg/h" and shown(limit) is limit
+    assert rate_unit() == "deg/h" and shown(limit) == limit
 
 
 def test_an_uncertainty_in_another_unit_keeps_it_and_its_sensitivity_changes() -> None:
@@ -75,7 +77,37 @@ def test_an_uncertainty_in_another_unit_keeps_it_and_its_sensitivity_changes() -
 def test_sentences_keep_their_digits(text: str, wanted: str) -> None:
     with displayed("mdps"):
         assert shown_text(text) == wanted
-    assert shown_text(text) == text
+    assert shown_text(text) == text.replace("7.20e-04", "7.20·10⁻⁴")
+
+
+def test_limits_events_and_statistics_carry_their_unit_with_them() -> None:
+    limit = DetectionLimit(value=3.6, unit="deg/h/C", parameter="tau_s", over=((600.0, 7.2), (900.0, None)))
+    event = EventSize(value=3.6, low=1.8, high=7.2, unit="deg/h")
+    warm = EventSize(value=1.0, low=0.5, high=2.0, unit="C")
+    rms, share = (
+        ComparedStatistic(
+            statistic=name,
+            measured=3.6,
+            simulated_mean=1.8,
+            simulated_low=0.0,
+            simulated_high=3.6,
+            p_value=0.5,
+        )
+        for name in ("rms_dph", "autocorrelation")
+    )
+    of_size, of_time = (
+        ParameterLikelihood(
+            cause="a", parameter=name, values=(3.6, 7.2), gain=(-1.0, 0.0), low=None, high=7.2
+        )
+        for name in ("amplitude_dph", "tau_s")
+    )
+    with displayed("mdps"):
+        found = shown(limit)
+        assert (found.value, found.unit, found.over) == (1.0, "mdps/C", ((600.0, 2.0), (900.0, None)))
+        assert (shown(event).high, shown(event).unit, shown(warm)) == (2.0, "mdps", warm)
+        assert (shown(rms).measured, shown(rms).simulated_mean, shown(rms).p_value) == (1.0, 0.5, 0.5)
+        assert shown(of_size).values == (1.0, 2.0) and shown(of_size).gain == (-1.0, 0.0)
+        assert shown(share) == share and shown(of_time) == of_time
 
 
 def test_a_unit_that_is_not_known_is_refused_with_those_that_are() -> None:
