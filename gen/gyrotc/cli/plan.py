@@ -120,7 +120,7 @@ def _over(id: str, limit: DetectionLimit) -> str:
     if not points:
         return ""
     shown = (points[0], points[len(points) // 2], points[-1])
-    return f"{limit.parameter}: " + ", ".join(f"{sci(v, 1)} at {plain(p)}" for p, v in shown)
+    return f"{limit.parameter}: " + ", ".join(f"{sci(v, 1)} at {sci(p)}" for p, v in shown)
 
 
 def _separability(result: Plan) -> Table:
@@ -131,7 +131,7 @@ def _separability(result: Plan) -> Table:
     title = "d at which a cause (row) is separated from another (column); detection itself takes d = 6"
     table = _table(title, "cause", *(CATALOGUE[o].words.short for o in others))
     for row in rows:
-        at = "" if row.value is None else f" {plain(row.value)}"
+        at = "" if row.value is None else f" {sci(row.value)}"
         cells = []
         for o in others:
             d = row.d.get(o)

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from ..results.evaluation import Comparison, Group, Method, Published
 from .chart import AFTER, BEFORE, COVERED, Panel, drawing, stacked
-from .scales import power
+from .display import power
 
 ENVIRONMENTS = ("-40 C", "20 C", "60 C", "1 C/min", "3 C/min", "5 C/min")
 

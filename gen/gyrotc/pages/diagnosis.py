@@ -32,6 +32,7 @@ from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .display import rate_unit, shown
 from .report import page_environment, page_from, write_page
 from .thermal import sorted_by_rate
+from .words import words
 
 PICTURES, SERIES = "pictures", "series.json"
 
@@ -270,7 +271,7 @@ def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:
 
 def _likelihood(likelihood: ParameterLikelihood) -> Markup:
     """Profile likelihood of the parameter of a cause where it is near its top, with its 95 % interval."""
-    panel = Panel(x=likelihood.parameter, y="2 Δ log likelihood", title=likelihood.cause)
+    panel = Panel(x=words(likelihood.parameter), y="2 Δ log likelihood", title=likelihood.cause)
     panel.y_range = (max(_SHOWN, 1.05 * min(likelihood.gain)), None)
     if likelihood.low is not None and likelihood.high is not None:
         panel.span(likelihood.low, likelihood.high, AFTER)

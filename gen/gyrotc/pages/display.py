@@ -111,7 +111,8 @@ def _shown(value: Any, *, rate: bool) -> Any:
 
 
 def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
-    from ..results.diagnosed import ComparedStatistic, EventSize, ParameterLikelihood
+    from ..results.diagnosed import ComparedStatistic, ParameterLikelihood
+    from ..results.findings import Size
     from ..results.fleet import FleetOutlier
     from ..results.planned import DetectionLimit
     from ..results.release import Contribution, Instrument, Limit
@@ -131,10 +132,10 @@ def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
         rates |= {"values", "low", "high"}
     elif isinstance(part, Contribution):
         rates.add("standard_uncertainty" if part.unit == NATIVE else "sensitivity")
-    elif isinstance(part, EventSize | DetectionLimit) and part.unit.startswith(NATIVE):
+    elif isinstance(part, Size | DetectionLimit) and part.unit.startswith(NATIVE):
         rates |= {"value", "low", "high"}
     update = {name: _shown(getattr(part, name), rate=name in rates) for name in type(part).model_fields}
-    if isinstance(part, Contribution | EventSize | DetectionLimit) and part.unit.startswith(NATIVE):
+    if isinstance(part, Contribution | Size | DetectionLimit) and part.unit.startswith(NATIVE):
         update["unit"] = part.unit.replace(NATIVE, rate_unit())
         if isinstance(part, DetectionLimit):
             update["over"] = tuple((at, _shown(limit, rate=True)) for at, limit in part.over)

@@ -57,7 +57,7 @@ def separability_matrix(result: Plan) -> Markup:
 def accuracy_by_hours(result: Plan) -> Markup:
     """Predicted RMS over the noise floor, and error of the map, over chamber hours."""
     hours = [a.hours for a in result.accuracy]
-    left = Panel(x="chamber hours", y="RMS of 100 s means ÷ noise floor")
+    left = Panel(x="chamber hours", y="RMS ÷ noise floor")
     right = Panel(x="chamber hours", y=f"error of the map, {rate_unit()}", y_log=True)
     left.horizontal(1.0, dash="5 3")
     for panel, color, values in (

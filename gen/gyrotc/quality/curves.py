@@ -96,6 +96,13 @@ class _Way:
         return "sign_reversed" if self.column == tuple(range(len(self.column))) else "axes_exchanged"
 
     @property
+    def changed(self) -> list[int]:
+        """Axes whose column or sign is another."""
+        return [
+            k for k, (c, sign) in enumerate(zip(self.column, self.sign, strict=True)) if c != k or sign < 0
+        ]
+
+    @property
     def changes(self) -> int:
         """Columns that are exchanged, and signs that are reversed."""
         return sum(c != k for k, c in enumerate(self.column)) + sum(s < 0 for s in self.sign)
@@ -107,9 +114,9 @@ class _Way:
         if len(self.column) == 1:
             return "its sign is reversed"
         parts = [
-            f"axis {axes[k]} stands {'with the other sign ' if s < 0 else ''}in the column of {axes[c]}"
-            for k, (c, s) in enumerate(zip(self.column, self.sign, strict=True))
-            if c != k or s < 0
+            f"axis {axes[k]} stands {'with the other sign ' if self.sign[k] < 0 else ''}in the column of "
+            f"{axes[self.column[k]]}"
+            for k in self.changed
         ]
         return "; ".join(parts)
 
@@ -139,14 +146,19 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     if not usable:
         return None
     of_others = [np.array(known[t]) for t in curve.temperature_c[usable].tolist()]
-    usual = np.array([rates.mean(axis=0) for rates in of_others]) + _earth(curve)
-    squares = sum(float(np.sum((rates - rates.mean(axis=0)) ** 2)) for rates in of_others)
-    freedom = sum((len(rates) - 1) * rates.shape[1] for rates in of_others)
-    scatter = float(np.sqrt(squares / freedom))
-    found = _best(curve.rates_dph[usable], usual, _AGREES * scatter)
+    own, usual = (
+        curve.rates_dph[usable],
+        np.array([rates.mean(axis=0) for rates in of_others]) + _earth(curve),
+    )
+    squares = np.sum([np.sum((rates - rates.mean(axis=0)) ** 2, axis=0) for rates in of_others], axis=0)
+    variance = squares / sum(len(rates) - 1 for rates in of_others)
+    found = _best(own, usual, _AGREES * float(np.sqrt(variance.mean())))
     if found is None:
         return None
-    way, left, stated = found
+    way = found[0]
+    at = way.changed  # axes that stand as they should say nothing of one that does not
+    scatter = float(np.sqrt(variance[at].mean()))
+    left, stated = (float(np.sqrt(np.mean((r - usual)[:, at] ** 2))) for r in (way.of(own), own))
     if left > _AGREES * scatter or stated < _BETTER * max(left, scatter):
         return None
     return way, (

@@ -10,7 +10,8 @@ from gyrotc.common.errors import InputError
 from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text, significant
 from gyrotc.pages.scales import AxisScale, scale_of
 from gyrotc.pages.words import sci, with_uncertainty, words
-from gyrotc.results.diagnosed import ComparedStatistic, EventSize, ParameterLikelihood
+from gyrotc.results.diagnosed import ComparedStatistic, ParameterLikelihood
+from gyrotc.results.findings import Size
 from gyrotc.results.planned import DetectionLimit
 from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
@@ -82,8 +83,8 @@ def test_sentences_keep_their_digits(text: str, wanted: str) -> None:
 
 def test_limits_events_and_statistics_carry_their_unit_with_them() -> None:
     limit = DetectionLimit(value=3.6, unit="deg/h/C", parameter="tau_s", over=((600.0, 7.2), (900.0, None)))
-    event = EventSize(value=3.6, low=1.8, high=7.2, unit="deg/h")
-    warm = EventSize(value=1.0, low=0.5, high=2.0, unit="C")
+    event = Size(value=3.6, low=1.8, high=7.2, unit="deg/h")
+    warm = Size(value=1.0, low=0.5, high=2.0, unit="C")
     rms, share = (
         ComparedStatistic(
             statistic=name,

@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 from browser import CHROMIUM, Browser, browser
+from campaigns import scenario
 from conftest import HOST, Command
 from recordings import columns, toml, write_csv
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
 
-PAGES = ("unit", "axes", "fleet")
+PAGES = ("unit", "axes", "fleet", "diagnosis", "plan", "check")
 
 _CONTRAST = """(() => {
   const channel = v => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4 };
@@ -69,7 +70,14 @@ def pages(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> dict[str
         _axis(folder / "d" / f"RLG-{k}", "rate_dph", 4 + k)
     gyrotc("fleet", folder / "d", "--out", folder / "fleet")
     found = {"unit": folder / "unit" / "report.html", "axes": folder / "axes" / "report.html"}
-    found["fleet"] = folder / "fleet" / "fleet.html"
+    gyrotc("diagnose", folder / "d" / "RLG-0", "--out", folder / "diagnosis")
+    gyrotc("plan", scenario(folder), "--out", folder / "plan")
+    rows = columns(720, seed=9)
+    rows["temperature_c"][300:310] += 5.0
+    write_csv(folder / "e" / "run-01.csv", rows)
+    gyrotc("check", folder / "e", "--plots", folder / "check.html")
+    found |= {name: folder / name / "report.html" for name in ("diagnosis", "plan")}
+    found |= {"fleet": folder / "fleet" / "fleet.html", "check": folder / "check.html"}
     assert [name for name, page in found.items() if not page.is_file()] == []
     return found
 

@@ -508,6 +508,18 @@ def test_the_run_with_its_sign_reversed_is_named(reversed_run: int | None, tmp_p
     assert all("Look at mounting and wiring" in d.text for d in reported)
 
 
+def test_axes_that_stand_as_they_should_do_not_hide_one_that_does_not(tmp_path: Path) -> None:
+    """Six times the scatter in y; in the mean over three axes it is 3.5 times."""
+    for k in range(4):
+        table = run(k)
+        rng = np.random.default_rng(k)
+        y = 0.0065 * np.sin(table["temperature_c"] / 10.0) * (-1.0 if k == 1 else 1.0)
+        rates = {f"rate_{a}_dph": rng.normal(0.0, 0.004, 600) + (y if a == "y" else 0.0) for a in "xyz"}
+        write_csv(tmp_path / "R" / f"{k}.csv", {n: table[n] for n in ("time_s", "temperature_c")} | rates)
+    reported = [d for d in check(tmp_path / "R").warnings if d.id == "sign_reversed"]
+    assert [d.where for d in reported] == ["1.csv"]
+
+
 def test_runs_of_noise_alone_are_not_accused(tmp_path: Path) -> None:
     for k in range(4):
         write_csv(tmp_path / "R" / f"{k}.csv", columns(600, seed=k))
