@@ -77,9 +77,9 @@ def c_comment(text: str, limit: int = _LINE) -> CText:
     return CText(_shown(text, allowed, limit))
 
 
-def c_literal(text: str, limit: int = 64) -> CText:
+def c_literal(text: str) -> CText:
     """Text between the quotes of a C string: as in a comment, without quotes, question marks and `%`."""
-    return CText(_shown(text, lambda char, _: " " <= char <= "~" and char not in '\\"?%', limit))
+    return CText(_shown(text, lambda char, _: " " <= char <= "~" and char not in '\\"?%', 64))
 
 
 def c_code(text: str) -> CText:
@@ -156,9 +156,9 @@ def _only_html(value: Any) -> Any:
     return terminal_text(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
-def picture_text(text: str, limit: int = _TITLE) -> str:
+def picture_text(text: str) -> str:
     """Text in a picture: one line, no control characters."""
-    return _shown(text, lambda char, _: char.isprintable(), limit)
+    return _shown(text, lambda char, _: char.isprintable(), _TITLE)
 
 
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -256,7 +256,7 @@ def _toml_text(text: str) -> str:
 
 def toml_comment(text: str, limit: int = _LINE) -> str:
     """Text behind a `#`: one line."""
-    return _shown(text, lambda char, _: char.isprintable(), limit)
+    return _shown(text, lambda char, _: char.isprintable(), _TITLE)
 
 
 def csv_cell(value: Any) -> Any:

@@ -95,6 +95,7 @@ def _hidden(search: Search, view: View) -> list[NoiseFinding]:
 
 OfResiduals = Callable[[FloatArray], FloatArray]
 
+_SEED = 1  # of the draws
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
 _SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
@@ -137,7 +138,6 @@ def ensemble_of(
     *,
     beside: FloatArray | None = None,
     estimated: bool = False,
-    seed: int = 1,
 ) -> Ensemble:
     """Draws the ensemble and compares.
 
@@ -146,7 +146,6 @@ def ensemble_of(
         declared: Noise of the plain simulation; None: white, of the estimated level.
         beside: Columns that the extended simulation has beside the map, shape (N, k).
         estimated: Whether the simulated noise is that which the search estimates (the declared one is refuted).
-        seed: Fixes the draws of the ensemble.
     """
     records = search.records
     if estimated:
@@ -156,7 +155,7 @@ def ensemble_of(
     else:
         colour, scale = COLOURS[0], search.view_of(COLOURS[0]).scale
     whiten = Whitener(colour, records.kept, records.block_s, search.sigma)
-    normal = np.random.default_rng(seed).standard_normal((records.size, _MEMBERS))
+    normal = np.random.default_rng(_SEED).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)
     both = np.column_stack([search.y, noise])
     model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))

@@ -24,6 +24,7 @@ from ..tables.emit import quantise_all
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
 _HOUR_S = 3600.0  # the angle after one hour is a figure of merit
+_SEED = 1  # of the draws
 _DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
 _FAR = 4.0  # robust standard deviations, beyond which a difference says nothing about the floor
 
@@ -118,7 +119,6 @@ def gain_of(
     after: Sequence[Averages],
     floor: float,
     average_s: float,
-    seed: int = 1,
     *,
     whole_dph: float | None = None,
 ) -> Gain:
@@ -129,7 +129,7 @@ def gain_of(
     b2, a2, weight = _pieces(before, after, average_s)
     total = weight.sum()
     rms_b, rms_a = float(np.sqrt(b2.sum() / total)), float(np.sqrt(a2.sum() / total))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     drawn = rng.integers(0, weight.size, (_DRAWS, weight.size))
     n = weight[drawn].sum(axis=1)
     diff = (b2 - a2)[drawn].sum(axis=1) / n

@@ -113,23 +113,21 @@ def search_of(
     declared: Declared | None = None,
     screened: Screened | None = None,
     say: Progress = lambda _: None,
-    level: int | None = None,
 ) -> Search:
     """The search with the coarsest map that the data do not reject."""
     checked = screen(records) if screened is None else screened
     y, empty = cleaned(records, checked)
     left_out = np.eye(records.size)[:, empty] if empty.size else None
     channels = _channels(records)
-    levels: Sequence[int] = range(_HIGHEST_LEVEL + 1) if level is None else [level]
-    for at in levels:
-        bank = bank_of(records, at, say)
+    for level in range(_HIGHEST_LEVEL + 1):
+        bank = bank_of(records, level, say)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
         search = open_search(
             records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour
         )
-        if at == levels[-1] or not needs_finer(search):
+        if level == _HIGHEST_LEVEL or not needs_finer(search):
             break
     return search
 

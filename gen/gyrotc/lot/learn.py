@@ -243,10 +243,10 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
-def predictive(state: LotState, scale: float = 1.0) -> list[tuple[FloatArray, FloatArray]]:
+def predictive(state: LotState) -> list[tuple[FloatArray, FloatArray]]:
     """Mean and covariance of the coefficients of a unit that was not seen, one for each cluster."""
-    spread = scale * state.spread()
-    return [(m, spread + scale * c) for m, c in zip(state.means, state.covariances, strict=True)]
+    spread = state.spread()
+    return [(m, spread + c) for m, c in zip(state.means, state.covariances, strict=True)]
 
 
 def evidence(units: UnitSums, mean: FloatArray, covariance: FloatArray) -> FloatArray:

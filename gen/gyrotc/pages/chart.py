@@ -14,7 +14,6 @@ import struct
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from html import escape
 
 import numpy as np
 from markupsafe import Markup
@@ -274,14 +273,13 @@ def side_by_side(*pictures: Markup | None) -> Markup | None:
 
 def drawing(
     panels: Sequence[Panel], *, columns: int = 1, width: float = FULL, height: float = 190.0,
-    heights: Sequence[float] | None = None, share_x: bool = False, share_y: bool = False, identifier: str = "",
+    heights: Sequence[float] | None = None, share_x: bool = False, share_y: bool = False,
 ) -> Markup:  # fmt: skip
     """Panels in a grid as one `<svg>` element, with one legend above.
 
     Args:
         height: Of the axes of a row, points; `heights`: of each row.
         share_x, share_y: All panels have one range; a shared y axis is written at the left only.
-        identifier: Goes into the picture's metadata.
     """
     rows = -(-len(panels) // columns)
     tall = list(heights or [height] * rows)
@@ -310,11 +308,10 @@ def drawing(
             bottom = last or not share_x or k + columns >= len(panels)
             parts.append(_panel(panels[k], box, xs[k], ys[k], left=not share_y or column == 0, bottom=bottom))
         y += head + tall[row] + foot
-    meta = f"<metadata>{escape(identifier)}</metadata>" if identifier else ""
     size = f'viewBox="0 0 {width:g} {y:.0f}" width="100%"'
     small = " half" if width <= HALF else ""
     return checked_svg(
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="gy{small}" {size}>{meta}{_style()}{"".join(parts)}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="gy{small}" {size}>{_style()}{"".join(parts)}</svg>'
     )
 
 
@@ -345,8 +342,8 @@ def _scales(panels: Sequence[Panel], axis: str, shared: bool) -> list[AxisScale]
     return made
 
 
-def _wide(text: str, size: float = _SMALL) -> float:
-    return _WIDE * size * len(text)
+def _wide(text: str) -> float:
+    return _WIDE * _SMALL * len(text)
 
 
 def _ticks(panel: Panel, scale: AxisScale, axis: str, length: float) -> list[tuple[float, str]]:

@@ -111,7 +111,7 @@ def temperature_findings_of(run: Run, rows: Rows, f: RunFacts) -> Iterator[Findi
             size=((size, size, size), "C"),
             leave_out=out,
         )
-    stretches = stuck_stretches(time, temperature, run.row_period_s)
+    stretches = stuck_stretches(temperature, run.row_period_s)
     if stretches:
         spans = [(float(time[k]), float(time[k + n - 1]) + run.row_period_s) for k, n in stretches]
         start, end = max(spans, key=lambda span: span[1] - span[0])
@@ -226,7 +226,7 @@ def _departures(values: FloatArray) -> Iterator[FloatArray]:
         yield np.abs(step[before : len(step) - after] - middle_of_five(*windows.T))
 
 
-def stuck_stretches(time: FloatArray, temperature: FloatArray, period_s: float) -> list[tuple[int, int]]:
+def stuck_stretches(temperature: FloatArray, period_s: float) -> list[tuple[int, int]]:
     """First row and number of rows of the stretches in which a thermometer was stuck.
 
     A coarse converter, or a logger that averages one, repeats a reading for as long as a chamber holds. So a stretch

@@ -408,7 +408,7 @@ def chosen_by_cross_validation(
         for row in comparison.rows(name)
     ]
     findings = [_refusal(one, text) for one, text in refused.items()]
-    misses = name == "constant" and _misses(samples, comparison)
+    misses = name == "constant" and _misses(comparison)
     if misses:
         findings.insert(0, _does_not_generalise(comparison))
     return Chosen(name, outcome, rows, _reason(comparison, name, misses), findings)
@@ -430,7 +430,7 @@ def _trained(
     return fit_simple(name, samples, scaling, average_s)
 
 
-def _misses(samples: TrainingData, comparison: CandidateScores) -> bool:
+def _misses(comparison: CandidateScores) -> bool:
     """Whether a constant leaves more than noise on what it has not seen."""
     rms = comparison.rms_dph[:, CANDIDATES.index("constant")]
     return len(rms) == 0 or bool(np.sqrt(np.mean(rms**2)) > _STRUCTURE * comparison.noise_dph)

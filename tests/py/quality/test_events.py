@@ -522,7 +522,7 @@ def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged:
     stuck[4800:5400] = stuck[4800]  # within the ramp from 20 to 50 C
     for values, expected in ((read, []), (stuck, [480])):
         rows = np.round(values.reshape(-1, 10).mean(axis=1), 4) if averaged else values[9::10]
-        found = stuck_stretches(time[9::10], rows, 10.0)
+        found = stuck_stretches(rows, 10.0)
         assert [first for first, _ in found] == pytest.approx(expected, abs=1), found
 
 

@@ -332,7 +332,7 @@ def _time(
         return [(_find(file, name, main)[1], "named by the map") for name in chosen.columns.time], None, ""
     stamps = [c for c in main.columns if c.kind == "stamp"]
     if stamps:
-        whole = _stamps(file, stamps)
+        whole = _stamps(stamps)
         fraction = fraction_of(main.columns, whole[-1][0])
         return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
     if parts := parts_of(main.columns):
@@ -354,7 +354,7 @@ def _time(
     raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 
 
-def _stamps(file: LoggerFile, stamps: Sequence[Column]) -> list[tuple[Column, str]]:
+def _stamps(stamps: Sequence[Column]) -> list[tuple[Column, str]]:
     """One column of dates and times, or a date and a time of day."""
     from .stamps import forms_of
 
