@@ -20,6 +20,8 @@
 #define WARM_UP 10U
 #define MEMORY 11U
 #define MEMORY_SLOPE 12U
+#define N_OBSERVED 7U  /* states that a rate depends on: two knots, and those behind the knots */
+#define BEHIND(state) ((state) - KNOTS + 2U) /* their place among these */
 #define N_DRAWN (STATES - KNOTS) /* states that are drawn anew at each power-on */
 #define ROW(i) (((i) * ((i) + 1U)) / 2U) /* first element of a row of a symmetric matrix, among its packed rows */
 #define DIAGONAL(i) (ROW(i) + (i))
@@ -88,7 +90,7 @@ typedef struct {
     float warm_up;       /* factor of the warm-up */
     float memory[4];     /* transition of the memory and its slope, by rows */
     uint_least32_t knot; /* the one below T */
-    float h[STATES];     /* of the two knots about T and the states behind the knots */
+    float h[N_OBSERVED]; /* of the two knots about T, then of the states behind the knots */
 } step_t;
 
 static void interpolate(const gtc_learn_prior_t *prior, float temp_c, step_t *step)
@@ -103,8 +105,8 @@ static void interpolate(const gtc_learn_prior_t *prior, float temp_c, step_t *st
     }
     u = gtc_f32_diff(u, (float)k);
     step->knot = k;
-    step->h[k] = gtc_f32_diff(1.0F, u);
-    step->h[k + 1U] = u;
+    step->h[0] = gtc_f32_diff(1.0F, u);
+    step->h[1] = u;
 }
 
 /* States and factors of the instant of the step itself. */
@@ -128,11 +130,10 @@ static void step_to(const gtc_learn_state_t *state, const gtc_learn_prior_t *pri
     step->memory[2] = product(-square(l), step->memory[1]);
     step->memory[3] = add_product(left, left, -way);
     interpolate(prior, temp_c, step);
-    step->h[OFFSET] = 1.0F;
-    step->h[SLOPE] = gtc_f32_diff(temp_c, prior->reference_c);
-    step->h[WARM_UP] = 1.0F;
-    step->h[MEMORY] = 1.0F;
-    step->h[MEMORY_SLOPE] = 0.0F;
+    step->h[BEHIND(OFFSET)] = 1.0F;
+    step->h[BEHIND(SLOPE)] = gtc_f32_diff(temp_c, prior->reference_c);
+    step->h[BEHIND(WARM_UP)] = 1.0F;
+    step->h[BEHIND(MEMORY)] = 1.0F;
 }
 
 /* The covariance of the knots, some time later. */
@@ -183,10 +184,10 @@ static void propagate(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, 
     transform(step->memory, &state->x[MEMORY], &state->x[MEMORY_SLOPE]);
 }
 
-/* The state behind state k that a rate depends on. */
-static uint_least32_t following(const step_t *step, uint_least32_t k)
+/* A state that a rate depends on. */
+static uint_least32_t observed(const step_t *step, uint_least32_t i)
 {
-    return (k == (step->knot + 1U)) ? OFFSET : (k + 1U);
+    return (i < 2U) ? (step->knot + i) : ((KNOTS - 2U) + i);
 }
 
 /* What is expected of a rate, h x, with P h and its variance h P h. */
@@ -203,30 +204,31 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
     float *const ph = expected->ph;
     float rate = 0.0F;
     float var = 0.0F;
+    uint_least32_t i;
     uint_least32_t j;
     uint_least32_t k;
 
     clear(ph, STATES);
-    for (k = step->knot; k < n; k = following(step, k)) {
-        const float h = step->h[k];
-        uint_least32_t pair = ROW(k);
+    for (i = 0U; i < n; i++) {
+        const float h = step->h[i];
 
+        k = observed(step, i);
         for (j = 0U; j < k; j++) {
-            ph[j] = add_product(ph[j], h, state->p[pair + j]);
+            ph[j] = add_product(ph[j], h, state->p[ROW(k) + j]);
         }
-        for (pair = DIAGONAL(k); j < STATES; pair += j) {
-            ph[j] = add_product(ph[j], h, state->p[pair]);
-            j++;
+        for (j = k; j < STATES; j++) {
+            ph[j] = add_product(ph[j], h, state->p[ROW(j) + k]);
         }
     }
-    for (k = step->knot; k < n; k = following(step, k)) {
-        rate = add_product(rate, step->h[k], state->x[k]);
-        var = add_product(var, step->h[k], ph[k]);
+    for (i = 0U; i < n; i++) {
+        k = observed(step, i);
+        rate = add_product(rate, step->h[i], state->x[k]);
+        var = add_product(var, step->h[i], ph[k]);
     }
     ph[MEMORY] = gtc_f32_add(ph[MEMORY], memory_var); /* P0 is not in the state */
     var = gtc_f32_add(var, memory_var);
     expected->rate = rate;
-    expected->var = (var > 0.0F) ? var : 0.0F;
+    expected->var = (var < 0.0F) ? 0.0F : var;
 }
 
 /* Variance, or covariance, of knots for a gyro that has learned nothing. */
@@ -240,15 +242,14 @@ static float aged_var(const gtc_learn_prior_t *prior, uint_least32_t pair, float
 static float unlearned_var(const gtc_learn_state_t *state, const gtc_learn_prior_t *prior, const step_t *step)
 {
     const float service_s = within(gtc_f32_add(state->service_s, step->elapsed_s), 0.0F, LONGEST_S);
-    const uint_least32_t low = step->knot;
-    const uint_least32_t high = low + 1U;
+    const uint_least32_t k = step->knot;
     float var;
-    uint_least32_t k;
+    uint_least32_t i;
 
-    var = product(step->h[low], aged_var(prior, DIAGONAL(low), service_s));
-    var = add_product(var, step->h[high], aged_var(prior, DIAGONAL(high), service_s));
-    for (k = KNOTS; k < MEMORY_SLOPE; k++) {
-        var = add_product(var, square(step->h[k]), prior->power_on_var[k - KNOTS]);
+    var = product(step->h[0], aged_var(prior, DIAGONAL(k), service_s));
+    var = add_product(var, step->h[1], aged_var(prior, DIAGONAL(k + 1U), service_s));
+    for (i = 0U; i < GTC_LEARN_DRAWN; i++) {
+        var = add_product(var, square(step->h[i + 2U]), prior->power_on_var[i]);
     }
     return var;
 }
@@ -414,7 +415,7 @@ int gtc_learn_rest(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, con
     propagate(state, prior, &step);
     state->time_s = stop->time_s;
     state->temp_c = stop->temp_c;
-    expect(state, prior, &step, MEMORY_SLOPE, &expected);
+    expect(state, prior, &step, N_OBSERVED - 1U, &expected);
     innovation = gtc_f32_diff(stop->rate_dph, expected.rate);
     expected.var = gtc_f32_add(expected.var, noise);
     status = judged(state, prior, stop, &expected, innovation);
@@ -439,10 +440,10 @@ int gtc_learn_shift(const gtc_learn_state_t *state, const gtc_learn_prior_t *pri
     }
     step_to(state, prior, time_s, temp_c, &step);
     unlearned = unlearned_var(state, prior, &step);
-    step.h[WARM_UP] = step.warm_up;
-    step.h[MEMORY] = step.memory[0];
-    step.h[MEMORY_SLOPE] = step.memory[1];
-    expect(state, prior, &step, STATES, &expected);
+    step.h[BEHIND(WARM_UP)] = step.warm_up;
+    step.h[BEHIND(MEMORY)] = step.memory[0];
+    step.h[BEHIND(MEMORY_SLOPE)] = step.memory[1];
+    expect(state, prior, &step, N_OBSERVED, &expected);
     y = expected.rate;
     var = expected.var;
     if (gtc_f32_is_missing(y) != 0) {
@@ -510,7 +511,7 @@ int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
     half.bits = (words[2].bits << 16) & 0xFFFFFFFFUL;
     state->refused_dph = half.value;
     for (k = 0U; k < KNOTS; k++) {
-        state->x[k] = words[FIRST_NUMBER + k].value;
+        state->x[k] = within(words[FIRST_NUMBER + k].value, -prior->authority_dph, prior->authority_dph);
     }
     for (k = 0U; k < KNOT_PAIRS; k++) {
         state->p[k] = words[FIRST_NUMBER + KNOTS + k].value;

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 from emitted import GOLDEN, emitted, spoil
-from gyrotc.model import load_model
+from gyrotc.model import Learning, Model, load_model
+from gyrotc.tables.learning import data_sheet_spread
 from models import bank_with_channels, with_memories
 from results import Results
 
@@ -39,6 +40,7 @@ class Part:
     checks: int = 0
     left: int = 0
     shape: tuple[int, str] | None = None
+    numerics: tuple[str, ...] = ("f32", "q31")
 
 
 _RELATED = {"f32": "gtc_f32_cell", "q31": "gtc_q31_position"}
@@ -75,6 +77,13 @@ PARTS = {
         "terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "auxiliary")
     ),
     "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "curve")),
+    "learning in service": Part(
+        "learn",
+        "learning",
+        contracts={"f32": "gtc_f32_is_missing,gtc_f32_saturate,gtc_f32_root"},
+        checks=11,
+        numerics=("f32",),
+    ),
     "product of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "product")),
 }
 
@@ -108,14 +117,25 @@ def _alarms(output: str) -> int:
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Emitted C by the name of its table."""
+    return {name: emitted(tmp_path_factory.mktemp(name), _model(name)) / "c" for name in _TABLES}
+
+
+_TABLES = ("golden", "terms", "bank", "learning")
+
+
+def _model(name: str) -> Model:
     golden = load_model(GOLDEN)
-    models = {"golden": golden, "terms": with_memories(golden), "bank": bank_with_channels(golden)}
-    return {name: emitted(tmp_path_factory.mktemp(name), model) / "c" for name, model in models.items()}
+    if name == "learning":
+        spread = data_sheet_spread(2e-4, 1e-4, 2e-4)
+        known = Learning(spread=spread, reference_c=20.0, authority_dph=1.0, noise_deg_per_sqrt_h=5e-4)
+        return golden.model_copy(update={"learning": known})
+    return {"golden": lambda m: m, "terms": with_memories, "bank": bank_with_channels}[name](golden)
 
 
 @pytest.mark.parametrize("machine", ["gcc_x86_64", "gcc_x86_16"])
-@pytest.mark.parametrize("numeric", ["f32", "q31"])
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize(
+    ("name", "numeric"), [(name, n) for name, part in PARTS.items() for n in part.numerics]
+)
 def test_no_alarm(name: str, numeric: str, machine: str, tables: dict[str, Path], results: Results) -> None:
     part = PARTS[name]
     left = part.left if numeric == "q31" else 0
@@ -144,12 +164,13 @@ def test_no_alarm(name: str, numeric: str, machine: str, tables: dict[str, Path]
             r"for \(i = state->table->slope_blocks - 1U; i > 0U; i--\)",
             "for (i = 250U; i > 0U; i--)",  # Eva sees what leaves the state, not what leaves a member of it
         ),
+        ("learning in service", "f32", r"k > \(KNOTS - 2U\)", "k > KNOTS"),  # a knot that is none
     ],
 )
 def test_a_missing_guard_is_an_alarm(
     part: str, numeric: str, pattern: str, replacement: str, tmp_path: Path
 ) -> None:
     """The proof can fail."""
-    folder = emitted(tmp_path)
+    folder = emitted(tmp_path, _model(PARTS[part].table))
     spoil(folder / "c" / "gtc.c", pattern, replacement, count=0)
     assert _alarms(_analysed(folder / "c", PARTS[part], numeric, "gcc_x86_64")) > 0

@@ -211,7 +211,9 @@ class Learner:
             np.float32
         )
         self.service_s, self.refused_dph[:] = halves
-        self.x[:KNOTS], self.p[:_KNOT_PAIRS] = numbers[:KNOTS, None], numbers[KNOTS:, None]
+        limit = self._numbers["authority_dph"]
+        self.x[:KNOTS] = self._within(numbers[:KNOTS, None], -limit, limit)
+        self.p[:_KNOT_PAIRS] = numbers[KNOTS:, None]
         return OK
 
     def _draw(self, temp_c: float) -> None:
@@ -289,7 +291,7 @@ class Learner:
             var = var + factor * ph[state]
         ph[_MEMORY] = ph[_MEMORY] + memory_var
         var = var + memory_var
-        return rate, ph, np.where(var > 0.0, var, self._number(0.0))
+        return rate, ph, np.where(var < 0.0, self._number(0.0), var)
 
     def _unlearned_var(self, step: _Step) -> Any:
         known, h = self._numbers, step.h
