@@ -25,7 +25,7 @@ def _printed(name: str, numeric: str, folder: Path, work: Path) -> list[str]:
     c = folder / "c"
     sources = [EXAMPLE / "main.c", EXAMPLE / f"nav_{numeric}.c", c / "gtc.c", c / "gtc_rlg_0042.c"]
     compile_c(target, sources, work / "nav_loop", include=c)
-    done = run_program(target, work / "nav_loop", data=(EXAMPLE / "sequence.txt").read_bytes())
+    done = run_program(target, work / "nav_loop", data=[(EXAMPLE / "sequence.txt").read_bytes()])
     assert done.returncode == 0, done.stderr
     return done.stdout.decode("ascii").splitlines()
 
