@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -204,7 +205,7 @@ def _before(folder: Path) -> Iterator[dict[str, Any]]:
             )
             (folder / "program.c").write_text(text, encoding="ascii")
             name = f"{BEFORE}: {program.name.removesuffix(', default options').removesuffix('; default options')}"
-            yield {"name": name, **_everywhere(lambda c, v: _linked([*folders, *sources], c, v, folder))}
+            yield {"name": name, **_everywhere(partial(_linked, [*folders, *sources], folder=folder))}
 
 
 def _everywhere(measure: Callable[[str, str], tuple[int, int]]) -> dict[str, tuple[int, int]]:
@@ -214,7 +215,7 @@ def _everywhere(measure: Callable[[str, str], tuple[int, int]]) -> dict[str, tup
 def sizes() -> dict[str, Any]:
     """Every program on every core at every level, and those of `BEFORE`."""
     with tempfile.TemporaryDirectory() as now, tempfile.TemporaryDirectory() as before:
-        rows = [{"name": p.name, **_everywhere(lambda c, v, p=p: size(p, c, v, Path(now)))} for p in PROGRAMS]
+        rows = [{"name": p.name, **_everywhere(partial(size, p, folder=Path(now)))} for p in PROGRAMS]
         rows += _before(Path(before))
     version = subprocess.run([COMPILER[0], "-dumpversion"], check=True, capture_output=True, text=True).stdout
     return {"centers": len(load_model(MODEL).networks[0].centers), "compiler": version.strip(), "rows": rows}
