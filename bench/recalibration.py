@@ -40,7 +40,7 @@ Floats = NDArray[np.float64]
 Change = Callable[[Floats, Floats], Floats]
 
 _ANOTHER = "another unit's map"
-UNITS, SEED, _JOBS = 50, 35, 2
+UNITS, SEED, _JOBS = 50, 36, 2
 _EARLIER = 5  # runs of the earlier calibration; the check run is of the sixth
 _SIZE_DPH = (
     2e-3  # of a change: about three sigma of the noise of 100-s means, a fortieth of the bias's own range
