@@ -110,7 +110,7 @@ def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[
 def _reason(
     entry: FleetEntry, id_: str, text: str, file: str | None = None, time_s: float | None = None
 ) -> Reason:
-    return Reason(name=entry.name, id=id_, text=text, file=file, time_s=time_s)
+    return Reason(name=entry.name, id=id_, text=text.removesuffix("."), file=file, time_s=time_s)
 
 
 def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list[FleetEntry]:

@@ -13,13 +13,11 @@ from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by
 from .display import in_unit, rate_unit
 
 _IN_TIME = (
-    "step",
     "outliers",
     "noise",
     "warm_up",
-    "ramp",
     "run_outlier",
-)  # reasons that show over time, not over temperature
+)  # reasons that show over time, not over temperature, beside those that have a time
 _FIRST_C, _BIN_C = -90.0, 5.0  # of the curves of entries
 _SMALL_FLEET = 200  # gyros: beyond it dots are drawn smaller
 _MOST_CURVES = 400  # of an axis: more make one dark area, which the band shows as well
@@ -77,7 +75,11 @@ def why_outlier(known: Mapping[str, FleetEntry], reason: Reason) -> Markup:
     entry = known[reason.name]
     series = entry.facts.series if entry.facts else None
     panel = (
-        _over_time(series, reason) if series and reason.id in _IN_TIME else _over_temperature(known, entry)
+        _over_time(series, reason)
+        if series
+        and reason.file in (None, series.file)
+        and (reason.time_s is not None or reason.id in _IN_TIME)
+        else _over_temperature(known, entry)
     )
     return drawing([panel], width=HALF, height=160.0)
 
