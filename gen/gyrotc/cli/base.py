@@ -69,8 +69,8 @@ DIAGNOSE: Stages = (
     ("measuring the gain", 0.08), ("drawing", 0.13),
 )  # fmt: skip
 BUILD: Stages = (
-    ("reading", 0.04), ("training", 0.04), ("leaving out span", 0.04), ("emitting C", 0.01), ("verifying", 0.77),
-    ("replaying", 0.03), ("drawing the report", 0.07),
+    ("reading", 0.11), ("training", 0.07), ("leaving out span", 0.02), ("emitting C", 0.03), ("verifying", 0.6),
+    ("replaying", 0.09), ("drawing the report", 0.08),
 )  # fmt: skip
 PLAN: Stages = (
     ("simulating the profile", 0.1), ("computing signatures", 0.3), ("comparing causes", 0.2),
