@@ -16,12 +16,12 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
 
 from .errors import InputError
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
+    from pydantic import TypeAdapter, ValidationError
 
 ENVIRONMENT = "GYROTC_MAX"
 
@@ -241,13 +241,13 @@ def parse_json(data: bytes, where: str, expected: str) -> Any:
     """The content of JSON text in UTF-8. Raises as `read_json`."""
     text = _decoded(data, where, expected)
     try:
-        content = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        content = json.loads(text, parse_constant=_refuse_constant)
     except RecursionError as error:
         deepest = int(ceiling("nesting"))
         raise InputError(where, "is nested too deep", f"at most {deepest} levels") from error
     except ValueError as error:
         raise InputError(where, f"is not JSON ({error})", expected) from error
-    _look_through(content, where)
+    _look_through(content, where, finite=True)
     return content
 
 
@@ -257,13 +257,21 @@ def checked(kind: type[T], content: Any, where: str) -> T:
     Raises:
         InputError: A field is missing or of another type; the message names it.
     """
-    from pydantic import TypeAdapter, ValidationError  # half of the time that `gyrotc --help` may take
+    from pydantic import ValidationError  # half of the time that `gyrotc --help` may take
 
     try:
         # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
-        return TypeAdapter(kind).validate_json(json.dumps(content))
+        found: T = _adapter(cast("Any", kind)).validate_json(json.dumps(content))
+        return found
     except ValidationError as error:
         raise refused(error, lambda field: f"{where}, field {field}" if field else where) from error
+
+
+@functools.cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
 def refused(error: ValidationError, place: Callable[[str], str]) -> InputError:
@@ -291,23 +299,20 @@ def _refuse_constant(text: str) -> float:
     raise ValueError(f"{text} is not a finite number")
 
 
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text[:_SHOWN]} is not a finite number")
-    return value
+def _look_through(content: Any, where: str, *, finite: bool = False) -> None:
+    """Refuses what is nested too deep, integers of more than 64 bits, and text that is no Unicode.
 
-
-def _look_through(content: Any, where: str) -> None:
-    """Refuses what is nested too deep, integers of more than 64 bits, and text that is no Unicode."""
+    `finite`: also infinities, which a number with a large exponent becomes.
+    """
     deepest = int(ceiling("nesting"))
     levels: list[Any] = [content]
     for depth in range(deepest + 2):
         below: list[Any] = []
         for value in levels:
             if type(value) is float:  # most are
-                continue
-            if isinstance(value, dict):
+                if finite and math.isinf(value):
+                    raise InputError(where, f"is not JSON ({value} is not a finite number)")
+            elif isinstance(value, dict):
                 for key, inner in value.items():
                     _look_at(key, where)
                     below.append(inner)

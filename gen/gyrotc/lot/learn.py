@@ -45,15 +45,14 @@ def of_few(freedom: float) -> float:
 
 
 def scores(
-    precision: FloatArray, moment: FloatArray, mean: FloatArray, covariance: FloatArray
+    precision: FloatArray, moment: FloatArray, mean: FloatArray, factor: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Signal-to-noise ratios of the independent directions, and the squared scores in them: 1 on average.
 
     Args:
         precision, moment: What the unit's recordings say (`UnitSums`), shapes (n, n) and (n,).
-        mean, covariance: Of the lot, the same shapes.
+        mean, factor: Of the lot, and the lower triangle whose square its covariance is, the same shapes.
     """
-    factor = np.linalg.cholesky(covariance)
     ratio, vectors = np.linalg.eigh(factor.T @ precision @ factor)
     known = ratio > 1e-9 * ratio[-1]
     moved = vectors.T @ (factor.T @ (moment - precision @ mean))
@@ -463,11 +462,11 @@ def _left_out(sums: UnitSums, state: LotState) -> tuple[FloatArray, float, NDArr
         rest = folds != fold
         _, cluster = np.unique(state.cluster[rest], return_inverse=True)
         seen = fitted(sums.select(rest), state.basis, state.rank, cluster, _AGAIN, start=state)
-        for k in np.flatnonzero(~rest):
-            one = sums.select(np.array([k]))
-            ways = predictive(seen)
-            mean, covariance = ways[int(np.argmax([evidence(one, *way)[0] for way in ways]))]
-            found[k] = scores(one.precision[0], one.moment[0], mean, covariance)
+        ways = predictive(seen)
+        factors = [np.linalg.cholesky(covariance) for _, covariance in ways]
+        nearest = np.argmax([evidence(sums.select(~rest), *way) for way in ways], axis=0)
+        for k, way in zip(np.flatnonzero(~rest).tolist(), nearest.tolist(), strict=True):
+            found[k] = scores(sums.precision[k], sums.moment[k], ways[way][0], factors[way])
     freedom = state.freedom
     far = np.array([p_value(*one, freedom) for one in found]) < FALSE_ALARM / n
     scale = inflation([one for one, away in zip(found, far, strict=True) if not away])

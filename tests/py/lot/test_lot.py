@@ -167,7 +167,9 @@ def test_scores_of_the_lots_own_units_are_as_expected() -> None:
     for _ in range(300):
         w = prior.means[0] + factor @ rng.normal(size=len(factor))
         moment = precision @ w + values.T @ rng.normal(size=len(values))
-        found.append(p_value(*scores(precision, moment, prior.means[0], prior.covariances[0])))
+        found.append(
+            p_value(*scores(precision, moment, prior.means[0], np.linalg.cholesky(prior.covariances[0])))
+        )
     assert kstest(found, "uniform").pvalue > 1e-3
 
 
