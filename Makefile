@@ -175,6 +175,10 @@ lot-prior: setup
 fleet: setup
 	@$(PYTHON) -m bench docs --only fleet
 
+## a thousand gyros on a Dask cluster whose workers are killed three times: every table as without
+fleet-kills: setup
+	@GYROTC_SERIALS=$${GYROTC_SERIALS:-1000} $(PYTHON) -m pytest -q tests/py/fleet/test_fleet_dask.py -k three_workers_killed
+
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results.md
 kills: setup
 	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
@@ -242,4 +246,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet lot lot-prior uncertainty faults kills mutants oracle blind blind-other events invariance odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet fleet-kills lot lot-prior uncertainty faults kills mutants oracle blind blind-other events invariance odd cycles packages dist release lock offline site clean

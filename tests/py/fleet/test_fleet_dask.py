@@ -29,7 +29,8 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed")
 
 SERIALS = ("RLG-1", "RLG-2", "RLG-3")
 WORKERS = ("anna", "bert")
-LIMIT_S = 300.0  # of what takes seconds where nothing else runs
+MANY = int(os.environ.get("GYROTC_SERIALS", "40"))
+LIMIT_S = 300.0 + 5.0 * MANY  # of what takes seconds, and a fraction of one a gyro, where nothing else runs
 BIN = Path(sys.executable).parent
 
 
@@ -206,8 +207,16 @@ if unit._built.__name__ != "held":  # Dask runs this twice
 class Held:
     """A fleet whose workers hold each gyro until it is let go; whoever begins with the deadly one is killed."""
 
-    def __init__(self, world: Path, folder: Path, *, held: Sequence[str] = SERIALS, deadly: str = "") -> None:
-        self.folder, self.out, self.lab = folder, folder / "out", world / "lab" / "few"
+    def __init__(
+        self,
+        world: Path,
+        folder: Path,
+        *,
+        held: Sequence[str] = SERIALS,
+        deadly: str = "",
+        lab: Path | None = None,
+    ) -> None:
+        self.folder, self.out, self.lab = folder, folder / "out", lab or world / "lab" / "few"
         for name in held:
             (folder / name).touch()
         self.preload = _HELD.format(folder=str(folder), deadly=deadly)
@@ -275,6 +284,37 @@ def test_what_is_done_is_not_done_again_when_its_worker_is_killed(
     status, states, said = held.end()
     assert status == 0 and states == ["done"] * 3, said
     assert len(held.begun("RLG-1")) == 1 and len(held.begun("RLG-2")) == 2
+
+
+@pytest.mark.slow
+def test_with_three_workers_killed_every_table_is_the_one_made_here(
+    world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
+) -> None:
+    """GYROTC_SERIALS gyros (40); `make fleet-kills` does a thousand."""
+    names = [f"RLG-{k:04d}" for k in range(MANY)]
+    for seed, name in enumerate(names, 100):
+        gyro(tmp_path / "lab" / name, name, seed=seed)
+    held = Held(world, tmp_path, held=(), lab=tmp_path / "lab")
+    for worker in WORKERS:
+        alone.worker(worker, "--nanny", preload=held.preload)
+    held.start(alone.address)
+    for kill in (1, 2, 3):  # each with another gyro: one that costs three workers has failed
+        victim = names[kill * len(names) // 4]
+        held.wait_until(lambda victim=victim: held.begun(victim))
+        os.kill(held.begun(victim)[-1], signal.SIGKILL)
+    status, states, said = held.end()
+    assert status == 0 and states == ["done"] * len(names), said
+    assert len(set(held.begun())) >= len(WORKERS) + 2  # processes: those killed, and those that came for them
+    done = gyrotc("fleet", held.lab, "--out", tmp_path / "here")
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in names:
+        made, here = (_tables(place / name) for place in (held.out, tmp_path / "here"))
+        assert len(here) > 5 and made == here, name
+
+
+def _tables(unit: Path) -> dict[str, bytes]:
+    """The model and every emitted file."""
+    return {path.name: path.read_bytes() for path in [unit / "model.json", *(unit / "c").iterdir()]}
 
 
 @pytest.mark.slow
