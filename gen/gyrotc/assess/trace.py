@@ -42,8 +42,8 @@ def trace_at(path: Path, each: int) -> Iterator[Callable[[Sequence[FloatArray], 
             return
         time, temperature, rate, bias = _means(list(columns[:4]), each)
         bits = np.bitwise_or.reduceat(columns[4], np.arange(0, columns[4].size, each))
-        written = (time, temperature, rate, bias, rate - bias, bits)
-        pacsv.write_csv(pa.table(dict(zip(_COLUMNS, written, strict=True))), stream, options)
+        written = [_arrow(values) for values in (time, temperature, rate, bias, rate - bias, bits)]
+        pacsv.write_csv(pa.Table.from_arrays(written, _COLUMNS), stream, options)
 
     def take(columns: Sequence[FloatArray], status: NDArray[np.int32]) -> None:
         nonlocal waiting
@@ -59,6 +59,12 @@ def trace_at(path: Path, each: int) -> Iterator[Callable[[Sequence[FloatArray], 
         if waiting:
             write(waiting)
     part.replace(path)
+
+
+def _arrow(values: NDArray[Any]) -> pa.Array:
+    """Numbers as Arrow has them; `pa.array` would load pandas where that is installed."""
+    buffer = pa.py_buffer(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, buffer])
 
 
 def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:

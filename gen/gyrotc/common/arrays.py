@@ -1,14 +1,51 @@
-"""Types that annotations of every package use."""
+"""Types that annotations of every package use, and long arrays part by part."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import ctypes
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 Progress = Callable[[str], None]
 """Called with what is being done."""
+PART = 2**16
+"""Rows that are looked at together: what is computed of them stays small beside the columns of a long recording."""
+
+
+def give_back() -> None:
+    """What was freed in small parts goes back to the system, where the C library is glibc."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def numpy_of(values: pa.Array) -> NDArray[Any]:
+    """Values of Arrow, NaN where there is none; `to_numpy` alone would load pandas where that is installed."""
+    if values.null_count == 0 and str(values.type).startswith(("int", "uint", "float", "double")):
+        return np.asarray(np.from_dlpack(values))
+    return np.asarray(values.to_numpy(zero_copy_only=False))
+
+
+def those(values: FloatArray, chosen: BoolArray) -> FloatArray:
+    """The chosen values; the same array where that is all of them."""
+    return values if chosen.all() else values[chosen]
+
+
+def steps_are(values: FloatArray, found: Callable[[FloatArray], BoolArray]) -> BoolArray:
+    """What is found of the differences of neighbours, shape (n - 1,); part by part."""
+    parts = (np.diff(values[part.start : part.stop + 1]) for part in parts_of(len(values) - 1))
+    return np.concatenate([np.zeros(0, dtype=bool), *map(found, parts)])
+
+
+def parts_of(rows: int, size: int = PART) -> Iterator[slice]:
+    """So many rows, part by part."""
+    return (slice(at, min(at + size, rows)) for at in range(0, rows, size))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import FloatArray
+from .arrays import FloatArray, parts_of
 from .inputs import need_memory
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "average",
     "median",
     "median_of_parts",
+    "median_step",
     "middle_of_five",
     "quantile_of_parts",
     "statistics",
@@ -77,6 +78,11 @@ _DIGIT_BITS = 16  # of a float64: its numbers are in the order of their bits, so
 def median_of_parts(parts: Parts) -> float:
     """`median` of numbers that do not fit in memory together, to the bit."""
     return sum(_middle(parts, lambda count: ((count - 1) // 2, count // 2))) / 2
+
+
+def median_step(time_s: FloatArray) -> float:
+    """`median` of the differences of neighbours of increasing numbers, two at least, to the bit."""
+    return median_of_parts(lambda: (np.diff(time_s[p.start : p.stop + 1]) for p in parts_of(len(time_s) - 1)))
 
 
 def quantile_of_parts(parts: Parts, share: float) -> float:
@@ -154,11 +160,7 @@ class Averager:
     """
 
     def __init__(self, time_s: FloatArray, average_s: float, from_s: float | None = None) -> None:
-        def steps() -> Iterable[FloatArray]:
-            parts = range(0, time_s.size - 1, _TOGETHER)
-            return (np.diff(time_s[at : at + _TOGETHER + 1]) for at in parts)
-
-        self._period = median_of_parts(steps) if time_s.size > 1 else average_s
+        self._period = median_step(time_s) if time_s.size > 1 else average_s
         self._average_s = max(average_s, self._period)
         self._from_s = (float(time_s[0]) if time_s.size else 0.0) if from_s is None else from_s
         bins = int(self._bins(time_s[-1:])[0]) + 1 if time_s.size else 0

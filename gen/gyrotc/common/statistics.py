@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.special import chdtri, ndtri
 
-from .arrays import FloatArray
+from .arrays import FloatArray, parts_of
 from .metrics import MAD_TO_SIGMA
 
 
@@ -18,8 +18,12 @@ def cell_means(length_s: float, time_s: FloatArray, *columns: FloatArray) -> tup
         time_s: Times in order, s, shape (n,), n > 0.
         columns: Shape (n,) each.
     """
-    index = np.floor((time_s - time_s[0]) / length_s + 1e-9).astype(np.int64)
-    first = np.flatnonzero(np.r_[True, np.diff(index) > 0])
+    last, begun = np.array([-1]), []
+    for part in parts_of(len(time_s)):
+        index = np.floor((time_s[part] - time_s[0]) / length_s + 1e-9).astype(np.int64)
+        begun.append(part.start + np.flatnonzero(np.diff(index, prepend=last) > 0))
+        last = index[-1:]
+    first = np.concatenate(begun)
     count = np.diff(np.r_[first, len(time_s)])
     return tuple(np.add.reduceat(v, first) / count for v in (time_s, *columns))
 

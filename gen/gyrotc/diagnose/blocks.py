@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes.base import History
-from ..common.arrays import FloatArray
+from ..common.arrays import PART, BoolArray, FloatArray, parts_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory
 from ..recordings.records import Dataset, Rows, Run
@@ -228,20 +228,21 @@ def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, N
     n = len(rows.time_s) // group * group
     use = usable[:n].reshape(-1, group)
     count = np.maximum(use.sum(axis=1), 1)
+    parts = list(parts_of(n // group, max(1, PART // group)))
 
-    def mean(values: FloatArray) -> FloatArray:
-        part = values[:n].reshape(-1, group)
-        return np.asarray(np.where(use, np.nan_to_num(part), 0.0).sum(axis=1) / count)
+    def thinned(values: FloatArray, mean: Callable[[FloatArray, BoolArray], FloatArray]) -> FloatArray:
+        groups = values[:n].reshape(-1, group)
+        return np.concatenate([mean(groups[part], use[part]) for part in parts])
 
-    time = rows.time_s[:n].reshape(-1, group).mean(axis=1)
+    def of_used(values: FloatArray) -> FloatArray:
+        sums = thinned(values, lambda x, used: np.where(used, np.nan_to_num(x), 0.0).sum(axis=1))
+        return np.asarray(sums / count)
+
     filled = Rows(
-        time,
-        np.nanmean(
-            np.where(np.isfinite(rows.temperature_c[:n]), rows.temperature_c[:n], np.nan).reshape(-1, group),
-            axis=1,
-        ),
-        mean(rows.rate_dph),
-        {k: mean(v) for k, v in rows.channels.items()},
+        thinned(rows.time_s, lambda x, _: x.mean(axis=1)),
+        thinned(rows.temperature_c, lambda x, _: np.nanmean(np.where(np.isfinite(x), x, np.nan), axis=1)),
+        of_used(rows.rate_dph),
+        {k: of_used(v) for k, v in rows.channels.items()},
     )
     return filled, 2 * use.sum(axis=1) >= group
 

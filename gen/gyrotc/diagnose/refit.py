@@ -158,7 +158,8 @@ def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Pl
 
 
 def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
-    blocks, rows = front.blocks(run), run.rows()
+    rows = run.rows()
+    blocks = front.blocks(run, rows)
     data = samples_of(blocks, front.block_s, number)
     before = blocks_since_power_on(rows, run, front.block_s)
     course = blocks.stream.course(blocks.steps, blocks.settings.samples_per_block, before)

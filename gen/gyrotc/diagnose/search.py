@@ -163,7 +163,7 @@ class Search:
         channels: Columns of the auxiliary channels, as they were given.
         beside: Columns that are in every model beside the map (blocks left out, causes found), shape (N, b).
         declared: Covariance of block means that is declared, (deg/h)²; None: nothing is.
-        views: By number of the colour in `COLOURS`; the declared colour has the number after the last.
+        views: Of the colours that the data allow, by number in `COLOURS`; the declared one comes after the last.
         best: Number of the likeliest colour.
         allowed: Numbers of the colours that the data allow (95 %: ratio and correlation time are free).
         cautious: Whether a cause must be significant under every colour, not on their average.
@@ -280,4 +280,5 @@ def open_search(
     top = max(view.log_likelihood for view in views.values())
     best = next(k for k, view in views.items() if view.log_likelihood == top)
     allowed = tuple(k for k, view in views.items() if 2.0 * (top - view.log_likelihood) <= CHI2_95_TWO)
-    return Search(question, channels, beside, declared, views, best, allowed)
+    kept = {k: views[k] for k in allowed}  # each holds the inner products of all columns
+    return Search(question, channels, beside, declared, kept, best, allowed)

@@ -15,6 +15,7 @@ import pyarrow.csv as pacsv
 from markupsafe import Markup
 
 from ..causes import CATALOGUE
+from ..common.arrays import numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average
@@ -216,15 +217,15 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     need_memory(_TRACE_COPIES * size / _LEAST_ROW_BYTES, str(path), "its rows")
     with file:
         read = pacsv.read_csv(file, pacsv.ReadOptions(use_threads=False), convert_options=types)
-    columns = read.columns
+    columns = [[np.zeros(0), *map(numpy_of, column.chunks)] for column in read.columns]
     del read
-    time_s = columns[0].to_numpy()
+    time_s = np.concatenate(columns[0])
     if not (np.isfinite(time_s).all() and np.all(time_s[1:] > time_s[:-1])):
         raise InputError(f"{path}, column time_s", "times that do not increase", "a trace as gyrotc wrote it")
+    scored = np.ones(len(time_s), dtype=bool)
     del time_s
-    scored = np.ones(len(columns[0]), dtype=bool)
     # Popped, so that a full-rate trace is not in memory twice.
-    return average(*(columns.pop(0).to_numpy() for _ in names), scored=scored, average_s=average_s)
+    return average(*(np.concatenate(columns.pop(0)) for _ in names), scored=scored, average_s=average_s)
 
 
 def _number(value: float | None, digits: int = 2) -> str:

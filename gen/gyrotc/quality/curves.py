@@ -16,7 +16,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, those
 from ..common.metrics import median
 from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
@@ -317,7 +317,8 @@ def _gain_throughout(run: Run, others: Sequence[Mapping[float, float]]) -> bool:
     good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
     if not good.any():
         return False
-    t, x, y = cell_means(_BLOCK_S, rows.time_s[good], rows.temperature_c[good], rows.rate_dph[good])
+    columns = (those(column, good) for column in (rows.time_s, rows.temperature_c, rows.rate_dph))
+    t, x, y = cell_means(_BLOCK_S, *columns)
     known = np.array(sorted(usual))
     curve = np.interp(x, known, [usual[c] for c in known.tolist()])
     used = (x >= known[0]) & (x <= known[-1])

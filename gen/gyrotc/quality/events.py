@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, those
 from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
 from ..results.findings import Finding
 from .changes import Change, changes_of
@@ -105,9 +105,10 @@ class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
             good &= np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
             good[self._departing[number]] = False
             good &= self._runs[number].file not in self._without
-            part = tuple(
-                column if good.all() else column[good]
-                for column in (rows.time_s, rows.temperature_c, rows.rate_dph)
+            part = (
+                those(rows.time_s, good),
+                those(rows.temperature_c, good),
+                those(rows.rate_dph, good),
             )
             self._read = number, part if len(part[0]) > 1 else (np.zeros(2),) * 3
         return self._read[1]
@@ -207,7 +208,7 @@ def _hours(from_s: float, to_s: float) -> str:
 
 def _dropouts(run: Run, rows: Rows) -> Iterator[Finding]:
     """Times without rows."""
-    time = rows.time_s[run.in_span(rows.time_s)]
+    time = those(rows.time_s, run.in_span(rows.time_s))
     for k in np.flatnonzero(np.diff(time) > max(_LOST_S, 10.0 * run.row_period_s)):
         start, length = float(time[k]), float(time[k + 1] - time[k])
         if not _excluded(run, (start, start + length)):

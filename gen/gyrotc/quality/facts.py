@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray
+from ..common.arrays import PART, BoolArray, FloatArray, steps_are, those
 from ..common.metrics import MAD_TO_SIGMA, median, median_of_parts
 from ..recordings.records import EarthRate, Rows, Run
 
@@ -21,7 +21,6 @@ _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _LEAST_HELD = 30  # rates: fewer do not show a rhythm
 _HELD = 0.9  # of them held for as long as the others, to a row: their rhythms need not fit
 SPIKE_SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
-PART = 2**16  # rows that are looked at together
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,15 +87,15 @@ class RunFacts:
 def facts_of(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
-    time, temperature = _those(rows.time_s, inside), _those(rows.temperature_c, inside)
+    time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
     finite = inside & np.isfinite(rows.rate_dph)
-    rate = _those(rows.rate_dph, finite)
-    late = np.flatnonzero(_steps_are(time, lambda step: step > _GAP_PERIODS * run.row_period_s))
+    rate = those(rows.rate_dph, finite)
+    late = np.flatnonzero(steps_are(time, lambda step: step > _GAP_PERIODS * run.row_period_s))
     if not inside.all():
         late = late[np.diff(np.flatnonzero(inside))[late] == 1]  # what was excluded is no gap
     missing = int(np.sum(np.round((time[late + 1] - time[late]) / run.row_period_s) - 1.0))
     low_c, high_c, resolution = _levels(temperature)
-    measured = _those(rows.rate_dph, inside)
+    measured = those(rows.rate_dph, inside)
     if not np.isfinite(measured).all():
         measured = np.where(np.isfinite(measured), measured, rate.mean() if len(rate) else 0.0)
     cells_t, slopes, cells_rate = _cells(time, temperature, measured, run.row_period_s)
@@ -129,17 +128,6 @@ def facts_of(run: Run, rows: Rows) -> RunFacts:
         constant=_constant(rows, inside, rate),
         earth=run.earth,
     )
-
-
-def _those(values: FloatArray, chosen: BoolArray) -> FloatArray:
-    """The chosen values; the same array where that is all of them."""
-    return values if chosen.all() else values[chosen]
-
-
-def _steps_are(values: FloatArray, found: Callable[[FloatArray], BoolArray]) -> BoolArray:
-    """What is found of the differences of neighbours, shape (n - 1,); part by part, as all of them fill memory."""
-    parts = (np.diff(values[at : at + PART + 1]) for at in range(0, len(values) - 1, PART))
-    return np.concatenate([np.zeros(0, dtype=bool), *map(found, parts)])
 
 
 def _levels(temperature: FloatArray) -> tuple[float, float, float]:
@@ -244,6 +232,6 @@ def _held(rate: FloatArray) -> int:
 
 
 def _constant(rows: Rows, inside: BoolArray, rate: FloatArray) -> tuple[str, ...]:
-    columns = {"temperature": _those(rows.temperature_c, inside), "rate": rate}
-    columns |= {f"channel {name}": _those(values, inside) for name, values in rows.channels.items()}
+    columns = {"temperature": those(rows.temperature_c, inside), "rate": rate}
+    columns |= {f"channel {name}": those(values, inside) for name, values in rows.channels.items()}
     return tuple(name for name, values in columns.items() if len(values) and np.ptp(values) == 0.0)

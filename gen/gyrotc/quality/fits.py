@@ -19,6 +19,7 @@ from scipy.linalg import solve_discrete_are
 from scipy.signal import lfilter
 
 from ..common.arrays import FloatArray
+from ..common.metrics import median_step
 from ..common.statistics import cell_means, orthonormal, running_mean
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]
@@ -57,7 +58,7 @@ class RunCells:
 
 def cells_of(rows: Rows, cell_s: float) -> RunCells:
     """Means over cells of at least one row."""
-    length = max(float(np.median(np.diff(rows[0]))), cell_s)
+    length = max(median_step(rows[0]), cell_s)
     t, x, y = cell_means(length, *rows)
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > _GAP_CELLS * length)

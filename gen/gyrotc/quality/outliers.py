@@ -65,7 +65,7 @@ def outliers_of(stretches: Sequence[LeftOutRows], kept: float) -> Outliers:
 
 
 _AROUND = 5  # blocks of a running median, at least
-_PART = 2**18  # rows that are looked at together: bounds memory
+_PART = 2**16  # rows that are looked at together: bounds memory
 _GROUP = 200  # rows, at least, of one scale
 _GROUP_BLOCKS = 10  # blocks, at least, of one scale: the same where rows are few to a block
 _BURST = 0.1  # share of departing rows from which a block is left out whole

@@ -13,7 +13,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ..common.arrays import FloatArray
+from ..common.arrays import PART, FloatArray, those
 from ..common.metrics import (
     MAD_TO_SIGMA,
     Averages,
@@ -26,7 +26,7 @@ from ..common.statistics import cell_means
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.findings import Finding
-from .facts import PART, RunFacts, changes_in
+from .facts import RunFacts, changes_in
 from .findings import finding, mark_of
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
@@ -84,8 +84,7 @@ def temperature_findings_of(run: Run, rows: Rows, f: RunFacts) -> Iterator[Findi
     What a rate does is not judged where its temperature is not known: behind a jump that stays, and where it is stuck.
     """
     inside = run.in_span(rows.time_s)
-    whole = inside.all()
-    time, temperature = (v if whole else v[inside] for v in (rows.time_s, rows.temperature_c))
+    time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
     jumps = jumps_of(time, temperature, f.temperature_step_c)
     if jumps:
         first = jumps[0]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray
+from ..common.arrays import BoolArray, FloatArray, steps_are, those
 from ..recordings.records import Mark, Rows, Run
 from ..results.findings import Finding
 from .findings import finding
@@ -23,6 +23,7 @@ _PARTS, _LEAST_STEPS = 50, 40
 _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt
 # Of a row period, and of the rows: a clock of coarser ticks than the rows
 _COARSE, _COARSE_SHARE = 0.4, 0.05
+_COARSE_ROWS = 2**16  # at the start, which tell it
 _EVEN_ROWS, _EVEN, _EVEN_SHARE = 400, 1.25, 0.8  # parts in which even rows stay so near a line, in units
 _REPORTED = 20  # that are reported: enough to see a pattern
 _HOUR_S = 3600.0  # a change of summer time
@@ -31,28 +32,28 @@ _HOUR_S = 3600.0  # a change of summer time
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """What is suspect about the times of a run."""
     inside = run.in_span(rows.time_s)
-    time, temperature, at = rows.time_s, rows.temperature_c, range(len(rows))
-    together: NDArray[np.bool_] = np.broadcast_to(np.True_, max(len(rows) - 1, 0))
+    time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
+    at: Sequence[int] = range(len(rows))
+    together: BoolArray = np.broadcast_to(np.True_, max(len(rows) - 1, 0))
     if not inside.all():
         rows_inside = np.flatnonzero(inside)
-        time, temperature, at = time[inside], temperature[inside], rows_inside.tolist()
+        at = rows_inside.tolist()
         together = np.diff(rows_inside) == 1  # what was excluded is no gap
-    step = np.diff(time)
-    if len(step) < _AROUND_ROWS:
+    if len(together) < _AROUND_ROWS:
         return
-    coarse = _coarse(run, step if inside.all() else step[together])
+    coarse = _coarse(run, np.diff(time[: _COARSE_ROWS + 1])[together[:_COARSE_ROWS]])
     if coarse is not None:
         yield coarse
         return
-    gaps = np.flatnonzero((step > _GAP * run.row_period_s) & together)
+    late = steps_are(time, lambda step: step > _GAP * run.row_period_s)
+    gaps = np.flatnonzero(late & together)
     jumps = [k for k in gaps[:1000].tolist() if _clock_was_set(time, temperature, k, run.row_period_s)]
     missing = np.setdiff1d(gaps, jumps)
     if jumps:
         yield _jumps(run, time, at, jumps)
     if len(missing):
         yield _gaps(run, time, at, missing)
-    step[(step > _GAP * run.row_period_s) | ~together] = np.nan
-    yield from _drift(run, time, at, step)
+    yield from _drift(run, time, at, together & ~late)
 
 
 def _marks(run: Run, time: FloatArray, at: Sequence[int], places: list[int]) -> tuple[Mark, ...]:
@@ -114,9 +115,8 @@ def _line(time: FloatArray, temperature: FloatArray) -> tuple[float, float, floa
     return float(level), float(slope), float(np.std(temperature - level - slope * time))
 
 
-def _coarse(run: Run, step: FloatArray) -> Finding | None:
+def _coarse(run: Run, some: FloatArray) -> Finding | None:
     """Stamps whose own resolution is about the row period: rows seem to be missing, or twice as dense, by turns."""
-    some = step[: 2**16]
     short = some[some < 5.5 * run.row_period_s]
     kinds = np.unique(np.round(short / run.row_period_s, 3)) * run.row_period_s
     if not 2 <= len(kinds) <= 8:
@@ -144,32 +144,36 @@ def _regular(step: FloatArray, unit: float) -> bool:
     return float(np.mean(np.abs(rest).max(axis=1) < _EVEN * unit)) > _EVEN_SHARE
 
 
-def _drift(run: Run, time: FloatArray, at: Sequence[int], step: FloatArray) -> Iterator[Finding]:
+def _drift(run: Run, time: FloatArray, at: Sequence[int], even: BoolArray) -> Iterator[Finding]:
     """Rows that come ever faster or slower by the stamps: the clock of the rows or that of the stamps drifts.
 
     Args:
-        step: From row to row, s; NaN where rows are missing.
+        even: Which steps from row to row have no room for a missing row.
     """
-    parts = min(_PARTS, len(step) // _LEAST_STEPS)
+    parts = min(_PARTS, len(even) // _LEAST_STEPS)
     if parts < 4:
         return
-    size = len(step) // parts
-    steps = step[: parts * size].reshape(parts, size)
-    count = np.sum(np.isfinite(steps), axis=1)
-    kept = np.flatnonzero(count >= 0.5 * size)
+    size = len(even) // parts
+
+    def steps(part: int) -> FloatArray:
+        rows = slice(part * size, (part + 1) * size)
+        return np.where(even[rows], np.diff(time[rows.start : rows.stop + 1]), np.nan)
+
+    count = np.count_nonzero(even[: parts * size].reshape(parts, size), axis=1)
+    kept = np.flatnonzero(count >= 0.5 * size).tolist()
     if len(kept) < 4:
         return
-    mean = np.array([np.nanmean(steps[k]) for k in kept])
+    mean = np.array([np.nanmean(steps(k)) for k in kept])
     usual = float(np.median(mean))
-    squares = sum(float(np.nansum((steps[k] - m) ** 2)) for k, m in zip(kept, mean, strict=True))
+    squares = sum(float(np.nansum((steps(k) - m) ** 2)) for k, m in zip(kept, mean, strict=True))
     scatter = float(np.sqrt(squares / count[kept].sum()))
     difference = np.abs(mean / usual - 1.0)
     limit = _DRIFT + _DRIFT_SIGMAS * scatter / usual / np.sqrt(count[kept])
     if not (difference > limit).any():
         return
-    worst = int(kept[np.argmax(difference - limit)])
+    worst = kept[int(np.argmax(difference - limit))]
     total = float(np.sum(np.abs(mean - usual) * count[kept]))
-    every = (usual, float(np.nanmean(steps[worst])))
+    every = (usual, float(np.nanmean(steps(worst))))
     yield _drifting(run, time, at, (worst * size, (worst + 1) * size), every, total)
 
 

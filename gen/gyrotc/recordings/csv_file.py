@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from .files import Prefix, Source
@@ -158,12 +158,12 @@ class CsvFile(Source):
         at = 0
         try:
             for lines, _, _ in blocks_of_lines(self.path, self.size, self.name):
-                table = parsed(lines, unique, wanted)
-                for column, values in zip(read.values(), table.columns, strict=True):
-                    if values.null_count:
-                        return None
-                    column[at : at + len(table)] = values.to_numpy()
-                at += len(table)
+                for batch in parsed(lines, unique, wanted).to_batches():
+                    for column, values in zip(read.values(), batch.columns, strict=True):
+                        if values.null_count:
+                            return None
+                        column[at : at + len(batch)] = numpy_of(values)
+                    at += len(batch)
         except pa.ArrowInvalid:
             return None
         return {name: column[:at] for name, column in read.items()}

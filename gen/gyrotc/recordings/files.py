@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, give_back
 from ..common.errors import InputError
 from ..common.inputs import open_input
 from .values import Fault
@@ -115,6 +115,8 @@ class Source(ABC):
         """As `read`; not to write to. Small files that were read last are not read again: a job asks three times."""
         kept = _last_read.of(self)
         if not all(name in kept for name in names):
+            if self.size > _KEPT_BYTES:
+                give_back()
             found = self.read(names)
             if found is None:
                 return None

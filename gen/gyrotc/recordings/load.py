@@ -408,7 +408,7 @@ def _recordings(
                 expected = f"one that meets the rows of the file, {first:.10g} ... {last:.10g} s"
                 where = place_of(description, index)
                 problems.add(InputError(where, "a span without rows", expected))
-        recordings[name] = replace(recording, time_s=np.zeros(0))
+        recordings[name] = recording = replace(recording, time_s=np.zeros(0))  # before the next file is read
     return recordings, with_rows
 
 

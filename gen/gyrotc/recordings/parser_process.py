@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from ..common.arrays import numpy_of
 from ..common.errors import InputError
 from ..common.inputs import ENVIRONMENT, ceiling, refuse_above
 from ..store.scratch import scratch_folder
@@ -127,7 +128,7 @@ class _Rows(LoggerTable):
         while (batch := self.worker.rows({"do": "next", "stream": stream})) is not None:
             refuse_above("rows", first + len(batch), f"{self.file} {self.name}".rstrip(), "rows")
             values = {
-                name: column if pa.types.is_string(column.type) else column.to_numpy(zero_copy_only=False)
+                name: column if pa.types.is_string(column.type) else numpy_of(column)
                 for name, column in zip(batch.schema.names, batch.columns, strict=True)
             }
             yield Chunk(values, first, float(batch.schema.metadata[b"done"]))

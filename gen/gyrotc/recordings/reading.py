@@ -10,7 +10,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.metrics import median
+from ..common.metrics import median_step
 from .csv_file import CsvFile
 from .description import Columns, Problems
 from .files import Source
@@ -242,7 +242,7 @@ def open_recording(
         return None
     if len(problems) > before:
         return None
-    period = median(np.diff(time), overwrite_input=True)
+    period = median_step(time)
     if period < _SHORTEST_S:
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))

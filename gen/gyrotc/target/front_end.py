@@ -325,6 +325,16 @@ class Stream:
         """Sample number of each row."""
         return self.positions(slice(0, len(self)))
 
+    def first_rows(self, samples: NDArray[np.integer]) -> NDArray[np.int64]:
+        """The first row at or behind each sample number, without a number for every row."""
+        if self.placed is None:
+            return np.asarray(np.minimum(samples, len(self)), dtype=np.int64)
+        return np.asarray(np.searchsorted(self.placed, samples.astype(self.placed.dtype)))
+
+    def samples_of(self, rows: NDArray[np.int64]) -> NDArray[np.integer]:
+        """Sample numbers of some rows."""
+        return rows if self.placed is None else self.placed[rows]
+
     def positions(self, part: slice) -> NDArray[np.integer]:
         """Of some rows."""
         if self.placed is not None:

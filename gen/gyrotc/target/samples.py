@@ -62,8 +62,8 @@ def judge_readings(
     """
     judged, sound = guard.limited(x), _sound(arithmetic, x, guard, period_us)
     judge = _Judge(arithmetic, guard, period_us)
-    verdict = np.zeros(x.size, dtype=np.int8)
     events = _events(arithmetic, judged, sound, judge.near, lost)
+    verdict = np.zeros(x.size, dtype=np.int8)
     waiting = list(lost)
     i = 0
     while i < x.size:
@@ -104,7 +104,10 @@ def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -
     """Readings that are there, in their range or taken as its edge, and not stuck."""
     there = ~arithmetic.is_missing(x)
     with np.errstate(invalid="ignore"):
-        sound = there & (x >= guard.low) & (x <= guard.high) if not guard.takes_edge else there.copy()
+        sound = there.copy()
+        if not guard.takes_edge:
+            sound &= x >= guard.low
+            sound &= x <= guard.high
     if guard.stuck_us:
         bits = (x if there.all() else x[there]).view(f"u{x.itemsize}")
         repeats = np.zeros(bits.size + 1, dtype=np.bool_)

@@ -21,7 +21,7 @@ from ..common.ranges import MOST_HELD
 from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
-from ..recordings.records import Dataset, Run, joined_runs
+from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..results.evaluation import Pooled
 from ..results.findings import Finding
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
@@ -99,9 +99,10 @@ class FrontEnd:
     lead_blocks: int = 1
     agree_s: float = AGREE_S
 
-    def blocks(self, run: Run) -> Blocks:
+    def blocks(self, run: Run, rows: Rows | None = None) -> Blocks:
+        """Runs over a run; `rows`: those of its file, where they are in memory already."""
         return run_blocks(
-            run.rows(),
+            run.rows() if rows is None else rows,
             run,
             block_s=self.block_s,
             slope_blocks=self.slope_blocks,
@@ -217,12 +218,13 @@ def _read(
     longest_s = 0.0
     for k, run in enumerate(stretches):
         say(f"reading {run.file}")
-        blocks = front.blocks(run)
+        rows = run.rows()
+        blocks = front.blocks(run, rows)
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
-        columns.append(seen_by_target(dataset, run.rows(), blocks) if channels else {})
+        columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
         left_out += stretches_left_out(run, blocks.left_out_s)
-        del blocks  # before those of the next run are made: a file of 100 Hz fills memory
+        del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
     data = joined(parts)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(

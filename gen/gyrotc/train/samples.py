@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import steps_are
 from ..quality.outliers import departing_rows
 from ..target import status as status_bits
 from ..target.arithmetic import F32
@@ -69,10 +70,7 @@ class Blocks:
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
     """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    parts = [
-        np.diff(time_s[at : at + _PART + 1]) / row_period_s > _GAP for at in range(0, time_s.size, _PART)
-    ]
-    late = np.flatnonzero(np.concatenate([np.zeros(0, dtype=bool), *parts]))
+    late = np.flatnonzero(steps_are(time_s, lambda step: step / row_period_s > _GAP))
     if len(late) == 0:
         return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
     missed = np.zeros(time_s.size, dtype=np.int64)
@@ -141,11 +139,9 @@ def run_blocks(
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
     k = steps.in_force(last)
     temperature, slope, status = _in_force(steps, k)
-    position = stream.position
-    starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size).astype(position.dtype)
-    first_row = np.searchsorted(position, starts)
-    start_s = _time_of(starts[:-1], position, rows.time_s)
-    del position  # of a file of 100 Hz it fills memory
+    starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size)
+    first_row = stream.first_rows(starts)
+    start_s = _time_of(starts[:-1], stream, rows.time_s)
     rate, count, left_out = _mean_rate(rows, run, first_row, n)
     return Blocks(
         start_s=start_s,
@@ -190,14 +186,14 @@ def _in_force(
 
 
 def _time_of(
-    samples: NDArray[np.integer], position: NDArray[np.integer], time_s: NDArray[np.float64]
+    samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Times of samples, shape (k,), between the rows beside them, whose samples are given."""
+    """Times of samples, shape (k,), between the rows beside them."""
     if len(time_s) == 0:
         return np.empty(0)
-    after = np.minimum(np.searchsorted(position, samples), len(position) - 1)
+    after = np.minimum(stream.first_rows(samples), len(time_s) - 1)
     near = np.unique(np.r_[np.maximum(after - 1, 0), after])
-    return np.asarray(np.interp(samples, position[near], time_s[near]))
+    return np.asarray(np.interp(samples, stream.samples_of(near), time_s[near]))
 
 
 def _mean_rate(

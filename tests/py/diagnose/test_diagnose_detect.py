@@ -31,7 +31,7 @@ from gyrotc.diagnose.joined import (
 )
 from gyrotc.diagnose.noise import COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
 from gyrotc.diagnose.screens import cleaned, screen
-from gyrotc.diagnose.search import Search, residual_log_likelihood
+from gyrotc.diagnose.search import Search, residual_log_likelihood, view_of_bank
 from gyrotc.recordings.records import Rows
 from numpy.typing import NDArray
 from scipy import stats
@@ -96,7 +96,7 @@ def test_the_likelihood_of_a_colour_is_that_of_a_dense_normal_distribution(quiet
     numbers = [0, 3, TRUE_COLOUR, 14, 20]
     own, expected = [], []
     for number in numbers:
-        view, inner = quiet.views[number], free.T @ dense(quiet, number) @ free
+        view, inner = view_of_bank(quiet.question, number), free.T @ dense(quiet, number) @ free
         normal = stats.multivariate_normal(np.zeros(len(inner)), view.scale**2 * inner)
         best = np.sqrt(free.T @ quiet.y @ np.linalg.solve(inner, free.T @ quiet.y) / quiet.freedom)
         assert view.scale == pytest.approx(best, rel=1e-6)
@@ -130,7 +130,7 @@ def test_a_projection_is_that_of_whitened_columns(quiet: Search) -> None:
 def test_without_the_map_a_candidate_is_its_whole_column_again(planted: Search) -> None:
     """The plain map stands beside as if a cause had brought it: then nothing may change but inputs, which go."""
     moved = planted.extended(planted.bank.map)
-    views = [s.views[planted.best] for s in (planted, moved)]
+    views = [view_of_bank(s.question, planted.best) for s in (planted, moved)]
     was, now = project(planted, views[0], "map"), project(moved, views[1], "beside")
     at = planted.joined.layout.signatures
     a, b = (p.a[at] * v.scale for p, v in zip((was, now), views, strict=True))

@@ -7,16 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.feather
 import pyarrow.parquet as pq
 
+from ...common.arrays import numpy_of
 from ...common.errors import InputError
 from ...common.inputs import ceiling, open_input, refuse_above
 from ..tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
 from .csv_dialect import kind_of_cells
 
+_BUFFER_BYTES = 2**20  # of a column: without one the whole column of a row group is read at once
 _SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count
 _HARMLESS_BYTES = 2**26  # 64 MiB, which any host has: below it no ratio of packing is asked about
 _DAMAGE = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)  # of whatever pyarrow meets
@@ -63,7 +64,7 @@ class ParquetBatches:
         at = 0
         with opened:
             try:
-                with pq.ParquetFile(opened, pre_buffer=False) as file:
+                with pq.ParquetFile(opened, pre_buffer=False, buffer_size=_BUFFER_BYTES) as file:
                     for batch in file.iter_batches(most, columns=list(columns), use_threads=False):
                         at += len(batch)
                         yield batch
@@ -175,7 +176,7 @@ def _values_of(column: Any) -> Any:
         return column.cast(pa.int64()).to_numpy(zero_copy_only=False)
     if pa.types.is_decimal(column.type):
         return column.cast(pa.float64()).to_numpy(zero_copy_only=False)
-    return numbers(np.asarray(column.to_numpy(zero_copy_only=False)))
+    return numbers(numpy_of(column))
 
 
 def open_feather(path: Path) -> LoggerFile:
