@@ -63,7 +63,6 @@ _AROUND_S = 240.0  # in which a place is sought anew
 _EDGE = 3  # cells at the ends of a run in which a change cannot be distinguished from noise
 _HOUR_S = 3600.0  # by definition
 _PLACED_95 = 7.35  # of a likelihood ratio of places: Hansen, Econometrica 68 (2000) 575, table 1
-_LEAST_ODDS = 4.0  # that a change is over within 30 s: four of five of the steps that are reported are steps
 _NEAR_CELLS = 8  # on either side of a step, in which its rows are looked at
 _PLACES = 240  # that are tried around a change
 _PARTS = (0.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of a cell, that a change may begin beside its edge
@@ -323,7 +322,7 @@ class _Search:
     def _best(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> _At:
         """The likeliest place and duration.
 
-        Of steps and transitions it is a step where the odds are, each of both kinds being as likely beforehand and all
+        Of steps and transitions it is what is more likely, each of both kinds being as likely beforehand and all
         durations of a kind alike; a drift where it is nearly as likely as they are.
         """
         cells = self._cells[at.run]
@@ -354,7 +353,7 @@ class _Search:
         mean = [
             np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind
         ]
-        steps = len(mean) == 1 or mean[0] >= _LEAST_ODDS * mean[1]
+        steps = len(mean) == 1 or mean[0] >= mean[1]
         return max(over if steps else lasting, key=lambda pair: pair[0])[1]
 
     def _gains(self, fit: SmoothFit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
