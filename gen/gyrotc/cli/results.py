@@ -114,9 +114,8 @@ def verify_table(result: Verification) -> RichTable:
         table.add_column(name, justify="right", no_wrap=True)
     for entry in (e for e in result.targets if e.status != "missing"):  # `not_installed_lines` names those
         replayed, counted = entry.replayed, entry.map_cost
-        differ = (
-            None if entry.mismatches is None else entry.mismatches + (replayed.mismatches if replayed else 0)
-        )
+        beside = sum(part.mismatches for part in (replayed, entry.learned) if part)
+        differ = None if entry.mismatches is None else entry.mismatches + beside
         table.add_row(
             entry.name, entry.numeric, entry.status, _known(entry.vectors),
             _known(replayed.rows if replayed else None), _known(differ),
@@ -155,7 +154,8 @@ def verify_notes(result: Verification) -> Iterator[str]:
         replayed = entry.replayed
         found = [entry.error, replayed.error if replayed else None, *entry.first_mismatches]
         yield from (f"{who}: {text}" for text in found if text)
-        yield from (f"{who}: {text}" for text in replayed.first_mismatches) if replayed else ()
+        parts = (part for part in (replayed, entry.learned) if part)
+        yield from (f"{who}: {text}" for part in parts for text in part.first_mismatches)
     yield from file_notes(result)
     yield from _log_notes(result.log) if result.log else ()
     for error in result.errors:
