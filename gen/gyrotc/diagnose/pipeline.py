@@ -1,4 +1,8 @@
-"""The stages of `gyrotc diagnose` in order: screen, noise, compare, detect, attribute, extend, measure."""
+"""The stages of `gyrotc diagnose` in order: screen, noise, compare, detect, attribute, extend, measure.
+
+Screens come before any test for causes: outliers, variance that is not even, steps of the thermometer. Unforeseen
+variance is the main source of false causes. Outliers are left out, never replaced; uneven variance becomes weights.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +10,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
+from numpy.typing import NDArray
+from scipy.special import chdtrc, fdtrc, ndtr, pdtrc
 
 from ..causes import CATALOGUE
-from ..common.arrays import Progress
+from ..common.arrays import FloatArray, Progress
 from ..common.statistics import main_directions, orthonormal
+from ..quality.facts import SPIKE_SIGMAS
+from ..quality.outliers import BLOCK_S, departing
+from ..target.front_end import samples_per_block
 from .attribution import Attribution, attribute, overlap
-from .blocks import Records
+from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .gains import Gains
 from .joined import Channels
 from .noise import NOISE_WORDS, Declared
-from .screens import Screened, cleaned, screen
 from .search import Search, open_search
 from .signature_bank import bank_of
 
@@ -179,3 +186,155 @@ def _of_map(candidate: Candidate) -> bool:
 def _after(search: Search, attribution: Attribution) -> Search:
     """The search with the causes found taken out."""
     return search.extended(attribution.columns) if attribution.causes else search
+
+
+_MANY = 8  # single outliers are left out in silence
+_P_VARIANCE = (
+    1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
+)
+_RATIO = 1.25  # of standard deviations, above which uneven variance matters
+_KNOTS = 4  # hats over the temperature: the variance is a slow function of it
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the screens found and what is done about it.
+
+    Attributes:
+        masks: Per run, rows that are kept, shape (n,).
+        n_outliers: Rows left out.
+        sigma: Factor of the noise of every block, median 1, shape (N,); None: even.
+        findings: Causes of the family `noise` found here: id, p-value, parameters.
+    """
+
+    masks: tuple[NDArray[np.bool_], ...]
+    n_outliers: int
+    sigma: FloatArray | None
+    findings: tuple[tuple[str, float, dict[str, float]], ...]
+
+
+def screen(records: Records) -> Screened:
+    """Runs all screens."""
+    masks = tuple(_without_outliers(run) for run in records.runs)
+    kept = sum(int(mask.sum()) for mask in masks)
+    rows = sum(int(run.usable.sum()) for run in records.runs)
+    findings: list[tuple[str, float, dict[str, float]]] = []
+    if (found := rows - kept) >= _MANY:
+        by_chance = float(pdtrc(found - 1, 2.0 * float(ndtr(-SPIKE_SIGMAS)) * rows))
+        findings.append(("outliers", by_chance, {"count": float(found), "share": found / rows}))
+    sigma, p_variance, ratio = _variance(records, masks)
+    if sigma is not None:
+        findings.append(("noise_variance", p_variance, {"ratio": ratio}))
+    step = _temperature_step(records)
+    if step is not None:
+        findings.append(("temperature_quantisation", 0.0, {"step_c": step}))
+    return Screened(masks, found, sigma, tuple(findings))
+
+
+def _without_outliers(run: Record) -> NDArray[np.bool_]:
+    """Usable rows of a run that are no spikes and no parts of bursts, by the rule that training has."""
+    keep: NDArray[np.bool_] = run.usable.copy()
+    at = np.flatnonzero(keep)
+    keep[at[departing(run.rate_dph[at], samples_per_block(BLOCK_S, run.row_s))]] = False
+    return keep
+
+
+def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray | None, float, float]:
+    """Does the quick part of the noise depend on |dT/dt|, T or the time since power-on?
+
+    The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a
+    block is one row) is regressed on smooth functions of the three (Breusch and Pagan's idea, robust).
+
+    Returns:
+        Factor of every block's standard deviation or None, p-value, ratio of largest to smallest (95 % range).
+    """
+    value, at = _quick_power(records, masks)
+    design = _variance_design(records)
+    usable_rows = value > 0.0
+    logs, x = np.log(value[usable_rows]), design[at[usable_rows]]
+    if logs.size < 4 * x.shape[1]:
+        return None, 1.0, 1.0
+    q = orthonormal((x - x.mean(axis=0))[:, 1:])
+    rank = max(q.shape[1], 1)
+    centred = logs - logs.mean()
+    weights = q.T @ centred
+    left = float(((centred - q @ weights) ** 2).sum())
+    freedom = logs.size - 1 - q.shape[1]
+    f = float((weights**2).sum()) / rank / (left / freedom)
+    p = float(fdtrc(rank, freedom, f))
+    beta, *_ = np.linalg.lstsq(x, logs, rcond=1e-8)
+    sigma = np.exp(0.5 * (design @ beta - np.median(design @ beta)))
+    low, high = np.quantile(sigma, [0.025, 0.975])
+    ratio = float(high / low)
+    if p > _P_VARIANCE or ratio < _RATIO:
+        return None, p, ratio
+    return np.clip(sigma, 0.1, 10.0), p, ratio
+
+
+def _quick_power(
+    records: Records, masks: Sequence[NDArray[np.bool_]]
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Mean squared difference of neighbouring usable rows of a block, and the block, where there are such rows."""
+    power, index = [], []
+    for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
+        usable = masks[k]
+        pair = usable[1:] & usable[:-1]
+        square = np.where(pair, np.diff(np.where(usable, run.rate_dph, 0.0)) ** 2, 0.0)
+        number = records.index[k][1:]
+        size = int(records.index[k][-1]) + 1
+        total = np.bincount(number, weights=square, minlength=size)
+        count = np.bincount(number, weights=pair, minlength=size)
+        kept = records.kept[k]
+        ok = count[kept] > 0
+        power.append(total[kept][ok] / count[kept][ok])
+        index.append(np.arange(span.start, span.stop)[ok])
+    return np.concatenate(power), np.concatenate(index)
+
+
+def _variance_design(records: Records) -> FloatArray:
+    """Constant, |dT/dt|, its square, hats over T, and a fading with time since power-on, shape (N, k)."""
+    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    r = np.abs(records.average([centred_slope(run.history) for run in records.runs]))
+    r = r / max(float(r.max()), 1e-9)
+    columns = [np.ones_like(t), r, r**2]
+    span = float(np.ptp(t))
+    if span > 2.0:
+        nodes = np.linspace(t.min(), t.max(), _KNOTS)
+        width = nodes[1] - nodes[0]
+        columns += [np.maximum(0.0, 1.0 - np.abs(t - n) / width) for n in nodes[1:]]
+    if all(run.history.on_s is not None for run in records.runs):
+        on = records.average([np.asarray(run.history.on_s) for run in records.runs])
+        columns.append(np.exp(-np.maximum(on, 0.0) / 1800.0))
+    return np.column_stack(columns)
+
+
+def _temperature_step(records: Records) -> float | None:
+    """Step of the temperature record, C, where it is so coarse that the record stands still between steps."""
+    steps = []
+    for run in records.runs:
+        t = run.history.temperature_c
+        change = np.abs(np.diff(t))
+        moved = change[change > 1e-9]
+        if moved.size < 20:
+            continue
+        unit = float(np.quantile(moved, 0.02))
+        even = np.abs(moved / unit - np.round(moved / unit)) < 0.02
+        still = float(np.mean(change <= 1e-9))
+        if unit >= 0.05 and even.mean() > 0.95 and still > 0.5:
+            steps.append(unit)
+    return float(np.median(steps)) if len(steps) * 2 > len(records.runs) else None
+
+
+def cleaned(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Block means without the outliers, and the blocks of which nothing is left (their value is 0).
+
+    The blocks themselves stay the same, so that a bank of the temperature records stays valid.
+    """
+    y = np.zeros(records.size)
+    empty = []
+    for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
+        keep = screened.masks[k]
+        y[span] = records.average_run(k, np.where(keep, run.rate_dph, 0.0), keep)
+        count = np.bincount(records.index[k], weights=keep, minlength=int(records.index[k][-1]) + 1)
+        empty.append(np.flatnonzero(count[records.kept[k]] == 0) + span.start)
+    return y, np.concatenate(empty)

@@ -30,7 +30,7 @@ from gyrotc.diagnose.joined import (
     variance_ratio_of,
 )
 from gyrotc.diagnose.noise import COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
-from gyrotc.diagnose.screens import cleaned, screen
+from gyrotc.diagnose.pipeline import cleaned, screen
 from gyrotc.diagnose.search import Search, residual_log_likelihood, view_of_bank
 from gyrotc.recordings.records import Rows
 from numpy.typing import NDArray

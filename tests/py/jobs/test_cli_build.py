@@ -270,7 +270,7 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
 def test_traces_of_files_with_one_stem_do_not_meet() -> None:
     from types import SimpleNamespace
 
-    from gyrotc.assess.trace import trace_name
+    from gyrotc.assess.evaluate import trace_name
 
     runs = [
         SimpleNamespace(file=f, from_s=s)
