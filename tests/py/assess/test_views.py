@@ -1,4 +1,4 @@
-"""Every view of a verdict says the same: terminal, page, certificate, DCC, what is signed, fleet, catalogue, JSON."""
+"""Every view of a verdict says the same: terminal, pages, certificate, DCC, Python, signature, catalogue, JSON."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from gyrotc.assess.limits import Limits, decided, held_against
 from gyrotc.cli.results import limit_lines, summary
-from gyrotc.deliver.certificate import rows_of
+from gyrotc.deliver.certificate import LaboratoryFacts, certificate_page, rows_of
 from gyrotc.fleet import catalogue, unit
 from gyrotc.fleet.manifest import Fleet, Unit
 from gyrotc.fleet.page import write_summary
+from gyrotc.jobs.api import Result
 from gyrotc.jobs.build import Built
 from gyrotc.jobs.release import _unit
 from gyrotc.model import Model
@@ -33,6 +34,7 @@ _RULES = ("guard_band", "guard_band_binary", "simple_acceptance")
 _NO_TRAINING = cast(Training, None)  # no verdict depends on it
 _NO_FLEET = cast(Fleet, None)  # nor on the options
 _VERDICTS = "CONDITIONAL PASS|PASS|FAIL"
+_IN_DCC = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
 
 
 def pooled(rms: float) -> Pooled:
@@ -94,10 +96,19 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         table = re.findall(r'class="state"><span[^>]*>([^<]*)<', macros.limits_table(shown.held))
         certified = [row.verdict for row in rows_of(shown)]
         signed = _unit(model, shown)
+        conformity = [row.conformity for row in rows_of(shown)]
+        page = certificate_page([shown], {None: None}, LaboratoryFacts(), ["number"], "drawn")
+        built = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=held)
         again = HeldLimits.model_validate_json(json.dumps(held.content()))
         assert again == held, number
         assert banner == [shown.verdict or "No verdict"], number
         assert signed.verdict == shown.decision, number
+        assert re.findall(r"<strong>([^<]*)</strong>", page)[:1] == (
+            [shown.verdict] if shown.verdict else []
+        ), number
+        assert re.findall(r'class="state"><span[^>]*>([^<]*)<', page) == table, number
+        assert conformity == [_IN_DCC[one.decision] for one in shown.held], number
+        assert Result(Path(), built).decision == shown.decision, number
         assert table == certified == [one.decision for one in shown.held], number
         if evaluation.mismatches:
             assert shown.decision == "FAIL", number
