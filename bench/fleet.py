@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from datetime import date, timedelta
@@ -24,12 +24,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.fleet.catalogue import SCHEMA, catalogued
+from gyrotc.fleet.catalogue import catalogued, hash_rows, opened
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.page import summary_of
 from gyrotc.fleet.run import run_fleet
+from gyrotc.model import load_model
+from gyrotc.store.folder import kept_by_hash
+from gyrotc.tables.emit import image_of
+from gyrotc.tables.quantise import quantise
 from lot import FAULTS, Lot
 from results import machine, write
+
+from .sizes import MODEL
 
 _GYROS = 20
 _SERIALS = 1000
@@ -211,34 +217,52 @@ def _hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _rows(rows: int) -> Iterator[tuple[Any, ...]]:
+def _rows(rows: int, kept: dict[int, tuple[str, str, str]]) -> Iterator[tuple[Any, ...]]:
+    """Calibrations; `kept`: hashes of model, image and file of those gyros whose payloads are there."""
     for k in range(rows):
         day = _FIRST + timedelta(days=365 * (k % _EACH))
         known = _hash(str(k))
         yield (
             f"RLG-{k // _EACH:06d}", "", day.isoformat(), (day + timedelta(days=400)).isoformat(), "lot", "done",
-            "PASS", known, known, known, known, 7e-4, 1e-4, "RLG",
+            "PASS", *kept.get(k // _EACH, (known, known, known)), known, 7e-4, 1e-4, "RLG",
         )  # fmt: skip
+
+
+def _kept(folder: Path, gyros: Iterable[int]) -> dict[int, tuple[str, str, str]]:
+    """Payloads of gyros, as a fleet leaves them: hashes of model, image and file."""
+    kept, base, made = {}, load_model(MODEL), folder / "made"
+    for k in gyros:
+        model = base.model_copy(update={"serial": f"RLG-{k:06d}"})
+        model.save(made)
+        text = kept_by_hash(folder / "payloads", made).name
+        made.write_bytes(image_of(quantise(model, "f32")))
+        kept[k] = model.hash, kept_by_hash(folder / "payloads", made).name, text
+    return kept
 
 
 def times(rows: int) -> dict[str, Any]:
     """Times of the question, s, in a catalogue of so many calibrations."""
-    draw = np.random.default_rng(1)
+    asked = np.random.default_rng(1).integers(0, rows // _EACH, _ASKED)
     with tempfile.TemporaryDirectory(prefix="gyrotc-catalogue-") as work:
         path = Path(work) / "catalogue.sqlite"
+        with opened(path):
+            pass  # made as a fleet makes it; its statements end after a minute, those below need more
         with closing(sqlite3.connect(path)) as base, base:
-            base.executescript(SCHEMA)
             columns = base.execute(
                 "SELECT group_concat(name) FROM pragma_table_info('calibration')"
             ).fetchone()[0]
-            names = columns.removeprefix("id,")
-            base.executemany(f"INSERT INTO calibration ({names}) VALUES ({', '.join('?' * 14)})", _rows(rows))
+            names = columns.removeprefix("id,").removesuffix(",row_sha256")
+            places = ", ".join("?" * 14)
+            made = _rows(rows, _kept(path.parent, set(asked.tolist())))
+            base.executemany(f"INSERT INTO calibration ({names}) VALUES ({places})", made)
             files = (
                 (k + 1, f"run-{n}.csv", "train", _hash(f"{k} {n}")) for k in range(rows) for n in range(2)
             )
             base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", files)
+            for k in range(rows // _EACH):
+                hash_rows(base, f"RLG-{k:06d}")
         took = []
-        for k in draw.integers(0, rows // _EACH, _ASKED):
+        for k in asked:
             begun = time.perf_counter()
             answer = catalogued(path, f"RLG-{k:06d}", "2022-06-01")
             took.append(1e3 * (time.perf_counter() - begun))

@@ -112,7 +112,7 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     if not made and not place.exists():
         return 0
     place.mkdir(exist_ok=True)
-    with _opened(place / _FILE) as base:
+    with opened(place / _FILE) as base:
         known: dict[tuple[str, str, str], set[str | None]] = {}
         for *inputs, model_hash in base.execute(
             "SELECT serial, axis, input_sha256, model_hash FROM calibration"
@@ -133,7 +133,8 @@ def _tag_of(entry: FleetEntry, tag: str) -> str:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+def opened(path: Path) -> Iterator[sqlite3.Connection]:
+    """A catalogue, to be written to; one that is none yet is made."""
     _check_file(path)
     try:
         with closing(sqlite3.connect(path)) as base:
@@ -229,7 +230,7 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
     number = base.execute(f"INSERT INTO calibration ({', '.join(row)}) VALUES ({places})", row).lastrowid
     files = {(number, d.file, d.role, d.sha256) for d in data}
     base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", sorted(files))
-    _hash_rows(base, serial)
+    hash_rows(base, serial)
     return 1
 
 
@@ -248,7 +249,7 @@ def _hashes(base: sqlite3.Connection, serial: str) -> Iterator[tuple[int, str, s
         yield number, axis, stated, last[axis]
 
 
-def _hash_rows(base: sqlite3.Connection, serial: str) -> None:
+def hash_rows(base: sqlite3.Connection, serial: str) -> None:
     """Enters the hashes of a gyro's rows anew."""
     for number, axis, _, hash_ in list(_hashes(base, serial)):
         base.execute("UPDATE calibration SET row_sha256 = ? WHERE id = ?", (hash_, number))
@@ -280,7 +281,7 @@ def withdraw(place: Path, model_hash: str) -> int:
         InputError: There is no catalogue, it is damaged, or no calibration of this model is in it.
     """
     path = _file_of(place)
-    with _opened(path) as base, base:
+    with opened(path) as base, base:
         of_model = "SELECT DISTINCT serial FROM calibration WHERE model_hash = ?"
         serials = [serial for (serial,) in base.execute(of_model, (model_hash,)).fetchall()]
         for serial in serials:
@@ -289,7 +290,7 @@ def withdraw(place: Path, model_hash: str) -> int:
             "UPDATE calibration SET tag = 'withdrawn' WHERE model_hash = ?", (model_hash,)
         ).rowcount
         for serial in serials:
-            _hash_rows(base, serial)
+            hash_rows(base, serial)
     if not count:
         raise InputError("--withdraw", repr(model_hash), "the hash of a model in this catalogue")
     return count

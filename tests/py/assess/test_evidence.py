@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.evidence.run import ABOUT, KINDS, found
+from tests.evidence.run import ABOUT, KINDS, found, tasks
 
 NAMED = ABOUT | {"refused"}
 
@@ -29,3 +29,14 @@ def test_a_fault_of_one_run_is_named(way: str) -> None:
 @pytest.mark.parametrize("way", KINDS["fleets"][:2])
 def test_a_run_of_another_gyro_of_the_fleet_is_named(way: str) -> None:
     assert found("fleets", way, 2, 0) == {"copy_of_other"}
+
+
+@pytest.mark.slow
+def test_a_tenth_of_the_campaign_keeps_to_its_shares() -> None:
+    """`make evidence` draws 500 clean sets, and 200 of each kind that is none."""
+    print("seed 3")
+    counts = {"clean": 50, "copies": 20, "faults": 20, "fleets": 20}
+    named = dict.fromkeys(counts, 0)
+    for kind, way, seed, number in tasks(counts, 3):
+        named[kind] += bool(found(kind, way, seed, number) & NAMED)
+    assert named["clean"] <= 1 and all(named[kind] >= 19 for kind in counts if kind != "clean"), named

@@ -63,6 +63,25 @@ def test_white_noise_stays_within_its_band_of_rms_over_floor(
     assert beyond <= 1
 
 
+@pytest.mark.parametrize("likeness", [0.0, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("lengths", [(6,), (12, 9), (40,), LENGTHS])
+def test_an_rms_above_its_limit_is_never_silent(lengths: tuple[int, ...], likeness: float) -> None:
+    """Whatever the number of means, and however alike neighbours are."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    above = 0
+    for _ in range(60):
+        runs = [rng.normal(size=n) for n in lengths]
+        for run in runs:
+            for k in range(1, run.size):
+                run[k] += likeness * run[k - 1]
+        found = judged(runs, floor=float(rng.uniform(0.4, 1.1)))
+        if found.rms_over_floor > RMS_OVER_FLOOR:
+            above += 1
+            assert found.reasons
+    assert above > 10
+
+
 @pytest.mark.parametrize(("name", "size"), [("slow", 0.4), ("slow", 1.0), ("offset", 0.4), ("steep", 0.5)])
 def test_structure_below_the_noise_is_seen(name: str, size: float) -> None:
     print("seed", SEED)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.catalogue import SCHEMA, _hash_rows, catalogued, enter, export, withdraw
+from gyrotc.fleet.catalogue import SCHEMA, catalogued, enter, export, hash_rows, withdraw
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.results.base import read_result
@@ -192,7 +192,7 @@ def test_a_payload_that_is_not_what_its_row_says_is_refused(
     else:
         with sqlite3.connect(place / "catalogue.sqlite") as base:
             base.execute("UPDATE calibration SET serial = 'RLG-9'")
-            _hash_rows(base, "RLG-9")  # as who knows of the hashes makes them again
+            hash_rows(base, "RLG-9")  # as who knows of the hashes makes them again
     done = gyrotc(
         "catalogue",
         place / "catalogue.sqlite",
@@ -281,7 +281,7 @@ def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(
         image = one.model_sha256
     with sqlite3.connect(place / "catalogue.sqlite") as base:
         base.execute("UPDATE calibration SET image_sha256 = ? WHERE serial = 'RLG-1'", (image,))
-        _hash_rows(base, "RLG-1")
+        hash_rows(base, "RLG-1")
     with pytest.raises(InputError, match=f"{image}: is not the image that"):
         catalogued(place / "catalogue.sqlite", "RLG-1", day)
 

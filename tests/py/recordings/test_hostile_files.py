@@ -61,9 +61,8 @@ def test_500_hostile_files_are_read_or_refused_within_limits(tmp_path: Path) -> 
     count = int(os.environ.get("GYROTC_HOSTILE_FILES", "500"))
     command = [sys.executable, "hostile_files.py", str(tmp_path / "work"), str(count), str(SEED)]
     log = tmp_path / "calls.txt"
-    traced = shutil.which("strace") is not None
-    if traced:
-        command = ["strace", "-f", "-qq", "-e", "trace=%file", "-o", str(log), *command]
+    assert shutil.which("strace"), "strace is not installed: tools/setup.sh test installs it"
+    command = ["strace", "-f", "-qq", "-e", "trace=%file", "-o", str(log), *command]
     (tmp_path / "work").mkdir()
     environment = os.environ | {"PYTHONPATH": str(TESTS), "XDG_CACHE_HOME": str(tmp_path / "work" / "cache")}
     done = subprocess.run(command, cwd=TESTS, env=environment, capture_output=True, text=True, check=False)
@@ -75,7 +74,6 @@ def test_500_hostile_files_are_read_or_refused_within_limits(tmp_path: Path) -> 
     assert [one for one in results if one["status"] not in (0, 2)] == []
     assert [one for one in results if one["seconds"] > MOST_S] == []
     assert max(one["own_mib"] for one in results) <= MOST_MIB
-    if traced:
-        calls = sum(1 for _ in _opened(log))
-        assert calls > count, "nothing was traced"
-        assert sorted(set(_foreign(log, tmp_path))) == []
+    calls = sum(1 for _ in _opened(log))
+    assert calls > count, "nothing was traced"
+    assert sorted(set(_foreign(log, tmp_path))) == []
