@@ -99,7 +99,7 @@ def import_(
     Example: gyrotc import chamber.csv --out RLG-0042 --rate-unit deg/s
     """
     from ..recordings.importers.job import ImportOptions, import_files
-    from ..recordings.importers.map_file import Map, load_map
+    from ..recordings.importers.map_file import Map, checked_map, load_map
 
     known = load_map(map_file) if map_file else Map()
     units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
@@ -111,7 +111,7 @@ def import_(
     options = ImportOptions(serial, format.value, trust_units, dry_run, exam)
     with progress() as say:
         result = import_files(
-            files, out, Map.model_validate(chosen), options, ask=_ask, say=tell,
+            files, out, checked_map(chosen, "options"), options, ask=_ask, say=tell,
             progress=lambda name, done: say(f"{name} {done:.0%}"),
         )  # fmt: skip
     if result is not None:

@@ -165,6 +165,12 @@ def test_a_loop_of_links_is_one_message(option: str, place: Path) -> None:
     assert done.returncode in (0, 2) and "internal fault" not in done.stderr, done.stderr
 
 
+def test_an_empty_unit_is_one_message(place: Path) -> None:
+    """Before: exit status 70; the drawn calls found it."""
+    done = run_gyrotc("import", "data/run-01.csv", "--out", "I", "--rate-unit", "", "--dry-run")
+    assert done.returncode == 2 and "options, field units.rate: ''" in done.stderr, done.stderr
+
+
 def _names(count: int) -> list[bytes]:
     names = {
         text.encode("utf-8", "surrogatepass").replace(b"/", b"|").replace(b"\x00", b"")[:200]

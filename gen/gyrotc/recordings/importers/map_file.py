@@ -91,19 +91,24 @@ def load_map(path: Path) -> Map:
     Raises:
         InputError: It is no map; the field is named.
     """
-    name = path.name
-    content = read_toml(path, "a map that gyrotc import wrote")
+    return checked_map(read_toml(path, "a map that gyrotc import wrote"), path.name)
+
+
+def checked_map(content: Any, name: str) -> Map:
+    """A map of what a file, or options, state.
+
+    Raises:
+        InputError: It is none; the field is named.
+    """
     try:
         return Map.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
+        where = f"{name}, field {'.'.join(str(part) for part in first['loc'])}"
         if first["type"] == "extra_forbidden":
-            raise InputError(
-                f"{name}, field {field}", "is not known", "a field named in docs/import.md"
-            ) from error
+            raise InputError(where, "is not known", "a field named in docs/import.md") from error
         expected = first["msg"].removeprefix("Input should be ")
-        raise InputError(f"{name}, field {field}", repr(first["input"])[:80], expected) from error
+        raise InputError(where, repr(first["input"])[:80], expected) from error
 
 
 def map_text(chosen: Map) -> str:
