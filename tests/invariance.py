@@ -156,8 +156,8 @@ class Answer:
     @staticmethod
     def of(result: Diagnosed) -> Answer:
         parameters = {
-            f"{cause.id}.{name}": value.value
-            for cause in result.physical
+            f"{k}.{cause.id}.{name}": value.value
+            for k, cause in enumerate(result.physical)
             for name, value in cause.parameters.items()
         }
         figures = {"noise floor": result.noise_floor_dph or 0.0}
