@@ -307,7 +307,7 @@ def section(record: dict[str, Any]) -> str:
         (r["variation"], r["sets"], r["same"], r["kept"], f"{r['parameters']:.1%}", f"{r['figures']:.1%}")
         for r in record["rows"]
     ]
-    return f"Sets: {', '.join(record['sets'])}.\n\n{table(head, rows)}"
+    return f"## Recordings handed over in other ways\n\nSets: {', '.join(record['sets'])}.\n\n{table(head, rows)}"
 
 
 def main() -> None:
