@@ -151,7 +151,12 @@ class _Worker:
                 "ceilings": os.environ.get(ENVIRONMENT, ""),
             }
             self._server = _server(os.getpid())
-            self._channel, self._pid = self._server.start(request)
+            try:
+                self._channel, self._pid = self._server.start(request)
+            except OSError:  # somebody has ended it: the next file gets another
+                self._server.stop()
+                _server.cache_clear()
+                raise self._broken("cannot be started") from None
             stack.callback(self._server.end, self._channel, self._pid)
             self.close = weakref.finalize(self, stack.pop_all().close)
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from gyrotc.common.errors import InputError
+from gyrotc.recordings import parser_process
 from gyrotc.recordings.importers import formats
 from gyrotc.recordings.importers.map_file import Map
 from gyrotc.recordings.parquet_file import ParquetFile
@@ -181,3 +182,14 @@ def test_rows_that_were_not_stated_are_refused(
     monkeypatch.setattr(file, "_rows", rows)
     with pytest.raises(InputError, match="states"):
         file.read(file.names)
+
+
+def test_a_server_that_was_ended_is_one_message_and_started_again(file: Path) -> None:
+    """Before: the broken pipe to it counted as a closed standard output."""
+    opened("reads_the_file", file).close()
+    server = parser_process._server(os.getpid())
+    server._process.kill()
+    server._process.wait()
+    with pytest.raises(InputError, match="its reader cannot be started"):
+        opened("reads_the_file", file)
+    opened("reads_the_file", file).close()
