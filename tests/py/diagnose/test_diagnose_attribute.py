@@ -571,7 +571,7 @@ def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> N
     text = "\n".join(diagnosis_lines(result(verdict)))
     assert text.startswith(f"G1: {verdict.replace('_', ' ')}. Finding.")
     assert VERDICTS[verdict] in text and "next: " in text
-    assert "warm_up: 0.001 deg/h" in text and "cavity_lag: not visible" in text, "the detection limits"
+    assert "warm_up: 1.00·10⁻³ deg/h" in text and "cavity_lag: not visible" in text, "the detection limits"
 
 
 def test_an_ambiguous_verdict_names_the_experiment() -> None:
