@@ -277,7 +277,8 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
     A scale changes curve and noise: where the noise says the same factor, the curve need not be clear of what the other
     runs' own factors are.
     """
-    training = [c for c, run in zip(dataset.curves, dataset.runs, strict=True) if run.role == "train"]
+    roles = {run.file: run.role for run in dataset.runs}  # without copies, which have curves, too
+    training = [c for c in dataset.curves if roles.get(c.file) == "train"]
     others = [_series(c, dataset.axis) for c in training if c is not curve]
     own = _factor(_series(curve, dataset.axis), others)
     if own is None or abs(own[0] - 1.0) < _LEAST_CHANGE:
