@@ -70,7 +70,9 @@ def curve_findings(
         earlier: Models of an earlier calibration by axis ("" where the recordings have one rate).
     """
     found = {}
-    for curve, run in zip(dataset.curves, dataset.runs, strict=True):
+    runs = {run.file: run for run in reversed(dataset.runs)}  # without copies, which have curves, too
+    for curve in (c for c in dataset.curves if c.file in runs):
+        run = runs[curve.file]
         one = (
             _orientation(dataset, curve, earlier or {})
             or _unit(curve.file, facts)
@@ -277,8 +279,8 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
     A scale changes curve and noise: where the noise says the same factor, the curve need not be clear of what the other
     runs' own factors are.
     """
-    roles = {run.file: run.role for run in dataset.runs}  # without copies, which have curves, too
-    training = [c for c in dataset.curves if roles.get(c.file) == "train"]
+    files = {run.file for run in dataset.runs if run.role == "train"}
+    training = [c for c in dataset.curves if c.file in files]
     others = [_series(c, dataset.axis) for c in training if c is not curve]
     own = _factor(_series(curve, dataset.axis), others)
     if own is None or abs(own[0] - 1.0) < _LEAST_CHANGE:
