@@ -256,7 +256,7 @@ def _toml_text(text: str) -> str:
 
 def toml_comment(text: str, limit: int = _LINE) -> str:
     """Text behind a `#`: one line."""
-    return _shown(text, lambda char, _: char.isprintable(), _TITLE)
+    return _shown(text, lambda char, _: char.isprintable(), limit)
 
 
 def csv_cell(value: Any) -> Any:

@@ -149,6 +149,12 @@ def test_a_serial_is_harmless_or_refused(model_dict: dict[str, Any]) -> None:
     assert table_id("..", None) != table_id("__", None)
 
 
+def test_a_comment_holds_a_whole_line() -> None:
+    """And not only the title of a picture: exports say there how far a table lies from the map."""
+    line = "said " * 29 + "once"
+    assert toml_comment(line) == c_comment(line) == line
+
+
 def test_templates_of_c_refuse_text_that_nothing_made_safe() -> None:
     template = c_environment().from_string("static int x = {{ value }};")
     for value in (7, "RLG_1", c_comment("a */ b"), c_literal('"'), c_code("V(0.5F)")):
