@@ -50,6 +50,7 @@ _ADVICE = {
     "shared_axes": "Look at the wiring of the channels and at the columns of the logger.",
     "stuck_rate": "Look at the logger and the gyro's data line there; leave the stretch out by exclude.",
     "stuck_temperature": "Look at the thermometer's wiring; paste the exclude line.",
+    "temperature_late": "Pair the files of this run anew and convert them again, or leave the run out.",
     "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --rate-hz R.",
     "time_jumps": "Number the rows instead, gyrotc import FILE --rate-hz R, or cut the file there into two runs by "
     "to_s and from_s.",

@@ -591,10 +591,11 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     run: Run,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from gyrotc.recordings.importers import formats, tables
+    from gyrotc.recordings import tables
+    from gyrotc.recordings.importers import formats
 
     def in_this_process(parser: formats.Parser, path: Path) -> LoggerFile:
-        module = importlib.import_module(parser.module, "gyrotc.recordings.importers")
+        module = importlib.import_module(parser.module, "gyrotc.recordings")
         file: LoggerFile = getattr(module, parser.function)(path)
         return file
 
