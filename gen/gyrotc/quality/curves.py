@@ -70,9 +70,7 @@ def curve_findings(
         earlier: Models of an earlier calibration by axis ("" where the recordings have one rate).
     """
     found = {}
-    runs = {run.file: run for run in reversed(dataset.runs)}  # without copies, which have curves, too
-    for curve in (c for c in dataset.curves if c.file in runs):
-        run = runs[curve.file]
+    for curve in dataset.curves:
         one = (
             _orientation(dataset, curve, earlier or {})
             or _unit(curve.file, facts)
@@ -81,7 +79,7 @@ def curve_findings(
         if one is not None:
             id, text, factor = one
             found[curve.file] = finding(
-                id, text, run, marks=(Mark(run.file),), size=(factor, "times"), whole_run=True
+                id, text, curve, marks=(Mark(curve.file),), size=(factor, "times"), whole_run=True
             )
     return list(found.values())
 
@@ -279,8 +277,7 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
     A scale changes curve and noise: where the noise says the same factor, the curve need not be clear of what the other
     runs' own factors are.
     """
-    files = {run.file for run in dataset.runs if run.role == "train"}
-    training = [c for c in dataset.curves if c.file in files]
+    training = [c for c in dataset.curves if c.role == "train"]
     others = [_series(c, dataset.axis) for c in training if c is not curve]
     own = _factor(_series(curve, dataset.axis), others)
     if own is None or abs(own[0] - 1.0) < _LEAST_CHANGE:

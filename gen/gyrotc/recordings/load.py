@@ -328,8 +328,9 @@ def survey(
             "recorded so many seconds later"
         )
     shared = shared_rows(runs, recordings, axis, problems)
-    kept = counted_once(runs, shared) if once else tuple(runs)
-    dataset = _dataset(folder, description, axis, kept, channels, tuple(warnings), trusted_texts)
+    kept = counted_once(runs_by_entry, shared) if once else runs_by_entry
+    counted = tuple(kept.values())
+    dataset = _dataset(folder, description, axis, counted, channels, tuple(warnings), trusted_texts)
     return replace(
         dataset,
         shared=shared,
@@ -340,7 +341,7 @@ def survey(
             for name in dict.fromkeys(run.file for run in runs)
             for signs in noise_signs(name, recordings[name].noise_on(axis))
         ),
-        curves=curves_of(description, runs_by_entry, recordings),
+        curves=curves_of(description, kept, recordings),
     )
 
 

@@ -88,16 +88,16 @@ def _rows_between(run: Run, low_s: float, high_s: float) -> tuple[tuple[int, int
     return (first + 1, last + 1), _times(time, first, last + 1, run.row_period_s)
 
 
-def counted_once(runs: Sequence[Run], shared: Sequence[SharedRows]) -> tuple[Run, ...]:
+def counted_once(runs: Mapping[int, Run], shared: Sequence[SharedRows]) -> dict[int, Run]:
     """Runs of which rows that another one has are left out; none of which too little would remain."""
-    kept = []
-    for run in runs:
+    kept = {}
+    for number, run in runs.items():
         twice = [one for one in shared if one.file == run.file]
         gaps = tuple(Exclusion(*one.span_s, f"also in {one.other_file}") for one in twice)
         without = replace(run, exclude=(*run.exclude, *gaps)) if gaps else run
         if not gaps or np.count_nonzero(without.in_span(_span(run).time_s)) >= MIN_ROWS:
-            kept.append(without)
-    return tuple(kept)
+            kept[number] = without
+    return kept
 
 
 def shared_axes(recordings: Mapping[str, Recording]) -> tuple[SharedAxes, ...]:

@@ -96,6 +96,8 @@ def _curve(run: Run, recording: Recording, description: Description, entry: RunE
     axes = tuple(recording.layout.axes)
     return Curve(
         file=run.file,
+        from_s=run.from_s,
+        role=run.role,
         axes=axes,
         temperature_c=_PLACE_C * places,
         rates_dph=scale * np.column_stack([s / count for s in sums]),

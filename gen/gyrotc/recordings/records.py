@@ -277,6 +277,8 @@ class Curve:
 
     Attributes:
         file: Its file.
+        from_s: Where the run begins in it, s, if not with its first row.
+        role: The run's.
         axes: Axes of the file; none where it has one rate.
         temperature_c: Temperatures, C, shape (p,).
         rates_dph: Mean rates as they were recorded, deg/h, shape (p, axes).
@@ -285,6 +287,8 @@ class Curve:
     """
 
     file: str
+    from_s: float | None
+    role: str
     axes: tuple[str, ...]
     temperature_c: FloatArray
     rates_dph: FloatArray

@@ -159,9 +159,9 @@ def test_templates_of_c_refuse_text_that_nothing_made_safe() -> None:
     template = c_environment().from_string("static int x = {{ value }};")
     for value in (7, "RLG_1", c_comment("a */ b"), c_literal('"'), c_code("V(0.5F)")):
         template.render(value=value)
-    for value in ("a b", "1;", 'system("x")', "a-b", 0.5, None, True, ["a"], b"a", "\n"):
+    for unsafe in ("a b", "1;", 'system("x")', "a-b", 0.5, None, True, ["a"], b"a", "\n"):
         with pytest.raises(ValueError, match="nothing made safe"):
-            template.render(value=value)
+            template.render(value=unsafe)
     with pytest.raises(jinja2.UndefinedError):
         template.render()
     for text in [*(set(HOSTILE) - {"-1"}), "V(x)", "0x1UL; int x", "f()", "&gtc_f32_term_x, "]:
