@@ -201,13 +201,14 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
                    expected_t *expected)
 {
     const float memory_var = prior->power_on_var[MEMORY - KNOTS];
-    float *const ph = expected->ph;
-    float rate = 0.0F;
+    float *ph;
     float var = 0.0F;
     uint_least32_t i;
     uint_least32_t j;
     uint_least32_t k;
 
+    expected->rate = 0.0F;
+    ph = expected->ph;
     clear(ph, STATES);
     for (i = 0U; i < n; i++) {
         const float h = step->h[i];
@@ -222,12 +223,11 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
     }
     for (i = 0U; i < n; i++) {
         k = observed(step, i);
-        rate = add_product(rate, step->h[i], state->x[k]);
+        expected->rate = add_product(expected->rate, step->h[i], state->x[k]);
         var = add_product(var, step->h[i], ph[k]);
     }
     ph[MEMORY] = gtc_f32_add(ph[MEMORY], memory_var); /* P0 is not in the state */
     var = gtc_f32_add(var, memory_var);
-    expected->rate = rate;
     expected->var = (var < 0.0F) ? 0.0F : var;
 }
 
@@ -385,7 +385,10 @@ static int judged(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, cons
         status = GTC_E_REST;
     } else if (!(square_dph <= product(prior->gate_square, expected->var))) {
         if ((stop->confirmed == 0) && !(square_dph <= product(prior->jump_square, expected->var))) {
-            status = (agrees(state, prior, innovation) != 0) ? GTC_DISAGREES : GTC_E_REST;
+            status = GTC_E_REST;
+            if (agrees(state, prior, innovation) != 0) {
+                status = GTC_DISAGREES;
+            }
         }
         if (status >= 0) {
             inflate(state, expected, square_dph, (status == GTC_DISAGREES) ? 1 : 0);
@@ -486,7 +489,6 @@ int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
 {
     gtc_word_t half;
     uint_least32_t k;
-    int status;
 
     if ((state == NULL) || (prior == NULL) || (words == NULL)) {
         return GTC_E_ARG;
@@ -502,7 +504,7 @@ int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
     if (words[0].bits != prior->id) {
         return GTC_E_ID;
     }
-    status = gtc_learn_start(state, prior);
+    draw(state, prior, prior->reference_c);
     state->power_ons = words[1].bits >> 16;
     state->since_refused = (words[1].bits >> 8) & COUNT_MASK;
     state->refused = words[1].bits & COUNT_MASK;
@@ -516,5 +518,5 @@ int gtc_learn_restore(gtc_learn_state_t *state, const gtc_learn_prior_t *prior,
     for (k = 0U; k < KNOT_PAIRS; k++) {
         state->p[k] = words[FIRST_NUMBER + KNOTS + k].value;
     }
-    return status;
+    return GTC_OK;
 }
