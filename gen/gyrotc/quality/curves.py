@@ -300,8 +300,9 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
             abs(f - 1.0) for f, _ in among
         ):
             return None
-    run = next(run for run in dataset.runs if run.file == curve.file)
-    if run.role != "train" or not _gain_throughout(run, others):
+    of_curve = (run for run in dataset.runs if (run.file, run.from_s) == (curve.file, curve.from_s))
+    run = next(of_curve, None)
+    if run is None or run.role != "train" or not _gain_throughout(run, others):
         return None
     text = (
         f"The rates of {curve.file} are those of the other runs times {factor:.3g} (95 % {limits[1]:.3g} ... "

@@ -18,7 +18,7 @@ from ..common.texts import c_environment
 from ..model import Model
 from ..results.verification import LearnedCalls
 from ..store.files import write_own
-from ..target.learning import KEPT_WORDS, Learner, ServicePrior, Stop
+from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop
 from .toolchain import Target, compile_objects, link, run_program
 
 Words = NDArray[np.uint32]
@@ -44,7 +44,7 @@ class _Call:
 def drawn_calls(prior: ServicePrior) -> list[_Call]:
     """Power-ons with rests that are accepted, and that each gate refuses; a save after each."""
     draw = np.random.default_rng(_SEED)
-    high = prior.low_c + 7.0 / prior.knots_per_c
+    high = prior.low_c + (KNOTS - 1) / prior.knots_per_c
     sigma = float(np.sqrt(prior.map_var[0] + prior.power_on_var[0] + prior.power_on_var[3]))
     calls = [_Call(_START)]
 
