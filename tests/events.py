@@ -226,9 +226,7 @@ def draw_place(temperature: Array, where: str, rng: np.random.Generator) -> floa
     """A time well within the run, in a hold or on a ramp."""
     times = np.arange(4200, temperature.size - 4200)
     slope = np.abs(np.gradient(temperature))[times] * 60.0
-    there = {"hold": slope < STILL_C_PER_MIN, "ramp": slope > 5.0 * STILL_C_PER_MIN, "any": slope >= 0.0}[
-        where
-    ]
+    there = {"hold": slope < STILL_C_PER_MIN, "ramp": slope > 5.0 * STILL_C_PER_MIN, "any": slope >= 0.0}[where]
     return float(rng.choice(times[there])) if there.any() else float(rng.choice(times))
 
 

@@ -198,11 +198,7 @@ def compared(was: Answer, name: str, now: Answer | str) -> dict[str, Any]:
     parameters, figures = moved(was.parameters, now.parameters), moved(was.figures, now.figures)
     same = (was.verdict, was.causes) == (now.verdict, now.causes)
     allowed = VARIATIONS[name].parameters
-    kept = (
-        same
-        and all(v <= allowed for v in parameters.values())
-        and all(v <= FIGURES for v in figures.values())
-    )
+    kept = same and all(v <= allowed for v in parameters.values()) and all(v <= FIGURES for v in figures.values())
     return {
         **record,
         "same": same,
@@ -258,9 +254,7 @@ def sets(source: Path, work: Path) -> Iterator[tuple[str, Path, str]]:
         yield f"{name} {axis}", folder, axis
 
 
-def diagnosed(
-    source: Path, only: Sequence[str], names: tuple[str, ...], workers: int
-) -> list[dict[str, Any]]:
+def diagnosed(source: Path, only: Sequence[str], names: tuple[str, ...], workers: int) -> list[dict[str, Any]]:
     """Records of all sets whose names have one of the parts `only` (none: of all)."""
     records: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as work, ProcessPoolExecutor(workers) as pool:

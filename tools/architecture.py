@@ -66,9 +66,7 @@ def page(graph: dict[str, set[str]]) -> str:
     lines += ["```", "", "| package | imports |", "| --- | --- |"]
     depth = {name: len(reach(graph, name)) for name in graph}
     for name in sorted(graph, key=lambda n: (depth[n], n)):
-        lines.append(
-            f"| `{name}` | {', '.join(f'`{o}`' for o in sorted(graph[name])) or 'nothing of gyrotc'} |"
-        )
+        lines.append(f"| `{name}` | {', '.join(f'`{o}`' for o in sorted(graph[name])) or 'nothing of gyrotc'} |")
     return _HEAD + "\n".join(lines) + "\n"
 
 

@@ -168,9 +168,7 @@ def _licence(found: Any) -> str:
     """A licence in words: the expression, else what the package is classified as, else its own short word for it."""
     if found.get("License-Expression"):
         return str(found["License-Expression"])
-    classes = [
-        c.rpartition(" :: ")[2] for c in found.get_all("Classifier") or [] if c.startswith("License ::")
-    ]
+    classes = [c.rpartition(" :: ")[2] for c in found.get_all("Classifier") or [] if c.startswith("License ::")]
     short = str(found.get("License") or "NOASSERTION").strip().splitlines()[0]
     return " / ".join(classes) or short[:80]
 

@@ -140,9 +140,7 @@ class Model:
     def guard(self, channel: str) -> dict[str, float]:
         if channel in self.raw["guards"]:
             return dict(self.raw["guards"][channel])
-        reference = next(
-            t["parameters"]["reference"] for t in self.raw["terms"] if t.get("channel") == channel
-        )
+        reference = next(t["parameters"]["reference"] for t in self.raw["terms"] if t.get("channel") == channel)
         return {
             "low": -1e9, "high": 1e9, "max_step": 1e9, "max_rate_per_min": 0.0, "agree_s": 0.0, "stuck_s": 0.0,
             "missing_s": self.raw["hold_blocks"] * self.raw["block_s"], "fallback": reference,
@@ -306,9 +304,7 @@ def constants(text: str) -> list[int]:
     words = []
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
     text = text.replace("(-2147483647L - 1L)", "-2147483648L")
-    for value, bits, plain in re.findall(
-        r"V\(([^)]*)F\)|B\(([^)]*?)U?L?\)|(?<![\w.])(-?\d\w*?)U?L?(?![\w.])", text
-    ):
+    for value, bits, plain in re.findall(r"V\(([^)]*)F\)|B\(([^)]*?)U?L?\)|(?<![\w.])(-?\d\w*?)U?L?(?![\w.])", text):
         if value:
             words.append(struct.unpack("<I", struct.pack("<f", float(value)))[0])
         else:
@@ -353,10 +349,7 @@ def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
     if source != image.words:
         wrong = [k for k, pair in enumerate(zip(source, image.words, strict=False)) if pair[0] != pair[1]]
         yield f"the C source is not the image (words {wrong[:5]}, {len(source)} of {len(image.words)})"
-    if (
-        hex_bytes((folder / image.where).with_suffix(".hex").read_text())
-        != (folder / image.where).read_bytes()
-    ):
+    if hex_bytes((folder / image.where).with_suffix(".hex").read_text()) != (folder / image.where).read_bytes():
         yield "the Intel HEX file is not the image"
 
 
@@ -483,9 +476,7 @@ def check_authority(model: Model, image: Image, bound: float) -> Iterator[str]:
 
 def check_header(model: Model, image: Image, name: str, header: str) -> Iterator[str]:
     """What a program reads from the emitted header before it runs."""
-    macros = dict(
-        re.findall(rf"^#define GTC_{name.upper()}_(\w+) (\S+|\"[^\"]*\")(?: /\*.*)?$", header, re.M)
-    )
+    macros = dict(re.findall(rf"^#define GTC_{name.upper()}_(\w+) (\S+|\"[^\"]*\")(?: /\*.*)?$", header, re.M))
     block = round(model.raw["block_s"] * 1e6)
     whole = {
         "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
@@ -535,9 +526,7 @@ def check_regions(model: Model, image: Image) -> Iterator[str]:
     """Where the networks of a bank hold."""
     e, s = image.member["envelope"], image.member["scale"]
     whole = {"temperature_c": model.t_range, "slope_c_per_min": model.r_range}
-    for network, (head, _) in zip(
-        [*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True
-    ):
+    for network, (head, _) in zip([*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True):
         region = network["region"] or whole
         edges = [*region["temperature_c"], *(r * model.per_block for r in region["slope_c_per_min"])]
         for k, (got, edge) in enumerate(zip(head[4:], edges, strict=True)):
@@ -602,9 +591,7 @@ def check_map(model: Model, image: Image, bound: float) -> Iterator[str]:
         error = abs(image.bias(image.input(t), image.input(slope)) - model.bias(t, slope))
         if error > worst:
             worst, where = error, (t, slope)
-    print(
-        f"{image.where}: largest departure of the table from the model {worst:.3e} deg/h, bound {bound:.2e}"
-    )
+    print(f"{image.where}: largest departure of the table from the model {worst:.3e} deg/h, bound {bound:.2e}")
     if worst > bound:
         yield f"at T = {where[0]:.4f} C, slope = {where[1]:.6f} C per block the table departs by {worst:.3e} deg/h"
 
@@ -639,9 +626,7 @@ def check_bound(model: Model, bound: float) -> Iterator[str]:
 def check_answer(model: Model, image: Image, words: list[int], bound: float) -> Iterator[str]:
     """One known answer: temperature, slope, bias, status."""
     t, slope = (image.number(w) / (1.0 if image.numeric == "f32" else 65536.0) for w in words[:2])
-    if not (math.isfinite(t) and math.isfinite(slope)) or (
-        image.numeric == "q31" and 0x80000000 in words[:2]
-    ):
+    if not (math.isfinite(t) and math.isfinite(slope)) or (image.numeric == "q31" and 0x80000000 in words[:2]):
         if words[3] < 2**31:
             yield f"a missing input is answered with status {words[3]}"
         return

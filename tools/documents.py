@@ -72,9 +72,7 @@ def steps(text: str) -> list[Step]:
 def agrees(printed: str, wanted: list[str]) -> bool:
     """Whether output is what a page says, `...` standing for anything."""
     parts = [
-        r"(?:.*\n)*?"
-        if line.strip() == "..."
-        else ".*?".join(map(re.escape, line.rstrip().split("..."))) + r"[ \t]*\n"
+        r"(?:.*\n)*?" if line.strip() == "..." else ".*?".join(map(re.escape, line.rstrip().split("..."))) + r"[ \t]*\n"
         for line in wanted
     ]
     text = printed if printed.endswith("\n") or not printed else printed + "\n"
@@ -116,18 +114,14 @@ def run(page: Path, timed: Callable[[Step, float], None] = lambda step, seconds:
 def _copy(folder: Path) -> Path:
     """The sources' files without results of builds, for commands that write beside them."""
     work = folder / "gyrotc"
-    ignored = shutil.ignore_patterns(
-        "build", "dist", ".venv", ".git", "__pycache__", ".*_cache", "corpus", "*.png"
-    )
+    ignored = shutil.ignore_patterns("build", "dist", ".venv", ".git", "__pycache__", ".*_cache", "corpus", "*.png")
     shutil.copytree(ROOT, work, ignore=ignored, symlinks=True)
     return work
 
 
 def anchors(text: str) -> set[str]:
     """Names that a link may have behind its `#`: headings as GitHub and MkDocs write them."""
-    headings = re.findall(
-        r"^#+ (.+)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE
-    )
+    headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
     plain = [re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]
     return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in plain}
 

@@ -38,9 +38,7 @@ def _copy(out: Path, *paths: Path) -> None:
 def esp_idf(out: Path) -> None:
     """A component that needs nothing beside it."""
     _copy(out, PACKAGES / "Kconfig")
-    for template in (PACKAGES / "esp-idf").glob(
-        "*.in"
-    ):  # so named that no tool takes their folder for a component
+    for template in (PACKAGES / "esp-idf").glob("*.in"):  # so named that no tool takes their folder for a component
         shutil.copy(template, out / template.stem)
     _copy(out, ROOT / "LICENSE", ROOT / "CHANGELOG.md", ROOT / "libc" / "README.md")
     _runtime(out)
@@ -90,9 +88,7 @@ def main() -> int:
     """Makes the packages that are named, by default all."""
     parser = argparse.ArgumentParser(prog="tools/packages.py", description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
-    parser.add_argument(
-        "kinds", nargs="*", choices=[[], *KINDS], metavar="KIND", help=f"of {', '.join(KINDS)}"
-    )
+    parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], metavar="KIND", help=f"of {', '.join(KINDS)}")
     arguments = parser.parse_args()
     for path in assemble(arguments.out, arguments.kinds or list(KINDS)):
         print(f"{path}: {path.stat().st_size} bytes")

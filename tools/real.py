@@ -100,9 +100,7 @@ def _runs_out(source: Path, work: Path) -> Iterator[Case]:
     files = sorted(source.glob("*.csv"))
     for k, held in enumerate(files):
         folder = work / f"{source.name}-data-{k}"
-        _described(
-            folder, source.name, files, [f'role = "{"exam" if f == held else "train"}"' for f in files]
-        )
+        _described(folder, source.name, files, [f'role = "{"exam" if f == held else "train"}"' for f in files])
         yield Case(source.name, held.stem, folder, False)
 
 
@@ -136,9 +134,7 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         trace = out / "trace" if case.plotted else None
         result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()
         said = tuple(finding["id"] for finding in result["findings"])
-        yield Result(
-            case, axis, fitted.model.method, said, result, of_others(dataset, result["exam"]["samples"]), out
-        )
+        yield Result(case, axis, fitted.model.method, said, result, of_others(dataset, result["exam"]["samples"]), out)
 
 
 def table(results: Sequence[Result]) -> str:

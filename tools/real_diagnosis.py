@@ -36,9 +36,7 @@ Result = dict[str, Any]
 def diagnosed(data: Path, axis: str, out: Path) -> Result:
     """One run of the installed command."""
     command = [Path(sys.executable).with_name("gyrotc"), "diagnose", data, "--axis", axis, "--out", out]
-    done = subprocess.run(
-        [*command, "--average-s", str(AVERAGE_S)], check=True, capture_output=True, text=True
-    )
+    done = subprocess.run([*command, "--average-s", str(AVERAGE_S)], check=True, capture_output=True, text=True)
     print(done.stdout.splitlines()[0])
     return dict(json.loads((out / "diagnose.json").read_text("utf-8")))
 
@@ -79,9 +77,7 @@ def cubic(data: Path, axis: str) -> float:
     return float(np.sqrt(np.mean((exam.bias_dph - columns(exam) @ weights) ** 2)))
 
 
-def gains(
-    results: dict[str, Result], spreads: dict[str, list[float]], cubics: dict[str, float]
-) -> Iterator[str]:
+def gains(results: dict[str, Result], spreads: dict[str, list[float]], cubics: dict[str, float]) -> Iterator[str]:
     """A row for each axis: unseen branch without and with what was named, over the sizes of the map."""
     yield (
         "| axis | verdict | cubic in T with dT/dt | map of (T, dT/dt) alone, default size "
@@ -123,16 +119,12 @@ def tried(results: dict[str, Result]) -> Iterator[str]:
 
 def _product(of_t: int, of_rate: int) -> str:
     """A product of powers of T and r = dT/dt."""
-    factors = [
-        f"{name}^{power}" if power > 1 else name for name, power in (("T", of_t), ("r", of_rate)) if power
-    ]
+    factors = [f"{name}^{power}" if power > 1 else name for name, power in (("T", of_t), ("r", of_rate)) if power]
     return " ".join(factors)
 
 
 def _parameters(state: Result) -> str:
-    return ", ".join(
-        f"{n} {p['value']:.3g} ({p['low']:.3g} … {p['high']:.3g})" for n, p in state.items() if n != "id"
-    )
+    return ", ".join(f"{n} {p['value']:.3g} ({p['low']:.3g} … {p['high']:.3g})" for n, p in state.items() if n != "id")
 
 
 def isothermal(results: dict[str, Result]) -> Iterator[str]:

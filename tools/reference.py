@@ -106,9 +106,7 @@ def schemas_page() -> str:
         parts += [f"## {kind}\n", _cell(schema.get("description", "")) + "\n"]
         parts += ["| field | always there | meaning |", "| --- | --- | --- |"]
         for name, field in schema.get("properties", {}).items():
-            parts.append(
-                f"| `{name}` | {'yes' if name in required else ''} | {_cell(field.get('description', ''))} |"
-            )
+            parts.append(f"| `{name}` | {'yes' if name in required else ''} | {_cell(field.get('description', ''))} |")
         parts.append("")
     return "\n".join(parts)
 

@@ -98,9 +98,7 @@ def linked(text: str, page: Path, name: str) -> str:
 def drawn(block: str) -> dict[str, set[str]]:
     """Packages by name, with those from which an arrow of the drawing leads to them."""
     found = re.findall(r"^ *(\w+) --> (\w+)$", block, re.MULTILINE)
-    return {
-        name: {a for a, b in found if b == name} for name in sorted({n for arrow in found for n in arrow})
-    }
+    return {name: {a for a, b in found if b == name} for name in sorted({n for arrow in found for n in arrow})}
 
 
 def picture(graph: dict[str, set[str]]) -> str:

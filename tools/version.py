@@ -37,8 +37,7 @@ def differing(root: Path) -> list[str]:
     """One line for each file whose version is not the header's, or that has none."""
     wanted = header_version(root)
     found = {
-        name: re.findall(pattern, (root / name).read_text("utf-8"), re.MULTILINE)
-        for name, pattern in PLACES.items()
+        name: re.findall(pattern, (root / name).read_text("utf-8"), re.MULTILINE) for name, pattern in PLACES.items()
     }
     return [
         f"{name}: {', '.join(versions) or 'no version'}; {HEADER} has {wanted}"

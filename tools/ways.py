@@ -156,9 +156,7 @@ def weights(work: Path, wheel: Path) -> Iterator[dict[str, Any]]:
         if not wrong:
             chosen = [one["metadata"] for one in json.loads(report.read_text("utf-8"))["install"]]
             new = {f"{one['name']}=={one['version']}" for one in chosen if one["name"] != "gyrotc"} - plain
-            wrong = _ran(
-                [*pip, "--no-deps", "--target", str(folder), *new, *([] if plain else [wheel])], work
-            )
+            wrong = _ran([*pip, "--no-deps", "--target", str(folder), *new, *([] if plain else [wheel])], work)
         if wrong:
             yield {"extra": name, "mb": 0.0, "packages": 0, "result": wrong}
             continue

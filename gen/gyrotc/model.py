@@ -375,9 +375,7 @@ class Model(_Frozen):
     seed: int
     meta: dict[str, Any] = {}
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, strict=True, populate_by_name=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True, populate_by_name=True)
 
     @model_validator(mode="after")
     def _whole(self) -> Model:
@@ -460,11 +458,7 @@ class Model(_Frozen):
         t = t0 + (t1 - t0) * (np.arange(columns) + 0.5) / columns
         r = r0 + (r1 - r0) * (np.arange(rows) + 0.5) / rows
         every_t, every_r = (grid.ravel() for grid in np.meshgrid(t, r))
-        seen = (
-            np.array([c == "1" for row in self.coverage.rows for c in row])
-            if self.coverage
-            else np.ones(0, bool)
-        )
+        seen = np.array([c == "1" for row in self.coverage.rows for c in row]) if self.coverage else np.ones(0, bool)
         return (every_t[seen], every_r[seen]) if seen.any() else (every_t, every_r)
 
     def network_dph(
@@ -476,9 +470,7 @@ class Model(_Frozen):
     def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:
         bias = network.w0 + z @ np.array(network.linear)
         center, half = self.scale.temperature_c
-        for (c_t, c_r), (d_t, d_r), weight in zip(
-            network.centers, network.widths, network.weights, strict=True
-        ):
+        for (c_t, c_r), (d_t, d_r), weight in zip(network.centers, network.widths, network.weights, strict=True):
             u = np.zeros(z.shape[:-1])
             if d_t is not None:
                 u = u + ((z[..., 0] - (c_t - center) / half) / d_t) ** 2
@@ -608,9 +600,7 @@ def load_model(path: Path, *, stamped: bool = True) -> Model:
     if stamped and checksum != model.hash:
         raise InputError(
             f"{path}, field {CHECKSUM}",
-            "is missing"
-            if checksum is None
-            else "is not that of the other fields: the file was changed or damaged",
+            "is missing" if checksum is None else "is not that of the other fields: the file was changed or damaged",
             f"the file as gyrotc wrote it (a change made on purpose: gyrotc stamp {path})",
         )
     return model

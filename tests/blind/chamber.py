@@ -77,15 +77,11 @@ def steps(start: float, legs: Sequence[tuple[float, float, float]], seconds: int
     return out
 
 
-def expose(
-    unit: Unit, name: str, programme: Array, soak_c: float, lead_s: int, rng: np.random.Generator
-) -> Exposure:
+def expose(unit: Unit, name: str, programme: Array, soak_c: float, lead_s: int, rng: np.random.Generator) -> Exposure:
     """Runs one programme: soaked and dark until power-on, `lead_s` at the first temperature, then recorded."""
     extra = 600
     total = extra + lead_s + programme.size + extra
-    command = np.concatenate(
-        [np.full(extra + lead_s, programme[0]), programme, np.full(extra, programme[-1])]
-    )
+    command = np.concatenate([np.full(extra + lead_s, programme[0]), programme, np.full(extra, programme[-1])])
     phase = rng.uniform(0, 2 * np.pi)
     ripple = unit.ripple_c * np.sin(2 * np.pi * np.arange(total) / unit.ripple_s + phase)
     air = case = block = soak_c
@@ -130,16 +126,11 @@ def separating_programmes(rng: np.random.Generator, hours: float) -> list[tuple[
         runs.append(("cold start", np.full(seconds, at), at, 0))
     for _ in range(2):
         up = [(float(rng.choice([1.0, 3.0, 5.0])), t, rng.uniform(1200, 2100)) for t in (-20, 0, 20, 40, 60)]
-        down = [
-            (float(rng.choice([1.0, 3.0, 5.0])), t, rng.uniform(1200, 2100)) for t in (40, 20, 0, -20, -40)
-        ]
+        down = [(float(rng.choice([1.0, 3.0, 5.0])), t, rng.uniform(1200, 2100)) for t in (40, 20, 0, -20, -40)]
         runs.append(("staircase", steps(-40 + rng.uniform(-2, 2), up + down, seconds), -40.0, 0))
     for order in (1, -1):
         peaks = [60, -40, 45, -25, 30, -10, 20, 5][::order]
-        legs = [
-            (float(rng.choice([1.0, 3.0, 5.0])), p + rng.uniform(-3, 3), rng.uniform(900, 2400))
-            for p in peaks
-        ]
+        legs = [(float(rng.choice([1.0, 3.0, 5.0])), p + rng.uniform(-3, 3), rng.uniform(900, 2400)) for p in peaks]
         runs.append(("nested loops", steps(10 + rng.uniform(-2, 2), legs, seconds), 10.0, 0))
     rate = rng.uniform(2, 4)
     runs.append(("ramp", steps(0.0, [(rate, 60, 3600), (rate, -40, 3600)], seconds), 0.0, 0))

@@ -57,9 +57,7 @@ def orders(total: int, rng: np.random.Generator, weakest: float = 0.5) -> list[O
         out.append(Order("two", tuple((name, float(rng.uniform(2.5, 5.0))) for name in pair)))
     foreign = (*effects.FOREIGN, *effects.FOREIGN_RANDOM)
     for k in range(round(0.11 * total)):
-        out.append(
-            Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),))
-        )
+        out.append(Order("foreign", ((foreign[k % len(foreign)], float(effects.log_uniform(rng, 2.0, 7.0))),)))
     return [out[k] for k in rng.permutation(len(out))]
 
 
@@ -72,9 +70,7 @@ def campaign_of(seed: int, number: int) -> tuple[Campaign, Yardstick]:
     return campaign, Yardstick(campaign)
 
 
-def recording_of(
-    seed: int, number: int, order: Order, campaign: Campaign, yardstick: Yardstick
-) -> tuple[Hidden, bool]:
+def recording_of(seed: int, number: int, order: Order, campaign: Campaign, yardstick: Yardstick) -> tuple[Hidden, bool]:
     """The number-th recording of a run, and whether its noise is declared."""
     rng = np.random.default_rng([seed, 2, number])
     white = float(np.exp(rng.uniform(np.log(4e-4), np.log(1.2e-3))))

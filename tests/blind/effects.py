@@ -245,10 +245,7 @@ def node_product(scene: Scene, rng: np.random.Generator) -> Effect:
     """Product of the temperature and a late second node: no single linear memory."""
     tau = log_uniform(rng, 300, 1500)
     period = rng.uniform(25, 45)
-    return [
-        np.sin(2 * np.pi * r.block_c / period) * np.abs(follow(r.block_c, tau) - r.block_c)
-        for r in scene.runs
-    ], {}
+    return [np.sin(2 * np.pi * r.block_c / period) * np.abs(follow(r.block_c, tau) - r.block_c) for r in scene.runs], {}
 
 
 def dead_zone(scene: Scene, rng: np.random.Generator) -> Effect:
@@ -312,9 +309,7 @@ def pulses(scene: Scene, rng: np.random.Generator) -> Effect:
 def room_cycle(scene: Scene, rng: np.random.Generator) -> Effect:
     """An unrecorded sinusoid in time, of another phase in every run."""
     period = log_uniform(rng, 1500, 8000)
-    return [
-        np.sin(2 * np.pi * np.arange(r.block_c.size) / period + rng.uniform(0, 2 * np.pi)) for r in scene.runs
-    ], {}
+    return [np.sin(2 * np.pi * np.arange(r.block_c.size) / period + rng.uniform(0, 2 * np.pi)) for r in scene.runs], {}
 
 
 def stick_slip(scene: Scene, rng: np.random.Generator) -> Effect:

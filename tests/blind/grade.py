@@ -14,9 +14,7 @@ Row = dict[str, Any]
 _AVERAGE = 10  # rows of 10 s in 100 s
 
 
-def grade(
-    hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool
-) -> Row:
+def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool) -> Row:
     """Truth and answer of one recording, side by side."""
     physical = [c for c in result["causes"] if c["family"] != "noise"]
     row: Row = {
@@ -75,9 +73,7 @@ def _parameters(hidden: Hidden, physical: list[dict[str, Any]]) -> list[dict[str
                 got = cause["parameters"].get(key)
                 if got is not None:
                     inside = got["low"] <= value <= got["high"]
-                    out.append(
-                        {"name": f"{name}.{key}", "true": value, "got": got["value"], "inside": inside}
-                    )
+                    out.append({"name": f"{name}.{key}", "true": value, "got": got["value"], "inside": inside})
     return out
 
 

@@ -116,9 +116,7 @@ class Tool:
         return dict(json.loads(answer.read_text(encoding="utf-8")))
 
 
-def one_campaign(
-    plan: Plan, number: int, todo: list[tuple[int, Order]], tool: Tool, store: Store
-) -> list[Row]:
+def one_campaign(plan: Plan, number: int, todo: list[tuple[int, Order]], tool: Tool, store: Store) -> list[Row]:
     """Recordings of one campaign, one after the other."""
     campaign, yardstick = campaign_of(plan.seed, number)
     rows = []

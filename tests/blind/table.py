@@ -23,9 +23,7 @@ def _k(row: Row) -> float:
 
 def _one(low: float, high: float = 1e9, *, offset: bool = False) -> Callable[[Row], bool]:
     """Recordings with one hidden cause and k in a range, run offsets excepted."""
-    return lambda r: (
-        r["stratum"] == "one" and low <= _k(r) < high and (r["truth"] == ["turn_on_offset"]) == offset
-    )
+    return lambda r: r["stratum"] == "one" and low <= _k(r) < high and (r["truth"] == ["turn_on_offset"]) == offset
 
 
 RANDOM = ("thermometer_drift", "telegraph", "pulses", "room_cycle")
@@ -222,9 +220,7 @@ def _sets(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def _time(rows: Sequence[Row]) -> list[dict[str, Any]]:
     seconds = [r["seconds"] for r in rows if r["seconds"]]
     middle = float(np.median(seconds)) if seconds else 0.0
-    return _value(
-        "median CPU time of a diagnosis, bank cached, s", "≤ 3", middle, middle <= 3.0, len(seconds)
-    )
+    return _value("median CPU time of a diagnosis, bank cached, s", "≤ 3", middle, middle <= 3.0, len(seconds))
 
 
 _BINS = ((0.1, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.0 + 1e-9))  # of stated probabilities
@@ -258,18 +254,12 @@ def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
     chosen = [
         r["gain"]
         for r in rows
-        if r["stratum"] == "one"
-        and _k(r) >= 1.7
-        and r["gain"]
-        and family_right(r)
-        and r["truth"][0] in _GAINING
+        if r["stratum"] == "one" and _k(r) >= 1.7 and r["gain"] and family_right(r) and r["truth"][0] in _GAINING
     ]
     out = _share("held-out gain as share of the oracle's, k ≥ 1.7 (pooled)", chosen)
     for cause in FAMILY:
         hidden = [
-            r["gain"]
-            for r in rows
-            if r["stratum"] == "one" and _k(r) >= 1.7 and r["gain"] and r["truth"] == [cause]
+            r["gain"] for r in rows if r["stratum"] == "one" and _k(r) >= 1.7 and r["gain"] and r["truth"] == [cause]
         ]
         out += _share(f"... of all that hide {cause}, named or not", hidden)
     return out + worse_on_the_exam([r["gain"] for r in rows if r["gain"] and r["gain"]["shipped"]])
@@ -284,9 +274,7 @@ def _share(name: str, gains: Sequence[dict[str, float]]) -> list[dict[str, Any]]
 
 def worse_on_the_exam(shipped: Sequence[dict[str, float]]) -> list[dict[str, Any]]:
     """Shares of the extensions that were shipped and made the exam worse, at all and beyond its noise."""
-    out = proportion(
-        "shipped although worse on the exam", "0", [bool(g["worse"]) for g in shipped], 0.0, "max"
-    )
+    out = proportion("shipped although worse on the exam", "0", [bool(g["worse"]) for g in shipped], 0.0, "max")
     surely = [bool(g.get("surely_worse", False)) for g in shipped]
     return out + proportion("... by more than the exam's noise (95 %)", "0", surely, 0.0, "max")
 
@@ -305,9 +293,7 @@ def _honesty(rows: Sequence[Row]) -> list[dict[str, Any]]:
         if like.max() > best:
             best, at = float(like.max()), (float(c), float(widths[like.argmax()]))
     ratio = float(np.exp(at[0] + at[1] * np.log(19.0)))
-    return _value(
-        "95 %-power amplitude over printed limit", "0.75-1.25", ratio, 0.75 <= ratio <= 1.25, len(data)
-    )
+    return _value("95 %-power amplitude over printed limit", "0.75-1.25", ratio, 0.75 <= ratio <= 1.25, len(data))
 
 
 def text(rows: Sequence[Row]) -> str:

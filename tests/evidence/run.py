@@ -42,9 +42,7 @@ def found_in_fleet(way: str, rng: np.random.Generator) -> set[str]:
     one, other = (int(k) for k in rng.choice(_GYROS, 2, replace=False))
     gyro, runs = drawn[one]
     drawn[other][1][int(rng.integers(5))] = exported_again(runs[int(rng.integers(5))], way, gyro, rng)
-    pairs = {
-        (copy.name, copy.other) for copy in copies([_entry(k, runs) for k, (_, runs) in enumerate(drawn)])
-    }
+    pairs = {(copy.name, copy.other) for copy in copies([_entry(k, runs) for k, (_, runs) in enumerate(drawn)])}
     right = {(str(min(one, other)), str(max(one, other)))}
     return {"copy_of_other"} if pairs == right else {f"{a} and {b}" for a, b in pairs}
 
@@ -112,13 +110,9 @@ def main() -> None:
     print("| sets | drawn | named |\n| --- | ---: | ---: |")
     for kind, way in drawn:
         print(f"| {kind}{f', {way}' if way != kind else ''} | {drawn[kind, way]} | {named[kind, way]} |")
-    totals = {
-        k: sum(n for (kind, _), n in named.items() if kind == k) / max(getattr(given, k), 1) for k in KINDS
-    }
+    totals = {k: sum(n for (kind, _), n in named.items() if kind == k) / max(getattr(given, k), 1) for k in KINDS}
     print(", ".join(f"{'false' if k == 'clean' else k} {share:.1%}" for k, share in totals.items()))
-    good = totals["clean"] <= 0.01 and all(
-        totals[k] >= 0.95 for k in KINDS if k != "clean" and getattr(given, k)
-    )
+    good = totals["clean"] <= 0.01 and all(totals[k] >= 0.95 for k in KINDS if k != "clean" and getattr(given, k))
     sys.exit(0 if good else 1)
 
 

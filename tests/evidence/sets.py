@@ -42,9 +42,7 @@ def drawn_gyro(rng: np.random.Generator) -> Gyro:
     noise = float(10.0 ** rng.uniform(-3.0, 0.0))
     curve = rng.normal(0.0, [1.0, 1.0, 0.5, 0.3])
     swing = noise * float(10.0 ** rng.uniform(1.3, 1.8))
-    return Gyro(
-        curve * swing / np.ptp(np.polynomial.chebyshev.chebval(np.linspace(-1, 1, 50), curve)), 0.0, noise
-    )
+    return Gyro(curve * swing / np.ptp(np.polynomial.chebyshev.chebval(np.linspace(-1, 1, 50), curve)), 0.0, noise)
 
 
 def drawn_run(gyro: Gyro, rng: np.random.Generator, rows: int, period_s: float) -> Recorded:
@@ -85,9 +83,7 @@ def exported_again(run: Recorded, way: str, gyro: Gyro, rng: np.random.Generator
     if way == "shifted":
         return Recorded(time + rng.uniform(1.0, 5000.0), temperature, np.round(rate, 7))
     if way == "scaled":
-        return Recorded(
-            time, temperature, rate * (1.0 + 10.0 ** rng.uniform(-7, -1)) + rng.normal(0.0, gyro.noise_dph)
-        )
+        return Recorded(time, temperature, rate * (1.0 + 10.0 ** rng.uniform(-7, -1)) + rng.normal(0.0, gyro.noise_dph))
     if way == "noise":
         level = gyro.noise_dph * 10.0 ** rng.uniform(-7.0, -0.5)
         return Recorded(time, temperature, rate + rng.normal(0.0, level, len(rate)))

@@ -22,9 +22,7 @@ from .jobs import GYROTC, Case, command
 
 UNITS = ("A", "B", "C")
 _MANIFEST = 'schema = 1\ndatasets = ["gyros/*"]\nnumeric = ["f32"]\n[options]\nseed = {}\n'
-_ROW = re.compile(
-    r'<tr data-state="([a-z]+)"[^>]*><td class="name">(?:<a [^>]*>)?([A-Z])<(.*?)</tr>', re.DOTALL
-)
+_ROW = re.compile(r'<tr data-state="([a-z]+)"[^>]*><td class="name">(?:<a [^>]*>)?([A-Z])<(.*?)</tr>', re.DOTALL)
 _VALUE = re.compile(r'data-value="([^"]+)"')
 
 
@@ -97,9 +95,7 @@ def _untrue(unit: Path, status: str, figures: Mapping[str, str]) -> list[str]:
         return [f"{unit.name} is {status}, and {faults(unit)}"]
     entry = json.loads((unit / "entry.json").read_text())
     reported = {name: f"{entry[name]:.4g}" if name.endswith("_dph") else str(entry[name]) for name in figures}
-    return (
-        [] if reported == figures and figures else [f"{unit.name}: {figures}, and its result says {reported}"]
-    )
+    return [] if reported == figures and figures else [f"{unit.name}: {figures}, and its result says {reported}"]
 
 
 def _of_json(path: Path) -> Iterator[tuple[str, Row]]:

@@ -143,9 +143,7 @@ def commands(root: Path) -> list[Case]:
     scenario, data, out, other = root / "short.toml", root / "data", root / "out", root / "other"
     scenario.write_text(SCENARIO, encoding="utf-8")
     keys = [_key(root / f"key-{k}.pem") for k in range(2)]
-    subprocess.run(
-        [*GYROTC, "simulate", scenario, "--seed", "3", "--out", data], check=True, stdout=subprocess.DEVNULL
-    )
+    subprocess.run([*GYROTC, "simulate", scenario, "--seed", "3", "--out", data], check=True, stdout=subprocess.DEVNULL)
 
     def case(name: str, line: Callable[[int], Sequence[object]], *results: Path) -> Case:
         return Case(name, lambda version: command(name, *line(version)), results)
@@ -193,6 +191,4 @@ def command(*arguments: object) -> None:
     """A command line, in this process."""
     from gyrotc.cli.main import run
 
-    raise SystemExit(
-        run([str(a) for a in arguments])
-    )  # `main` leaves at once: the calls could not be counted
+    raise SystemExit(run([str(a) for a in arguments]))  # `main` leaves at once: the calls could not be counted

@@ -60,15 +60,11 @@ class Campaign:
         if again.status != 0:
             self._tell(where, f"the next job ends with {again.status}: {again.reported}")
         self._look(case, f"{where}, then again")
-        reported = (
-            (1, 2) if case.name == "check" else (1,)
-        )  # a file that cannot be read is a result of its own
+        reported = (1, 2) if case.name == "check" else (1,)  # a file that cannot be read is a result of its own
         if end.status not in reported:
             for result, *contents in zip(case.results, before, found, case.contents(), strict=True):
                 self._compare(where, result, *contents)
-        if left := self._left() | {
-            f"{path.name} (temporary)" for path in Path(os.environ["TMPDIR"]).iterdir()
-        }:
+        if left := self._left() | {f"{path.name} (temporary)" for path in Path(os.environ["TMPDIR"]).iterdir()}:
             self._tell(where, f"the next job leaves {sorted(left)}")
         return end
 
@@ -82,9 +78,7 @@ class Campaign:
     def _compare(self, where: str, result: Path, before: Content, found: Content, after: Content) -> None:
         """What was found is what was there, or what an undisturbed job makes; but for files that are never the same."""
         changing = self._changing.get(result, set())
-        old, now, new = (
-            {k: b"" if k in changing else v for k, v in c.items()} for c in (before, found, after)
-        )
+        old, now, new = ({k: b"" if k in changing else v for k, v in c.items()} for c in (before, found, after))
         if now not in (old, new):
             names = sorted(n for n in {*old, *now, *new} if now.get(n) not in (old.get(n), new.get(n)))
             self._tell(where, f"{result.name} is neither as before nor as after: {names or 'a mixture'}")
@@ -164,9 +158,7 @@ def _again_with_shim() -> None:
         environment = os.environ | {"LD_PRELOAD": str(library), _IN_SHIM: "1"}
         command = [sys.executable, "-m", "tests.kills.run", *sys.argv[1:]]
         raise SystemExit(
-            os.waitstatus_to_exitcode(
-                os.waitpid(os.spawnve(os.P_NOWAIT, sys.executable, command, environment), 0)[1]
-            )
+            os.waitstatus_to_exitcode(os.waitpid(os.spawnve(os.P_NOWAIT, sys.executable, command, environment), 0)[1])
         )
 
 

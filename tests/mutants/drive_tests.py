@@ -43,9 +43,7 @@ if __name__ == "__main__":
         raise ImportError(f"{gyrotc.__file__} is not the changed package")
     first = _First()
     tests = [str(FOLDER / test) for test in sys.argv[1:]]
-    status = pytest.main(
-        ["-q", "-x", "-p", "no:cacheprovider", "--rootdir", str(FOLDER.parents[1]), *tests], [first]
-    )
+    status = pytest.main(["-q", "-x", "-p", "no:cacheprovider", "--rootdir", str(FOLDER.parents[1]), *tests], [first])
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) and not first.reported:
         raise RuntimeError(f"pytest ended with {status}")
     print(json.dumps({"seen_by": "test" if first.reported else None, "reported": first.reported}))

@@ -29,8 +29,7 @@ def section(result: dict[str, Any]) -> str:
         packages.setdefault(f"`{m['file'].split('/')[0]}`", []).append(m["seen_by"])
     packages["all"] = [m["seen_by"] for m in mutants]
     counts = [
-        [name, len(seen), *(seen.count(who) for who in (*_WHO, None)), _rate(seen)]
-        for name, seen in packages.items()
+        [name, len(seen), *(seen.count(who) for who in (*_WHO, None)), _rate(seen)] for name, seen in packages.items()
     ]
     rows = [
         [

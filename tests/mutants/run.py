@@ -74,9 +74,7 @@ class House:
         core = Path(importlib.import_module("gyrotc._core").__file__ or "")
         shutil.copy(core, self.package / core.name)
         # By its content: a file that is changed and put back within a second is read anew.
-        compileall.compile_dir(
-            self.package, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH
-        )
+        compileall.compile_dir(self.package, quiet=1, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
 
     def objection(self, model: str, fault: Fault | None = None, tests: Sequence[str] = ()) -> dict[str, Any]:
         """Who objects to what the generator, with the fault, makes of a model; or which of `tests` fails with it."""
@@ -84,18 +82,14 @@ class House:
         text = path.read_text("utf-8")
         if fault is not None:
             if text.count(fault.old) != 1:
-                raise ValueError(
-                    f"{fault.name}: {fault.file} has its text {text.count(fault.old)} times, not once"
-                )
+                raise ValueError(f"{fault.name}: {fault.file} has its text {text.count(fault.old)} times, not once")
             path.write_text(text.replace(fault.old, fault.new), "utf-8")
         try:
             if tests:
                 return self._driven(HERE / "drive_tests.py", *tests)
             with tempfile.TemporaryDirectory() as out:
                 result = Path(out) / "result"
-                return self._driven(
-                    HERE / "drive.py", ROOT / MODELS[model], result, ROOT / "tools/check_table.py"
-                )
+                return self._driven(HERE / "drive.py", ROOT / MODELS[model], result, ROOT / "tools/check_table.py")
         finally:
             path.write_text(text, "utf-8")
 
@@ -129,9 +123,7 @@ def tried(names: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
             found = house.objection(model, tests=tests)
             if found["seen_by"] is not None:
                 what = model or ", ".join(tests)
-                raise ValueError(
-                    f"{found['seen_by']} objects to the sound generator's {what}: {found['reported']}"
-                )
+                raise ValueError(f"{found['seen_by']} objects to the sound generator's {what}: {found['reported']}")
         for fault in chosen:
             yield asdict(fault) | house.objection(fault.model, fault, fault.tests)
 

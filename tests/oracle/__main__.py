@@ -51,9 +51,7 @@ def main() -> int:
     if asked.write:
         reference.write(_made_with())
     elif wrong and not asked.against and reference.made_with != _made_with():
-        print(
-            f"The reference was made with {reference.made_with},\nthis run with {_made_with()}: see CONTRIBUTING.md."
-        )
+        print(f"The reference was made with {reference.made_with},\nthis run with {_made_with()}: see CONTRIBUTING.md.")
     print(f"{steps} steps, {wrong} differ; what they gave in full: {asked.out}")
     return 1 if wrong else 0
 
@@ -61,13 +59,9 @@ def main() -> int:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.oracle", description=__doc__)
     parser.add_argument("sets", nargs="*", default=list(SETS), metavar="SET", help=", ".join(SETS))
-    parser.add_argument(
-        "--out", type=Path, default=ROOT / "build" / "oracle", help="folder for full outcomes"
-    )
+    parser.add_argument("--out", type=Path, default=ROOT / "build" / "oracle", help="folder for full outcomes")
     parser.add_argument("--against", type=Path, help="--out of another run, instead of the tracked reference")
-    parser.add_argument(
-        "--real", type=Path, default=ROOT.parent / "shared" / "data" / "real", help="measured sets"
-    )
+    parser.add_argument("--real", type=Path, default=ROOT.parent / "shared" / "data" / "real", help="measured sets")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--write", action="store_true", help="make the reference from this checkout")
     asked = parser.parse_args()

@@ -44,9 +44,7 @@ class Reference:
         content = json.loads(path.read_text("utf-8")) if path.is_file() else {}
         self.made_with: dict[str, str] = content.get("made_with", {})
         paths = content.get("paths", [])
-        self._shapes: list[list[str]] = [
-            [paths[int(k)] for k in s.split()] for s in content.get("shapes", [])
-        ]
+        self._shapes: list[list[str]] = [[paths[int(k)] for k in s.split()] for s in content.get("shapes", [])]
         self._sets: dict[str, dict[str, dict[str, str]]] = content.get("sets", {})
 
     def steps(self, name: str) -> dict[str, dict[str, str]]:
@@ -56,9 +54,7 @@ class Reference:
     def differences(self, part: str, found: Any) -> Iterator[str]:
         """As the function of this name; of the reference a hash is shown."""
         shape, hashes = part.split(" ")
-        known = {
-            path: hashes[_DIGITS * k : _DIGITS * (k + 1)] for k, path in enumerate(self._shapes[int(shape)])
-        }
+        known = {path: hashes[_DIGITS * k : _DIGITS * (k + 1)] for k, path in enumerate(self._shapes[int(shape)])}
         values = dict(_leaves(found))
         for path in dict.fromkeys([*known, *values]):
             if path not in known or path not in values:
@@ -70,8 +66,7 @@ class Reference:
     def enter(self, name: str, outcomes: Mapping[str, Mapping[str, Any]]) -> None:
         """Replaces a set."""
         self._sets[name] = {
-            step: {part: self._text(value) for part, value in parts.items()}
-            for step, parts in outcomes.items()
+            step: {part: self._text(value) for part, value in parts.items()} for step, parts in outcomes.items()
         }
 
     def _text(self, value: Any) -> str:

@@ -105,9 +105,7 @@ def _paper(s: Steps) -> None:
     s.run("check", "data", "--json", "check.json", "--envelope", "-40:60,-5:5", "--plots", "check.html")
     s.run("fit", "data", "--out", "result", "--json", "fit.json")
     s.run("emit", "result/model.json", "--out", "result", "--json", "emit.json")
-    s.run(
-        "evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json"
-    )
+    s.run("evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json")
     s.run("report", "result")
     s.run("diagnose", "data", "--out", "diagnosis")
     s.run("plan", "paper", "--out", "plan", "--add-thermometer", "--separate", "hysteresis,turn_on_offset")
@@ -168,9 +166,7 @@ def _extended(s: Steps) -> None:
     s.run("build", "data", "--extend", "--numeric", "q31", "--out", "result")
 
 
-def _simulated(
-    scenario: str, *, seed: int, noise: str = "paper", few: bool = True
-) -> Callable[[Steps], None]:
+def _simulated(scenario: str, *, seed: int, noise: str = "paper", few: bool = True) -> Callable[[Steps], None]:
     """Check, fit, emit and diagnosis of a scenario; `few`: four runs of eight hours instead of twelve."""
 
     def do(s: Steps) -> None:
@@ -199,9 +195,7 @@ def _channels(s: Steps) -> None:
 def _pulses(s: Steps) -> None:
     """Counts of pulses in Parquet files, and the options of training."""
     s.write(_text("few.toml", _FEW.format("separating")), name="scenario")
-    s.run(
-        "simulate", "few.toml", "--seed", 6, "--pulses", "--format", "parquet", "--row-s", 20, "--out", "data"
-    )
+    s.run("simulate", "few.toml", "--seed", 6, "--pulses", "--format", "parquet", "--row-s", 20, "--out", "data")
     s.run("check", "data", "--json", "check.json")
     for method in ("constant", "linear", "cubic", "cubic_slope", "mrbf_t", "mrbf", "bank"):
         s.run("fit", "data", "--method", method, "--out", method, name=f"fit {method}")
@@ -272,9 +266,7 @@ def _reversed_unit(folder: Path) -> None:
 
 def _measured(folder: str, axis: str, *commands: str) -> RecordingSet:
     def do(s: Steps) -> None:
-        s.write(
-            lambda f: shutil.copytree(s.measured / folder, f / "data", ignore=shutil.ignore_patterns("raw"))
-        )
+        s.write(lambda f: shutil.copytree(s.measured / folder, f / "data", ignore=shutil.ignore_patterns("raw")))
         s.run("check", "data", "--axis", axis, "--json", "check.json")
         if "fit" in commands:
             s.run("fit", "data", "--axis", axis, "--out", "result")
@@ -289,9 +281,7 @@ def _accepted(s: Steps) -> None:
     """Small recordings in every accepted form."""
     for name, make in ACCEPTED.items():
         place = _place(name)
-        s.write(
-            lambda f, make=make, place=place: _made(make, f / place / "RLG-1"), name=f"recordings: {name}"
-        )
+        s.write(lambda f, make=make, place=place: _made(make, f / place / "RLG-1"), name=f"recordings: {name}")
         s.run("check", f"{place}/RLG-1", "--json", f"{place}/check.json", name=f"check: {name}")
         s.run("fit", f"{place}/RLG-1", "--out", f"{place}/result", name=f"fit: {name}")
 
@@ -332,20 +322,14 @@ def _with(c: Columns, **changed: Any) -> Columns:
 #: What happens to the second of three runs.
 EVENTS: dict[str, Callable[[Columns], Columns]] = {
     "step": lambda c: _with(c, rate_dph=c["rate_dph"] + 0.01 * _where(c, 1500, 9999)),
-    "drift at the beginning": lambda c: _with(
-        c, rate_dph=c["rate_dph"] + 0.05 * np.exp(-c["time_s"] / 1200.0)
-    ),
+    "drift at the beginning": lambda c: _with(c, rate_dph=c["rate_dph"] + 0.05 * np.exp(-c["time_s"] / 1200.0)),
     "spikes": lambda c: _with(c, rate_dph=c["rate_dph"] + 0.2 * (np.arange(c["time_s"].size) % 397 == 5)),
     "sign reversed": lambda c: _with(c, rate_dph=-c["rate_dph"]),
-    "sign reversed within": lambda c: _with(
-        c, rate_dph=np.where(_where(c, 900, 9999), -1, 1) * c["rate_dph"]
-    ),
+    "sign reversed within": lambda c: _with(c, rate_dph=np.where(_where(c, 900, 9999), -1, 1) * c["rate_dph"]),
     "another scale": lambda c: _with(c, rate_dph=1.5 * c["rate_dph"]),
     "saturated": lambda c: _with(c, rate_dph=np.clip(c["rate_dph"], 0.008, 0.02)),
     "rate stuck": lambda c: _with(c, rate_dph=np.where(_where(c, 700, 1000), 0.0125, c["rate_dph"])),
-    "thermometer stuck": lambda c: _with(
-        c, temperature_c=np.where(_where(c, 700, 1400), 47.0, c["temperature_c"])
-    ),
+    "thermometer stuck": lambda c: _with(c, temperature_c=np.where(_where(c, 700, 1400), 47.0, c["temperature_c"])),
     "thermometer jumps": lambda c: _with(c, temperature_c=c["temperature_c"] + 8.0 * _where(c, 1200, 9999)),
     "thermometer off": lambda c: _with(c, temperature_c=c["temperature_c"] + 3.0),
     "noise doubled": lambda c: _with(c, rate_dph=c["rate_dph"] + 5e-3 * np.sin(1e3 * c["time_s"] ** 1.1)),
@@ -376,9 +360,7 @@ def _events(s: Steps) -> None:
     s.run("check", "step", "--plots", "check.html", name="check with a page")
     for name in ("step", "spikes"):
         s.run("diagnose", name, "--json", f"{name}-found.json", name=f"diagnose: {name}")
-    s.run(
-        "diagnose", "step", "--accept-events", "--json", "accepted.json", name="diagnose without the events"
-    )
+    s.run("diagnose", "step", "--accept-events", "--json", "accepted.json", name="diagnose without the events")
 
 
 def _graded(s: Steps) -> None:

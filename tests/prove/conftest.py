@@ -22,9 +22,7 @@ _SKIPPED: set[str] = set()  # tools that are not here
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--results", type=Path, help="folder whose results/summary.json and results.md are written"
-    )
+    parser.addoption("--results", type=Path, help="folder whose results/summary.json and results.md are written")
 
 
 @pytest.fixture(scope="session")

@@ -106,9 +106,7 @@ def test_means_and_slopes_stay_within_their_bounds(numeric: str, results: Result
 
 def _steepest(model: Model) -> tuple[float, float]:
     """Largest slopes of the map on a grid, deg/h per C and per (C per block)."""
-    t, r = (
-        np.linspace(*limits, 801) for limits in (model.envelope.temperature_c, model.envelope.slope_c_per_min)
-    )
+    t, r = (np.linspace(*limits, 801) for limits in (model.envelope.temperature_c, model.envelope.slope_c_per_min))
     bias = model.map_dph(*np.meshgrid(t, r, indexing="ij"))
     per_block = model.block_s / 60.0
     return (

@@ -73,9 +73,7 @@ PARTS = {
     "map of any table": Part("map", precision=7, contracts=_RELATED, checks=1, shape=(1, "warm_up")),
     "map of any bank": Part("map", precision=7, contracts=_RELATED, checks=1, left=3, shape=(2, "warm_up")),
     "terms of any table": Part("terms", precision=7, contracts=_TERMS, checks=1, shape=(1, "warm_up")),
-    "channels of any table": Part(
-        "terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "auxiliary")
-    ),
+    "channels of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "auxiliary")),
     "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "curve")),
     "learning in service": Part(
         "learn",
@@ -133,9 +131,7 @@ def _model(name: str) -> Model:
 
 
 @pytest.mark.parametrize("machine", ["gcc_x86_64", "gcc_x86_16"])
-@pytest.mark.parametrize(
-    ("name", "numeric"), [(name, n) for name, part in PARTS.items() for n in part.numerics]
-)
+@pytest.mark.parametrize(("name", "numeric"), [(name, n) for name, part in PARTS.items() for n in part.numerics])
 def test_no_alarm(name: str, numeric: str, machine: str, tables: dict[str, Path], results: Results) -> None:
     part = PARTS[name]
     left = part.left if numeric == "q31" else 0
@@ -167,9 +163,7 @@ def test_no_alarm(name: str, numeric: str, machine: str, tables: dict[str, Path]
         ("learning in service", "f32", r"k > \(KNOTS - 2U\)", "k > KNOTS"),  # a knot that is none
     ],
 )
-def test_a_missing_guard_is_an_alarm(
-    part: str, numeric: str, pattern: str, replacement: str, tmp_path: Path
-) -> None:
+def test_a_missing_guard_is_an_alarm(part: str, numeric: str, pattern: str, replacement: str, tmp_path: Path) -> None:
     """The proof can fail."""
     folder = emitted(tmp_path, _model(PARTS[part].table))
     spoil(folder / "c" / "gtc.c", pattern, replacement, count=0)

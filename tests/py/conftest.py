@@ -54,9 +54,7 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
         warnings.catch_warnings(),
         mock.patch.dict(os.environ),  # --max is set for the rest of a process
     ):
-        warnings.simplefilter(
-            "ignore"
-        )  # as the program does; those of our own code fail the tests of that code
+        warnings.simplefilter("ignore")  # as the program does; those of our own code fail the tests of that code
         os.chdir(cwd or before)
         try:
             status = main.run(words)

@@ -81,9 +81,7 @@ def recorded(folder: Path) -> Dataset:
     rng = np.random.default_rng(5)
     for k in range(2):
         time_s = np.delete(np.arange(900.0), [*range(200, 203), *range(500, 540)])
-        temperature = (
-            15.0 + 10.0 * k + 20.0 * np.sin(time_s / 400.0 + k) + rng.normal(0.0, 0.003, time_s.size)
-        )
+        temperature = 15.0 + 10.0 * k + 20.0 * np.sin(time_s / 400.0 + k) + rng.normal(0.0, 0.003, time_s.size)
         temperature[300 + k] += 25.0
         columns = {
             "time_s": time_s,

@@ -80,9 +80,7 @@ def mat_packed(path: Path) -> None:
 
 def parquet_packed(path: Path) -> None:
     zeros = np.zeros(_GIANT)
-    pq.write_table(
-        pa.table({"time_s": zeros, "temperature_c": zeros, "rate_dph": zeros}), path, compression="zstd"
-    )
+    pq.write_table(pa.table({"time_s": zeros, "temperature_c": zeros, "rate_dph": zeros}), path, compression="zstd")
 
 
 def csv_long_name(path: Path) -> None:

@@ -40,9 +40,7 @@ def mat_73(path: Path, t: Truth) -> None:
             one = file.create_dataset(name, data=values[None, :])
             one.attrs["MATLAB_class"] = np.bytes_("double")
     with path.open("r+b") as raw:
-        raw.write(
-            b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Sun Mar 1 08:00:00 2026 HDF5 schema 1.00 ."
-        )
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Sun Mar 1 08:00:00 2026 HDF5 schema 1.00 .")
 
 
 def hdf5_attributes(path: Path, t: Truth) -> None:
@@ -82,9 +80,7 @@ def parquet_stamps(path: Path, t: Truth) -> None:
 def parquet_names(path: Path, t: Truth) -> None:
     axes = {f"gyro_{a}_rad_s": np.radians(t.rate_dps[:, k]) for k, a in enumerate("xyz")}
     pq.write_table(
-        pa.table(
-            {"timestamp_us": np.round(t.time_s * 1e6).astype(np.int64), "imu_temp_c": t.temperature_c} | axes
-        ),
+        pa.table({"timestamp_us": np.round(t.time_s * 1e6).astype(np.int64), "imu_temp_c": t.temperature_c} | axes),
         path,
     )
 
@@ -103,9 +99,7 @@ def tdms_waveform(path: Path, t: Truth) -> None:
 
 
 def tdms_stamps(path: Path, t: Truth) -> None:
-    stamps = np.datetime64(START.replace(tzinfo=None), "us") + np.round(t.time_s * 1e6).astype(
-        "timedelta64[us]"
-    )
+    stamps = np.datetime64(START.replace(tzinfo=None), "us") + np.round(t.time_s * 1e6).astype("timedelta64[us]")
     _tdms(
         path,
         {
@@ -133,9 +127,7 @@ def px4(path: Path, t: Truth) -> None:
     fields = "uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;"
     fields += "float x;float y;float z;float temperature;"
     rows = zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True)
-    data = [
-        struct.pack("<HQQI4f", 0, round(s * 1e6) + 5_000_000, round(s * 1e6), 1, *r, c) for s, r, c in rows
-    ]
+    data = [struct.pack("<HQQI4f", 0, round(s * 1e6) + 5_000_000, round(s * 1e6), 1, *r, c) for s, r, c in rows]
     _ulog(path, {"sensor_gyro": fields}, [(0, "sensor_gyro")], data)
 
 
@@ -156,9 +148,7 @@ def _dataflash(path: Path, formats: list[tuple[int, str, str, str]], data: list[
     out = b""
     for kind, name, form, labels in [(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), *formats]:
         length = 3 + sum(sizes[mark] for mark in form)
-        out += b"\xa3\x95\x80" + struct.pack(
-            "<BB4s16s64s", kind, length, name.encode(), form.encode(), labels.encode()
-        )
+        out += b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, length, name.encode(), form.encode(), labels.encode())
     path.write_bytes(out + b"".join(data))
 
 
@@ -166,8 +156,7 @@ def ardupilot(path: Path, t: Truth) -> None:
     labels = "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz"
     rows = zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True)
     data = [
-        b"\xa3\x95\x81"
-        + struct.pack("<QB6fIIfBBHH", round(s * 1e6), 0, *r, 0.0, 0.0, -9.8, 0, 0, c, 1, 1, 1000, 1000)
+        b"\xa3\x95\x81" + struct.pack("<QB6fIIfBBHH", round(s * 1e6), 0, *r, 0.0, 0.0, -9.8, 0, 0, c, 1, 1, 1000, 1000)
         for s, r, c in rows
     ]
     _dataflash(path, [(129, "IMU", "QBffffffIIfBBHH", labels)], data)
@@ -275,9 +264,7 @@ BINARY_CASES = [
         tolerance=1e-4,
         temperature_tolerance=1e-5,
     ),
-    Case(
-        "ROS 1 bag, temperature of another topic", "ros1.bag", ros1, axes=True, needs="rosbags", started=True
-    ),
+    Case("ROS 1 bag, temperature of another topic", "ros1.bag", ros1, axes=True, needs="rosbags", started=True),
     Case("ROS 2 bag", "ros2", ros2, axes=True, needs="rosbags", started=True),
     Case("MDF 4", "car.mf4", mdf4, needs="asammdf"),
 ]

@@ -230,9 +230,7 @@ def quoted(t: Truth) -> list[str]:
 @text()
 def missing(t: Truth) -> list[str]:
     """Readings that were lost, a header in the middle, an unfinished last line."""
-    lines = _rows(
-        t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}"
-    )
+    lines = _rows(t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}")
     head = "time_s,temp_c,rate_dph"
     return [head, *lines[:100], head, *lines[100:]]
 
@@ -296,9 +294,7 @@ CSV_CASES = [
         started=True,
     ),
     Case("ISO 8601 with Z, comments, kelvin, deg/s", "iso.csv", iso_stamps, started=True, tolerance=1e-6),
-    Case(
-        "local stamps with a zone", "local.csv", local_stamps, ("--time-zone", "Europe/Berlin"), started=True
-    ),
+    Case("local stamps with a zone", "local.csv", local_stamps, ("--time-zone", "Europe/Berlin"), started=True),
     Case(
         "date and time in two columns, AM/PM, fahrenheit",
         "us.csv",

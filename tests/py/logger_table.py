@@ -17,9 +17,7 @@ _MARKS = re.compile(r"(<!-- files -->\n).*?(<!-- /files -->)", re.DOTALL)
 
 def table() -> str:
     """The table as text."""
-    rows = "\n".join(
-        f"| {k} | {_cell(case.id)} | {_command(case)} |" for k, case in enumerate(cases(), start=1)
-    )
+    rows = "\n".join(f"| {k} | {_cell(case.id)} | {_command(case)} |" for k, case in enumerate(cases(), start=1))
     return f"| | file | command, with `--out RLG-1` |\n| ---: | --- | --- |\n{rows}\n"
 
 

@@ -104,12 +104,7 @@ class Lot:
         self._all(unit, f"rate_{axis}_dph", lambda rate: factor * rate)
 
     def _warm_up(self, unit: str, axis: str) -> None:
-        fades = (
-            self.draw.choice([-1.0, 1.0])
-            * self.draw.uniform(2.0, 4.0)
-            * _NOISE_DPH
-            * np.exp(-self.time_s / 900.0)
-        )
+        fades = self.draw.choice([-1.0, 1.0]) * self.draw.uniform(2.0, 4.0) * _NOISE_DPH * np.exp(-self.time_s / 900.0)
         self._all(unit, f"rate_{axis}_dph", lambda rate: rate + fades)
 
     def _thermometer_late(self, unit: str, _: str) -> set[str]:

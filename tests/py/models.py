@@ -16,10 +16,7 @@ def random_model(seed: int, **changes: Any) -> Model:
     r = rng.uniform(0.2, 6.0)
     n = int(rng.integers(0, 24))
     cells = int(rng.integers(1, 20)), int(rng.integers(1, 9))
-    widths = [
-        tuple(None if rng.random() < 0.1 else float(w) for w in pair)
-        for pair in rng.uniform(0.2, 3.0, (n, 2))
-    ]
+    widths = [tuple(None if rng.random() < 0.1 else float(w) for w in pair) for pair in rng.uniform(0.2, 3.0, (n, 2))]
     values: dict[str, Any] = {
         "serial": f"RLG-{seed}",
         "axis": None,
@@ -31,16 +28,12 @@ def random_model(seed: int, **changes: Any) -> Model:
         "envelope": Envelope(temperature_c=(t0, t1), slope_c_per_min=(-r, r)),
         "coverage": None
         if rng.random() < 0.2
-        else Coverage(
-            cells=cells, rows=tuple("".join(row) for row in rng.choice(["0", "1"], (cells[1], cells[0])))
-        ),
+        else Coverage(cells=cells, rows=tuple("".join(row) for row in rng.choice(["0", "1"], (cells[1], cells[0])))),
         "networks": (
             Network(
                 w0=float(rng.normal(0.0, 0.01)),
                 linear=(float(rng.normal(0.0, 0.01)), float(rng.normal(0.0, 0.01))),
-                centers=tuple(
-                    zip(rng.uniform(t0, t1, n).tolist(), rng.uniform(-r, r, n).tolist(), strict=True)
-                ),
+                centers=tuple(zip(rng.uniform(t0, t1, n).tolist(), rng.uniform(-r, r, n).tolist(), strict=True)),
                 widths=tuple(widths),
                 weights=tuple(rng.normal(0.0, 0.01, n).tolist()),
             ),
@@ -105,9 +98,7 @@ def random_stand_in(seed: int, size: float) -> Network:
     return Network(
         w0=float(rng.normal(0.0, size)),
         linear=(float(rng.normal(0.0, size)), float(rng.normal(0.0, size))),
-        centers=tuple(
-            zip(rng.uniform(-40.0, 60.0, n).tolist(), rng.uniform(-3.0, 3.0, n).tolist(), strict=True)
-        ),
+        centers=tuple(zip(rng.uniform(-40.0, 60.0, n).tolist(), rng.uniform(-3.0, 3.0, n).tolist(), strict=True)),
         widths=tuple((float(w), None if rng.random() < 0.3 else 1.0) for w in rng.uniform(0.4, 3.0, n)),
         weights=tuple(rng.normal(0.0, size, n).tolist()),
     )
@@ -159,9 +150,7 @@ def _of_channel(term: Term, rng: np.random.Generator) -> Term:
     if term.channel is None or kind == 0:
         return term
     if kind == 1:
-        return Term(
-            id="auxiliary_curve", parameters=_random_curve(rng), channel=term.channel, stand_in=term.stand_in
-        )
+        return Term(id="auxiliary_curve", parameters=_random_curve(rng), channel=term.channel, stand_in=term.stand_in)
     growth = {"slope_dph_per_unit_per_c": float(rng.normal(0.0, 1e-4))}
     middle = {"reference_c": float(rng.uniform(-40.0, 60.0))}
     parameters = term.parameters | growth | middle
@@ -243,9 +232,7 @@ def random_channels(model: Model, seed: int, rows: int) -> np.ndarray:
     return channels
 
 
-def random_history(
-    model: Model, seed: int, rows: int, samples_per_block: int
-) -> tuple[np.ndarray, np.ndarray]:
+def random_history(model: Model, seed: int, rows: int, samples_per_block: int) -> tuple[np.ndarray, np.ndarray]:
     """Temperatures with every fault there is, and the samples missed before each: shapes (n,), (n,)."""
     rng = np.random.default_rng(seed)
     low, high = model.envelope.temperature_c

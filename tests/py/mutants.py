@@ -144,9 +144,7 @@ def _collected(process: subprocess.Popen[str], counts: Counter[str]) -> int | No
     status = process.wait()
     if status == 0:
         return None
-    print(
-        f"mutant {at} of {name}: the worker ended with status {status} (-27: {SECONDS} s of work, -14: {WAITING} s)"
-    )
+    print(f"mutant {at} of {name}: the worker ended with status {status} (-27: {SECONDS} s of work, -14: {WAITING} s)")
     counts[f"{name} killed"] += 1
     if not shown:
         raise SystemExit(f"a worker did not start, status {status}")

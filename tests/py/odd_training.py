@@ -17,9 +17,7 @@ def odd_samples(seed: int) -> TrainingData:
     runs = int(rng.choice([1, 1, 1, 2, 3, 4, 7]))
     block_s = float(rng.choice([0.001, 0.1, 1.0, 10.0, 10.0, 50.0, 300.0]))
     span_c = float(rng.choice([0.01, 1.9, 2.1, 8.0, 40.0, 100.0]))
-    scale = (
-        float(10.0 ** rng.uniform(-9.0, 9.0)) if rng.random() < 0.5 else float(10.0 ** rng.uniform(-3.0, 4.0))
-    )
+    scale = float(10.0 ** rng.uniform(-9.0, 9.0)) if rng.random() < 0.5 else float(10.0 ** rng.uniform(-3.0, 4.0))
     shape = rng.normal(0.0, 1.0, 5)
     noise = float(rng.choice([0.0, 1e-6, 1e-3, 0.1, 1.0]))
     lowest_c = rng.uniform(-20.0, 30.0 - 0.5 * span_c)

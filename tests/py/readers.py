@@ -258,9 +258,7 @@ def _recording(folder: Path, name: str) -> Callable[[bytes], None]:
         (work / name).write_bytes(data)
         if b"pulses" in data[:100]:
             run = f'file = "{name}"'
-            (work / "dataset.toml").write_text(
-                toml(run, head='schema = 1\nserial = "A"\npulse_weight_arcsec = 0.1')
-            )
+            (work / "dataset.toml").write_text(toml(run, head='schema = 1\nserial = "A"\npulse_weight_arcsec = 0.1'))
         _used(work, "y" if b"rate_y_dph" in data[:100] else None)
 
     return read
@@ -403,9 +401,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         records = records_of(load(seeds / "data"), "train", block_s=600.0, average_s=600.0)
         bank = build(records, 0)
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
-        small = {
-            k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1
-        }
+        small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
         path.write_bytes(kept._packed("a.bank", signature_bank._content(replace(bank, **small))))
     return path.read_bytes()
 

@@ -51,9 +51,7 @@ def write_parquet(path: Path, table: Mapping[str, NDArray[np.float64]] | None = 
     pq.write_table(pa.table(dict(columns() if table is None else table)), path, row_group_size=50)
 
 
-def toml(
-    *runs: str, head: str = 'schema = 1\nserial = "RLG-0042"\nearth_rate = "removed"', tail: str = ""
-) -> str:
+def toml(*runs: str, head: str = 'schema = 1\nserial = "RLG-0042"\nearth_rate = "removed"', tail: str = "") -> str:
     """A description; each run is the lines of one [[run]]."""
     return "\n".join([head, *(f"[[run]]\n{run}" for run in runs), tail, ""])
 
@@ -187,9 +185,7 @@ REFUSED: dict[str, Refused] = {
         ("a.csv, line 2, column temperature_c", "(and 119 more lines)", "-90 ... 200 C", "kelvin?"),
     ),
     "too cold": Refused(line(7, "50.0,-95,20.0"), ("a.csv, line 7, column temperature_c", "-95", "-90")),
-    "implausible rate": Refused(
-        line(7, "50.0,20.1,8e6"), ("a.csv, line 7, column rate_dph", "8000000", "7.5e+06")
-    ),
+    "implausible rate": Refused(line(7, "50.0,20.1,8e6"), ("a.csv, line 7, column rate_dph", "8000000", "7.5e+06")),
     "semicolons": Refused(
         with_text(lambda lines: [text.replace(",", ";").replace(".", ",") for text in lines]),
         ("a.csv, line 1", "semicolons", "commas", "points"),
@@ -212,18 +208,14 @@ REFUSED: dict[str, Refused] = {
     "half pulses": Refused(
         lambda folder: (
             write_csv(folder / "a.csv", columns_of_pulses() | {"pulses": np.full(ROWS, 0.5)}),
-            (folder / "dataset.toml").write_text(
-                toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")
-            ),
+            (folder / "dataset.toml").write_text(toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")),
         ),
         ("a.csv, line 2, column pulses", "0.5 (and 119 more lines)", "whole counts"),
     ),
     "pulses too heavy": Refused(
         lambda folder: (
             write_csv(folder / "a.csv", columns_of_pulses()),
-            (folder / "dataset.toml").write_text(
-                toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1e6")
-            ),
+            (folder / "dataset.toml").write_text(toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1e6")),
         ),
         ("a.csv, line 3, column pulses", "-7.5e+06 ... 7.5e+06 deg/h"),
     ),
@@ -246,13 +238,9 @@ REFUSED: dict[str, Refused] = {
         ("a.parquet", "0 rows with a temperature and a rate", "at least 10"),
     ),
     # dataset.toml
-    "broken TOML": Refused(
-        description(head='schema = 1\nserial = "RLG'), ("dataset.toml", "no TOML", "line 2")
-    ),
+    "broken TOML": Refused(description(head='schema = 1\nserial = "RLG'), ("dataset.toml", "no TOML", "line 2")),
     "missing schema": Refused(description(head='serial = "A"'), ("dataset.toml, field schema", "missing")),
-    "unknown schema": Refused(
-        description(head='schema = 2\nserial = "A"'), ("dataset.toml, field schema", "2", "1")
-    ),
+    "unknown schema": Refused(description(head='schema = 2\nserial = "A"'), ("dataset.toml, field schema", "2", "1")),
     "missing serial": Refused(description(head="schema = 1"), ("dataset.toml, field serial", "missing")),
     "serial as path": Refused(
         description(head='schema = 1\nserial = "../RLG"'), ("dataset.toml, field serial", "'../RLG'")
@@ -265,9 +253,7 @@ REFUSED: dict[str, Refused] = {
         description(head=f'schema = 1\nserial = "{"R" * 65}"'), ("dataset.toml, field serial", "1 to 64")
     ),
     "serial no text": Refused(description(head="schema = 1\nserial = 42"), ("field serial", "42", "string")),
-    "unknown key": Refused(
-        description(head=HEAD + "\nserail = 1"), ("dataset.toml, field serail", "not known")
-    ),
+    "unknown key": Refused(description(head=HEAD + "\nserail = 1"), ("dataset.toml, field serail", "not known")),
     "unknown key of a run": Refused(
         description(RUN + '\nrol = "train"'), ("dataset.toml, run 1 (run-01.csv), field rol", "not known")
     ),
@@ -284,9 +270,7 @@ REFUSED: dict[str, Refused] = {
         lambda folder: _only_toml(folder, HEAD + "\nrun = []"),
         ("dataset.toml, field run", "is empty", "at least one [[run]]"),
     ),
-    "no training run": Refused(
-        description(RUN + '\nrole = "exam"'), ("dataset.toml", "no run has the role train")
-    ),
+    "no training run": Refused(description(RUN + '\nrole = "exam"'), ("dataset.toml", "no run has the role train")),
     "file missing": Refused(description('file = "run-02.csv"'), ("run-02.csv", "does not exist")),
     "file is a folder": Refused(
         lambda folder: (described(folder, 'file = "b.csv"'), (folder / "b.csv").mkdir()),
@@ -298,9 +282,7 @@ REFUSED: dict[str, Refused] = {
     ),
     "absolute file": Refused(description('file = "/tmp/run-01.csv"'), ("field file", "inside the folder")),
     "unknown kind of file": Refused(description('file = "run-01.xls"'), (".csv or .parquet",)),
-    "same file twice": Refused(
-        description(RUN, RUN), ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1")
-    ),
+    "same file twice": Refused(description(RUN, RUN), ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1")),
     "same file in two spellings": Refused(
         description(RUN, 'file = "./run-01.csv"'),
         ("dataset.toml, run 2 (run-01.csv)", "overlaps that of run 1"),
@@ -342,16 +324,12 @@ REFUSED: dict[str, Refused] = {
     "negative noise": Refused(
         description(head=HEAD, tail="[noise]\narw_deg_per_sqrt_h = -1.0"), ("field noise.arw_deg_per_sqrt_h",)
     ),
-    "pulse weight zero": Refused(
-        description(head=HEAD + "\npulse_weight_arcsec = 0.0"), ("pulse_weight_arcsec",)
-    ),
+    "pulse weight zero": Refused(description(head=HEAD + "\npulse_weight_arcsec = 0.0"), ("pulse_weight_arcsec",)),
     "temperature late by days": Refused(
         description(head=HEAD + "\ntemperature_late_s = 86400.0"), ("temperature_late_s", "3600")
     ),
     "compute without latitude": Refused(
-        description(
-            RUN + "\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0", head=HEAD + '\nearth_rate = "compute"'
-        ),
+        description(RUN + "\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0", head=HEAD + '\nearth_rate = "compute"'),
         ("field latitude_deg", "missing"),
     ),
     "compute without axis": Refused(
@@ -400,14 +378,10 @@ ACCEPTED: dict[str, Callable[[Path], object]] = {
     "no final newline": with_bytes(lambda data: data.rstrip(b"\n")),
     "empty lines": with_text(lambda lines: [*lines[:9], "", *lines[9:], ""]),
     "one constant temperature": with_columns(lambda c: c | {"temperature_c": np.full(ROWS, 25.0)}),
-    "whole numbers": with_text(
-        lambda lines: [lines[0], *(f"{k},{20 + k // 9},{k % 7}" for k in range(ROWS))]
-    ),
+    "whole numbers": with_text(lambda lines: [lines[0], *(f"{k},{20 + k // 9},{k % 7}" for k in range(ROWS))]),
     "time that starts late": with_columns(lambda c: c | {"time_s": c["time_s"] + 86400.0}),
     "time before zero": with_columns(lambda c: c | {"time_s": c["time_s"] - 3600.0}),
-    "uneven rows": with_columns(
-        lambda c: c | {"time_s": c["time_s"] + np.r_[np.zeros(60), np.full(60, 77.0)]}
-    ),
+    "uneven rows": with_columns(lambda c: c | {"time_s": c["time_s"] + np.r_[np.zeros(60), np.full(60, 77.0)]}),
     "Parquet": lambda folder: write_parquet(folder / "a.parquet"),
     "unfinished last line": _unfinished,
     "several runs": description(
@@ -428,9 +402,7 @@ ACCEPTED: dict[str, Callable[[Path], object]] = {
             folder / "a.csv",
             columns_of_pulses(),
         ),
-        (folder / "dataset.toml").write_text(
-            toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")
-        ),
+        (folder / "dataset.toml").write_text(toml('file = "a.csv"', head=HEAD + "\npulse_weight_arcsec = 1.0")),
     ),
     "computed earth rate": description(
         RUN + "\naxis_azimuth_deg = 90.0\naxis_elevation_deg = 0",

@@ -40,10 +40,7 @@ class Verdict:
 
 def models(n: int = TABLES) -> list[Model]:
     """Tables with few and many centers, every other one with terms."""
-    return [
-        random_model(seed, serial=f"ST-{seed}", terms=random_terms(seed) if seed % 2 else ())
-        for seed in range(n)
-    ]
+    return [random_model(seed, serial=f"ST-{seed}", terms=random_terms(seed) if seed % 2 else ()) for seed in range(n)]
 
 
 def write_sources(folder: Path, n: int = TABLES) -> list[Path]:

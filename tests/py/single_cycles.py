@@ -23,9 +23,7 @@ def clean_cycle(folder: Path, seed: int, noise: float) -> Records:
     start = float(rng.uniform(10.0, 30.0)) if rng.uniform() < 0.5 else turns[1]
     legs = [*turns, start][: int(rng.integers(1, 4))]
     rates = np.exp(rng.uniform(np.log(0.7), np.log(5.0), len(legs)))
-    steps = ", ".join(
-        f"{{ramp_to_c = {t:.1f}, c_per_min = {r:.2f}}}" for t, r in zip(legs, rates, strict=True)
-    )
+    steps = ", ".join(f"{{ramp_to_c = {t:.1f}, c_per_min = {r:.2f}}}" for t, r in zip(legs, rates, strict=True))
     minutes = _minutes(start, legs, rates) + float(rng.uniform(0.0, 20.0))
     scenario = folder / f"cycle-{seed}.toml"
     scenario.write_text(

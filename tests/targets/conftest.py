@@ -23,9 +23,7 @@ _FOUND = Results()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--results", type=Path, help="folder whose results/summary.json and results.md are written"
-    )
+    parser.addoption("--results", type=Path, help="folder whose results/summary.json and results.md are written")
 
 
 @pytest.fixture(scope="session")

@@ -91,9 +91,7 @@ def _function_tables(targets: Sequence[dict[str, Any]]) -> list[str]:
 def quoted(result: dict[str, Any]) -> dict[str, Any]:
     """What the page says: of every model its totals, of the golden one each target."""
     golden = [_quoted_target(t) for t in result["models"][0]["targets"]]
-    controls = [
-        {k: c[k] for k in ("control", "name", "numeric", "vectors", "mismatches")} for c in result["controls"]
-    ]
+    controls = [{k: c[k] for k in ("control", "name", "numeric", "vectors", "mismatches")} for c in result["controls"]]
     kept = {name: result[name] for name in ("schema", "machine", "nav_loop")}
     return kept | {"models": [_totals(m) for m in result["models"]], "targets": golden, "controls": controls}
 

@@ -43,9 +43,7 @@ def right(sources: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Verd
     return verdict
 
 
-def _reported(
-    results: Results, build: str, flags: tuple[str, ...], right: Verdict, verdict: Verdict | None
-) -> None:
+def _reported(results: Results, build: str, flags: tuple[str, ...], right: Verdict, verdict: Verdict | None) -> None:
     """A row of docs/results.md; None: it does not compile."""
     row: dict[str, object] = {"build": build, "flags": " ".join(flags), "differ": None}
     if verdict is not None:
@@ -94,9 +92,7 @@ def test_fast_math_by_name_does_not_compile(
 def test_builds_of_targets(
     name: str, flags: tuple[str, ...], sources: list[Path], right: Verdict, tmp_path: Path, results: Results
 ) -> None:
-    verdict = on_target(
-        with_flags(name), ("-std=c99", "-ffp-contract=off", *flags), sources, tmp_path / "build"
-    )
+    verdict = on_target(with_flags(name), ("-std=c99", "-ffp-contract=off", *flags), sources, tmp_path / "build")
     _reported(results, name, flags, right, verdict)
     assert verdict.differing(right), "the control changes no result"
     assert verdict.missed(right) == []

@@ -44,9 +44,7 @@ def main() -> int:
     """Runs the checks that are named, by default all."""
     parser = argparse.ArgumentParser(prog="tools/promises", description=__doc__.splitlines()[0])
     parser.add_argument("checks", nargs="*", metavar="CHECK", help=f"of {', '.join(CHECKS)}; default: all")
-    parser.add_argument(
-        "--root", type=Path, default=Path(__file__).resolve().parents[2], help="the source tree"
-    )
+    parser.add_argument("--root", type=Path, default=Path(__file__).resolve().parents[2], help="the source tree")
     arguments = parser.parse_args()
     unknown = set(arguments.checks) - set(CHECKS)
     if unknown:

@@ -58,10 +58,7 @@ _LINE = re.compile(r"(?<=<!-- older -->\n).*?(?=<!-- /older -->)", re.DOTALL)
 def _python(text: str) -> str:
     tree = ast.parse(text)
     for node in ast.walk(tree):
-        if (
-            isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
-            and ast.get_docstring(node) is not None
-        ):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
             node.body = node.body[1:] or [ast.Pass()]
     return ast.unparse(tree)
 

@@ -45,11 +45,7 @@ def _python(text: str) -> Iterator[tuple[str, int, bool]]:
     lines = text.splitlines()
     body = ast.parse(text).body
     for node, after in zip(body, [*body[1:], None], strict=True):
-        if (
-            not isinstance(node, ast.Assign | ast.AnnAssign)
-            or node.value is None
-            or not _is_number(node.value)
-        ):
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None or not _is_number(node.value):
             continue
         name = _name(node.targets[0] if isinstance(node, ast.Assign) else node.target)
         if name:
@@ -84,11 +80,7 @@ def _is_number(value: ast.expr) -> bool:
 
 
 def _is_text(node: ast.stmt | None) -> bool:
-    return (
-        isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
-    )
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
 def _headed(lines: list[str], at: int) -> bool:

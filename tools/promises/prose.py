@@ -49,9 +49,7 @@ _WORD = re.compile(r"[A-Za-z]+(?:-[A-Za-z]+)*")
 
 def pages(root: Path) -> list[Path]:
     """Pages for readers; the change log and decisions are records."""
-    return sorted(
-        [*root.glob("docs/*.md"), *(root / n for n in ("README.md", "CONTRIBUTING.md", "SECURITY.md"))]
-    )
+    return sorted([*root.glob("docs/*.md"), *(root / n for n in ("README.md", "CONTRIBUTING.md", "SECURITY.md"))])
 
 
 def sources(root: Path) -> list[Path]:
@@ -126,9 +124,7 @@ def long_sentences(root: Path) -> Iterator[str]:
     for page in pages(root):
         text = page.read_text("utf-8")
         where = page.relative_to(root)
-        for number, (is_, should) in enumerate(
-            zip(text.splitlines(), broken(text).splitlines(), strict=False), 1
-        ):
+        for number, (is_, should) in enumerate(zip(text.splitlines(), broken(text).splitlines(), strict=False), 1):
             if is_ != should:
                 yield f"{where}:{number}: the line does not end at a sentence (python tools/promises/prose.py)"
                 break
@@ -146,9 +142,7 @@ _EXAMPLES = {"CONTRIBUTING.md"}  # names files that its reader writes
 
 def missing_files(root: Path) -> Iterator[str]:
     """Source files that a page names and the tree does not have."""
-    have = {
-        path.relative_to(root).as_posix() for path in root.rglob("*") if _SOURCE.fullmatch(f"`{path.name}`")
-    }
+    have = {path.relative_to(root).as_posix() for path in root.rglob("*") if _SOURCE.fullmatch(f"`{path.name}`")}
     for page in pages(root):
         where = page.relative_to(root).as_posix()
         for name in _SOURCE.findall(page.read_text("utf-8")) if where not in _EXAMPLES else ():

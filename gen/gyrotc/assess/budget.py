@@ -111,9 +111,7 @@ def _stated(instruments: Sequence[Instrument], quantity: str) -> tuple[float, fl
     mine = [i for i in instruments if i.quantity == quantity and i.expanded_uncertainty is not None]
     if not mine:
         return None
-    u, freedom = combined(
-        [((i.expanded_uncertainty or 0.0) / i.coverage_factor, i.degrees_of_freedom) for i in mine]
-    )
+    u, freedom = combined([((i.expanded_uncertainty or 0.0) / i.coverage_factor, i.degrees_of_freedom) for i in mine])
     certificates = ", ".join(i.certificate for i in mine if i.certificate)
     return u, freedom, ", ".join(i.name for i in mine), certificates
 

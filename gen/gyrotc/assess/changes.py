@@ -36,9 +36,7 @@ from .evaluate import evaluate
 from .limits import Limits, held_against
 
 
-def as_found(
-    earlier: Earlier, dataset: Dataset, limits: Limits | None, average_s: float
-) -> tuple[AsFound | None, str]:
+def as_found(earlier: Earlier, dataset: Dataset, limits: Limits | None, average_s: float) -> tuple[AsFound | None, str]:
     """The earlier correction on new recordings, by the reference (the same as the compiled code, bit for bit).
 
     Returns:
@@ -300,9 +298,7 @@ def _variance(model: Model, t: FloatArray, slope: FloatArray) -> FloatArray | No
     return np.asarray(rows[place[0], place[1]] ** 2)
 
 
-def _figures(
-    earlier: Earlier, model: Model, evaluation: Evaluation
-) -> Iterator[tuple[str, FigureChange | str]]:
+def _figures(earlier: Earlier, model: Model, evaluation: Evaluation) -> Iterator[tuple[str, FigureChange | str]]:
     """Figures before and after; those of recordings only where both were judged on the same kind."""
     yield "centers", FigureChange(before=earlier.model.n_centers, after=model.n_centers)
     yield "noise_floor_dph", FigureChange(before=earlier.model.noise_floor_dph, after=model.noise_floor_dph)
@@ -332,7 +328,5 @@ def _versions(old: Manifest | None, new: Manifest) -> Iterator[tuple[str, TextCh
 
 def _files(old: Manifest | None, new: Manifest) -> FileChanges:
     """Emitted files."""
-    before, after = (
-        {k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new)
-    )
+    before, after = ({k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new))
     return _changed_hashes(before, after)

@@ -252,9 +252,7 @@ class Required(_Part):
     """What must be there, and what must not."""
 
     arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
-    targets: Annotated[
-        tuple[str, ...], BeforeValidator(_as_tuple)
-    ] = ()  # bit for bit, in all their arithmetics
+    targets: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()  # bit for bit, in all their arithmetics
     no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
     # Parts of tables and runtime; what is false is left out.
@@ -300,22 +298,16 @@ class ServiceLearning(_Part):
         """
         rules = model.uncertainty_dph.rules if model.uncertainty_dph else None
         noise = self.noise_deg_per_sqrt_h or (rules.noise_deg_per_sqrt_h if rules else 0.0)
-        known = (
-            [sigma for row in model.uncertainty_dph.rows for sigma in row] if model.uncertainty_dph else [0.0]
-        )
+        known = [sigma for row in model.uncertainty_dph.rows for sigma in row] if model.uncertainty_dph else [0.0]
         table = float(np.median(known)) if self.table_dph is None else self.table_dph
         stated = {"noise_deg_per_sqrt_h": noise, "table_dph": 1.0 if self.spread else table}
         for name, value in stated.items():
             if not value > 0.0:
-                raise InputError(
-                    f"{where}, field learning.{name}", "is missing", "a number: training does not tell it"
-                )
+                raise InputError(f"{where}, field learning.{name}", "is missing", "a number: training does not tell it")
         turn_on = model.between_dph if self.turn_on_dph is None else self.turn_on_dph
         return Learning(
             spread=self.spread or data_sheet_spread(table, turn_on, self.ageing_dph_per_sqrt_month),
-            reference_c=sum(model.envelope.temperature_c) / 2.0
-            if self.reference_c is None
-            else self.reference_c,
+            reference_c=sum(model.envelope.temperature_c) / 2.0 if self.reference_c is None else self.reference_c,
             authority_dph=self.authority_dph,
             noise_deg_per_sqrt_h=noise,
             settle_s=self.settle_s,
@@ -373,9 +365,7 @@ def load_limits(path: Path) -> Limits:
     return limits
 
 
-def held_against(
-    limits: Limits, model: Model, evaluation: Evaluation, verification: Verification | None
-) -> HeldLimits:
+def held_against(limits: Limits, model: Model, evaluation: Evaluation, verification: Verification | None) -> HeldLimits:
     """Every limit with what was measured, and whether all are met."""
     checks = (
         *_amounts(limits, _measured(model, evaluation, verification), evaluation),
@@ -478,9 +468,7 @@ def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -
 def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
     for name, (low, high) in covers.model_dump(exclude_none=True).items():
         has = getattr(model.envelope, name)
-        yield _limit(
-            f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1], "range of the recordings"
-        )
+        yield _limit(f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1], "range of the recordings")
 
 
 def _needs(needs: Required, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:
@@ -492,9 +480,7 @@ def _needs(needs: Required, evaluation: Evaluation, verification: Verification |
         status = tuple(sorted({entry.status for entry in entries if entry.name == target}))
         yield _limit("needs.targets", status, target, status == ("pass",), "compared")
     if needs.generalises:
-        yield _limit(
-            "needs.generalises", evaluation.generalises, True, evaluation.generalises is True, "yes or no"
-        )
+        yield _limit("needs.generalises", evaluation.generalises, True, evaluation.generalises is True, "yes or no")
     found = tuple(finding.id for finding in evaluation.findings)
     for name in needs.no_findings:
         there = found if name == "any" else tuple(f for f in found if f == name)

@@ -39,9 +39,7 @@ class ProductGuard(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    range: Annotated[tuple[_Value, _Value], BeforeValidator(_as_tuple), AfterValidator(_ascending)] | None = (
-        None
-    )
+    range: Annotated[tuple[_Value, _Value], BeforeValidator(_as_tuple), AfterValidator(_ascending)] | None = None
     step: _Change = None  # accepted from one reading to the next ...
     rate_per_min: _Change = None  # ... and this much more a minute since the last one that was accepted
     agree_s: _Seconds = None  # how long readings must agree at start, after a jump, after a loss
@@ -78,14 +76,10 @@ def guarded(model: Model, asked: Mapping[str, ProductGuard], file: str, recorded
 
 def _of_temperature(model: Model, guard: ProductGuard, where: str) -> Guard:
     if guard.fallback is not None:
-        raise InputError(
-            f"{where}.fallback", repr(guard.fallback), "none: the constant correction comes from training"
-        )
+        raise InputError(f"{where}.fallback", repr(guard.fallback), "none: the constant correction comes from training")
     low, high = guard.range or PLAUSIBLE_C
     if not PLAUSIBLE_C[0] <= low < high <= PLAUSIBLE_C[1]:
-        raise InputError(
-            f"{where}.range", f"{low:g} to {high:g} C", "within {:g} to {:g} C".format(*PLAUSIBLE_C)
-        )
+        raise InputError(f"{where}.range", f"{low:g} to {high:g} C", "within {:g} to {:g} C".format(*PLAUSIBLE_C))
     trained = model.envelope.temperature_c
     if not low <= trained[0] <= trained[1] <= high:
         raise InputError(

@@ -48,9 +48,7 @@ def residual_test(
     lengths = tuple(x.size for x in judged if x.size)
     if not lengths or rms_dph is None or not floor_dph:
         return None
-    limit, low, high = _limits(
-        lengths, None if floor_lengths is None else tuple(n for n in floor_lengths if n > 1)
-    )
+    limit, low, high = _limits(lengths, None if floor_lengths is None else tuple(n for n in floor_lengths if n > 1))
     return ResidualTest(
         autocorrelation=_correlation(judged),
         autocorrelation_limit=limit,

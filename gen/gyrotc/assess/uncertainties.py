@@ -18,9 +18,7 @@ from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from ..results.evaluation import EvaluatedRun, FigureUncertainty
 
-_BLOCK_S = (
-    7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
-)
+_BLOCK_S = 7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
 _LEAST_BLOCKS = 8  # shorter ones where an hour would give fewer: fewer squares hardly tell a variance
 _LEAST_MEANS = 4  # in a block
 _HALF_HOUR_S, _HOUR_S, _FIRST_S = 1800.0, 3600.0, 600.0  # the names of the figures say it
@@ -53,9 +51,7 @@ def figure_uncertainties(
             freedom=None,
             method=f"extreme-value distribution of {after.size} means",
         )
-    found = {
-        name: _scaled(one, 1.0 / scale if name == "improvement" else scale) for name, one in found.items()
-    }
+    found = {name: _scaled(one, 1.0 / scale if name == "improvement" else scale) for name, one in found.items()}
     if "rms_dph" in found and floor is not None and floor[0] > 0.0:
         rms_dph = scale * float(np.sqrt(np.mean(after**2)))
         found["rms_over_floor"] = _over_floor(found["rms_dph"], rms_dph, *floor)
@@ -128,9 +124,7 @@ def _of_windows(
         ("first_10min_rms_dph", average_s),
     )
     for name, window_s in names:
-        known = [
-            (value, a) for a, run in zip(judged, runs, strict=True) if (value := getattr(run.after, name))
-        ]
+        known = [(value, a) for a, run in zip(judged, runs, strict=True) if (value := getattr(run.after, name))]
         if not known:
             continue
         value, a = max(known, key=lambda pair: pair[0])
@@ -150,9 +144,7 @@ def _scaled(one: FigureUncertainty, factor: float) -> FigureUncertainty:
     return one if factor == 1.0 else one.model_copy(update={"standard": one.standard * factor})
 
 
-def _over_floor(
-    rms: FigureUncertainty, rms_dph: float, floor_dph: float, differences: int | None
-) -> FigureUncertainty:
+def _over_floor(rms: FigureUncertainty, rms_dph: float, floor_dph: float, differences: int | None) -> FigureUncertainty:
     """Of RMS over floor, relative variances added; the floor's is 3/4n of n successive differences (von Neumann)."""
     of_floor = float(np.sqrt(0.75 / differences)) if differences else 0.0
     known = f"floor from {differences} successive differences" if differences else "floor of the simulation"

@@ -343,9 +343,7 @@ class Cause:
     record: Callable[[Scene, Values], FloatArray] | None = None
     features: Callable[[History, Values], Features] | None = None
     amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
-    mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = (
-        None
-    )
+    mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = None
     overtone: Callable[[Values, int], Values] | None = None
     unseen_s: Callable[[Values], float] | None = None
     repair: Callable[[Values], str] | None = None

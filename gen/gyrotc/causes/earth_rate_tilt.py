@@ -22,9 +22,7 @@ _REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     fixture_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     latitude = math.radians(values["latitude_deg"])
-    arcsec_per_c = (
-        math.cos(latitude) * values["twist_arcsec_per_c"] + math.sin(latitude) * values["tilt_arcsec_per_c"]
-    )
+    arcsec_per_c = math.cos(latitude) * values["twist_arcsec_per_c"] + math.sin(latitude) * values["tilt_arcsec_per_c"]
     angle = math.radians(arcsec_per_c / 3600.0) * (fixture_c - _REFERENCE_C)
     return np.asarray(EARTH_RATE_DPH * angle)
 

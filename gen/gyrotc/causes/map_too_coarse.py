@@ -12,9 +12,7 @@ from .base import Cause, Features, History, Parameter, Scene, SearchRule, Tellin
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
-    return np.asarray(
-        values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"])
-    )
+    return np.asarray(values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"]))
 
 
 def _features(history: History, values: Values) -> Features:

@@ -53,9 +53,7 @@ def _mended(
 ) -> tuple[FloatArray, FloatArray]:
     """Not a number where the temperature of that time was not recorded."""
     later = time_s + values["shift_s"]
-    true_c, true_slope = (
-        np.interp(later, time_s, x, left=np.nan, right=np.nan) for x in (temperature_c, slope)
-    )
+    true_c, true_slope = (np.interp(later, time_s, x, left=np.nan, right=np.nan) for x in (temperature_c, slope))
     return true_c, true_slope
 
 

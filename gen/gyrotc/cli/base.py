@@ -204,9 +204,7 @@ def _json_place(path: Path | None) -> Path | None:
 
 JsonOption = Annotated[
     Path | None,
-    typer.Option(
-        "--json", callback=_json_place, help="Write the machine-readable result here; -: standard output."
-    ),
+    typer.Option("--json", callback=_json_place, help="Write the machine-readable result here; -: standard output."),
 ]
 AxisOption = Annotated[
     str | None,
@@ -262,9 +260,7 @@ LotOption = Annotated[
 ]
 PriorOption = Annotated[
     Path | None,
-    typer.Option(
-        "--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."
-    ),
+    typer.Option("--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."),
 ]
 AgeingOption = Annotated[
     float | None,
@@ -434,14 +430,10 @@ def _main(
             "--max",
             metavar="NAME=VALUE",
             callback=lambda texts: set_ceilings(texts or []),
-            help="Move a ceiling of inputs, before the command; may be repeated: "
-            + ", ".join(CEILINGS)
-            + ".",
+            help="Move a ceiling of inputs, before the command; may be repeated: " + ", ".join(CEILINGS) + ".",
         ),
     ] = None,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")
-    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")] = False,
     verbose: Annotated[
         bool,
         typer.Option("--verbose", "-v", help="Print every stage with its time on stderr; also after it."),

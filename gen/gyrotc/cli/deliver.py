@@ -59,9 +59,7 @@ def export(
         GyroAxis, typer.Option("--axis-as", help="Axis of the autopilot for a gyro of one axis.")
     ] = GyroAxis.x,
     device: Annotated[int, typer.Option("--device", min=0, help="PX4: CAL_GYRO0_ID of the vehicle.")] = 0,
-    points: Annotated[
-        str, typer.Option("--points", help="Temperatures x rates of temperature of a table.")
-    ] = "61x25",
+    points: Annotated[str, typer.Option("--points", help="Temperatures x rates of temperature of a table.")] = "61x25",
     address: Annotated[
         str, typer.Option("--address", help="A2L: where the table begins in memory, e.g. 0x80040000.")
     ] = "0",
@@ -111,9 +109,7 @@ def sign(
     folder: DirArg,
     key: Annotated[
         Path | None,
-        typer.Option(
-            "--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."
-        ),
+        typer.Option("--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."),
     ] = None,
     passphrase_file: Annotated[
         Path | None,

@@ -43,23 +43,17 @@ def fleet(
     ] = None,
     wait: Annotated[
         int,
-        typer.Option(
-            "--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits."
-        ),
+        typer.Option("--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits."),
     ] = 60,
     full: Annotated[
         bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
     ] = False,
-    tag: Annotated[
-        str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")
-    ] = "",
+    tag: Annotated[str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")] = "",
     shard: Annotated[
         str | None,
         typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs."),
     ] = None,
-    gathered: Annotated[
-        bool, typer.Option("--gather", help="Only the summary of what shares have done.")
-    ] = False,
+    gathered: Annotated[bool, typer.Option("--gather", help="Only the summary of what shares have done.")] = False,
     release: Annotated[
         list[str] | None,
         typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it."),
@@ -241,9 +235,7 @@ def _tell_entry(entry: FleetEntry) -> None:
 
 @app.command()
 def lot(
-    fleet: Annotated[
-        Path, typer.Argument(help="The folder that gyrotc fleet wrote: fully calibrated units.")
-    ],
+    fleet: Annotated[Path, typer.Argument(help="The folder that gyrotc fleet wrote: fully calibrated units.")],
     out: Annotated[Path, typer.Option("--out", callback=written_place, help="File for the lot.")],
     axis: Annotated[
         str | None,

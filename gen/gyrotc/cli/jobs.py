@@ -244,12 +244,8 @@ def build(
     tell(f"report: {out / 'report.html'}")
     why = [r.evaluation.residual_words for r in results if not r.diagnosis and r.evaluation.structure_left]
     if why:
-        tell(
-            f"next, as the residual is more than noise ({why[0]}): gyrotc diagnose {shlex.quote(str(dataset))}"
-        )
-    failures = [
-        (f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures
-    ]
+        tell(f"next, as the residual is more than noise ({why[0]}): gyrotc diagnose {shlex.quote(str(dataset))}")
+    failures = [(f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures]
     if failures:
         raise CheckFailed("; ".join(failures))
 
@@ -289,9 +285,7 @@ def _print_built(result: Built) -> None:
 @with_build_options("seed", "block_s", "average_s")
 def compare(
     dataset: DatasetArg,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")] = None,
     axis: AxisOption = None,
     *,
     options: dict[str, Any],
@@ -333,9 +327,7 @@ def diagnose(
     dataset: DatasetArg,
     model: Annotated[
         Path | None,
-        typer.Option(
-            "--model", help="A model.json made before, whose method, block and number of centers are used."
-        ),
+        typer.Option("--model", help="A model.json made before, whose method, block and number of centers are used."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")

@@ -28,9 +28,7 @@ def crash_line(error: BaseException) -> str:
 
     The id follows from where the program failed, so that the same fault has the same id everywhere.
     """
-    frames = [
-        f"{Path(f.filename).name}:{f.lineno}:{f.name}" for f in traceback.extract_tb(error.__traceback__)
-    ]
+    frames = [f"{Path(f.filename).name}:{f.lineno}:{f.name}" for f in traceback.extract_tb(error.__traceback__)]
     kind = type(error).__name__
     number = hashlib.sha256(" ".join([__version__, kind, *frames]).encode()).hexdigest()[:8]
     text = "\n".join(
@@ -208,9 +206,7 @@ def run(arguments: list[str]) -> int:
         return GyrotcError.exit_status
     except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
         if isinstance(error, RuntimeError) and str(error).startswith(_LOOP):
-            print(
-                f"gyrotc: {terminal_line(str(error))}; expected a path that ends somewhere", file=sys.stderr
-            )
+            print(f"gyrotc: {terminal_line(str(error))}; expected a path that ends somewhere", file=sys.stderr)
             return GyrotcError.exit_status
         print(f"gyrotc: {crash_line(error)}", file=sys.stderr)
         return EXIT_STATUS

@@ -101,9 +101,7 @@ def _table(title: str, *columns: str) -> Table:
 
 
 def _limits(result: Plan) -> Table:
-    table = _table(
-        "What these runs will find (95 % of cases)", "cause", "limit", "unit", "over its parameter"
-    )
+    table = _table("What these runs will find (95 % of cases)", "cause", "limit", "unit", "over its parameter")
     for entry in result.limits:
         limit = entry.detection_limit
         value = "never" if limit.value is None else sci(limit.value)
@@ -144,9 +142,7 @@ def _separability(result: Plan) -> Table:
 
 def _accuracy(result: Plan) -> Table:
     title = "Predicted accuracy of the compensated bias over the whole programme"
-    table = _table(
-        title, "after run", "hours", "error of the map, deg/h", "RMS of 100 s means", "over the floor"
-    )
+    table = _table(title, "after run", "hours", "error of the map, deg/h", "RMS of 100 s means", "over the floor")
     for entry, run in zip(result.accuracy, result.runs, strict=True):
         table.add_row(
             run.profile, f"{entry.hours:g}", sci(entry.map_error_dph, 1), sci(entry.rms_dph),
@@ -189,9 +185,7 @@ def plan(
     ] = None,
     separate: Annotated[
         str | None,
-        typer.Option(
-            "--separate", help="Two causes, e.g. hysteresis,turn_on_offset: which further run parts them."
-        ),
+        typer.Option("--separate", help="Two causes, e.g. hysteresis,turn_on_offset: which further run parts them."),
     ] = None,
     add_thermometer: Annotated[
         bool, typer.Option("--add-thermometer", help="Where a further thermometer would add most.")
@@ -199,13 +193,9 @@ def plan(
     lot: LotOption = None,
     unit: Annotated[
         Path | None,
-        typer.Option(
-            "--unit", help="A result of a unit: which run to record next, by what it is known to lack."
-        ),
+        typer.Option("--unit", help="A result of a unit: which run to record next, by what it is known to lack."),
     ] = None,
-    hours: Annotated[
-        float, typer.Option("--hours", help="With --unit: no run is proposed that is longer, h.")
-    ] = 8.0,
+    hours: Annotated[float, typer.Option("--hours", help="With --unit: no run is proposed that is longer, h.")] = 8.0,
     price_per_hour: Annotated[
         float, typer.Option("--price-per-hour", help="With --unit: of the chamber, in any currency.")
     ] = 1.0,
@@ -293,9 +283,7 @@ def _next_run(
         tell(f"{out / 'programme.csv'}: set points over time")
 
 
-def _plan_with_lot(
-    scenario: str, path: Path, require: Sequence[str], out: Path | None, json_file: Path | None
-) -> None:
+def _plan_with_lot(scenario: str, path: Path, require: Sequence[str], out: Path | None, json_file: Path | None) -> None:
     """`gyrotc plan --lot`: the shortest chamber programme of an accuracy, as a file and in words."""
     from ..lot.job import load_lot
     from ..lot.planning import plan_with_lot, programme_csv, programme_text

@@ -49,9 +49,7 @@ def import_(
     ] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option(
-            "--column", help="What a column is, e.g. rate=G1, temperature=T2, time=t; may be repeated."
-        ),
+        typer.Option("--column", help="What a column is, e.g. rate=G1, temperature=T2, time=t; may be repeated."),
     ] = None,
     table: Annotated[
         str | None, typer.Option("--table", help="Which of several tables (topics, groups) of a file.")
@@ -77,9 +75,7 @@ def import_(
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the runs.")] = RunFormat.parquet,
     pulse_weight: Annotated[
         float | None,
-        typer.Option(
-            "--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."
-        ),
+        typer.Option("--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."),
     ] = None,
     exam: Annotated[
         bool | None,
@@ -89,9 +85,7 @@ def import_(
         ),
     ] = None,
     trust_units: TrustUnitsOption = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only show how the files would be read.")
-    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show how the files would be read.")] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Make a data set of files of loggers: CSV, Excel, Parquet, NumPy, MATLAB, HDF5, NetCDF, TDMS, PX4, ROS, MDF, ...
@@ -154,9 +148,7 @@ def _csv(stated: list[str], known: dict[str, Any]) -> dict[str, Any]:
         if key not in known or not value:
             raise InputError("--csv", repr(one), f"KEY=VALUE with KEY one of {', '.join(known)}")
         many = key in ("missing", "comment")
-        keys[key] = (
-            (*keys.get(key, known[key]), value) if many else int(value) if value.isdecimal() else value
-        )
+        keys[key] = (*keys.get(key, known[key]), value) if many else int(value) if value.isdecimal() else value
     return keys
 
 
@@ -176,17 +168,13 @@ def simulate(
     out: OutOption,
     seed: SeedOption = 1,
     row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
-    raw_hz: Annotated[
-        float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")
-    ] = None,
+    raw_hz: Annotated[float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")] = None,
     pulses: Annotated[bool, typer.Option("--pulses", help="Write integer pulses instead of a rate.")] = False,
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the files.")] = RunFormat.csv,
     noise: Annotated[
         NoiseLevel, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
     ] = NoiseLevel.paper,
-    units: Annotated[
-        int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")
-    ] = None,
+    units: Annotated[int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")] = None,
     family: Annotated[
         float | None,
         typer.Option("--family", help="Of a lot: how much units share, 0 (nothing) ... 1; default 0.9."),
@@ -274,9 +262,7 @@ def check(
     ] = None,
     plots: Annotated[
         Path | None,
-        typer.Option(
-            "--plots", callback=written_place, help="Write a page with a picture of every finding here."
-        ),
+        typer.Option("--plots", callback=written_place, help="Write a page with a picture of every finding here."),
     ] = None,
     display: DisplayOption = None,
     json_file: JsonOption = None,

@@ -52,9 +52,7 @@ def training_lines(training: Training) -> Iterator[str]:
                 yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
     if training.candidates:
         yield f"correction {training.method}: {training.reason}"
-        tried = (
-            f"{r.id} {sci(r.left_out_rms_dph)}" for r in training.candidates if r.left_out_rms_dph is not None
-        )
+        tried = (f"{r.id} {sci(r.left_out_rms_dph)}" for r in training.candidates if r.left_out_rms_dph is not None)
         yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
     yield from _channel_lines(training)
     yield from _lot_lines(training)

@@ -14,9 +14,7 @@ from .words import Shell
 
 @app.command()
 def schema(
-    name: Annotated[
-        str | None, typer.Argument(help="A result, e.g. limits; without it all, by name.")
-    ] = None,
+    name: Annotated[str | None, typer.Argument(help="A result, e.g. limits; without it all, by name.")] = None,
     table: Annotated[
         bool, typer.Option("--table", help="Fields, types and what they mean, as tables in Markdown.")
     ] = False,

@@ -46,9 +46,7 @@ from .results import evaluation_table, file_notes, prediction_line, training_lin
 
 
 @contextmanager
-def evaluation_folders(
-    folder: Path, trace: Path | None, recordings: Path
-) -> Iterator[tuple[Path, Path | None]]:
+def evaluation_folders(folder: Path, trace: Path | None, recordings: Path) -> Iterator[tuple[Path, Path | None]]:
     """Where to write `evaluate.json` and the traces, so that both take their places when the block ends well.
 
     Args:

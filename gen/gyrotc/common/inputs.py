@@ -282,9 +282,7 @@ def refused(error: ValidationError, place: Callable[[str], str]) -> InputError:
         return InputError(where, "is missing")
     if first["type"] == "extra_forbidden":
         return InputError(where, "is not known")
-    return InputError(
-        where, _short(first["input"]), re.sub("^(Input should be|Value error,) ", "", first["msg"])
-    )
+    return InputError(where, _short(first["input"]), re.sub("^(Input should be|Value error,) ", "", first["msg"]))
 
 
 def _decoded(data: bytes, where: str, expected: str) -> str:

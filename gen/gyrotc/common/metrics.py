@@ -114,9 +114,7 @@ def _farthest(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple
     prefix, below, ranks = 0, 0, None
     for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):
 
-        def digits(
-            shift: int = shift, prefix: int = prefix
-        ) -> Iterable[tuple[FloatArray, NDArray[np.int64]]]:
+        def digits(shift: int = shift, prefix: int = prefix) -> Iterable[tuple[FloatArray, NDArray[np.int64]]]:
             for part in parts():
                 known = np.ascontiguousarray(part).view(np.int64) >> shift
                 mine = (known >> _DIGIT_BITS) == prefix

@@ -99,9 +99,7 @@ def c_environment() -> jinja2.Environment:
     import jinja2
 
     def only_c(value: Any) -> Any:
-        return (
-            value if isinstance(value, jinja2.Undefined) else _only_c(value)
-        )  # jinja2 says which name it is
+        return value if isinstance(value, jinja2.Undefined) else _only_c(value)  # jinja2 says which name it is
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("gyrotc", "tables/templates"),
@@ -279,9 +277,7 @@ def file_stem(text: str) -> str:
 
 def terminal_text(text: str) -> str:
     """Text that is shown as it is: nothing in it moves a cursor, colours, or turns the direction of writing."""
-    return (
-        text if text.isprintable() else _shown(text, lambda char, _: char.isprintable() or char in "\n\t\xa0")
-    )
+    return text if text.isprintable() else _shown(text, lambda char, _: char.isprintable() or char in "\n\t\xa0")
 
 
 def terminal_line(text: str) -> str:

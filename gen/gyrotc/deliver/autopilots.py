@@ -71,9 +71,7 @@ def best_cubic(model: Model, autopilot: Autopilot) -> Cubic:
     low, high = (np.float32(edge) for edge in model.envelope.temperature_c)
     middle = (high + low) * np.float32(0.5)
     if autopilot == "ardupilot" and middle <= 0:
-        raise CheckFailed(
-            f"ArduPilot corrects nothing where the middle of the range is not above 0 C: {middle:.1f} C"
-        )
+        raise CheckFailed(f"ArduPilot corrects nothing where the middle of the range is not above 0 C: {middle:.1f} C")
     d = (t.astype(np.float32) - middle).astype(np.float64)
     unit = np.array([1.0, *([1.0 if autopilot == "px4" else float(_SCALE)] * (_ORDERS - 1))])
     columns = d[:, None] ** np.arange(_ORDERS) * unit

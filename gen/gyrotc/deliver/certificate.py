@@ -119,9 +119,7 @@ def certificate_page(
     """
     template = page_environment().get_template("certificate.html.j2")
     rows = [rows_of(unit) for unit in units]
-    return template.render(
-        units=units, rows=rows, pictures=pictures, facts=facts, missing=missing, accepted=accepted
-    )
+    return template.render(units=units, rows=rows, pictures=pictures, facts=facts, missing=missing, accepted=accepted)
 
 
 def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
@@ -328,9 +326,7 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
     if manifest is None:
         return
     if manifest.model_hash != unit.model.hash:
-        raise InputError(
-            str(folder / "manifest.json"), "is of another model", "a folder as gyrotc build left it"
-        )
+        raise InputError(str(folder / "manifest.json"), "is of another model", "a folder as gyrotc build left it")
     marker = read_marker(folder)
     left_out = marker.left_out if marker is not None else {}  # the model gives them; no fleet keeps them
     for name, known in manifest.files.items():

@@ -198,18 +198,14 @@ def _binary(sources: Mapping[str, bytes]) -> tuple[bytes, str]:
     with scratch_folder() as work:
         for name, data in sources.items():
             write_own(work / name, data)
-        compile_c(
-            shared, [work / name for name in sources if name.endswith(".c")], work / "fmu.so", include=work
-        )
+        compile_c(shared, [work / name for name in sources if name.endswith(".c")], work / "fmu.so", include=work)
         return (work / "fmu.so").read_bytes(), f"binary for {_here()}, and the sources"
 
 
 def _build_description(name: str, sources: Mapping[str, bytes]) -> bytes:
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     options = {"language": "C99", "compilerOptions": "-ffp-contract=off"}
-    files = SubElement(
-        SubElement(root, "BuildConfiguration", {"modelIdentifier": name}), "SourceFileSet", options
-    )
+    files = SubElement(SubElement(root, "BuildConfiguration", {"modelIdentifier": name}), "SourceFileSet", options)
     for file in (file for file in sources if file.endswith(".c")):
         SubElement(files, "SourceFile", {"name": file})
     return _xml(root)

@@ -194,9 +194,7 @@ def a2l_text(grids: Sequence[MapGrid], notes: Sequence[str], address: int) -> st
     )  # fmt: skip
     for grid in grids:
         text += "".join(_objects(grid, address))
-        address += _BYTES * (
-            grid.temperature_c.size * (grid.slope_c_per_min.size + 2) + grid.slope_c_per_min.size
-        )
+        address += _BYTES * (grid.temperature_c.size * (grid.slope_c_per_min.size + 2) + grid.slope_c_per_min.size)
     if address > _MEMORY:
         raise InputError("--address", "the map ends beyond 0xFFFFFFFF", "a smaller address")
     return text + _TAIL

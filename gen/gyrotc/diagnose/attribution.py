@@ -247,9 +247,7 @@ def choose(search: Search, count: int) -> tuple[Refined, ...]:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
         pair = weigher.preferred(pairs)
         best = pair if pair.criterion(gains.size) > best.criterion(gains.size) else best
-    chosen = sorted(
-        best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0)
-    )
+    chosen = sorted(best.members, key=lambda m: -max((p.gain for p in points if p.members[0] == m), default=0.0))
     return refine(search, gains, tuple(chosen)) if best.criterion(gains.size) > 0.0 else ()
 
 

@@ -88,9 +88,7 @@ class Records:
         ends = np.cumsum([k.size for k in self.kept])
         return [slice(int(e - k.size), int(e)) for e, k in zip(ends, self.kept, strict=True)]
 
-    def average_run(
-        self, number: int, rows: FloatArray, weight: NDArray[np.bool_] | None = None
-    ) -> FloatArray:
+    def average_run(self, number: int, rows: FloatArray, weight: NDArray[np.bool_] | None = None) -> FloatArray:
         """Block means of one run's rows, shape (n,) or (n, k); `weight` leaves rows out (default: `usable`)."""
         use = self.runs[number].usable if weight is None else weight
         index, kept = self.index[number], self.kept[number]
@@ -122,9 +120,7 @@ class Records:
 
     def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
         """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
-        tried = Records(
-            tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s
-        )
+        tried = Records(tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s)
         left = [r for r, kept in zip(tried.runs, tried.kept, strict=True) if kept.size > 1]
         runs = [replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left)]
         return Records(tuple(runs), self.block_s)
@@ -205,9 +201,7 @@ def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> fl
     return max(round(wanted / row), 1) * row
 
 
-def _record(
-    run: Run, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float
-) -> Record:
+def _record(run: Run, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float) -> Record:
     rows = run.rows()
     usable = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
     for name in channels:

@@ -20,9 +20,7 @@ from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .blocks import Records, centred_slope
 
-_TAUS_S = tuple(
-    np.geomspace(150.0, 4000.0, 8)
-)  # in steps of a factor 1.6: memories nearer than that are alike
+_TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))  # in steps of a factor 1.6: memories nearer than that are alike
 _EDGES = (0.6, 1.3)  # thresholds, in standard deviations of T − z
 _QUICK_S = tuple(np.geomspace(120.0, 1500.0, 7))  # time constant of the quicker direction
 _SLOWER = (3.0, 7.0)  # by which factor the other direction is slower
@@ -112,9 +110,7 @@ def _modulated(records: Records, late: dict[float, list[FloatArray]]) -> Iterato
         for act in (lags, [np.abs(d) for d in lags]):
             for period in _PERIODS_C:
                 waves = [2.0 * np.pi * r.history.temperature_c / period for r in records.runs]
-                pair = [
-                    np.column_stack([d * np.cos(w), d * np.sin(w)]) for d, w in zip(act, waves, strict=True)
-                ]
+                pair = [np.column_stack([d * np.cos(w), d * np.sin(w)]) for d, w in zip(act, waves, strict=True)]
                 yield Shape("memory whose strength changes over temperature", 3, records.average(pair))
 
 

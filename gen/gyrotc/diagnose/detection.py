@@ -46,9 +46,7 @@ def _without_map(search: Search, total: int) -> FloatArray:
     return mix
 
 
-def _project(
-    search: Search, view: View, full: FloatArray, b: FloatArray, out: NDArray[np.int64]
-) -> Projection:
+def _project(search: Search, view: View, full: FloatArray, b: FloatArray, out: NDArray[np.int64]) -> Projection:
     size, vectors = np.linalg.eigh(full[np.ix_(out, out)])
     keep = size > _RANK * size[-1]
     half = vectors[:, keep] / np.sqrt(size[keep])
@@ -206,9 +204,5 @@ def limit_of(cause: str, points: list[tuple[Candidate, float]]) -> CauseLimit:
     value = float(np.exp(np.median(np.log(finite)))) if finite else None
     if parameter is None:
         return CauseLimit(value, unit, (), None)
-    at = tuple(
-        (c.values[parameter.name], float(v))
-        for (c, _), v in zip(points, limits, strict=True)
-        if np.isfinite(v)
-    )
+    at = tuple((c.values[parameter.name], float(v)) for (c, _), v in zip(points, limits, strict=True) if np.isfinite(v))
     return CauseLimit(value, unit, at, parameter.name)

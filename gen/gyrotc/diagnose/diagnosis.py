@@ -79,9 +79,7 @@ def diagnose(
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
     events = found_events(dataset)
-    found = _diagnosed(
-        accepted(whole, events) if accept_events else whole, options or _options_of(model), say
-    )
+    found = _diagnosed(accepted(whole, events) if accept_events else whole, options or _options_of(model), say)
     reported = {"events": tuple(events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
@@ -130,9 +128,7 @@ def _options_of(model: Model | None) -> FitOptions:
         return FitOptions()
     centers = model.n_centers if map_method(model.method) == model.method else None
     method = map_method(model.method)
-    return FitOptions(
-        method=method, seed=model.seed, centers=centers, block_s=model.block_s, average_s=model.average_s
-    )
+    return FitOptions(method=method, seed=model.seed, centers=centers, block_s=model.block_s, average_s=model.average_s)
 
 
 def _extended_model(
@@ -147,9 +143,7 @@ def _extended_model(
     longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
     front = replace(front, stuck_s=stuck_after_s(longest_s))
     bumps = extension.bumps
-    plain = model_of(
-        dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps
-    )
+    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps)
     stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
     entries = _entries(extension.shipped, stand_ins)
     left_out = extension.after if extension.measured_on == "left out" else None
@@ -166,9 +160,7 @@ def _extended_model(
     return Model.from_dict({**content, **reported}), training
 
 
-def _as_emitted(
-    dataset: Dataset, extension: Extension, extended: Model | None, options: FitOptions
-) -> Extension:
+def _as_emitted(dataset: Dataset, extension: Extension, extended: Model | None, options: FitOptions) -> Extension:
     """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
     exam = [run for run in dataset.runs if run.role == "exam"]
     if extended is None or not exam:
@@ -220,9 +212,7 @@ def _with_terms(
             for e in entries
             if e["channel"] is not None
         }
-        at_start = [
-            start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries
-        ]
+        at_start = [start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries]
         stood = {channel: stand_in.sigma_dph for channel, stand_in in stand_ins.items()}
         rules["terms"] = [stood.get(e["channel"], s) for e, s in zip(entries, at_start, strict=True)]
     return content

@@ -59,9 +59,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
             found.append(NoiseFinding("noise_level", p, {"ratio": ratio}, text))
     if search.contradicts(view):
         p = float(chdtrc(2, 2.0 * (best.log_likelihood - view.log_likelihood)))
-        found.append(
-            NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared")
-        )
+        found.append(NoiseFinding("noise_colour", p, _described(search), "noise of another colour than declared"))
     if not found and declared is not None and not causes:
         found += _hidden(search, view)
     return found

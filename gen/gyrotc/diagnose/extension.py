@@ -92,9 +92,7 @@ class Refitting:
     Of a single cycle the map beside any effect is one of T alone (see `cycle`).
     """
 
-    def __init__(
-        self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool
-    ) -> None:
+    def __init__(self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool) -> None:
         self.records = records
         self.single_cycle = single_cycle
         self.runs = [r for r in dataset.runs if r.role == "train"]
@@ -116,9 +114,7 @@ class Refitting:
         }
         self.plain = {"method": options.method, "prior": options.prior}
 
-    def fit(
-        self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None
-    ) -> Fit:
+    def fit(self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None) -> Fit:
         """The map beside the effects (`beside`: as if there were any), without any what would be emitted.
 
         Fits on all samples are cached.
@@ -155,9 +151,7 @@ class Refitting:
         effects = completed(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
         stages = (effects[:k] for k in range(count + 1))
         scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
-        return [
-            self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)
-        ]
+        return [self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)]
 
     def _residuals(
         self,
@@ -199,10 +193,7 @@ def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
     """Held-out masks: groups of runs, or spans of few runs."""
     sizes = [len(run.data.bias_dph) for run in refitting.train]
     if len(refitting.train) >= FEW_RUNS:
-        return [
-            [np.full(n, k % _FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)]
-            for fold in range(_FOLDS)
-        ]
+        return [[np.full(n, k % _FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)] for fold in range(_FOLDS)]
     data = joined([run.data for run in refitting.train])
     return [
         [span.contains(run.data.run, run.data.time_s) for run in refitting.train]
@@ -266,9 +257,7 @@ def _comparison(refitting: Refitting, effects: Sequence[Effect]) -> CandidateSco
     except TrainingFailed:
         process = None
     rate = not (effects and refitting.single_cycle)
-    return compare_candidates(
-        data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate
-    )
+    return compare_candidates(data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate)
 
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts
@@ -426,10 +415,7 @@ def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Ga
     if later and min(float(d) for d in later if d is not None) > max(known):
         return gain_of(chain[0], chain[-1], floor, refitting.average_s)
     cut = float(np.quantile(known, _LEARNT))
-    held = [
-        np.full(len(r.data.bias_dph), d > cut, dtype=bool)
-        for r, d in zip(refitting.train, known, strict=True)
-    ]
+    held = [np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(refitting.train, known, strict=True)]
     if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
         return None
     ends = refitting.left_out(held, count)

@@ -95,8 +95,7 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
         rows = run.rows()
         inside = run.in_span(rows.time_s)
         replayed = [
-            list(replay_run(rows, run, model, table, None))
-            for model, table in zip(models, tables, strict=True)
+            list(replay_run(rows, run, model, table, None)) for model, table in zip(models, tables, strict=True)
         ]
         scored = np.all([np.concatenate([part.scored for part in parts]) for parts in replayed], axis=0)
         for means, parts in zip(found, replayed, strict=True):

@@ -28,9 +28,7 @@ from .joined import variance_ratio_of
 from .noise import Whitener
 from .search import Search
 
-_MOST_SPREAD = (
-    2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
-)
+_MOST_SPREAD = 2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
 
 
 class SizeLimit:
@@ -175,9 +173,7 @@ class Gains:
             self._bases = [self._project(c, white[:, i], bank.known[i]) for i, c in enumerate(bank.inputs)]
         return self._bases
 
-    def _project(
-        self, candidate: Candidate | None, design: FloatArray, known: NDArray[np.bool_] | None
-    ) -> _Base:
+    def _project(self, candidate: Candidate | None, design: FloatArray, known: NDArray[np.bool_] | None) -> _Base:
         blocks = [self.beside]
         if known is not None and not known.all():
             blocks.append(self.whiten(singled_out(~known)))
@@ -232,9 +228,7 @@ class Gains:
             det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
             if det <= _INDEPENDENT * before[0] * before[1]:
                 return 0.0
-            weights = (
-                np.array([own[1, 1] * a[0] - own[0, 1] * a[1], own[0, 0] * a[1] - own[0, 1] * a[0]]) / det
-            )
+            weights = np.array([own[1, 1] * a[0] - own[0, 1] * a[1], own[0, 0] * a[1] - own[0, 1] * a[0]]) / det
         if float(((self._shares[at] * weights) ** 2).sum()) > 1.0:
             return 0.0
         if base.taken is not None and not base.taken.allows(at, weights):
@@ -261,9 +255,7 @@ def _take(base: _Base, at: slice, shares: FloatArray) -> _Base | None:
     half = vectors / np.sqrt(values)
     cross, c = half.T @ base.gram[at], half.T @ base.a[at]
     taken = _Taken(half @ c, half @ cross, shares)
-    return _Base(
-        base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c, taken
-    )
+    return _Base(base.candidate, base.gain + float(c @ c), base.gram - cross.T @ cross, base.a - cross.T @ c, taken)
 
 
 _PAIR = 10.0  # what a pair must gain over the best single cause

@@ -269,9 +269,7 @@ def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: 
     norm = np.linalg.norm(rest, axis=0)
     norm = np.where(norm > _GONE * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
     length = np.linalg.norm(held, axis=0)
-    layout = JoinedLayout.of(
-        bank.map.shape[1], bank.signatures.shape[1], own.shape[1], len(bank.inputs), held.shape[1]
-    )
+    layout = JoinedLayout.of(bank.map.shape[1], bank.signatures.shape[1], own.shape[1], len(bank.inputs), held.shape[1])
     added = (*names, *bank.inputs)
     order, owners = _candidates(bank, layout, added)
     return Joined(

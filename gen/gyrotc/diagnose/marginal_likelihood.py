@@ -62,9 +62,7 @@ class MarginalLikelihood:
             return best_of(points, self.gains.size)
         return max(self._weighed(near).values(), key=lambda found: found[1])[0]
 
-    def judged(
-        self, points: Sequence[Point], chosen: CauseSet, k: int, ranked: Sequence[Rival]
-    ) -> tuple[Rival, ...]:
+    def judged(self, points: Sequence[Point], chosen: CauseSet, k: int, ranked: Sequence[Rival]) -> tuple[Rival, ...]:
         """Rivals of the k-th cause with distances and odds by the evidence, where that has chosen it; nearest first.
 
         Rivals that are too far behind to be asked keep their distance to the best of all.
@@ -121,9 +119,7 @@ class MarginalLikelihood:
         best = {key: found[0].criterion(size) for key, found in ranked.items()}
         least = max(best.values(), default=0.0) - LOOKED_AT
         keys = [key for key, value in best.items() if value >= least][:_MOST_KINDS]
-        behind = [
-            other for key in keys[:_MOST_BEHIND] for other in _behind(key) if best.get(other, 0.0) > 0.0
-        ]
+        behind = [other for key in keys[:_MOST_BEHIND] for other in _behind(key) if best.get(other, 0.0) > 0.0]
         return {key: _few(ranked[key], size) for key in dict.fromkeys([*keys, *behind])}
 
     def _weighed(self, near: _Near) -> dict[_Kinds, tuple[Point, float]]:
@@ -131,9 +127,7 @@ class MarginalLikelihood:
         left_out = np.zeros(self.gains.size, dtype=bool)
         for member in (m for points in near.values() for p in points for m in p.members if m.role == "input"):
             left_out |= ~self.bank.known[self.bank.inputs.index(member)]
-        tried = {
-            key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()
-        }
+        tried = {key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()}
         return {key: max(found, key=lambda one: one[1]) for key, found in tried.items()}
 
     @cached_property
@@ -179,15 +173,12 @@ def _largest(y: FloatArray, groups: Sequence[FloatArray]) -> float:
 
     def cost(logs: FloatArray) -> tuple[float, FloatArray]:
         size = np.exp(logs)
-        factor = cho_factor(
-            np.eye(data.size) + sum(s * g for s, g in zip(size, inner, strict=True)), lower=True
-        )
+        factor = cho_factor(np.eye(data.size) + sum(s * g for s, g in zip(size, inner, strict=True)), lower=True)
         weights = cho_solve(factor, data)
         inverse = cho_solve(factor, np.eye(data.size))
         value = float(data @ weights - data @ data) + 2.0 * float(np.log(np.diag(factor[0])).sum())
         slope = [
-            s * (float((inverse * g).sum()) - float(weights @ g @ weights))
-            for s, g in zip(size, inner, strict=True)
+            s * (float((inverse * g).sum()) - float(weights @ g @ weights)) for s, g in zip(size, inner, strict=True)
         ]
         return value, np.array(slope)
 

@@ -93,9 +93,7 @@ class _NestedModels:
         """Of a set of causes; one with a common variance of many weights is weighed as such."""
         random = [k for k in kept if self.causes[k].candidate.role == "variance"][-1:]
         held = self.held([k for k in kept if k not in random])
-        total = _energy(held, self.y) - self.price * sum(
-            searched(self.causes[k].candidate.id).price for k in kept
-        )
+        total = _energy(held, self.y) - self.price * sum(searched(self.causes[k].candidate.id).price for k in kept)
         return total + sum(_common(held, self.white[k], self.y) for k in random)
 
     def instead(self, k: int, ids: Sequence[str]) -> float:
@@ -169,9 +167,7 @@ def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatA
     return float(ratio_of(energy, size[keep])[0]) if other.common else float(energy.sum())
 
 
-_DIRECTION_C = (
-    3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
-)
+_DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
 _MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
 _TESTS = 3  # of which the smallest p-value counts
 

@@ -31,9 +31,7 @@ from .search import Search, open_search
 from .signature_bank import bank_of
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
-_MAIN = (
-    0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
-)
+_MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
 _STILL = 1e-9  # change of a channel, of its size, that is rounding
 _HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
 
@@ -131,9 +129,7 @@ def search_of(
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
-        search = open_search(
-            records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour
-        )
+        search = open_search(records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour)
         if level == _HIGHEST_LEVEL or not needs_finer(search):
             break
     return search
@@ -189,9 +185,7 @@ def _after(search: Search, attribution: Attribution) -> Search:
 
 
 _MANY = 8  # single outliers are left out in silence
-_P_VARIANCE = (
-    1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
-)
+_P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
 _KNOTS = 4  # hats over the temperature: the variance is a slow function of it
 
@@ -271,9 +265,7 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Flo
     return np.clip(sigma, 0.1, 10.0), p, ratio
 
 
-def _quick_power(
-    records: Records, masks: Sequence[NDArray[np.bool_]]
-) -> tuple[FloatArray, NDArray[np.int64]]:
+def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray, NDArray[np.int64]]:
     """Mean squared difference of neighbouring usable rows of a block, and the block, where there are such rows."""
     power, index = [], []
     for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):

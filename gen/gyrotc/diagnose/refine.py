@@ -28,9 +28,7 @@ class Interval:
     high: float
 
 
-def parabola_top(
-    energy: Callable[[float], float], here: float, width: float, low: float
-) -> tuple[float, float]:
+def parabola_top(energy: Callable[[float], float], here: float, width: float, low: float) -> tuple[float, float]:
     """One step to the top of a parabola through three points, and its curvature."""
     left, right = max(here - width, 0.5 * (here + low) if np.isfinite(low) else here - width), here + width
     x = np.array([left, here, right]) - here
@@ -263,9 +261,7 @@ def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
     return searched(member.id).width(here, reach_of(fit.search.records).span_c)
 
 
-def _result(
-    search: Search, fit: _Fit, members: list[Candidate], k: int, profile: FloatArray | None
-) -> Refined:
+def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile: FloatArray | None) -> Refined:
     """Amplitudes with intervals that allow for the uncertainty of the nonlinear parameters."""
     swapped = [m for m in members if m.role == "input"]
     blocks = [fit.edges] if swapped else [fit.edges, search.bank.map]

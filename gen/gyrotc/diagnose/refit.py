@@ -252,9 +252,7 @@ def terms_of(effects: Sequence[Effect]) -> list[Effect]:
     return [one for effect in effects for one in (effect, *effect.overtones)]
 
 
-def added_range(
-    runs: Sequence[Played], effects: Sequence[Effect], beside: FloatArray | float = 0.0
-) -> list[float]:
+def added_range(runs: Sequence[Played], effects: Sequence[Effect], beside: FloatArray | float = 0.0) -> list[float]:
     """Smallest and largest that the terms of a table together added in these runs, 0 among them, deg/h.
 
     Args:
@@ -263,10 +261,7 @@ def added_range(
     held = [effect for effect in terms_of(effects) if effect.term.table is not None]
     none = [np.zeros(run.in_force.size) for run in runs]
     added = np.concatenate(
-        [
-            sum((run.outcome(e).added[run.in_force] for e in held), n)
-            for run, n in zip(runs, none, strict=True)
-        ]
+        [sum((run.outcome(e).added[run.in_force] for e in held), n) for run, n in zip(runs, none, strict=True)]
     )
     both = np.append(added + beside, 0.0)
     return [float(both.min()), float(both.max())]

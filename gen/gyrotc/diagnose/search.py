@@ -138,9 +138,7 @@ def _with_likelihood(
     return View(colour, gram, b, yy, log_det, likelihood, float(np.sqrt(left / freedom)))
 
 
-def residual_log_likelihood(
-    rest: FloatArray | float, freedom: int, log_det: FloatArray | float
-) -> FloatArray:
+def residual_log_likelihood(rest: FloatArray | float, freedom: int, log_det: FloatArray | float) -> FloatArray:
     """Residual log-likelihood with the scale profiled, up to a constant that depends on `freedom` alone.
 
     Args:

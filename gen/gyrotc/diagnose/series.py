@@ -113,9 +113,7 @@ def _beyond_the_map(static: FloatArray, causes: Sequence[Refined]) -> FloatArray
 
 def _scored(before: Averages, after: Averages) -> ScoredRun:
     hours = (before.time_s - before.time_s[0]) / 3600.0
-    return ScoredRun(
-        hours=_values(hours), before_dph=_values(before.after_dph), after_dph=_values(after.after_dph)
-    )
+    return ScoredRun(hours=_values(hours), before_dph=_values(before.after_dph), after_dph=_values(after.after_dph))
 
 
 def _likelihood(cause: Refined) -> ParameterLikelihood | None:

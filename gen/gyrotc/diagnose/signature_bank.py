@@ -243,9 +243,7 @@ def _dictionary(records: Records) -> FloatArray:
 
 def _late(records: Records, tau_s: float) -> FloatArray:
     """How much a first-order memory of the temperature differs from it, C, shape (N, 1)."""
-    return records.columns(
-        lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None]
-    )
+    return records.columns(lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None])
 
 
 def direction_of(records: Records, width_c: float) -> FloatArray:

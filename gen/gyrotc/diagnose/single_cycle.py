@@ -174,8 +174,7 @@ class CycleFits:
         def at(value: float) -> tuple[Candidate, ...]:
             moved = [h + value - here[k] if together or j == k else h for j, h in enumerate(here)]
             return tuple(
-                replace(m, values={next(iter(m.values)): float(np.exp(v))})
-                for m, v in zip(members, moved, strict=True)
+                replace(m, values={next(iter(m.values)): float(np.exp(v))}) for m, v in zip(members, moved, strict=True)
             )
 
         if high - low <= _FINE:

@@ -86,15 +86,11 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
         across_width=(1.5 * 2.0 / (n_a - 1), 1.5 * 2.0 / (n_r - 1)),
         mix=np.eye(3 + n_t + len(across)),
     )
-    mean = records.average(
-        [raw(run.history.temperature_c, s) for run, s in zip(records.runs, slopes, strict=True)]
-    )
+    mean = records.average([raw(run.history.temperature_c, s) for run, s in zip(records.runs, slopes, strict=True)])
     left, size, right = np.linalg.svd(mean, full_matrices=False)
     keep = size > _KEEP * size[0]
     mix = right[keep].T / size[keep]
-    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[
-        :, keep
-    ]
+    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[:, keep]
 
 
 def fine_columns(records: Records, spacing_c: float = _FINE_C) -> FloatArray:
@@ -102,18 +98,14 @@ def fine_columns(records: Records, spacing_c: float = _FINE_C) -> FloatArray:
     low = min(float(r.history.temperature_c.min()) for r in records.runs)
     high = max(float(r.history.temperature_c.max()) for r in records.runs)
     nodes = np.arange(low, high + spacing_c, spacing_c)
-    columns = records.columns(
-        lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / spacing_c)
-    )
+    columns = records.columns(lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / spacing_c))
     return columns[:, columns.max(axis=0) > 0.0]
 
 
 _WHOLE = 0.999  # share of a block's rows that must know their input: all, up to the rounding of the mean
 
 
-def changed_inputs(
-    records: Records, basis: MapBasis
-) -> tuple[list[Candidate], FloatArray, NDArray[np.bool_]]:
+def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], FloatArray, NDArray[np.bool_]]:
     """Map of the changed inputs for every candidate of kind "input"."""
     reach = reach_of(records)
     candidates, maps, knowns = [], [], []
@@ -126,9 +118,7 @@ def changed_inputs(
     return candidates, np.array(maps), np.array(knowns)
 
 
-def replaced_map(
-    records: Records, basis: MapBasis, candidate: Candidate
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
     seen = _moved_inputs(records, candidate)
     maps = [records.average_run(k, basis(t, slope)) for k, (t, slope, _) in enumerate(seen)]
@@ -144,9 +134,7 @@ def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | N
     return records.average([basis.proportional(t, slope) for t, slope in seen])
 
 
-def _moved_inputs(
-    records: Records, candidate: Candidate
-) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
+def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
     """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
     features = CATALOGUE[candidate.id].features
     assert features is not None

@@ -291,9 +291,7 @@ def result_of(
         ),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
-        next=tuple(
-            next_steps(verdict, listed, list(untestable), gain=None if extended is None else extended.gain)
-        ),
+        next=tuple(next_steps(verdict, listed, list(untestable), gain=None if extended is None else extended.gain)),
     )
 
 
@@ -320,8 +318,7 @@ def _single_cycle(cycle: Cycle, extension: Extension) -> CycleResult:
     tried = (
         TriedMemories(
             states=tuple(
-                {"id": m.id, **{n: _estimate(i) for n in m.values}}
-                for m, i in zip(t.members, t.intervals, strict=True)
+                {"id": m.id, **{n: _estimate(i) for n in m.values}} for m, i in zip(t.members, t.intervals, strict=True)
             ),
             rms_dph=t.rms_dph,
             criterion=t.criterion,
@@ -453,9 +450,7 @@ def _tested(analysis: Analysis, id: str, channel: str | None, p_value: float) ->
 
 
 def _untested(id: str, why: str) -> ConsideredCause:
-    return ConsideredCause(
-        id=id, family=CATALOGUE[id].family, p_value=None, detection_limit=None, not_testable=why
-    )
+    return ConsideredCause(id=id, family=CATALOGUE[id].family, p_value=None, detection_limit=None, not_testable=why)
 
 
 def _limit(limit: CauseLimit) -> DetectionLimit:

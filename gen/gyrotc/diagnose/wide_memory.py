@@ -138,9 +138,7 @@ class _Family:
         held: Whitened orthonormal columns of the model, shape (N, h).
     """
 
-    def __init__(
-        self, gains: Gains, held: FloatArray, sizes: FloatArray, operator: Callable[..., FloatArray]
-    ) -> None:
+    def __init__(self, gains: Gains, held: FloatArray, sizes: FloatArray, operator: Callable[..., FloatArray]) -> None:
         self.gains, self.held = gains, held
         records = gains.search.records
         nodes = _nodes(records)
@@ -152,14 +150,11 @@ class _Family:
 
     def best(self) -> WideMemory:
         """The one with the greatest evidence, of those about each size."""
-        found = [
-            self._weighed(self.held, _about(self.steps, k), _about(self.white, k)) for k in range(_POINTS)
-        ]
+        found = [self._weighed(self.held, _about(self.steps, k), _about(self.white, k)) for k in range(_POINTS)]
         self._at = max(range(_POINTS), key=lambda k: found[k].evidence)
         lines = [w[:, :1] for w in self.white]
         constant = max(
-            self._weighed(self.held, line, line).evidence
-            for line in (_about(lines, k) for k in range(_POINTS))
+            self._weighed(self.held, line, line).evidence for line in (_about(lines, k) for k in range(_POINTS))
         )
         return replace(found[self._at], constant=constant)
 

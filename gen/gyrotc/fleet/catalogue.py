@@ -105,18 +105,14 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
     counts = Counter((entry.serial, entry.axis) for entry in entries)
     summary = read_optional(out / "fleet.json", FleetSummary)
     barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
-    made = [
-        e for e in entries if e.key and e.serial and counts[e.serial, e.axis] == 1 and e.name not in barred
-    ]
+    made = [e for e in entries if e.key and e.serial and counts[e.serial, e.axis] == 1 and e.name not in barred]
     place = out / CATALOGUE
     if not made and not place.exists():
         return 0
     place.mkdir(exist_ok=True)
     with opened(place / _FILE) as base:
         known: dict[tuple[str, str, str], set[str | None]] = {}
-        for *inputs, model_hash in base.execute(
-            "SELECT serial, axis, input_sha256, model_hash FROM calibration"
-        ):
+        for *inputs, model_hash in base.execute("SELECT serial, axis, input_sha256, model_hash FROM calibration"):
             known.setdefault(tuple(inputs), set()).add(model_hash)
         new = [e for e in made if _is_new(e, known.get((e.serial or "", e.axis or "", e.key or ""), set()))]
         with base:  # one transaction
@@ -149,9 +145,7 @@ def opened(path: Path) -> Iterator[sqlite3.Connection]:
     except sqlite3.OperationalError as error:  # the disk, a lock
         raise GyrotcError(f"{path}: {error}") from error
     except sqlite3.DatabaseError as error:
-        raise InputError(
-            str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
-        ) from error
+        raise InputError(str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it") from error
 
 
 def _confine(base: sqlite3.Connection) -> None:
@@ -167,13 +161,9 @@ def _check_schema(base: sqlite3.Connection, path: Path) -> None:
     with closing(sqlite3.connect(":memory:")) as empty:
         empty.executescript(SCHEMA)
         wanted = empty.execute(text).fetchall()
-    application, version = (
-        base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version")
-    )
+    application, version = (base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
     if application == _APPLICATION and 0 < version < _VERSION:
-        raise InputError(
-            str(path), f"is of an earlier gyrotc (version {version})", "a new --out of gyrotc fleet"
-        )
+        raise InputError(str(path), f"is of an earlier gyrotc (version {version})", "a new --out of gyrotc fleet")
     if application != _APPLICATION or base.execute(text).fetchall() != wanted:
         raise InputError(str(path), "has other tables than a catalogue", _EXPECTED)
 
@@ -197,9 +187,7 @@ def _check_file(path: Path) -> None:
             check_own(beside)
             with beside.open("rb") as stream:
                 if stream.read(len(magic)) not in (b"", bytes(len(magic)), magic):
-                    raise InputError(
-                        str(beside), f"is none of SQLite's {end[1:]} files", "none; move it away"
-                    )
+                    raise InputError(str(beside), f"is none of SQLite's {end[1:]} files", "none; move it away")
 
 
 def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> int:
@@ -286,9 +274,7 @@ def withdraw(place: Path, model_hash: str) -> int:
         serials = [serial for (serial,) in base.execute(of_model, (model_hash,)).fetchall()]
         for serial in serials:
             _check_rows(base, path, serial)
-        count = base.execute(
-            "UPDATE calibration SET tag = 'withdrawn' WHERE model_hash = ?", (model_hash,)
-        ).rowcount
+        count = base.execute("UPDATE calibration SET tag = 'withdrawn' WHERE model_hash = ?", (model_hash,)).rowcount
         for serial in serials:
             hash_rows(base, serial)
     if not count:
@@ -332,9 +318,7 @@ def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAns
                 _check_payloads(path.parent / Path(PAYLOADS).name, one)
             total = base.execute("SELECT coalesce(max(id), 0) FROM calibration").fetchone()[0]
     except sqlite3.DatabaseError as error:
-        raise InputError(
-            str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it"
-        ) from error
+        raise InputError(str(path), f"is no catalogue ({error})", "a catalogue as gyrotc fleet wrote it") from error
     return CatalogueAnswer(
         gyrotc_version=__version__, serial=serial, axis=None, day=day if serial else None, calibrations=total,
         found=found,
@@ -388,9 +372,7 @@ def export(place: Path, serial: str, day: str, out: Path) -> tuple[Catalogued, .
         if wrong:
             raise InputError(str(folder), wrong[0], "a result as gyrotc fleet wrote it")
         if load_model(folder / "model.json").hash != one.model_hash:
-            raise InputError(
-                str(folder), "holds another calibration than the catalogue names", "the fleet of that one"
-            )
+            raise InputError(str(folder), "holds another calibration than the catalogue names", "the fleet of that one")
         _copy(folder, out / one.axis if one.axis and len(found) > 1 else out, one)
     return found
 
@@ -412,8 +394,6 @@ def _copy(folder: Path, out: Path, one: Catalogued) -> None:
 
 def _entry(base: sqlite3.Connection, row: sqlite3.Row) -> Catalogued:
     names = [name for name in Catalogued.model_fields if name not in ("axis", "recordings")]
-    files = base.execute(
-        "SELECT file, role, sha256 FROM recording WHERE calibration = ? ORDER BY file", (row["id"],)
-    )
+    files = base.execute("SELECT file, role, sha256 FROM recording WHERE calibration = ? ORDER BY file", (row["id"],))
     recordings = tuple(CataloguedFile(file=f["file"], role=f["role"], sha256=f["sha256"]) for f in files)
     return Catalogued(**{name: row[name] for name in names}, axis=row["axis"] or None, recordings=recordings)

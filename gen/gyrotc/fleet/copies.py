@@ -64,9 +64,7 @@ def with_copies(entries: Sequence[FleetEntry], found: Sequence[Copy]) -> list[Fl
         others[copy.name].append(copy.other)
         others[copy.other].append(copy.name)
     return [
-        entry.model_copy(
-            update={"findings": (*entry.findings, "copy_of_other"), "copy_of": tuple(others[entry.name])}
-        )
+        entry.model_copy(update={"findings": (*entry.findings, "copy_of_other"), "copy_of": tuple(others[entry.name])})
         if entry.name in others and entry.model_hash is not None
         else entry
         for entry in entries
@@ -91,8 +89,7 @@ def _same_rows(entries: Sequence[FleetEntry]) -> _Pairs:
     return {
         (a, b): (count / min(len(words[a]), len(words[b])), None)
         for (a, b), count in common.items()
-        if count >= min(_LEAST_COMMON, len(words[a]))
-        and (entries[a].serial or "") != (entries[b].serial or "")
+        if count >= min(_LEAST_COMMON, len(words[a])) and (entries[a].serial or "") != (entries[b].serial or "")
     }
 
 
@@ -147,9 +144,7 @@ class _Runs:
 
     @staticmethod
     def of(runs: Sequence[NoiseSigns], serial: Numbers) -> _Runs:
-        parts = [
-            np.unpackbits(np.frombuffer(base64.b64decode(one.signs), np.uint8))[: one.count] for one in runs
-        ]
+        parts = [np.unpackbits(np.frombuffer(base64.b64decode(one.signs), np.uint8))[: one.count] for one in runs]
         count = np.array([len(part) for part in parts])
         signs = np.concatenate(parts)
         packed = np.r_[np.packbits(signs), np.zeros(2 * _WORD // 8 + 8, np.uint8)]

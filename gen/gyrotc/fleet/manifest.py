@@ -168,9 +168,7 @@ def _parsed(path: Path) -> _Manifest:
 def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
     for pattern in patterns:
         if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
-            raise InputError(
-                f"{path}, field datasets", repr(pattern), "a pattern below the manifest's folder"
-            )
+            raise InputError(f"{path}, field datasets", repr(pattern), "a pattern below the manifest's folder")
         try:
             found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
         except (IndexError, ValueError, OSError, RecursionError, NotImplementedError) as error:
@@ -186,9 +184,7 @@ def _listed(folder: Path) -> list[Path]:
     try:
         return sorted(folder.iterdir())
     except OSError as error:
-        raise InputError(
-            str(folder), f"cannot be read ({error.strerror})", "a folder of data sets"
-        ) from error
+        raise InputError(str(folder), f"cannot be read ({error.strerror})", "a folder of data sets") from error
 
 
 def _has_recordings(folder: Path) -> bool:

@@ -199,9 +199,7 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
 
 
 _LEAST_PLACES = 6  # of a shorter curve a correlation of 0.9 may be chance
-_ALIKE = (
-    0.9  # correlation of the usual gyro with the median of the lot, and of a mirrored one with its negative
-)
+_ALIKE = 0.9  # correlation of the usual gyro with the median of the lot, and of a mirrored one with its negative
 _SWING = 3.0  # how much more or less than the median it may swing
 _KNOWN = 0.8  # share of the lot that knows a temperature
 

@@ -111,7 +111,5 @@ def _table(entries: Sequence[FleetUnit]) -> str:
     writer.writerow(_COLUMNS)
     for entry in entries:
         cells = (getattr(entry, column) for column in _COLUMNS)
-        writer.writerow(
-            csv_cell(" ".join(c) if isinstance(c, tuple) else "" if c is None else c) for c in cells
-        )
+        writer.writerow(csv_cell(" ".join(c) if isinstance(c, tuple) else "" if c is None else c) for c in cells)
     return text.getvalue()

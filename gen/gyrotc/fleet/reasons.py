@@ -107,9 +107,7 @@ def reasons(entries: Sequence[FleetEntry], copied: Sequence[Copy] = ()) -> list[
     return [found[e.name] for e in entries if e.name in found]
 
 
-def _reason(
-    entry: FleetEntry, id_: str, text: str, file: str | None = None, time_s: float | None = None
-) -> Reason:
+def _reason(entry: FleetEntry, id_: str, text: str, file: str | None = None, time_s: float | None = None) -> Reason:
     return Reason(name=entry.name, id=id_, text=text.removesuffix("."), file=file, time_s=time_s)
 
 
@@ -225,9 +223,7 @@ def _thermometers(kind: _Kind) -> Iterator[Reason]:
     for entry, shift in zip(kind.entries, shifts, strict=True):
         if abs(shift) > max(_FAR * scatter, _LEAST_SHIFT_C):
             more = "more" if shift > 0.0 else "less"
-            text = (
-                f"thermometer differs: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
-            )
+            text = f"thermometer differs: it reads {abs(shift):.1f} C {more} than in the same runs of the others"
             yield _reason(entry, "thermometer_offset", text)
 
 
@@ -239,9 +235,7 @@ def _steps(kind: _Kind) -> Iterator[Reason]:
         if best[k] > usual + max(_FAR_LOG * scatter, np.log(_LEAST_STEP)):
             run = kind.facts[k].runs[int(np.nanargmax(scores[k]))]
             hours = run.step.time_s / _PER_H
-            text = (
-                f"step in {run.file} at {hours:.1f} h: the residual moved by {run.step.size_dph:+.2g} deg/h"
-            )
+            text = f"step in {run.file} at {hours:.1f} h: the residual moved by {run.step.size_dph:+.2g} deg/h"
             yield _reason(entry, "step", text, run.file, run.step.time_s)
 
 

@@ -64,9 +64,7 @@ def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry
         for future in as_completed(numbers):
             number = numbers[future]
             yield number, _entry_of(tasks[number], future)
-    except (
-        BaseException
-    ):  # a process died, or the user stops the fleet: the others end now, not with their queue
+    except BaseException:  # a process died, or the user stops the fleet: the others end now, not with their queue
         for process in multiprocessing.active_children():
             process.kill()
         raise

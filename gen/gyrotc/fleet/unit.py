@@ -214,9 +214,7 @@ def _built(task: Task) -> FleetEntry:
     key = task.found()
     if task.key not in ("", key):
         found = f"is {key[:16]} on worker {_worker()}, and {task.key[:16]} where the fleet was started"
-        raise InputError(
-            f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere"
-        )
+        raise InputError(f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere")
     with _calibrating():
         dataset = load(task.unit.dataset, axis=task.unit.axis)
     moved_to = move_away(task.out)
@@ -244,9 +242,7 @@ def _built(task: Task) -> FleetEntry:
     return entry.model_copy(update={"moved_to": moved_to}) if moved_to else entry
 
 
-def _entry_of(
-    task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]
-) -> FleetEntry:
+def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> FleetEntry:
     """What the summary says of the gyro, and what it is compared with others by."""
     role, judged = built.evaluation.judged() or (None, None)
     floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None

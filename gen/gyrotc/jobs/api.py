@@ -220,9 +220,7 @@ class Result:
 
     def _facts(self) -> list[tuple[str, str]]:
         unit, model = self._unit, self.model
-        proven = [
-            f"{one.name} {one.numeric}" for one in self.built.verification.targets if one.status == "pass"
-        ]
+        proven = [f"{one.name} {one.numeric}" for one in self.built.verification.targets if one.status == "pass"]
         found = [("unit", model.serial + (f", axis {model.axis}" if model.axis else ""))]
         if unit.judged:
             before, after = unit.judged.before.rms_dph, unit.judged.after.rms_dph

@@ -49,8 +49,7 @@ def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
     """Files of every axis's own `c/` by name."""
     return {
-        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()}
-        for axis in axes
+        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()} for axis in axes
     }
 
 
@@ -121,9 +120,7 @@ def verify_axes(
         serial=next(iter(results.values())).serial,
         axis=None,
         passed=sum(one.passed for one in results.values()),
-        failed=sum(one.failed for one in results.values())
-        + wrong
-        + (signed is not None and signed.status == "fail"),
+        failed=sum(one.failed for one in results.values()) + wrong + (signed is not None and signed.status == "fail"),
         missing=sum(one.missing for one in results.values()),
         emitted=emitted,
         signature=signed,
@@ -157,9 +154,7 @@ def _run_together(c: Path, ids: Sequence[str]) -> None:
     target = all_targets()[_HOST]
     with scratch_folder() as work:
         program = work / "main"
-        compile_c(
-            target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c
-        )
+        compile_c(target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c)
         done = run_program(target, program)
     if done.returncode != 0:
         raise CheckFailed(f"the image of all axes ended with status {done.returncode}")

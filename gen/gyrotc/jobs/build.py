@@ -250,9 +250,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
             limits=order.limits,
         )
         _write(work / "changes.json", changes.content())
-    budget = budget_of(
-        fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes
-    )
+    budget = budget_of(fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes)
     _write(work / "budget.json", budget.content())
     if order.compiled:
         say("drawing the report")
@@ -269,9 +267,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     )
 
 
-def _extended(
-    dataset: Dataset, work: Path, options: FitOptions, say: Progress
-) -> tuple[Fitted | None, Diagnosed]:
+def _extended(dataset: Dataset, work: Path, options: FitOptions, say: Progress) -> tuple[Fitted | None, Diagnosed]:
     """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
     from .diagnosis import diagnosed
 

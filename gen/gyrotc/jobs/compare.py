@@ -95,9 +95,7 @@ def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, lis
     parts = [samples_of(b, front.block_s, k) for k, b in enumerate(blocks)]
     data = joined(parts)
     if len(data) == 0:
-        raise InputError(
-            str(dataset.folder), "no usable sample", "at least one valid block of a training run"
-        )
+        raise InputError(str(dataset.folder), "no usable sample", "at least one valid block of a training run")
     exam = [run for run in dataset.runs if run.role == "exam"]
     everything = np.ones(len(data), dtype=bool)
     if exam:

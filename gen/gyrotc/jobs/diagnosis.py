@@ -156,9 +156,7 @@ def diagnosed(
         with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
             if stage:
                 stage.of(dataset.serial, dataset.axis)
-            made = diagnose(
-                dataset, model=model, options=options, progress=progress, accept_events=accept_events
-            )
+            made = diagnose(dataset, model=model, options=options, progress=progress, accept_events=accept_events)
             made = _saved(stage.folder, made, progress) if stage else made
         names = _written(made.result) if out else ()
         files = {path: (out / path).read_bytes().decode("utf-8") for path in names} if out else {}
@@ -219,9 +217,7 @@ def _name(
     prior = options.prior if options is not None else None
     depends: dict[str, Any] = {
         "code": _code(),
-        "description": hashlib.sha256(description.read_bytes()).hexdigest()
-        if description.is_file()
-        else None,
+        "description": hashlib.sha256(description.read_bytes()).hexdigest() if description.is_file() else None,
         "recordings": [[run.file, run.sha256, run.role] for run in dataset.runs],
         "stated": [dataset.serial, dataset.axis, dataset.applied_table, dataset.trusted, dataset.warnings],
         "model": None if model is None else digest_of(model.to_dict()),

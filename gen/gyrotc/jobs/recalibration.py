@@ -121,15 +121,11 @@ def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, 
         raise InputError("--lot", f"of axis {lot.axis}", f"a lot of axis {model.axis}, as the unit")
     known = prior_of(lot).with_runs(means)
     if known.p_value < FALSE_ALARM:
-        raise InputError(
-            "--lot", f"the unit does not fit it (p = {known.p_value:.2g})", "its own lot, or none"
-        )
+        raise InputError("--lot", f"the unit does not fit it (p = {known.p_value:.2g})", "its own lot, or none")
     return model, known, training.means
 
 
-def _ageing(
-    earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None
-) -> tuple[float, str]:
+def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None) -> tuple[float, str]:
     """How far the bias may have moved, 1 sigma, deg/h, and where that comes from."""
     if stated is not None:
         if not (math.isfinite(stated) and stated >= 0.0):

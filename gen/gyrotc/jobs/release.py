@@ -157,9 +157,7 @@ def _refuse_departure(stated: Any, found: Any, where: str) -> None:
     elif isinstance(stated, float) and isinstance(found, float):
         _same(stated, found, where)
     elif stated != found or type(stated) is not type(found):
-        raise InputError(
-            where, f"is {str(stated)[:60]}, and the other results give {str(found)[:60]}", _EXPECTED
-        )
+        raise InputError(where, f"is {str(stated)[:60]}, and the other results give {str(found)[:60]}", _EXPECTED)
 
 
 _LONGEST = 300  # characters of a reason: a line or two of a certificate

@@ -86,9 +86,7 @@ class Departures:
         edges = np.linspace(low, high, _CELLS + 1)
         number = np.clip(((t - low) / max(high - low, 1e-9) * _CELLS).astype(int), 0, _CELLS - 1)
         branch = np.sign(np.where(np.abs(r) > _STILL_C_PER_MIN, r, 0.0))
-        parts = [
-            (k, b) for k in range(_CELLS) for b in (-1.0, 0.0, 1.0) if np.any((number == k) & (branch == b))
-        ]
+        parts = [(k, b) for k in range(_CELLS) for b in (-1.0, 0.0, 1.0) if np.any((number == k) & (branch == b))]
         reach = -float(ndtri(0.5 * FALSE_ALARM / len(parts)))  # Bonferroni
         for k, b in parts:
             there = (number == k) & (branch == b)
@@ -260,9 +258,7 @@ class _Seen:
         white = np.linalg.solve(np.linalg.cholesky(scatter), np.column_stack([self.values @ root, self.left]))
         q, size, _ = np.linalg.svd(white[:, :-1], full_matrices=False)
         more = np.outer(sizes**2, size**2)
-        return np.asarray(
-            0.5 * np.sum((q.T @ white[:, -1]) ** 2 * more / (1.0 + more) - np.log1p(more), axis=1)
-        )
+        return np.asarray(0.5 * np.sum((q.T @ white[:, -1]) ** 2 * more / (1.0 + more) - np.log1p(more), axis=1))
 
     def gain(self, covariance: FloatArray) -> FloatArray:
         """What the coefficients move by for what is left, shape (coefficients, means)."""
@@ -274,9 +270,7 @@ def updated(prior: MapPrior, run: UnitMeans) -> MapPosterior:
     seen, covariance = _Seen(prior, run), prior.covariances[0]
     gain = seen.gain(covariance)
     rest = np.eye(len(covariance)) - gain @ seen.values
-    after = (
-        rest @ covariance @ rest.T + gain @ seen.noise @ gain.T
-    )  # Joseph's form: positive in spite of rounding
+    after = rest @ covariance @ rest.T + gain @ seen.noise @ gain.T  # Joseph's form: positive in spite of rounding
     return MapPosterior(prior, prior.means[0] + gain @ seen.left, after, 0, 1.0)
 
 

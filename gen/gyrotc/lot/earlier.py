@@ -29,9 +29,7 @@ from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
 from .use import curve_of, followed, known_map, seen_alone
 
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
-_SHAPE = (
-    0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape
-)
+_SHAPE = 0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape
 _MEANS: dict[ChangeKind, str] = {
     "unchanged": "is confirmed",
     "offset": "has moved by an offset",
@@ -64,9 +62,7 @@ class EarlierPrior(MapPrior):
     def check_axis(self, axis: str | None) -> None:
         """Nothing to refuse: it was read for this axis."""
 
-    def with_samples(
-        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
-    ) -> Given:
+    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
         """Finds what became of the earlier model, and fits it with a check run.
 
         Args:
@@ -141,9 +137,7 @@ def posterior_of_means(
         elif number < _ROUNDS:
             rest = fitted_parameters(basis, mean**2 + np.diag(covariance), 1.0, rest, free=False)
     asked = Asked(means.temperature_c, means.slope_c_per_min, means.count / means.count.sum(), between_dph)
-    prior = MapPrior(
-        basis, center, unit, *envelope, mean[None], covariance[None], np.ones(1), rest, asked, np.inf
-    )
+    prior = MapPrior(basis, center, unit, *envelope, mean[None], covariance[None], np.ones(1), rest, asked, np.inf)
     known = prior.alone()
     wider = max(1.0, (stated_dph / known.rms_sigma_dph()) ** 2)
     return replace(known, covariance=wider * covariance)
@@ -191,13 +185,9 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
     covariance = lower + np.tril(lower, -1).T
     asked = [np.array(x) for x in (known.asked_temperature_c, known.asked_slope_c_per_min, known.asked_share)]
     if len({len(x) for x in asked}) != 1 or not (asked[2].size and asked[2].min() >= 0.0 < asked[2].sum()):
-        raise InputError(
-            f"{where}, known, asked_share", "lists that do not go together", "a share for each place"
-        )
+        raise InputError(f"{where}, known, asked_share", "lists that do not go together", "a share for each place")
     if len(known.mean) != len(basis.kept):
-        raise InputError(
-            f"{where}, known, mean", f"{len(known.mean)} numbers", f"{len(basis.kept)}, one a function"
-        )
+        raise InputError(f"{where}, known, mean", f"{len(known.mean)} numbers", f"{len(basis.kept)}, one a function")
     check_positive(covariance, f"{where}, known")
     prior = MapPrior(
         basis=basis,

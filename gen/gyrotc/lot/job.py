@@ -96,12 +96,8 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
     units = [_unit(place) for place in places]
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:
-        raise InputError(
-            "--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own"
-        )
-    chosen = [
-        u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None
-    ]
+        raise InputError("--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own")
+    chosen = [u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None]
     distinct = {u.model.serial: u for u in chosen}
     if len(distinct) < LEAST_UNITS:
         others = (
@@ -207,15 +203,10 @@ def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, .
 
 def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> FloatArray:
     """Share of time in cells of the envelope; every unit counts the same."""
-    edges = [
-        np.linspace(low, max(high, low + 1e-9), n + 1)
-        for (low, high), n in zip(envelope, _CELLS, strict=True)
-    ]
+    edges = [np.linspace(low, max(high, low + 1e-9), n + 1) for (low, high), n in zip(envelope, _CELLS, strict=True)]
     total = np.zeros(_CELLS)
     for u in units:
-        at = [
-            np.clip(x, e[0], e[-1]) for x, e in zip((u.temperature_c, u.slope_c_per_min), edges, strict=True)
-        ]
+        at = [np.clip(x, e[0], e[-1]) for x, e in zip((u.temperature_c, u.slope_c_per_min), edges, strict=True)]
         total += np.histogram2d(at[0], at[1], bins=edges, weights=u.count / u.count.sum())[0]
     return np.asarray(total.T / len(units))
 

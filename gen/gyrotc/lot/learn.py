@@ -27,9 +27,7 @@ from ..train.means import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
-_STRANGE = (
-    16.0  # an unrelated unit's variance over the lot's, where the test has most power: four times as far away
-)
+_STRANGE = 16.0  # an unrelated unit's variance over the lot's, where the test has most power: four times as far away
 _LEAST_FREEDOM = 3  # below it Student's t has no variance, and a prior must have one
 _TELLING = 1.0  # variance by the lot over variance by noise, from which on a score says how wide the lot is
 
@@ -196,9 +194,7 @@ def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotStat
     return replace(state, directions=directions, rest=rest, of_mean=of_mean)
 
 
-def _conditioned(
-    units: UnitSums, state: LotState
-) -> tuple[LotState, tuple[FloatArray, FloatArray], FloatArray]:
+def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, tuple[FloatArray, FloatArray], FloatArray]:
     """The clusters' means; of each unit the covariance of its coefficients, its log determinant, their deviation.
 
     With S the spread, G the precision of a unit and P = (S⁻¹ + G)⁻¹ its posterior covariance, what a unit says of its
@@ -223,9 +219,7 @@ def _conditioned(
     )
 
 
-def _log_evidence(
-    units: UnitSums, state: LotState, posterior: FloatArray, log_determinant: FloatArray
-) -> float:
+def _log_evidence(units: UnitSums, state: LotState, posterior: FloatArray, log_determinant: FloatArray) -> float:
     """Log evidence of the units, up to a constant of the recordings; arguments as `_conditioned` gives them."""
     known = state.basis.variance(state.of_mean)
     totals = np.linalg.solve(state.covariances, state.means[..., None])[..., 0]
@@ -255,9 +249,7 @@ def evidence(units: UnitSums, mean: FloatArray, covariance: FloatArray) -> Float
     posterior, log_determinant = posteriors(inverse, units.precision)
     value = 0.5 * np.sum(moment * _times(posterior, moment), axis=1) + 0.5 * log_determinant
     value = value - 0.5 * float(np.linalg.slogdet(covariance)[1])
-    return np.asarray(
-        value + units.moment @ mean - 0.5 * np.einsum("i,uij,j->u", mean, units.precision, mean)
-    )
+    return np.asarray(value + units.moment @ mean - 0.5 * np.einsum("i,uij,j->u", mean, units.precision, mean))
 
 
 Envelope = tuple[tuple[float, float], tuple[float, float]]
@@ -397,10 +389,7 @@ def _freedom(sums: UnitSums, state: LotState) -> float:
 
 def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
     """The best model with so many clusters and no direction; None where no partition has enough units in each."""
-    tried = [
-        fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain)
-        for cluster in _partitions(sums, plain, number)
-    ]
+    tried = [fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain) for cluster in _partitions(sums, plain, number)]
     tried.sort(key=_worth, reverse=True)
     found: list[LotState] = []
     for first in tried[:_REFINED]:

@@ -91,9 +91,7 @@ def _with(prior: LotPrior) -> MapQuestion:
     largest = int(np.argmax(prior.share))
     values = prior.basis.values(asked.temperature_c, asked.slope_c_per_min)
     sigma = lot.noise_dph / lot.unit_dph
-    return MapQuestion(
-        prior.basis, prior.covariances[largest], sigma, lot.mean_s, values, asked.share, lot.unit_dph
-    )
+    return MapQuestion(prior.basis, prior.covariances[largest], sigma, lot.mean_s, values, asked.share, lot.unit_dph)
 
 
 def _without(prior: LotPrior) -> MapQuestion:
@@ -104,9 +102,7 @@ def _without(prior: LotPrior) -> MapQuestion:
     wide[0] = CONSTANT
     values = basis.values(asked.temperature_c, asked.slope_c_per_min)
     sigma = lot.noise_dph / lot.unit_dph
-    return MapQuestion(
-        basis, np.diag(basis.variance(wide)), sigma, lot.mean_s, values, asked.share, lot.unit_dph
-    )
+    return MapQuestion(basis, np.diag(basis.variance(wide)), sigma, lot.mean_s, values, asked.share, lot.unit_dph)
 
 
 def _searched(
@@ -124,12 +120,9 @@ def _searched(
             if (steps and to != steps[-1].to_c) or (not steps and (to != start or hold))
         ]
         found = [
-            (hours_of(start, one), question.sigma_dph(*inputs_of(plan, start, one, question.mean_s)))
-            for one in tried
+            (hours_of(start, one), question.sigma_dph(*inputs_of(plan, start, one, question.mean_s))) for one in tried
         ]
-        best = max(
-            range(len(tried)), key=lambda k: _gain(now, found[k][1], accuracy_dph) / (found[k][0] - hours)
-        )
+        best = max(range(len(tried)), key=lambda k: _gain(now, found[k][1], accuracy_dph) / (found[k][0] - hours))
         if found[best][0] > _MOST_H or not found[best][1] < now:
             break
         steps, (hours, now) = tried[best], found[best]
@@ -215,9 +208,7 @@ def programme_text(programme: LotProgramme) -> str:
 
 _PLACES = 5  # set points between the extremes: a quarter of the span is about as far as a map is smooth
 _KEPT = 2  # programmes of each length that are gone on from: the best first step does not always begin the best run
-_MOST_STEPS = (
-    4  # of a run: each further one multiplies the time of the search, and adds less than the one before
-)
+_MOST_STEPS = 4  # of a run: each further one multiplies the time of the search, and adds less than the one before
 
 
 @dataclass(frozen=True, slots=True)

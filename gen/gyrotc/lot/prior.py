@@ -53,9 +53,7 @@ class MapPrior:
             shrunk = np.linalg.inv(np.linalg.inv(covariance) + precision)
             found.append((mean + shrunk @ (moment - precision @ mean), shrunk))
             likely.append(float(evidence(sums, mean, covariance)[0]) + float(np.log(share)))
-            factor = np.linalg.cholesky(
-                covariance / of_few(self.freedom)
-            )  # the test counts the few by itself
+            factor = np.linalg.cholesky(covariance / of_few(self.freedom))  # the test counts the few by itself
             p.append(p_value(*scores(precision, moment, mean, factor), self.freedom))
         weight = np.exp(np.array(likely) - max(likely))
         weight /= weight.sum()

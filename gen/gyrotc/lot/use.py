@@ -85,9 +85,7 @@ class LotPrior(MapPrior):
         if self.lot.axis != axis:
             raise InputError("--lot", f"of axis {self.lot.axis}", f"a lot of axis {axis}, as the recordings")
 
-    def with_samples(
-        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
-    ) -> Given:
+    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
         """Tests whether a unit fits its lot, and fits it with the lot if it does.
 
         Args:
@@ -120,9 +118,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     """
     basis = LotBasis.read(lot.functions)
     kept = basis.kept
-    directions = (
-        np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
-    )
+    directions = np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
     rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
     freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
     scale = lot.cross_validation.spread_scale * of_few(freedom)
@@ -244,9 +240,7 @@ def _process(
     model = _PosteriorMap(posterior, scaling, center, spread, sigma, freedom)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
     at = scaling.normalise(asked.temperature_c, asked.slope_c_per_min)
-    kept = (
-        alone.kept if alone is not None and len(alone.kept) == len(means) else np.ones(len(means), dtype=bool)
-    )
+    kept = alone.kept if alone is not None and len(alone.kept) == len(means) else np.ones(len(means), dtype=bool)
     return Process(
         model=model,
         bins=Bins(*at, len(means) * asked.share, model.mean(*at), 0.0, float(len(means))),
@@ -263,9 +257,7 @@ def _process(
     )
 
 
-def _use(
-    prior: LotPrior, posterior: MapPosterior, serial: str, *, accepted: bool, scaling: Scaling
-) -> LotUse:
+def _use(prior: LotPrior, posterior: MapPosterior, serial: str, *, accepted: bool, scaling: Scaling) -> LotUse:
     lot, alone = prior.lot, prior.alone()
     before, after = alone.rms_sigma_dph(), posterior.rms_sigma_dph()
     share = 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
@@ -287,9 +279,7 @@ def _use(
 
 
 def _text(use: LotUse, clusters: int) -> str:
-    of = f"a lot of {use.units} units" + (
-        f" (cluster {use.cluster + 1} of {clusters})" if clusters > 1 else ""
-    )
+    of = f"a lot of {use.units} units" + (f" (cluster {use.cluster + 1} of {clusters})" if clusters > 1 else "")
     if not use.accepted:
         return f"not used: these runs lie farther from {of} than {1.0 - use.p_value:.1%} of its units do"
     seen = "; this unit is one of them" if use.member else ""

@@ -56,18 +56,11 @@ def _png(pixels: NDArray[np.uint8]) -> str:
     rows, columns, _ = pixels.shape
     lines = np.concatenate((np.zeros((rows, 1), np.uint8), pixels.reshape(rows, -1)), axis=1).tobytes()
     head = struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0)
-    data = (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", head)
-        + chunk(b"IDAT", zlib.compress(lines, 9))
-        + chunk(b"IEND", b"")
-    )
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines, 9)) + chunk(b"IEND", b"")
     return "data:image/png;base64," + base64.b64encode(data).decode("ascii")
 
 
-def image_svg(
-    image: Image, box: Box, xs: AxisScale, ys: AxisScale, named: Callable[[str, AxisScale], str]
-) -> str:
+def image_svg(image: Image, box: Box, xs: AxisScale, ys: AxisScale, named: Callable[[str, AxisScale], str]) -> str:
     """The picture and its scale; `named` gives the words of an axis."""
     x, y, w, h = box
     finite = image.values[np.isfinite(image.values)]
@@ -84,9 +77,7 @@ def image_svg(
     parts.append(_picture(_colored(shades), right, y, 12.0, h))
     scale = scale_of(np.array([low, high]), (low, high), False, 0.0)
     for at, text in scale.ticks(max(int(h / 36.0), 2)):
-        parts.append(
-            text_svg(right + 16.0, y + h * (1.0 - float(scale.place(np.array([at]))[0])) + 4.0, text)
-        )
+        parts.append(text_svg(right + 16.0, y + h * (1.0 - float(scale.place(np.array([at]))[0])) + 4.0, text))
     middle = f' transform="rotate(-90 {x + w + 70.0:.1f} {y + h / 2:.1f})"'
     parts.append(text_svg(x + w + 70.0, y + h / 2, named(image.bar, scale), anchor="middle", more=middle))
     return "".join(parts)
@@ -198,15 +189,11 @@ class Panel:
         """Bars of uncertainty from `low` to `high`."""
         self._add("errors", x, low, color, far=np.asarray(high, dtype=np.float64))
 
-    def vertical(
-        self, x: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8
-    ) -> None:
+    def vertical(self, x: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8) -> None:
         """A line from bottom to top."""
         self._add("vertical", [x], [np.nan], color, label, dash=dash, width=width)
 
-    def horizontal(
-        self, y: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8
-    ) -> None:
+    def horizontal(self, y: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8) -> None:
         """A line from left to right."""
         self._add("horizontal", [np.nan], [y], color, label, dash=dash, width=width)
 
@@ -214,9 +201,7 @@ class Panel:
         """A shaded part of the x axis."""
         self._add("span", [low, high], [np.nan, np.nan], color, label)
 
-    def bars(
-        self, values: ArrayLike, places: ArrayLike, color: str, label: str = "", *, height: float = 0.6
-    ) -> None:
+    def bars(self, values: ArrayLike, places: ArrayLike, color: str, label: str = "", *, height: float = 0.6) -> None:
         """Bars from zero to the right; `height` in units of the y axis."""
         self._add("bars", values, places, color, label, width=height)
 
@@ -239,9 +224,7 @@ class Panel:
         """Values, shape (rows from below, columns), as colours between the axes; `hidden` cells are hatched."""
         self.background = Image(values, x, y, hidden, bar)
 
-    def _add(
-        self, kind: str, x: ArrayLike, y: ArrayLike, color: str, label: str = "", **more: object
-    ) -> None:
+    def _add(self, kind: str, x: ArrayLike, y: ArrayLike, color: str, label: str = "", **more: object) -> None:
         at, to = (np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (x, y))
         self.marks.append(Drawn(kind, at, to, color, label, **more))  # type: ignore[arg-type]
 
@@ -287,13 +270,8 @@ def drawing(
     ys = _scales(panels, "y", share_y)
     legend, top = _legend(panels, width)
     parts, y = [legend], top
-    lefts = [
-        _left(panel, scale, tall[k // columns])
-        for k, (panel, scale) in enumerate(zip(panels, ys, strict=True))
-    ]
-    column_left = [
-        8.0 if share_y and column else max(lefts[column::columns], default=0.0) for column in range(columns)
-    ]
+    lefts = [_left(panel, scale, tall[k // columns]) for k, (panel, scale) in enumerate(zip(panels, ys, strict=True))]
+    column_left = [8.0 if share_y and column else max(lefts[column::columns], default=0.0) for column in range(columns)]
     column_right = [max(map(_right, panels[column::columns]), default=0.0) for column in range(columns)]
     inner = (width - sum(column_left) - sum(column_right) - _GAP * (columns - 1)) / columns
     for row in range(rows):
@@ -322,9 +300,7 @@ def stacked(*pictures: Markup) -> Markup:
         size = _SIZE.search(picture)
         assert size is not None
         wide, height = float(size[1]), float(size[2])
-        parts.append(
-            str(picture).replace(' width="100%"', f' y="{y:g}" width="{wide:g}" height="{height:g}"', 1)
-        )
+        parts.append(str(picture).replace(' width="100%"', f' y="{y:g}" width="{wide:g}" height="{height:g}"', 1))
         y += height
     head = f'<svg xmlns="http://www.w3.org/2000/svg" class="gy" viewBox="0 0 {wide:g} {y:g}" width="100%">'
     return checked_svg(f"{head}{''.join(parts)}</svg>")
@@ -411,9 +387,7 @@ def _panel(
     x_ticks, y_ticks = _ticks(panel, xs, "x", w), _ticks(panel, ys, "y", h)
     at_x = x + w * xs.place(np.array([at for at, _ in x_ticks]))
     at_y = y + h * (1.0 - ys.place(np.array([at for at, _ in y_ticks])))
-    grid = "".join(f"M{a:.1f} {y:.1f}v{h:.1f}" for a in at_x) + "".join(
-        f"M{x:.1f} {b:.1f}h{w:.1f}" for b in at_y
-    )
+    grid = "".join(f"M{a:.1f} {y:.1f}v{h:.1f}" for a in at_x) + "".join(f"M{x:.1f} {b:.1f}h{w:.1f}" for b in at_y)
     frame = f"M{x:.1f} {y:.1f}v{h:.1f}h{w:.1f}"
     if panel.background:
         parts.append(image_svg(panel.background, box, xs, ys, _named))
@@ -456,9 +430,7 @@ def _drawn(panel: Panel, box: tuple[float, float, float, float], xs: AxisScale, 
     x, y, w, h = box
     name = f"{_clips}-{x:.0f}-{y:.0f}-{w:.0f}-{h:.0f}"
     inside = "".join(mark_svg(mark, box, xs, ys) for mark in panel.marks)
-    clip = (
-        f'<clipPath id="{name}"><rect x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"/></clipPath>'
-    )
+    clip = f'<clipPath id="{name}"><rect x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"/></clipPath>'
     data = ""
     if panel.zoom:
         limits = " ".join(f"{v:.9g}" for v in (xs.low, xs.high, ys.low, ys.high))

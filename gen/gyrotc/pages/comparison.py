@@ -17,20 +17,12 @@ from .display import power
 
 ENVIRONMENTS = ("-40 C", "20 C", "60 C", "1 C/min", "3 C/min", "5 C/min")
 
-BEFORE_DPH = dict(
-    zip(ENVIRONMENTS, (7.218e-3, 6.796e-3, 7.194e-3, 6.804e-3, 6.804e-3, 6.806e-3), strict=True)
-)
+BEFORE_DPH = dict(zip(ENVIRONMENTS, (7.218e-3, 6.796e-3, 7.194e-3, 6.804e-3, 6.804e-3, 6.806e-3), strict=True))
 
 AFTER_DPH = {
-    "mlr": dict(
-        zip(ENVIRONMENTS, (13.953e-4, 13.953e-4, 13.954e-4, 14.276e-4, 14.180e-4, 14.122e-4), strict=True)
-    ),
-    "rbf_random": dict(
-        zip(ENVIRONMENTS, (8.93e-4, 8.944e-4, 8.93e-4, 8.916e-4, 8.928e-4, 8.944e-4), strict=True)
-    ),
-    "mrbf_paper": dict(
-        zip(ENVIRONMENTS, (6.918e-4, 6.922e-4, 6.926e-4, 6.930e-4, 6.922e-4, 6.912e-4), strict=True)
-    ),
+    "mlr": dict(zip(ENVIRONMENTS, (13.953e-4, 13.953e-4, 13.954e-4, 14.276e-4, 14.180e-4, 14.122e-4), strict=True)),
+    "rbf_random": dict(zip(ENVIRONMENTS, (8.93e-4, 8.944e-4, 8.93e-4, 8.916e-4, 8.928e-4, 8.944e-4), strict=True)),
+    "mrbf_paper": dict(zip(ENVIRONMENTS, (6.918e-4, 6.922e-4, 6.926e-4, 6.930e-4, 6.922e-4, 6.912e-4), strict=True)),
 }
 
 NEURONS = dict(zip(("20 C", "-40 C", "60 C", *ENVIRONMENTS[3:]), (108, 112, 115, 121, 129, 135), strict=True))
@@ -184,9 +176,7 @@ def _rows_of(methods: Sequence[Method]) -> dict[str, Any]:
 
 def _environment(methods: Sequence[Method], k: int, exponent: int) -> Panel:
     unit = 10.0**exponent
-    panel = Panel(
-        x=f"RMS after, {power(exponent)} deg/h", title=methods[0].groups[k].environment, **_rows_of(methods)
-    )
+    panel = Panel(x=f"RMS after, {power(exponent)} deg/h", title=methods[0].groups[k].environment, **_rows_of(methods))
     place = np.arange(len(methods))[::-1]
     before = (methods[0].groups[k].before_std_dph or 0.0) / unit
     panel.vertical(before, label="σ before: what the mean alone leaves", dash="2 3")

@@ -198,9 +198,7 @@ def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
         np.concatenate([np.array(values) for values in of])
         for of in zip(*((r.temperature_c, r.slope_c_per_min, r.residual_dph) for r in runs), strict=True)
     )
-    line = np.concatenate(
-        [np.zeros(len(r.hours)) if r.named_dph is None else np.array(r.named_dph) for r in runs]
-    )
+    line = np.concatenate([np.zeros(len(r.hours)) if r.named_dph is None else np.array(r.named_dph) for r in runs])
     words = f"residual, {rate_unit()}"
     over_t = Panel(x="temperature, C", y=words)
     for label, color, mask in sorted_by_rate(slope):
@@ -313,8 +311,6 @@ def _considered(scores: SearchScores) -> Markup:
     )
     panel.bars(list(scores.alone.values()), places, BEFORE, "alone", height=0.62)
     if scores.beside is not None:
-        panel.bars(
-            [scores.beside.get(i, 0.0) for i in ids], places, AFTER, "beside the named causes", height=0.28
-        )
+        panel.bars([scores.beside.get(i, 0.0) for i in ids], places, AFTER, "beside the named causes", height=0.28)
     panel.vertical(scores.limit, label="1 % for the whole search", dash="5 3")
     return drawing([panel], height=16.0 + 25.0 * len(ids))

@@ -117,9 +117,7 @@ def _shown_object(part: BaseModel, *, rate: bool) -> BaseModel:
     from ..results.planned import DetectionLimit
     from ..results.release import Contribution, Instrument, Limit
 
-    rates = {
-        name for name in type(part).model_fields if _RATE.search(name) or (rate and name not in _NO_RATES)
-    }
+    rates = {name for name in type(part).model_fields if _RATE.search(name) or (rate and name not in _NO_RATES)}
     if isinstance(part, Limit) and _RATE.search(part.limit):
         rates |= set(_OF_LIMIT)
     elif isinstance(part, FleetOutlier) and _RATE.search(part.figure):

@@ -51,9 +51,7 @@ def curves_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup
         if len(members) < 2:
             continue
         plain = [e for e in members if e.name not in outliers]
-        panel = Panel(
-            x="temperature, C", y=f"bias, {rate_unit()}", title=f"axis {axis}" if axis else "", zoom=True
-        )
+        panel = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title=f"axis {axis}" if axis else "", zoom=True)
         for k, entry in enumerate(plain[:: -(-len(plain) // _MOST_CURVES) or 1]):
             label = "the others" if k == 0 else ""
             panel.line(_centers(entry), _curve(entry), COVERED, label, width=0.8, title=entry.name)
@@ -76,9 +74,7 @@ def why_outlier(known: Mapping[str, FleetEntry], reason: Reason) -> Markup:
     series = entry.facts.series if entry.facts else None
     panel = (
         _over_time(series, reason)
-        if series
-        and reason.file in (None, series.file)
-        and (reason.time_s is not None or reason.id in _IN_TIME)
+        if series and reason.file in (None, series.file) and (reason.time_s is not None or reason.id in _IN_TIME)
         else _over_temperature(known, entry)
     )
     return drawing([panel], width=HALF, height=160.0)

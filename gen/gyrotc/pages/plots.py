@@ -61,9 +61,7 @@ def map_with_centers(model: Model) -> Markup | None:
     tt, rr = np.meshgrid(t, r)
     seen = model.coverage
     hidden = np.array([[c == "0" for c in row] for row in seen.rows]) if seen is not None else None
-    surface = Panel(
-        x="temperature, C", y="dT/dt, C/min", title="dots: centers (rings: beyond); hatched: not trained"
-    )
+    surface = Panel(x="temperature, C", y="dT/dt, C/min", title="dots: centers (rings: beyond); hatched: not trained")
     surface.image(in_unit(model.map_dph(tt, rr)), (t0, t1), (r0, r1), f"bias, {rate_unit()}", hidden)
     centers = np.array([c for network in model.networks for c in network.centers]).reshape(-1, 2)
     places = np.clip(centers, (t0, r0), (t1, r1))
@@ -71,14 +69,10 @@ def map_with_centers(model: Model) -> Markup | None:
     for of, hollow in ((within, False), (~within, True)):
         surface.dots(places[of, 0], places[of, 1], ACCENT, size=7.0, hollow=hollow)
     cuts = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="cuts through the map")
-    for rate, dash, color in zip(
-        np.linspace(r0, r1, 3), ("5 3", "", "1.5 2.5"), (AFTER, COVERED, BEFORE), strict=True
-    ):
+    for rate, dash, color in zip(np.linspace(r0, r1, 3), ("5 3", "", "1.5 2.5"), (AFTER, COVERED, BEFORE), strict=True):
         label = f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−")  # + 0.0: not "-0.00"
         cuts.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, label, dash=dash, width=1.4)
-    return side_by_side(
-        drawing([surface], width=HALF, height=240.0), drawing([cuts], width=HALF, height=220.0)
-    )
+    return side_by_side(drawing([surface], width=HALF, height=240.0), drawing([cuts], width=HALF, height=220.0))
 
 
 def _shown(limits: tuple[float, float]) -> tuple[float, float]:
@@ -116,9 +110,7 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
     named = dated and len(at) <= _MOST_NAMED
     ticks = [(t, str(one.date)[:10]) for t, one in zip(at, history, strict=True)] if named else None
     words = "" if named else "days since the first calibration" if dated else "number of the calibration"
-    left = Panel(
-        x=words, y=f"RMS of what remains, {rate_unit()}", y_range=(0.0, None), x_ticks=ticks, whole_x=True
-    )
+    left = Panel(x=words, y=f"RMS of what remains, {rate_unit()}", y_range=(0.0, None), x_ticks=ticks, whole_x=True)
     for label, color, values in (
         ("as found: the correction before", BEFORE, [one.as_found_rms_dph for one in history]),
         ("as left: the new one", AFTER, [one.as_left_rms_dph for one in history]),
@@ -149,9 +141,7 @@ def _moved(panel: Panel, at: Sequence[float], history: Sequence[Calibration]) ->
     total = np.cumsum(steps) - steps[0]
     panel.horizontal(0.0)
     panel.line(at, total, COVERED, "since the first calibration")
-    spread = np.array(
-        [(one.expanded_uncertainty_dph or np.nan) if k else np.nan for k, one in enumerate(history)]
-    )
+    spread = np.array([(one.expanded_uncertainty_dph or np.nan) if k else np.nan for k, one in enumerate(history)])
     panel.errors(at, total - spread, total + spread, AFTER)
     more = np.array([bool(one.significant) for one in history])
     x = np.array(at)

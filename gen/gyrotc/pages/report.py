@@ -135,22 +135,15 @@ def page_from(source: Path) -> Iterator[None]:
         jinja2.TemplateError,
     ) as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-        raise InputError(
-            str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them"
-        ) from error
+        raise InputError(str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them") from error
 
 
 def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], str]]:
     """Files of which rows were left out of training: stretches, and the line that leaves them out of all figures."""
     outliers = training.outliers if training else None
     stretches = outliers.stretches if outliers else ()
-    of_file = {
-        name: [s for s in stretches if s.file == name] for name in dict.fromkeys(s.file for s in stretches)
-    }
-    return [
-        (name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier"))
-        for name, mine in of_file.items()
-    ]
+    of_file = {name: [s for s in stretches if s.file == name] for name in dict.fromkeys(s.file for s in stretches)}
+    return [(name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier")) for name, mine in of_file.items()]
 
 
 @dataclass(frozen=True, slots=True)

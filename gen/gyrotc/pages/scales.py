@@ -88,9 +88,7 @@ def _step(low: float, high: float, most: int) -> float:
     """The least round step of which at most one more than `most` lie in a range."""
     unit = 10.0 ** math.floor(math.log10((high - low) / (most + 1)))
     return next(
-        f * unit
-        for f in _ROUND
-        if math.floor(high / (f * unit) + 1e-9) - math.ceil(low / (f * unit) - 1e-9) <= most
+        f * unit for f in _ROUND if math.floor(high / (f * unit) + 1e-9) - math.ceil(low / (f * unit) - 1e-9) <= most
     )
 
 

@@ -48,9 +48,7 @@ def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup |
     if not there:
         return None
     t = np.concatenate([a.temperature_c for a in there])
-    before, after = (
-        in_unit(np.concatenate([getattr(a, name) for a in there])) for name in ("before_dph", "after_dph")
-    )
+    before, after = (in_unit(np.concatenate([getattr(a, name) for a in there])) for name in ("before_dph", "after_dph"))
     slope = np.concatenate([slopes(a) for a in there])
     kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
     first = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="measured, and the map")
@@ -66,9 +64,7 @@ def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup |
         third.dots(t[of], after[of], color, size=_DOT)
         fourth.dots(slope[of], after[of], color, size=_DOT)
     _fit(first, model, kinds, slope)
-    return side_by_side(
-        *(drawing([panel], width=HALF, height=210.0) for panel in (first, second, third, fourth))
-    )
+    return side_by_side(*(drawing([panel], width=HALF, height=210.0) for panel in (first, second, third, fourth)))
 
 
 def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]], slope: FloatArray) -> None:
@@ -85,9 +81,7 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
         if label != "held":
             rate = float(np.median(slope[of]))
             words = f"map at {rate:+.2g} C/min".replace("-", "−")
-            panel.line(
-                t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, words, dash="5 3", width=1.6
-            )
+            panel.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, words, dash="5 3", width=1.6)
 
 
 def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
@@ -100,9 +94,7 @@ def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
     column = np.clip(((t - t0) / (t1 - t0 or 1.0) * columns).astype(int), 0, columns - 1)
     row = min(max(int((0.0 - r0) / (r1 - r0 or 1.0) * rows), 0), rows - 1)
     covered = _covered_at_rest(model, t)
-    cells = np.where(
-        covered, np.array(known.rows)[row, column], np.array(known.uncovered or known.rows)[row, column]
-    )
+    cells = np.where(covered, np.array(known.rows)[row, column], np.array(known.uncovered or known.rows)[row, column])
     return np.asarray(cells, dtype=np.float64)
 
 

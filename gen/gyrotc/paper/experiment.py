@@ -83,8 +83,7 @@ class Experiment:
         """What docs/paper.md is made of, in deg/h: mean, σ and RMS before and after, and centers; else RMS after."""
         before = {name: _figures(cell.before) for name, cell in self.cells["constant"].items()}
         after = {
-            method: {name: _after(cell, whole) for name, cell in cells.items()}
-            for method, cells in self.cells.items()
+            method: {name: _after(cell, whole) for name, cell in cells.items()} for method, cells in self.cells.items()
         }
         kept = {"floor_dph": self.floor_dph, "after": after}
         return kept | {"before": before} if whole else kept
@@ -126,8 +125,7 @@ def groups_of(folder: Path) -> tuple[list[PaperGroup], float]:
         blocks[run.environment, run.role] = samples_of(found, front.block_s, number)
         begins[run.environment, run.role] = found.begins_s or 0.0
     groups = [
-        PaperGroup(name, blocks[name, "train"], blocks[name, "exam"], begins[name, "exam"])
-        for name in ENVIRONMENTS
+        PaperGroup(name, blocks[name, "train"], blocks[name, "exam"], begins[name, "exam"]) for name in ENVIRONMENTS
     ]
     floor = simulated_floor(folder, [run.file for run in dataset.runs if run.role == "exam"], AVERAGE_S)
     assert floor is not None  # this data set was simulated

@@ -101,8 +101,7 @@ def checksum(series: Series) -> str:
 def _figure(series: Series, number: int) -> bytes:
     method, title, panel, enlarged = FIGURES[number]
     cells = {
-        name: (np.array(measured), np.array(series[method][name]))
-        for name, measured in series["measured"].items()
+        name: (np.array(measured), np.array(series[method][name])) for name, measured in series["measured"].items()
     }
     whole = slice(None)
     rows = [(_CONSTANT, whole), (_VARIABLE, whole)]
@@ -131,9 +130,7 @@ def png(figure: Figure, description: str = "", dpi: int = _DPI, colours: int = _
     return small.getvalue()
 
 
-def _line(
-    axes: Sequence[Axes], letter: str, cells: Sequence[tuple[str, _Shown]], panel: _Panel, part: slice
-) -> None:
+def _line(axes: Sequence[Axes], letter: str, cells: Sequence[tuple[str, _Shown]], panel: _Panel, part: slice) -> None:
     for ax, (name, shown) in zip(axes, cells, strict=True):
         panel(ax, shown, part)
         ax.set_title(f"({letter}) {name}", fontsize=8.5, loc="left")
@@ -145,9 +142,7 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     hours = CELL_S * np.arange(len(record.cavity_c)) / 3600.0
     average = round(AVERAGE_S / CELL_S)
-    measured, true = (
-        np.diff(angle[::average]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec)
-    )
+    measured, true = (np.diff(angle[::average]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
@@ -155,9 +150,7 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         above.plot(hours[:-1], record.reading_c, color=BEFORE, linewidth=1.2, label="sensor on the block")
         above.plot(hours, record.cavity_c, color=AFTER, linewidth=0.8, linestyle="--", label="cavity")
         above.set_ylabel("C")
-        below.plot(
-            hours[average::average], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s"
-        )
+        below.plot(hours[average::average], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s")
         below.plot(hours[average::average], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
         below.set_ylabel("1e-3 deg/h")
         below.set_xlabel("time, h")

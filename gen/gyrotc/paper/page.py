@@ -97,9 +97,7 @@ def _table_1(figures: Figures, *, published: bool) -> str:
     ]
     if published:
         rows.append(['*paper\'s "σ" before*', *(f"*{1e3 * BEFORE_DPH[name]:.3f}*" for name in ENVIRONMENTS)])
-    rows.append(
-        ["before: σ about the mean", *(f"{1e3 * before[name]['std_dph']:.3f}" for name in ENVIRONMENTS)]
-    )
+    rows.append(["before: σ about the mean", *(f"{1e3 * before[name]['std_dph']:.3f}" for name in ENVIRONMENTS)])
     for method, label in METHODS.items():
         of = after[method]
         rows.append([f"after, {label}", *(f"{1e3 * of[name]['rms_dph']:.3f}" for name in ENVIRONMENTS)])
@@ -139,13 +137,9 @@ def _gyros_table(gyros: Gyros) -> str:
         [label, *(_median_worst([_ratio(one, method) for one in of.values()]) for of in gyros.values())]
         for method, label in METHODS.items()
     ]
-    floors = [
-        f"{1e3 * float(np.median([one['floor_dph'] for one in of.values()])):.3f}" for of in gyros.values()
-    ]
+    floors = [f"{1e3 * float(np.median([one['floor_dph'] for one in of.values()])):.3f}" for of in gyros.values()]
     rows.append(["noise floor, 1e-3 deg/h", *floors])
-    return _markdown(
-        ["RMS after ÷ noise floor", *(f"{_NOISE_TITLES[noise]}: median, worst" for noise in gyros)], rows
-    )
+    return _markdown(["RMS after ÷ noise floor", *(f"{_NOISE_TITLES[noise]}: median, worst" for noise in gyros)], rows)
 
 
 def _scatter_table(figures: Figures, samples: int) -> str:
@@ -155,9 +149,7 @@ def _scatter_table(figures: Figures, samples: int) -> str:
     for method, published in AFTER_DPH.items():
         ours = [figures["after"][method][name]["std_dph"] for name in ENVIRONMENTS]
         rows.append([METHODS[method], _scatter(list(published.values())), _scatter(ours), chance])
-    return _markdown(
-        ["spread of σ over the environments", "paper", "here", f"chance, {samples} samples"], rows
-    )
+    return _markdown(["spread of σ over the environments", "paper", "here", f"chance, {samples} samples"], rows)
 
 
 def _scatter(values: Sequence[float]) -> str:
@@ -266,9 +258,7 @@ def _series(result: Experiment) -> Series:
     cells = {"measured": result.cells["constant"], **{name: result.cells[name] for name in _SERIES}}
     return {
         name: {
-            environment: np.round(
-                cell.before if name == "measured" else cell.predicted, _SERIES_DIGITS
-            ).tolist()
+            environment: np.round(cell.before if name == "measured" else cell.predicted, _SERIES_DIGITS).tolist()
             for environment, cell in of.items()
         }
         for name, of in cells.items()

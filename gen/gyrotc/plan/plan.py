@@ -86,9 +86,7 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
     )
 
 
-def _values(
-    sensitivity: Sensitivity, runs: list[int], required: Mapping[str, float]
-) -> dict[str, float | None]:
+def _values(sensitivity: Sensitivity, runs: list[int], required: Mapping[str, float]) -> dict[str, float | None]:
     if not runs:
         return dict.fromkeys(required)
     limits = sensitivity.limits(runs)
@@ -98,18 +96,14 @@ def _values(
 def _distance(sensitivity: Sensitivity, runs: list[int], required: Mapping[str, float]) -> float:
     """Sum of the logarithms by which limits are above what is required; 0 when all are reached."""
     values = _values(sensitivity, runs, required)
-    return sum(
-        float(np.log(_UNSEEN if v is None else max(v / required[id], 1.0))) for id, v in values.items()
-    )
+    return sum(float(np.log(_UNSEEN if v is None else max(v / required[id], 1.0))) for id, v in values.items())
 
 
 _D_FOUND = 6.0  # about where most causes are found, as in `sensitivity`
 _LEAST_C = 1e-4  # no thermometer tells less than this
 
 
-def places(
-    scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int
-) -> list[ThermometerPlace]:
+def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int) -> list[ThermometerPlace]:
     """Every node but the sensor's own, the most telling first.
 
     Raises:
@@ -234,8 +228,7 @@ def _limits(sensitivity: Sensitivity) -> tuple[PlanLimit, ...]:
 
     found = sensitivity.limits()
     return tuple(
-        PlanLimit(id=id, family=CATALOGUE[id].family, detection_limit=shown(limit))
-        for id, limit in found.items()
+        PlanLimit(id=id, family=CATALOGUE[id].family, detection_limit=shown(limit)) for id, limit in found.items()
     )
 
 
@@ -255,9 +248,7 @@ def _hard(rows: list[Row]) -> tuple[Hard, ...]:
 def _accuracy(sensitivity: Sensitivity) -> list[Accuracy]:
     """Predicted accuracy after each run: error of the map over the whole programme, RMS of means over 100 s."""
     programme = sensitivity.programme
-    floor = float(
-        np.sqrt(programme.declared.colour(_AVERAGE_S).matrix(np.zeros(1, dtype=np.int64), _AVERAGE_S)[0, 0])
-    )
+    floor = float(np.sqrt(programme.declared.colour(_AVERAGE_S).matrix(np.zeros(1, dtype=np.int64), _AVERAGE_S)[0, 0]))
     out = []
     hours = np.cumsum(programme.hours)
     for count in range(1, len(hours) + 1):

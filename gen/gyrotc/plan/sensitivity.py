@@ -285,11 +285,7 @@ def separability(sensitivity: Sensitivity, only: Sequence[str] | None = None) ->
                 candidate.id,
                 parameter.name if parameter else None,
                 candidate.values[parameter.name] if parameter else None,
-                {
-                    i: float(np.sqrt(10.0 / max(1.0 - s, _LEAST)))
-                    for i, s in shares.items()
-                    if i != candidate.id
-                },
+                {i: float(np.sqrt(10.0 / max(1.0 - s, _LEAST))) for i, s in shares.items() if i != candidate.id},
             )
         )
     return rows

@@ -52,9 +52,7 @@ _DURATIONS_S = (
 )  # from a step to ten minutes, where a drift begins
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
 _BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
-_MARGIN = (
-    1.25  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
-)
+_MARGIN = 1.25  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
 _KINDS = 4.0  # kinds of change, as looks: shapes of one kind are nearly one
 _INDEPENDENT = 5.0  # cells to a degree of freedom of a scale from a median of what is correlated
 _LEAST_CELLS = 60  # beside the columns that are fitted: fewer do not show what noise makes
@@ -150,9 +148,7 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     for _ in range(2):
         beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
         noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside)
-        search = _Search(
-            fine, maps_of(fine, knots_c), noise.scaled(coarse[0].cell_s / fine[0].cell_s), curves
-        )
+        search = _Search(fine, maps_of(fine, knots_c), noise.scaled(coarse[0].cell_s / fine[0].cell_s), curves)
         found = search.found(found)
         if not found:
             return []
@@ -168,9 +164,7 @@ def _within(one: Change, gain: Change) -> bool:
     return one.run == gain.run and one.time_s[1] <= gain.time_s[2] and gain.time_s[1] <= one.time_s[2]
 
 
-def _columns(
-    cells: RunCells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]
-) -> FloatArray | None:
+def _columns(cells: RunCells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]) -> FloatArray | None:
     """Columns of the changes of a run; `curves`: times and the map along each run, shape (2, n)."""
     t = cells.time_s
     curve = np.interp(t, *curves[run])
@@ -193,9 +187,7 @@ class _Search:
         self._looks = _KINDS * sum(len(one) for one in cells)
         chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
         self._limit = _MARGIN * chance
-        self._scale: FloatArray | None = (
-            None  # of each run: what noise makes of a change of size over error 1
-        )
+        self._scale: FloatArray | None = None  # of each run: what noise makes of a change of size over error 1
 
     def found(self, known: Sequence[_At]) -> list[_At]:
         """All that is clear, placed and fitted beside one another; it begins with what is known."""
@@ -207,9 +199,7 @@ class _Search:
             new = list(self._clearest(found))
             before = set(found)
             for gain in [at for at in new if at.kind == "gain"]:  # its own step goes with it
-                found = [
-                    at for at in found if at.run != gain.run or abs(at.middle_s - gain.begin_s) > _AROUND_S
-                ]
+                found = [at for at in found if at.run != gain.run or abs(at.middle_s - gain.begin_s) > _AROUND_S]
             for run in sorted({at.run for at in new}):
                 found = self._placed_anew(run, found + [at for at in new if at.run == run])
             if before == set(found):
@@ -350,9 +340,7 @@ class _Search:
                 return drift
         over = [pair for pair in best if pair[1].duration_s <= _over_s(cells)]
         lasting = best[len(over) :]
-        mean = [
-            np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind
-        ]
+        mean = [np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind]
         steps = len(mean) == 1 or mean[0] >= mean[1]
         return max(over if steps else lasting, key=lambda pair: pair[0])[1]
 

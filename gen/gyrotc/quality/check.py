@@ -92,9 +92,7 @@ class CheckResult:
             serial=self.serial,
             axis=self.axis,
             problems=tuple(
-                Problem(
-                    where=p.where, found=p.found, expected=p.expected, rows=_rows(self.marks.get(str(p), ()))
-                )
+                Problem(where=p.where, found=p.found, expected=p.expected, rows=_rows(self.marks.get(str(p), ())))
                 for p in self.problems
             ),
             warnings=self.warnings,
@@ -166,9 +164,7 @@ def check(
             facts += [(one, f) for f in of_axis]
     named = (_of_axes(warning, seen, len(axes)) for warning, seen in warnings.values())
     serial = datasets[-1][1].serial if datasets else None
-    return CheckResult(
-        serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets)
-    )
+    return CheckResult(serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets))
 
 
 def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:

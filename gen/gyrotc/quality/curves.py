@@ -46,13 +46,9 @@ _EVIDENCE = 10.0  # twice the logarithm of the odds against a memory: very stron
 _CLEAR_FACTOR = 5.0  # times the largest departure from 1 of the other runs' own factors
 _LEAST_SWING = 5.0  # of the curve, in terms of what the runs scatter about one another
 _LEFT = 0.25  # of what the run departs by as it stands: the most that the factor may leave,
-_ALIKE = (
-    1.5  # unless it is no more than so many times the scatter: a run's own and that of the mean of two others
-)
+_ALIKE = 1.5  # unless it is no more than so many times the scatter: a run's own and that of the mean of two others
 _UNITS = (1e3, 180.0 / np.pi, 3600.0)  # between units of a rate that are taken for one another
-_OF_UNIT = (
-    1.15  # ratio to such a factor: its neighbours lie 17 times away, and noise differs little between runs
-)
+_OF_UNIT = 1.15  # ratio to such a factor: its neighbours lie 17 times away, and noise differs little between runs
 _NOISE_ALIKE = 1.1  # ratio of the noises of the other runs, largest to smallest, for the noise to be evidence
 _PLACE_C, _PLACE_C_PER_MIN = 1.0, 0.25  # what counts as the same temperature and rate of it
 _COMMON_PLACES = 5  # fewer do not make a median
@@ -98,9 +94,7 @@ class _Way:
     @property
     def changed(self) -> list[int]:
         """Axes whose column or sign is another."""
-        return [
-            k for k, (c, sign) in enumerate(zip(self.column, self.sign, strict=True)) if c != k or sign < 0
-        ]
+        return [k for k, (c, sign) in enumerate(zip(self.column, self.sign, strict=True)) if c != k or sign < 0]
 
     @property
     def changes(self) -> int:
@@ -180,9 +174,7 @@ def _against_earth(curve: Curve) -> tuple[_Way, str] | None:
         along = abs(float(earth[0, 0]))
         if along < _LEAST_ALONG_DPH or abs(float(mean[0, 0] + earth[0, 0])) > _ALONG * along:
             return None
-        return _Way(
-            (0,), (-1,)
-        ), f"Earth's rate along its axis ({earth[0, 0]:.4g} deg/h; the mean is {mean[0, 0]:.4g})"
+        return _Way((0,), (-1,)), f"Earth's rate along its axis ({earth[0, 0]:.4g} deg/h; the mean is {mean[0, 0]:.4g})"
     if mean.shape[1] != 3 or abs(np.linalg.norm(mean) / _EARTH_DPH - 1.0) > _NORM:
         return None
     tolerance = _DIRECTION * _EARTH_DPH / np.sqrt(3.0)
@@ -296,9 +288,7 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
     if abs(louder - 1.0) < _LEAST_CHANGE or abs(factor / louder - 1.0) > _LEAST_CHANGE:
         rest = [others[:k] + others[k + 1 :] for k in range(len(others))]
         among = [one for k, of in enumerate(rest) if (one := _factor(others[k], of)) is not None]
-        if len(among) < _LEAST_OTHERS or abs(factor - 1.0) <= _CLEAR_FACTOR * max(
-            abs(f - 1.0) for f, _ in among
-        ):
+        if len(among) < _LEAST_OTHERS or abs(factor - 1.0) <= _CLEAR_FACTOR * max(abs(f - 1.0) for f, _ in among):
             return None
     of_curve = (run for run in dataset.runs if (run.file, run.from_s) == (curve.file, curve.from_s))
     run = next(of_curve, None)
@@ -333,9 +323,7 @@ def _series(curve: Curve, axis: str | None) -> dict[float, float]:
     return dict(zip(curve.temperature_c.tolist(), curve.rates_dph[:, column].tolist(), strict=True))
 
 
-def _factor(
-    own: Mapping[float, float], others: Sequence[Mapping[float, float]]
-) -> tuple[float, float] | None:
+def _factor(own: Mapping[float, float], others: Sequence[Mapping[float, float]]) -> tuple[float, float] | None:
     """The factor on the others' mean curve that makes this one, beside a constant, and half its 95 % interval.
 
     None where the runs share too few temperatures, the curve hardly swings, or no factor makes it this one.
@@ -380,10 +368,7 @@ def contradiction_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     run = np.concatenate([np.full(len(f.rates_dph), k) for k, f in enumerate(runs)])
     rate = np.concatenate([f.rates_dph for f in runs])
     at = np.concatenate(
-        [
-            np.column_stack([f.temperatures_c / _PLACE_C, f.slopes_c_per_min / _PLACE_C_PER_MIN]).round()
-            for f in runs
-        ]
+        [np.column_stack([f.temperatures_c / _PLACE_C, f.slopes_c_per_min / _PLACE_C_PER_MIN]).round() for f in runs]
     )
     keys, group = np.unique(np.column_stack([at, run]), axis=0, return_inverse=True)
     group = group.reshape(-1)
@@ -474,9 +459,7 @@ def evidence_beside_memories(
 
 def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
     """Squares that a fit leaves, its rank, and the correlation of neighbours in what it leaves, 0 at least."""
-    q, size, _ = np.linalg.svd(
-        columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False
-    )
+    q, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
     q = q[:, size > _RANK * size[0]]
     rest = y - q @ (q.T @ y)
     left = float(rest @ rest)

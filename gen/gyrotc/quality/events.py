@@ -36,9 +36,7 @@ def found_events(dataset: Dataset) -> list[Finding]:
     return [*of_runs, *(event for event in events_of(whole, facts, files) if event.file not in files)]
 
 
-def events_of(
-    runs: Sequence[Run], facts: Sequence[RunFacts], without: Collection[str | None] = ()
-) -> list[Finding]:
+def events_of(runs: Sequence[Run], facts: Sequence[RunFacts], without: Collection[str | None] = ()) -> list[Finding]:
     """Events of training runs, by run in order of time.
 
     Args:
@@ -74,11 +72,7 @@ def _of_rows(run: Run, f: RunFacts) -> tuple[list[Finding], NDArray[np.int64]]:
     rows = run.rows()
     wild = departing_rows(rows, run)
     of_thermometer = list(temperature_findings_of(run, rows, f))
-    lost = [
-        np.arange(*np.searchsorted(rows.time_s, span))
-        for event in of_thermometer
-        for span in event.leave_out_s
-    ]
+    lost = [np.arange(*np.searchsorted(rows.time_s, span)) for event in of_thermometer for span in event.leave_out_s]
     found = [*spike_findings(run, rows, wild), *of_thermometer, *_dropouts(run, rows)]
     return found, np.unique(np.concatenate([wild, *lost]))
 
@@ -143,9 +137,7 @@ def _of_changes(run: Run, changes: Sequence[Change], first_s: float, end_s: floa
                 f"at {back.time_s[0]:g} s, whatever the temperature is: leave out {_hours(*out)}, and find out what "
                 "happened then."
             )
-            yield finding(
-                "step_and_recover", text, run, time_s=one.time_s, size=(one.size, "deg/h"), leave_out=[out]
-            )
+            yield finding("step_and_recover", text, run, time_s=one.time_s, size=(one.size, "deg/h"), leave_out=[out])
             k += 1
         else:
             yield _lasting(run, one, first_s, end_s)

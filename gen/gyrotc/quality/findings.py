@@ -213,11 +213,7 @@ def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
     """Rows that several training runs, or several exams, hold, or one run twice: they count twice."""
     for shared in dataset.shared:
         rows = shared.rows[1] - shared.rows[0] + 1
-        same = (
-            "are also"
-            if shared.likeness is None
-            else f"have the noise (correlation {shared.likeness:.2f}) of"
-        )
+        same = "are also" if shared.likeness is None else f"have the noise (correlation {shared.likeness:.2f}) of"
         other = "the same file" if shared.other_file == shared.file else shared.other_file
         text = (
             f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} {same} rows {shared.other_rows[0]} to "
@@ -247,14 +243,9 @@ def copied_channel_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     for k, name in enumerate(names):
         for other in names[:k]:
             one, some = columns[name], slice(None, None, max(1, len(rows) // 1000))
-            if not np.array_equal(
-                one[some], columns[other][some], equal_nan=True
-            ):  # nearly all are told by a few rows
+            if not np.array_equal(one[some], columns[other][some], equal_nan=True):  # nearly all are told by a few rows
                 continue
-            same = all(
-                np.array_equal(one[part], columns[other][part], equal_nan=True)
-                for part in parts_of(len(rows))
-            )
+            same = all(np.array_equal(one[part], columns[other][part], equal_nan=True) for part in parts_of(len(rows)))
             if same and len(np.unique(one[some])) >= _FEWEST_VALUES:
                 text = (
                     f"{name} of {run.file} is a copy of the {other}, row by row: it tells nothing of its own. Record "

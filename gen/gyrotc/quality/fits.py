@@ -84,9 +84,7 @@ class Noise:
 @lru_cache(maxsize=256)
 def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
     moves = np.array([[1.0, 1.0], [0.0, 1.0]])
-    p = solve_discrete_are(
-        moves.T, np.array([[1.0], [0.0]]), np.diag([level, max(slope, _LEAST_SLOPE)]), np.eye(1)
-    )
+    p = solve_discrete_are(moves.T, np.array([[1.0], [0.0]]), np.diag([level, max(slope, _LEAST_SLOPE)]), np.eye(1))
     variance = float(p[0, 0]) + 1.0
     gain = moves @ p[:, 0] / variance
     return np.array([1.0, -2.0, 1.0]), np.array([1.0, gain[0] - 2.0, 1.0 - gain[0] + gain[1]]), variance
@@ -135,9 +133,7 @@ class SmoothFit:
             columns += [np.exp((one.time_s[0] - one.time_s) / tau) for tau in _WARM_UP_S]
             columns += [] if change is None else list(change.T)
             columns += [
-                np.asarray(np.arange(n) >= k, dtype=np.float64)
-                for k, gap in one.behind_gap
-                if gap > LONGEST_GAP_S
+                np.asarray(np.arange(n) >= k, dtype=np.float64) for k, gap in one.behind_gap if gap > LONGEST_GAP_S
             ]
             q = orthonormal(lfilter(b, a, np.column_stack(columns), axis=0))
             own.append(q)
@@ -152,9 +148,7 @@ class SmoothFit:
         rest = y - shared @ amplitudes
         free = max(len(y) - shared.shape[1] - sum(q.shape[1] for q in own), 1)
         left = max(float(rest @ rest) / free, 1e-300)
-        by_column = (
-            np.linalg.lstsq(shared.T @ stacked, amplitudes, rcond=None)[0] if shared.size else amplitudes
-        )
+        by_column = np.linalg.lstsq(shared.T @ stacked, amplitudes, rcond=None)[0] if shared.size else amplitudes
         return SmoothFit(
             tuple(cells),
             noise,
@@ -184,9 +178,7 @@ class SmoothFit:
         energy = raw - np.sum(held_d * held_d, axis=0)
         if o.shape[1]:
             of_both, of_beside = d.T @ o - held_d.T @ held_o, o.T @ o - held_o.T @ held_o
-            solved = np.linalg.lstsq(
-                of_beside, np.column_stack([of_both.T, o.T @ self.rest[run]]), rcond=None
-            )[0]
+            solved = np.linalg.lstsq(of_beside, np.column_stack([of_both.T, o.T @ self.rest[run]]), rcond=None)[0]
             inner = inner - of_both @ solved[:, -1]
             energy = energy - np.sum(of_both.T * solved[:, :-1], axis=0)
         return inner, np.maximum(energy, LEAST_ENERGY * raw)

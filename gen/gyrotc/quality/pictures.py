@@ -84,9 +84,7 @@ def pictures_of(folder: Path, result: CheckResult) -> list[list[Picture]]:
         InputError: A recording changed meanwhile.
     """
     of_problems = (_of_problem(folder, result, _marks(result, problem)) for problem in result.problems)
-    return [
-        list(one) for one in (*of_problems, *(_of_warning(result, warning) for warning in result.warnings))
-    ]
+    return [list(one) for one in (*of_problems, *(_of_warning(result, warning) for warning in result.warnings))]
 
 
 def _marks(result: CheckResult, problem: InputError) -> Sequence[Mark]:
@@ -125,9 +123,7 @@ def _of_warning(result: CheckResult, warning: Finding) -> Iterator[Picture]:
     axis = warning.axes[0] if warning.axes else result.datasets[0][0]
     dataset = dict(result.datasets)[axis]
     facts = [f for of, f in result.facts if of == axis]
-    files = list(dict.fromkeys(mark.file for mark in warning.rows)) or [
-        f.file for f in facts if f.file == warning.file
-    ]
+    files = list(dict.fromkeys(mark.file for mark in warning.rows)) or [f.file for f in facts if f.file == warning.file]
     if warning.id in _COVERED:
         yield _covered(facts)
     elif warning.id in _COMPARED:

@@ -150,17 +150,13 @@ def _sudden(time: FloatArray, temperature: FloatArray, resolution: float) -> tup
     if noise == 0.0:  # a coarse thermometer stays where it is most times; its larger steps tell how it wavers
         noise = quantile_of_parts(departures, _WAVERING) / _WAVERING_SIGMAS
     limit = _JUMP_SIGMAS * noise + 2.0 * resolution
-    wide = [
-        (at * PART + np.flatnonzero(part > limit), part[part > limit]) for at, part in enumerate(departures())
-    ]
+    wide = [(at * PART + np.flatnonzero(part > limit), part[part > limit]) for at, part in enumerate(departures())]
     found, departure = (np.concatenate(column) for column in zip(*wide, strict=True))
     changes = changes_in(temperature)
     last = changes[np.searchsorted(changes, found, side="right") - 1]
     taken = np.maximum(time[found + 1] - time[found], np.minimum(time[found + 1] - time[last], _HOLD_S))
     jumps = found[departure > _JUMP_C_PER_MIN / 60.0 * taken]
-    return tuple(
-        Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS]
-    )
+    return tuple(Jump(float(time[k + 1]), float(temperature[k]), float(temperature[k + 1])) for k in jumps[:_MAX_JUMPS])
 
 
 def displaced(time: FloatArray, temperature: FloatArray, resolution: float) -> tuple[Jump, ...]:
@@ -240,9 +236,7 @@ def stuck_stretches(temperature: FloatArray, period_s: float) -> list[tuple[int,
     longest = np.sort(np.r_[lengths[long], np.delete(lengths, long).max(initial=1)])[::-1].astype(np.float64)
     difference = np.flatnonzero(longest[:-1] >= _LONGER * longest[1:])
     difference = difference[difference < _MOST]
-    rare = len(difference) > 0 and len(starts) >= _OFTEN * (
-        len(temperature) - longest[: difference[-1] + 1].sum()
-    )
+    rare = len(difference) > 0 and len(starts) >= _OFTEN * (len(temperature) - longest[: difference[-1] + 1].sum())
     least = longest[difference[-1]] if rare else np.inf
     steps = np.abs(np.diff(temperature[starts]))
     release = _RELEASE * float(np.quantile(steps, _ON_RAMPS))

@@ -196,7 +196,5 @@ def _drifting(
         "time_drifts",
         text,
         run,
-        marks=(
-            Mark(run.file, (int(at[first]) + 1, int(at[last]) + 1), (float(time[first]), float(time[last]))),
-        ),
+        marks=(Mark(run.file, (int(at[first]) + 1, int(at[last]) + 1), (float(time[first]), float(time[last]))),),
     )

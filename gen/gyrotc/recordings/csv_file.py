@@ -57,9 +57,7 @@ def blocks_of_lines(
                 text = block if plain else decoder.decode(block, final=not left).encode()
             except UnicodeDecodeError as error:
                 found, place = f"bytes that are no {encoding}", number + rest.count(b"\n")
-                raise InputError(
-                    f"{name}, after line {place}", found, "another --csv encoding=..."
-                ) from error
+                raise InputError(f"{name}, after line {place}", found, "another --csv encoding=...") from error
             block = _with_lf(rest + text, last=not left)
             end = len(block) if not left else block.rfind(b"\n") + 1
             if end == 0 and len(block) > _LONGEST_LINE:
@@ -270,9 +268,7 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
     cells = next(csv.reader([text], skipinitialspace=True), [])
     names = tuple(_bare(cell) for cell in cells)
     if not names or all(_NUMBER.fullmatch(cell) for cell in names):
-        raise InputError(
-            where, "no header" if names else "an empty line", f"the names of the columns; {_IMPORT}"
-        )
+        raise InputError(where, "no header" if names else "an empty line", f"the names of the columns; {_IMPORT}")
     return names
 
 

@@ -301,9 +301,7 @@ def _place(location: tuple[int | str, ...], content: dict[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def dataset_toml(
-    head: Mapping[str, Any], tables: Mapping[str, Any], runs: Sequence[Mapping[str, Any]] = ()
-) -> str:
+def dataset_toml(head: Mapping[str, Any], tables: Mapping[str, Any], runs: Sequence[Mapping[str, Any]] = ()) -> str:
     """`dataset.toml` as text: keys of the head, tables of plain values (a list: one table each), then the runs."""
     lines = [*_pairs(head)]
     for name, table in tables.items():

@@ -54,9 +54,7 @@ def in_entry(entry: RunEntry, time_s: FloatArray) -> NDArray[np.bool_]:
     return inside(time_s, entry.from_s, entry.to_s, gaps)
 
 
-def check_description(
-    description: Description, applied: Applied | None, exam_only: bool, problems: Problems
-) -> None:
+def check_description(description: Description, applied: Applied | None, exam_only: bool, problems: Problems) -> None:
     """Checks that there is a training run, that Earth's rate can be computed, that the model given was subtracted."""
     if not exam_only and all(entry.role != "train" for entry in description.run):
         expected = "at least one training run"
@@ -96,9 +94,7 @@ def _overlap(one: RunEntry, other: RunEntry) -> bool:
     return not before(one, other) and not before(other, one)
 
 
-def of_axis(
-    recordings: Mapping[str, Recording], axis: str | None, problems: Problems
-) -> dict[str, Recording]:
+def of_axis(recordings: Mapping[str, Recording], axis: str | None, problems: Problems) -> dict[str, Recording]:
     """The recordings that have the axis that was asked for."""
     kept = {}
     for name, recording in recordings.items():
@@ -131,16 +127,12 @@ Suspected = tuple[str, Suspicion]
 """Name of a file and what contradicts its units."""
 
 
-def check_channel_units(
-    description: Description, recordings: Mapping[str, Recording], problems: Problems
-) -> None:
+def check_channel_units(description: Description, recordings: Mapping[str, Recording], problems: Problems) -> None:
     """Checks that every unit is that of a column: a typing error must not pass."""
     channels = {name for r in recordings.values() for name in r.layout.channels}
     for name in description.units:
         if name not in NATIVE and name not in channels:
-            expected = (
-                f"rate, time, temperature or a channel ({', '.join(sorted(channels)) or 'there is none'})"
-            )
+            expected = f"rate, time, temperature or a channel ({', '.join(sorted(channels)) or 'there is none'})"
             problems.add(InputError(f"{FILE}, field units.{name}", "no such column", expected))
 
 
@@ -189,9 +181,7 @@ def judge(suspicions: Sequence[Suspected], trust: bool, problems: Problems) -> l
         if trust:
             trusted.append((where, one.found))
         else:
-            expected = (
-                f'[units] {one.kind} = "{one.likely}" in {FILE}, or --trust-units if it is right as it is'
-            )
+            expected = f'[units] {one.kind} = "{one.likely}" in {FILE}, or --trust-units if it is right as it is'
             problems.add(InputError(where, one.found, expected))
     return trusted
 
@@ -382,9 +372,7 @@ def _description(folder: Path, problems: Problems) -> Description | None:
     return Description(serial=serial, run=runs)
 
 
-def _recordings(
-    folder: Path, description: Description, problems: Problems
-) -> tuple[dict[str, Recording], set[int]]:
+def _recordings(folder: Path, description: Description, problems: Problems) -> tuple[dict[str, Recording], set[int]]:
     """Every file that is in order, by name, without its times; and which runs have rows in them."""
     recordings: dict[str, Recording] = {}
     with_rows: set[int] = set()

@@ -94,9 +94,7 @@ def noise_copies(prints: Sequence[NoisePrint]) -> Iterator[NoiseCopy]:
         there = [k for k, g in enumerate(grids) if g is not None and g <= grid]
         pairs = [(i, j) for i, j in itertools.combinations(there, 2) if grid in (grids[i], grids[j])]
         period = 2.0 ** (grid / _STEPS)
-        series = {
-            k: one for k in {*itertools.chain(*pairs)} if (one := _series(prints[k], period)) is not None
-        }
+        series = {k: one for k in {*itertools.chain(*pairs)} if (one := _series(prints[k], period)) is not None}
         size = max((len(one) for one in series.values()), default=0)
         n = int(scipy.fft.next_fast_len(2 * size, real=True)) if size else 0
         spectra = {k: _phases(one, n) for k, one in series.items()}

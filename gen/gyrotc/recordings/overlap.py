@@ -46,9 +46,7 @@ def shared_rows(
     found: list[SharedRows] = []
     prints = [recordings[run.file].fingerprints.within(run) for run in runs]
     windows = windows_in_common(prints)
-    stretches = (
-        (j, i, shared) for (j, i), one in windows.items() for shared in _stretches(runs[j], runs[i], one)
-    )
+    stretches = ((j, i, shared) for (j, i), one in windows.items() for shared in _stretches(runs[j], runs[i], one))
     for j, i, shared in itertools.chain(stretches, _same_noise(runs, recordings, axis, set(windows))):
         if runs[i].role == runs[j].role:
             found.append(shared)

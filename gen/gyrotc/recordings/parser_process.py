@@ -202,9 +202,7 @@ class _Worker:
         return f"ends by {signal.Signals(number).name}" if number else "ends without an answer"
 
     def _broken(self, what: str) -> InputError:
-        return InputError(
-            self._path.name, f"its reader {what}", "a whole file (--max parser_s=... for more time)"
-        )
+        return InputError(self._path.name, f"its reader {what}", "a whole file (--max parser_s=... for more time)")
 
 
 class _Server:

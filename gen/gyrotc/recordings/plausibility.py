@@ -58,13 +58,9 @@ def earth_rate(
     phi, a, e = radians(latitude_deg), radians(azimuth_deg), radians(elevation_deg)
     along = cos(phi) * cos(a) * cos(e) + sin(phi) * sin(e)
     by_latitude = -sin(phi) * cos(a) * cos(e) + cos(phi) * sin(e)
-    by_azimuth = -cos(phi) * sin(
-        a
-    )  # turning the axis sideways by an angle turns its azimuth by that over cos E
+    by_azimuth = -cos(phi) * sin(a)  # turning the axis sideways by an angle turns its azimuth by that over cos E
     by_elevation = -cos(phi) * cos(a) * sin(e) + sin(phi) * cos(e)
-    sigma = hypot(
-        by_latitude * radians(latitude_sigma_deg), hypot(by_azimuth, by_elevation) * radians(axis_sigma_deg)
-    )
+    sigma = hypot(by_latitude * radians(latitude_sigma_deg), hypot(by_azimuth, by_elevation) * radians(axis_sigma_deg))
     return EarthRate(EARTH_RATE_DPH * along, EARTH_RATE_DPH * sigma)
 
 
@@ -79,9 +75,7 @@ def curves_of(
     Args:
         runs: By their number in the description.
     """
-    return tuple(
-        _curve(run, recordings[run.file], description, description.run[index]) for index, run in runs.items()
-    )
+    return tuple(_curve(run, recordings[run.file], description, description.run[index]) for index, run in runs.items())
 
 
 def _curve(run: Run, recording: Recording, description: Description, entry: RunEntry) -> Curve:
@@ -115,9 +109,7 @@ def _earth(description: Description, entry: RunEntry, axes: tuple[str, ...]) -> 
         angles = [_angle(entry.axis_azimuth_deg, axis), _angle(entry.axis_elevation_deg, axis)]
         if angles[0] is None or angles[1] is None:
             return None
-        along = earth_rate(
-            description.latitude_deg, angles[0], angles[1], latitude_sigma_deg=0.0, axis_sigma_deg=0.0
-        )
+        along = earth_rate(description.latitude_deg, angles[0], angles[1], latitude_sigma_deg=0.0, axis_sigma_deg=0.0)
         found.append(along.rate_dph)
     return tuple(found)
 
@@ -198,9 +190,7 @@ def suspicions(
         yield found
 
 
-def earth_suspicion(
-    column: str, mean_dph: float, earth_dph: float, unit: Conversion | None
-) -> Suspicion | None:
+def earth_suspicion(column: str, mean_dph: float, earth_dph: float, unit: Conversion | None) -> Suspicion | None:
     """A mean rate that is Earth's component along the axis, but in another unit."""
     if abs(earth_dph) < _SMALLEST_ALONG_DPH or mean_dph == 0.0:
         return None

@@ -47,9 +47,7 @@ class Evidence:
         """Adds rows; those without a finite value in every column are left out."""
         for start in range(0, len(time_s), _PART):
             part = slice(start, start + _PART)
-            self._add(
-                np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)])
-            )
+            self._add(np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)]))
 
     def _add(self, block: FloatArray) -> None:
         whole = np.isfinite(block).all(axis=1)
@@ -186,9 +184,7 @@ def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
     return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels)
 
 
-def known_rows(
-    columns: dict[str, FloatArray], layout: Layout, channels: Sequence[str]
-) -> dict[str, FloatArray]:
+def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequence[str]) -> dict[str, FloatArray]:
     """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
 
     A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
@@ -234,9 +230,7 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence, fingerprints, noise = _checked(
-            file, layout, conversions, pulse_weight_arcsec, problems
-        )
+        time, evidence, fingerprints, noise = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
@@ -290,9 +284,7 @@ def _checked(
     time = values[layout.time]
     found = list(faults(values, layout))
     if layout.pulses and not found:
-        found += rate_faults(
-            layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0)
-        )
+        found += rate_faults(layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0))
     for fault in found:
         place = lines[fault.row] if lines else file.place(fault.row)
         mark = Mark(file.name, (fault.row + 1, fault.row + 1), column=fault.column)

@@ -61,9 +61,7 @@ def _limit(kind: int, soft: int, hard: int | None = None) -> None:
     now = resource.getrlimit(kind)[1]
     both = soft, soft if hard is None else hard
     with suppress(OSError, ValueError):  # a system without that limit
-        resource.setrlimit(
-            kind, both if now == resource.RLIM_INFINITY else (min(both[0], now), min(both[1], now))
-        )
+        resource.setrlimit(kind, both if now == resource.RLIM_INFINITY else (min(both[0], now), min(both[1], now)))
 
 
 def _data_bytes() -> int:

@@ -47,14 +47,10 @@ class Fingerprints:
     def within(self, run: Run) -> Fingerprints:
         """Those whose first and last row belong to a run."""
         kept = run.in_span(self.first_s) & run.in_span(self.last_s)
-        return Fingerprints(
-            self.hash[kept], self.first[kept], self.last[kept], self.first_s[kept], self.last_s[kept]
-        )
+        return Fingerprints(self.hash[kept], self.first[kept], self.last[kept], self.first_s[kept], self.last_s[kept])
 
 
-def fingerprints_of(
-    time_s: FloatArray, temperature_c: FloatArray, rates: Sequence[FloatArray]
-) -> Fingerprints:
+def fingerprints_of(time_s: FloatArray, temperature_c: FloatArray, rates: Sequence[FloatArray]) -> Fingerprints:
     """Fingerprints of a recording: times (s), temperatures, rates or pulses of every axis; arrays of shape (n,)."""
     one_in = _ONE_IN
     while len(time_s) > one_in * _MOST_KEPT:
@@ -90,9 +86,7 @@ def windows_in_common(prints: Sequence[Fingerprints]) -> dict[tuple[int, int], N
     """
     found = {(j, j): windows for j, one in enumerate(prints) if len(windows := _that_repeat(one))}
     at = [np.flatnonzero(_new(one.hash)) for one in prints]
-    hashes = np.concatenate(
-        [np.zeros(0, np.uint64), *(one.hash[rows] for one, rows in zip(prints, at, strict=True))]
-    )
+    hashes = np.concatenate([np.zeros(0, np.uint64), *(one.hash[rows] for one, rows in zip(prints, at, strict=True))])
     run = np.repeat(np.arange(len(prints)), [len(rows) for rows in at])
     order = np.argsort(hashes, kind="stable")  # those that are alike by run
     hashes, run, place = hashes[order], run[order], np.concatenate([np.zeros(0, np.int64), *at])[order]
@@ -126,8 +120,6 @@ def sketch(fingerprints: Sequence[Fingerprints]) -> tuple[int, ...]:
     A twentieth of the rows in common shows with more than 99 % (Broder, "On the resemblance and containment of
     documents", 1997: 128 draws).
     """
-    smallest = [
-        one.hash[: _PATTERN * _SKETCH] for one in fingerprints
-    ]  # in order, each less than _PATTERN times
+    smallest = [one.hash[: _PATTERN * _SKETCH] for one in fingerprints]  # in order, each less than _PATTERN times
     every = np.unique(np.concatenate([np.zeros(0, np.uint64), *smallest]))
     return tuple(every[:_SKETCH].tolist())

@@ -71,9 +71,7 @@ _PREFIXES = {
 }  # fmt: skip
 _PREFIXED = {"s", "deg", "m", "K", "A"} | {name for names in _SI for name in names.split()}
 _DEFINED = {
-    name: (names.split()[0], definition)
-    for names, definition in (_SI | _OTHER).items()
-    for name in names.split()
+    name: (names.split()[0], definition) for names, definition in (_SI | _OTHER).items() for name in names.split()
 }
 
 _ENDINGS = {

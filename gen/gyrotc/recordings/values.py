@@ -172,11 +172,7 @@ def likely_temperature(values: FloatArray) -> str | None:
         return None
     if _KELVIN[0] <= low and high <= _KELVIN[1]:
         return "K"
-    return (
-        "degF"
-        if (high - 32.0) / 1.8 <= _TEMPERATURE_C[1] and (low - 32.0) / 1.8 >= _TEMPERATURE_C[0]
-        else None
-    )
+    return "degF" if (high - 32.0) / 1.8 <= _TEMPERATURE_C[1] and (low - 32.0) / 1.8 >= _TEMPERATURE_C[0] else None
 
 
 def _within(name: str, values: FloatArray, limits: tuple[float, float], unit: str) -> Iterator[Fault]:

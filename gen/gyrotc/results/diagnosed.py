@@ -102,9 +102,7 @@ class NamedCause(Part):
     gain: GainOnUnseen | None = Field(description="null for noise")
     signature: str = Field(description="how it shows")
     remedy: str = Field(description="what helps against it")
-    repair: str | None = Field(
-        default=None, description="line of `dataset.toml` that takes it out of the recordings"
-    )
+    repair: str | None = Field(default=None, description="line of `dataset.toml` that takes it out of the recordings")
     separable_from_d: dict[str, float] | None = Field(
         default=None, description="size, in standard deviations, from which each other cause is ruled out"
     )
@@ -151,9 +149,7 @@ class TriedMemories(Part):
 
     states: tuple[dict[str, str | Estimate], ...] = Field(description="`id` and parameters of each")
     rms_dph: float = Field(description="what they leave, deg/h")
-    criterion: float = Field(
-        description="twice the log-likelihood with the price of parameters; less is better"
-    )
+    criterion: float = Field(description="twice the log-likelihood with the price of parameters; less is better")
     resolved: bool = Field(description="whether this cycle fixes the parameters")
 
 
@@ -173,9 +169,7 @@ class CycleResult(Part):
     not_testable: str | None = Field(
         description="why memory cannot be distinguished from a static map; null where it can"
     )
-    gain: GainOnUnseen | None = Field(
-        description="of the best memories on unseen runs; null where there are none"
-    )
+    gain: GainOnUnseen | None = Field(description="of the best memories on unseen runs; null where there are none")
     static: tuple[StaticRate, ...] = Field(description="what needs no memory, the best first")
     tried: tuple[TriedMemories, ...] = Field(description="the best first")
 
@@ -223,9 +217,7 @@ class Diagnosed(UnitResult):
     text: str = Field(description="the finding in words")
     meaning: str = Field(description="what the verdict means")
     next: tuple[str, ...] = Field(description="what to do, the most telling first")
-    events: tuple[Finding, ...] = Field(
-        default=(), description="what happened to the recordings, by run and time"
-    )
+    events: tuple[Finding, ...] = Field(default=(), description="what happened to the recordings, by run and time")
     events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")
     scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
@@ -257,9 +249,7 @@ class RunSeries(Part):
     temperature_c: Values = Field(description="temperature, C")
     slope_c_per_min: Values = Field(description="dT/dt, C/min")
     rate_dph: Values = Field(description="rate less its mean over all training runs, deg/h")
-    residual_dph: Values = Field(
-        description="what the static map leaves (of a single cycle: a map of T), deg/h"
-    )
+    residual_dph: Values = Field(description="what the static map leaves (of a single cycle: a map of T), deg/h")
     simulated_low_dph: Values = Field(
         description="lower end of the middle 95 % of simulated residuals, means over half an hour, deg/h; empty of a "
         "single cycle"
@@ -304,15 +294,11 @@ class SearchScores(Part):
 class DiagnosisSeries(Result):
     """What the pictures of a diagnosis show: they are drawn from this and `diagnose.json` alone."""
 
-    schema_: Annotated[Literal["gyrotc.diagnosis-series/1"], Field(alias="schema")] = (
-        "gyrotc.diagnosis-series/1"
-    )
+    schema_: Annotated[Literal["gyrotc.diagnosis-series/1"], Field(alias="schema")] = "gyrotc.diagnosis-series/1"
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of the scored runs, s")
     runs: tuple[RunSeries, ...] = Field(description="training runs")
-    scored: tuple[ScoredRun, ...] = Field(
-        description="runs that were judged; none where nothing was to be judged"
-    )
+    scored: tuple[ScoredRun, ...] = Field(description="runs that were judged; none where nothing was to be judged")
     likelihoods: tuple[ParameterLikelihood | None, ...] = Field(
         description="of each physical cause of `diagnose.json`; null for one without a parameter"
     )

@@ -52,9 +52,7 @@ class Method(Part):
     sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
     noise_floor_dph: Figure = Field(description="as this method estimates it, deg/h")
     train_s: float = Field(description="processor time of training, s")
-    published_train_s: tuple[float, float] | None = Field(
-        default=None, description="least and most of the paper, s"
-    )
+    published_train_s: tuple[float, float] | None = Field(default=None, description="least and most of the paper, s")
 
 
 class Comparison(UnitResult):
@@ -201,9 +199,7 @@ class Evaluation(UnitResult):
     exam: Pooled | None = Field(description="all exam runs; null where there are none")
     findings: tuple[Finding, ...] = Field(description="what a person should know, the gravest first")
     model: ModelSizes = Field(description="what was evaluated")
-    left_out: Pooled | None = Field(
-        default=None, description="without exam runs: spans left out of training in turn"
-    )
+    left_out: Pooled | None = Field(default=None, description="without exam runs: spans left out of training in turn")
 
     generalises: bool | None = Field(
         default=None,
@@ -244,9 +240,7 @@ class Evaluation(UnitResult):
     @property
     def structure_left(self) -> bool:
         """Whether the residual holds more than noise, by its test or by a finding: `gyrotc diagnose` is next."""
-        return bool(self.residual and self.residual.reasons) or any(
-            f.id in _OF_STRUCTURE for f in self.findings
-        )
+        return bool(self.residual and self.residual.reasons) or any(f.id in _OF_STRUCTURE for f in self.findings)
 
     @property
     def residual_words(self) -> str:

@@ -43,14 +43,10 @@ class Finding(Part):
     """Something that a person should know; fields that do not apply are absent."""
 
     id: str = Field(description="its stable name")
-    where: str = Field(
-        default="data set", description="file with the start of the run and axes, or `data set`"
-    )
+    where: str = Field(default="data set", description="file with the start of the run and axes, or `data set`")
     text: str = Field(description="what was found, and what it means")
     next: str = Field(default="", description="what to do next; empty or absent where `text` says it")
-    file: str | None = Field(
-        default=None, description="of its run; null: it is about the data set or the model"
-    )
+    file: str | None = Field(default=None, description="of its run; null: it is about the data set or the model")
     from_s: Figure = Field(default=None, description="start of the run in its file, s; null: the whole file")
     axes: tuple[str, ...] = Field(default=(), description="axes that show it; empty: all that were read")
     time_s: Estimate | None = Field(default=None, description="when it happened, on the file's clock, s")

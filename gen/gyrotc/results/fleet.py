@@ -26,9 +26,7 @@ class Catalogued(Part):
 
     serial: str = Field(description="gyro serial")
     axis: Axis = Field(description="null where the recordings have one axis")
-    valid_from: str | None = Field(
-        description="day of the calibration; null: not stated, so it is valid on no day"
-    )
+    valid_from: str | None = Field(description="day of the calibration; null: not stated, so it is valid on no day")
     valid_until: str | None = Field(description="last day; null: until the next calibration")
     tag: str = Field(description="`--tag` of the fleet; `withdrawn`: may not be carried")
     status: Literal["done", "failed"] = Field(description="as in the fleet")
@@ -112,22 +110,14 @@ class FleetUnit(Part):
     )
     limits_met: Count | None = Field(default=None, description="limits that are met; null without limits")
     limits_held: Count | None = Field(default=None, description="limits in all; null without limits")
-    expanded_uncertainty_dph: Figure = Field(
-        default=None, description="U of `after_rms_dph` (95.45 %), deg/h"
-    )
-    date: str | None = Field(
-        default=None, description="`calibrated_on` of the data set, else the day of its last run"
-    )
+    expanded_uncertainty_dph: Figure = Field(default=None, description="U of `after_rms_dph` (95.45 %), deg/h")
+    date: str | None = Field(default=None, description="`calibrated_on` of the data set, else the day of its last run")
     rows_left_out: Count | None = Field(default=None, description="rows of training that were outliers")
     moved_to: str | None = Field(
         default=None, description="folder of an earlier result of the gyro that somebody had changed"
     )
-    copy_of: tuple[str, ...] = Field(
-        default=(), description="gyros of other serials with the same rows or noise"
-    )
-    outlier_reason: str | None = Field(
-        default=None, description="why it is an outlier, as in `reasons` of the fleet"
-    )
+    copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows or noise")
+    outlier_reason: str | None = Field(default=None, description="why it is an outlier, as in `reasons` of the fleet")
 
     released: str | None = Field(
         default=None,
@@ -177,9 +167,7 @@ class Facts(Part):
     )
     runs: tuple[ComparedRun, ...] = Field(description="every run")
     series: ResidualSeries | None = Field(description="of the run whose step is the clearest")
-    own: tuple[Finding, ...] = Field(
-        default=(), description="events of its runs; sought where more than noise is left"
-    )
+    own: tuple[Finding, ...] = Field(default=(), description="events of its runs; sought where more than noise is left")
 
 
 class NoiseSigns(Part):
@@ -198,12 +186,8 @@ class FleetEntry(FleetUnit):
     sketch: Annotated[str, Field(pattern="^([0-9a-f]{16})*$")] = Field(
         default="", description="the 16-digit hashes of some rows, chosen by their value: copies share them"
     )
-    noise: tuple[NoiseSigns, ...] = Field(
-        default=(), description="of its recordings: copies have it in common"
-    )
-    key: Sha256 | None = Field(
-        default=None, description="SHA-256 over recordings, options, limits and program"
-    )
+    noise: tuple[NoiseSigns, ...] = Field(default=(), description="of its recordings: copies have it in common")
+    key: Sha256 | None = Field(default=None, description="SHA-256 over recordings, options, limits and program")
     _kept: bool = PrivateAttr(default=False)
 
     @property
@@ -262,9 +246,7 @@ class Copy(Part):
     serial: str = Field(description="its serial")
     other: str = Field(description="name of the other")
     other_serial: str = Field(description="the other's serial")
-    share: Share = Field(
-        description="of the recordings of the one with fewer, about: of rows, or of the time of noise"
-    )
+    share: Share = Field(description="of the recordings of the one with fewer, about: of rows, or of the time of noise")
     likeness: Share | None = Field(
         default=None,
         description="correlation of the noise where no rows are the same; null: rows are the same",

@@ -19,9 +19,7 @@ class LotFunctions(Part):
     center_c: Celsius = Field(description="z_T = (T - center)/half range")
     half_range_c: Positive = Field(description="of T, C")
     half_range_c_per_min: Positive = Field(description="of dT/dt, C/min")
-    kept: tuple[Annotated[int, Field(ge=0, le=120)], ...] = Field(
-        description="numbers of the functions, of 121"
-    )
+    kept: tuple[Annotated[int, Field(ge=0, le=120)], ...] = Field(description="numbers of the functions, of 121")
 
 
 class LotProcess(Part):
@@ -89,16 +87,12 @@ class Lot(Result):
     clusters: Annotated[tuple[LotCluster, ...], Field(min_length=1)] = Field(
         description="one, where no more were found"
     )
-    directions: tuple[Numbers, ...] = Field(
-        description="in which units differ: coefficients of one standard deviation"
-    )
+    directions: tuple[Numbers, ...] = Field(description="in which units differ: coefficients of one standard deviation")
     rest: LotProcess = Field(description="what is each unit's own besides")
     of_mean: LotProcess = Field(description="smoothness of the mean maps")
     noise_dph: Positive = Field(description="median noise of means over `mean_s`, deg/h")
     mean_s: Positive = Field(description="length of these means, s")
-    between_dph: Amount = Field(
-        description="of the constant from power-on to power-on: RMS over the units, deg/h"
-    )
+    between_dph: Amount = Field(description="of the constant from power-on to power-on: RMS over the units, deg/h")
     cross_validation: CrossValidation = Field(description="over units")
     at_rest: AtRest = Field(description="to be read")
     checksum: str = Field(description="SHA-256 of the canonical form without this field")
@@ -121,9 +115,7 @@ class LotUse(Part):
     units: Count = Field(description="units that the lot was learnt from")
     member: bool = Field(description="whether this serial is one of them: then the lot has seen it before")
     cluster: int = Field(description="number of the cluster that fits best, from 0")
-    p_value: Share = Field(
-        description="probability that a unit of the lot lies as far from it as these runs do"
-    )
+    p_value: Share = Field(description="probability that a unit of the lot lies as far from it as these runs do")
     accepted: bool = Field(description="whether the lot was used: p_value is at least `false_alarm`")
     false_alarm: Share = Field(description="share of the lot's own units that the test refuses")
     text: str = Field(description="in words: what came from the lot and what from the unit's own runs")

@@ -37,18 +37,14 @@ class LotPlan(Result):
     accuracy_dph: Amount = Field(description="required, deg/h")
     before_dph: Amount = Field(description="1 sigma by the lot alone, before any run, deg/h")
     with_lot: LotProgramme = Field(description="with the lot")
-    without: LotProgramme = Field(
-        description="for a unit of which nothing is known but that its map is smooth"
-    )
+    without: LotProgramme = Field(description="for a unit of which nothing is known but that its map is smooth")
 
 
 class ProposedRun(Part):
     """A run, what it is expected to bring, and what it costs."""
 
     programme: LotProgramme = Field(description="what the chamber does, and 1 sigma of the map after it")
-    removed_share: Share = Field(
-        description="of the map's variance, mean over where corrections are asked for"
-    )
+    removed_share: Share = Field(description="of the map's variance, mean over where corrections are asked for")
     price: Amount = Field(description="of the run, with what one run costs before it begins")
 
 
@@ -114,9 +110,7 @@ class Separability(Part):
     id: str = Field(description="the cause that is there")
     parameter: str | None = Field(description="name of its parameter; null: none")
     value: Figure = Field(description="of its parameter")
-    d: dict[str, float] = Field(
-        description="size, in standard deviations, from which each other cause is ruled out"
-    )
+    d: dict[str, float] = Field(description="size, in standard deviations, from which each other cause is ruled out")
 
 
 class Hard(Part):
@@ -167,9 +161,7 @@ class ThermometerPlace(Part):
     node: str = Field(description="name of the node")
     there: bool = Field(description="whether a thermometer is there")
     difference_c: float = Field(description="RMS of its temperature less the sensor's, about the mean, C")
-    unseen_c: float = Field(
-        description="RMS of what map and thermometers that are there do not hold of it, C"
-    )
+    unseen_c: float = Field(description="RMS of what map and thermometers that are there do not hold of it, C")
     limit_dph_per_c: Figure = Field(
         description="amplitude of a part of the bias that follows it from which these runs show it; null: never"
     )
@@ -184,9 +176,7 @@ class Plan(Result):
     scenario: str = Field(description="name of the profile")
     hours: float = Field(description="chamber hours")
     noise: AssumedNoise = Field(description="that was assumed")
-    bias_range_dph: tuple[float, float] = Field(
-        description="lowest and highest bias of the simulated gyro, deg/h"
-    )
+    bias_range_dph: tuple[float, float] = Field(description="lowest and highest bias of the simulated gyro, deg/h")
     runs: tuple[PlannedRun, ...] = Field(description="of the profile")
     limits: tuple[PlanLimit, ...] = Field(description="what will be found")
     not_testable: dict[str, str] = Field(description="causes that cannot be tested, with the reason")

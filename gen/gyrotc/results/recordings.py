@@ -117,9 +117,7 @@ class SimulatedTruth(Numbered):
     scenario: str = Field(description="name or file of the scenario")
     seed: int = Field(description="of everything that was drawn")
     noise: dict[str, Any] = Field(description="levels of the noise, as in the scenario")
-    map: dict[str, Any] = Field(
-        description="the bias of the gyro over temperature and its rate, as it was drawn"
-    )
+    map: dict[str, Any] = Field(description="the bias of the gyro over temperature and its rate, as it was drawn")
     causes: tuple[dict[str, Any], ...] = Field(description="`id`, `channel` and parameters of each cause")
     plan: dict[str, Any] = Field(
         description="gyro, chamber, sensor and what is recorded of the scenario: thermometers, laser, channels"

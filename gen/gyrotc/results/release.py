@@ -22,17 +22,15 @@ class Instrument(Part):
     expanded_uncertainty: Positive | None = Field(
         default=None, description="as its certificate states it, in the unit of the quantity"
     )
-    coverage_factor: Annotated[float, Field(ge=1.0, le=10.0)] = Field(
-        default=2.0, description="k of that uncertainty"
-    )
+    coverage_factor: Annotated[float, Field(ge=1.0, le=10.0)] = Field(default=2.0, description="k of that uncertainty")
     degrees_of_freedom: Positive | None = Field(default=None, description="of it; null: many")
 
 
 class Contribution(Part):
     """One source of uncertainty."""
 
-    id: Literal["noise", "fit", "unseen", "turn_on", "thermometer", "reference", "arithmetic", "ageing"] = (
-        Field(description="its stable name")
+    id: Literal["noise", "fit", "unseen", "turn_on", "thermometer", "reference", "arithmetic", "ageing"] = Field(
+        description="its stable name"
     )
     text: str = Field(description="what it is of")
     type: Literal["A", "B"] = Field(description="of its evaluation: by statistics, or by other means")
@@ -53,9 +51,7 @@ class Budget(UnitResult):
     measurand: str = Field(description="what the uncertainty is of, in words")
     contributions: tuple[Contribution, ...] = Field(description="all that are known")
     not_known: tuple[str, ...] = Field(description="sources of which nothing was stated, which are not in it")
-    combined_dph: Amount = Field(
-        description="combined standard uncertainty: root of the sum of squares, deg/h"
-    )
+    combined_dph: Amount = Field(description="combined standard uncertainty: root of the sum of squares, deg/h")
     freedom: Figure = Field(description="effective degrees of freedom (Welch and Satterthwaite); null: many")
     coverage_factor: Positive = Field(description="k of 95.45 %")
     expanded_dph: Amount = Field(description="U = k times the combined one, deg/h")
@@ -116,9 +112,7 @@ class Limit(Part):
         "distribution about what was measured, nothing known before; null where it was not accepted or has no "
         "uncertainty",
     )
-    uncertainty_from: str = Field(
-        default="", description="what the uncertainty rests on, or why there is none"
-    )
+    uncertainty_from: str = Field(default="", description="what the uncertainty rests on, or why there is none")
 
     part: JudgedOn | None = Field(
         default=None,

@@ -16,9 +16,7 @@ class CheckedCell(Part):
     """What the earlier model left of the check run in a part of the envelope, and what it may have left."""
 
     temperature_c: tuple[float, float] = Field(description="from, to, C")
-    slope_c_per_min: tuple[float, float] = Field(
-        description="lowest and highest dT/dt of the run there, C/min"
-    )
+    slope_c_per_min: tuple[float, float] = Field(description="lowest and highest dT/dt of the run there, C/min")
     found_dph: float = Field(description="mean of what the earlier map left, deg/h")
     limit_dph: Amount = Field(
         description="what it may be, either way: by the earlier model's sigma, ageing and the noise of the run; all "
@@ -37,9 +35,7 @@ class TriedChange(Part):
         description="as it was, moved by an offset, by an offset and a slope over T and dT/dt, or changed in its shape"
     )
     log10_odds: float = Field(description="evidence for it against that for the map as it was, power of ten")
-    moved_rms_dph: Amount = Field(
-        description="how far the map then moves over the earlier envelope, RMS, deg/h"
-    )
+    moved_rms_dph: Amount = Field(description="how far the map then moves over the earlier envelope, RMS, deg/h")
     expanded_uncertainty_dph: Amount = Field(
         description="U (k = 2): twice the RMS that noise and the earlier model's sigma give although nothing changed"
     )
@@ -76,9 +72,7 @@ class EarlierUse(Part):
         description="how far the map has moved over the earlier envelope; U holds the noise of the run and the earlier "
         "model's sigma, not the ageing"
     )
-    accepted: bool = Field(
-        description="whether the table is made from both; else from the new recordings alone"
-    )
+    accepted: bool = Field(description="whether the table is made from both; else from the new recordings alone")
     change: MapChange | None = Field(description="what changed; null: nothing")
     cells: tuple[CheckedCell, ...] = Field(description="the check run in parts, T ascending")
     own_share: Figure = Field(
@@ -138,9 +132,7 @@ class NoiseTerms(Part):
     bias_instability_dph: Figure = Field(description="B, deg/h")
     rate_random_walk_dph_per_sqrt_h: Figure = Field(description="K, deg/h/√h")
     allan: tuple[AllanPoint, ...] = Field(description="at octaves of the block")
-    below: NoiseLimits = Field(
-        default=NoiseLimits(), description="what terms that are not resolved are below (95 %)"
-    )
+    below: NoiseLimits = Field(default=NoiseLimits(), description="what terms that are not resolved are below (95 %)")
 
 
 class BiasPlane(Part):
@@ -158,9 +150,7 @@ class CandidateModel(Part):
     left_out_rms_dph: Figure = Field(description="RMS on thermal history left out in turn, deg/h")
     standard_error_dph: Figure = Field(description="of this RMS, deg/h")
     beats_constant: bool = Field(description="whether it was shown to leave less than a constant does")
-    t: Figure = Field(
-        default=None, description="Student's t of its gain over a constant, over pieces left out"
-    )
+    t: Figure = Field(default=None, description="Student's t of its gain over a constant, over pieces left out")
     chosen: bool = Field(description="whether it was taken")
     refused: str | None = Field(default=None, description="why it could not be taken, where it was the best")
 
@@ -253,9 +243,7 @@ class Training(UnitResult):
     channels: tuple[ChannelTried, ...] | None = Field(
         default=None, description="recorded channels that were tried as inputs; absent without `--channels`"
     )
-    outliers: Outliers | None = Field(
-        default=None, description="rows that were left out; absent of an extended model"
-    )
+    outliers: Outliers | None = Field(default=None, description="rows that were left out; absent of an extended model")
     means: MapMeans | None = Field(
         default=None, description="what the runs say of the map; absent of an extended model"
     )
@@ -279,7 +267,5 @@ class Manifest(UnitResult):
     meta: dict[str, Any] = Field(description="`[meta]` of the data set")
     units: DeclaredUnits = Field(description="of the recordings")
     sources: tuple[Any, ...] = Field(description="`[source]` of recordings that were imported")
-    program: str = Field(
-        default="", description="SHA-256 of the program; empty: of a gyrotc that did not state it"
-    )
+    program: str = Field(default="", description="SHA-256 of the program; empty: of a gyrotc that did not state it")
     files: dict[str, str] = Field(description="SHA-256 of every file, by its path in the folder")

@@ -74,16 +74,12 @@ class VerifiedTarget(Part):
     """The board test on one target, in one arithmetic."""
 
     name: str = Field(description="of the target, or what a board calls itself")
-    status: Literal["pass", "fail", "missing"] = Field(
-        description="`missing`: its compiler or emulator is not here"
-    )
+    status: Literal["pass", "fail", "missing"] = Field(description="`missing`: its compiler or emulator is not here")
     numeric: str = Field(description="arithmetic")
     package: str | None = Field(default=None, description="packages that are missing")
     compiler: str | None = Field(default=None, description="name and version")
     flags: str | None = Field(default=None, description="options of the compiler")
-    log: str | None = Field(
-        default=None, description="file with the output of a board test that ran elsewhere"
-    )
+    log: str | None = Field(default=None, description="file with the output of a board test that ran elsewhere")
     parts: Count | None = Field(default=None, description="board tests of this arithmetic in that file")
     table_bytes: Count | None = Field(default=None, description="size of the table, bytes (section 3)")
     vectors: Count | None = Field(default=None, description="results that were compared")
@@ -91,15 +87,11 @@ class VerifiedTarget(Part):
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
     instructions: CallCost | None = Field(default=None, description="of a call of the map")
     cycles: CallCost | None = Field(default=None, description="of a call of the map")
-    ticks: CallCost | None = Field(
-        default=None, description="of a call of the map, in units of the board's counter"
-    )
+    ticks: CallCost | None = Field(default=None, description="of a call of the map, in units of the board's counter")
     stack_bytes: Count | None = Field(default=None, description="of a call of the map")
     step_instructions: CallCost | None = Field(default=None, description="of a sample")
     step_cycles: CallCost | None = Field(default=None, description="of a sample")
-    step_ticks: CallCost | None = Field(
-        default=None, description="of a sample, in units of the board's counter"
-    )
+    step_ticks: CallCost | None = Field(default=None, description="of a sample, in units of the board's counter")
     step_stack_bytes: Count | None = Field(default=None, description="of a sample")
     code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked")
     read_only_bytes: Count | None = Field(default=None, description="constants of them that are linked")
@@ -148,9 +140,7 @@ class SignatureCheck(Part):
         default=None,
         description="why it was released although the verdict is FAIL or CONDITIONAL PASS, as it was signed",
     )
-    valid_until: str | None = Field(
-        default=None, description="first day on which an axis ends, as it was signed"
-    )
+    valid_until: str | None = Field(default=None, description="first day on which an axis ends, as it was signed")
 
 
 class MapError(Part):

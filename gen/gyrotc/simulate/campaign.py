@@ -231,17 +231,13 @@ def _write_run(
     """Writes the rows of a run; yields the share that is done."""
     total_s = CELL_S * len(made.reading_c)
     columns = list(made.channels)
-    with SimulatedRunFile(
-        path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=columns
-    ) as file:
+    with SimulatedRunFile(path, format, row_s=length.row_s, pulse_weight_arcsec=weight, channels=columns) as file:
         for chunk in rows(made, length):
             file.write(chunk)
             yield float(chunk.time_s[-1] + length.row_s) / total_s
 
 
-def _truth_of_run(
-    folder: Path, file: str, made: SimulatedRecord, length: RowLength, weight: float | None
-) -> TrueRun:
+def _truth_of_run(folder: Path, file: str, made: SimulatedRecord, length: RowLength, weight: float | None) -> TrueRun:
     """Writes the noise of a run (mean of each row, or of each second where rows are shorter)."""
     step_s = length.cells * CELL_S
     edges = made.angle_arcsec[:: length.cells]
@@ -291,9 +287,7 @@ def _write_texts(
         seed=gyro.seed,
         noise=levels,
         map=gyro.bias_map.described(),
-        causes=tuple(
-            {"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause
-        ),
+        causes=tuple({"id": cause.id, "channel": cause.channel, **_finite(cause.values())} for cause in plan.cause),
         plan=plan.model_dump(
             mode="json", include=_SHOWN | ({"thermometer", "difference", "laser"} & plan.model_fields_set)
         ),

@@ -285,9 +285,7 @@ def internal_of(
     states = {f"{name}_c": values for name, values in nodes_c.items()}
     if laser is None:
         return Internal(bias, nodes_c, None, states)
-    wander = Channel(
-        name="loss", wander_sigma=laser.contamination_ppm, wander_tau_s=laser.contamination_tau_s
-    )
+    wander = Channel(name="loss", wander_sigma=laser.contamination_ppm, wander_tau_s=laser.contamination_tau_s)
     found = laser_states(
         laser,
         nodes_c[laser.mirror_node],

@@ -29,9 +29,7 @@ from .noise import CELL_S
 from .scenario import Chamber, Gyro, Profile, Scenario
 
 
-def chamber_air(
-    chamber: Chamber, programme_c: FloatArray, dt_s: float, rng: np.random.Generator
-) -> FloatArray:
+def chamber_air(chamber: Chamber, programme_c: FloatArray, dt_s: float, rng: np.random.Generator) -> FloatArray:
     """Air temperature for a programme on a grid of `dt_s`, C; starts settled on its first value."""
     offset = rng.normal(0.0, chamber.setpoint_sigma_c)
     phase = rng.uniform(0.0, 2.0 * np.pi)

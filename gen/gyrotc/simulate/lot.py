@@ -232,6 +232,4 @@ def _factor(spread: float, score: float) -> float:
 
 def _check_nodes(gyro: Gyro) -> None:
     if missing := {"case", "block"} - set(gyro.node):
-        raise InputError(
-            "scenario, gyro.node", f"no {' and no '.join(sorted(missing))}", "what units differ in"
-        )
+        raise InputError("scenario, gyro.node", f"no {' and no '.join(sorted(missing))}", "what units differ in")

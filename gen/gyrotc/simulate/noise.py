@@ -36,9 +36,7 @@ class CellNoise:
     white_arcsec: FloatArray
 
 
-def white_sigma_arcsec(
-    levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray
-) -> FloatArray:
+def white_sigma_arcsec(levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
     """Standard deviation of the angle that the random walk gathers in a cell, arcsec, one for each cell.
 
     Grows by a share for each C below or above 20 C (by its sign) and for each C/min of heating or cooling.

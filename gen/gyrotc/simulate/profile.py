@@ -140,9 +140,7 @@ def _targets(step: Ramp | Staircase | Triangle | Nested, now_c: float) -> list[f
     if isinstance(step, Staircase):
         treads = abs(step.staircase_to_c - now_c) / step.tread_c
         if treads > _MOST_CORNERS:
-            raise InputError(
-                "tread_c", f"{treads:.4g} treads", f"at most {_MOST_CORNERS} corners in a programme"
-            )
+            raise InputError("tread_c", f"{treads:.4g} treads", f"at most {_MOST_CORNERS} corners in a programme")
         treads = max(1, round(treads))
         return [float(c) for c in np.linspace(now_c, step.staircase_to_c, treads + 1)[1:]]
     if isinstance(step, Triangle):

@@ -291,9 +291,7 @@ class Scenario(_Strict):
         named += [("node of a difference", n) for d in self.difference for n in (d.node, d.against)]
         if self.laser:
             laser = self.laser
-            named += [
-                ("a node of the laser", n) for n in (laser.mirror_node, laser.gas_node, laser.path_node)
-            ]
+            named += [("a node of the laser", n) for n in (laser.mirror_node, laser.gas_node, laser.path_node)]
         return named
 
 

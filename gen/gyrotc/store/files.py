@@ -152,9 +152,7 @@ def open_stream(path: Path) -> BinaryIO:
     except OSError as error:
         if error.errno != errno.ENXIO:
             raise
-        raise InputError(
-            str(path), "is a pipe that nobody reads", "a reader, or the name of a file"
-        ) from None
+        raise InputError(str(path), "is a pipe that nobody reads", "a reader, or the name of a file") from None
     os.set_blocking(handle, True)
     return os.fdopen(handle, "wb", buffering=0)
 
@@ -338,9 +336,7 @@ def check_replaceable(path: Path) -> None:
         content = None
     parts = [content, *(content.values() if isinstance(content, dict) else ())]
     if not any(isinstance(p, dict) and str(p.get("schema", "")).startswith("gyrotc.") for p in parts):
-        raise InputError(
-            str(path), "exists and was not written by gyrotc", "a new name, or an earlier result"
-        )
+        raise InputError(str(path), "exists and was not written by gyrotc", "a new name, or an earlier result")
 
 
 def _is_stream(path: Path) -> bool:

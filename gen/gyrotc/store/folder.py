@@ -141,9 +141,7 @@ def kept_by_hash(store: Path, source: Path) -> Path:
     place = store / known[:2] / known
     if place.exists() or place.is_symlink():
         if not place.is_file() or sha256(place) != known:
-            raise InputError(
-                str(place), "is not what its name says", "a file that gyrotc fleet wrote, or none"
-            )
+            raise InputError(str(place), "is not what its name says", "a file that gyrotc fleet wrote, or none")
     else:
         place.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(place, source.read_bytes())

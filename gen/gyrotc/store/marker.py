@@ -50,9 +50,7 @@ _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 def marker_of(kind: str = "", command: str = "") -> Marker:
     """A marker of no files yet, of no one gyro."""
-    return Marker(
-        gyrotc_version=__version__, kind=kind, command=command, serial=None, axis=None, files={}, parts=()
-    )
+    return Marker(gyrotc_version=__version__, kind=kind, command=command, serial=None, axis=None, files={}, parts=())
 
 
 def marker_text(marker: Marker) -> str:
@@ -138,9 +136,7 @@ def _target(part: Path) -> str:
     return target if target.startswith(f".{part.name}.gyrotc-part-") and "/" not in target else part.name
 
 
-def survey(
-    folder: Path, marker: Marker, entries: frozenset[str] | None = None
-) -> tuple[list[str], list[str]]:
+def survey(folder: Path, marker: Marker, entries: frozenset[str] | None = None) -> tuple[list[str], list[str]]:
     """What is in a folder and not of gyrotc, and what gyrotc wrote and somebody changed: two lists of paths.
 
     Args:
@@ -337,9 +333,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
         lost = names if entries is None else sorted(set(names) & entries)
         if lost:
             found = f"exists and was not written by gyrotc (no {MARKER}): {_some(lost)}"
-            raise InputError(
-                str(out), found, "a new folder or one with a result; move or delete what is there"
-            )
+            raise InputError(str(out), found, "a new folder or one with a result; move or delete what is there")
         return None
     if kind is not None and marker.kind != kind:
         found = f"holds the {marker.kind} of gyrotc {marker.command}"
@@ -350,9 +344,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
         raise InputError(str(out), found, "nothing else in a result that is replaced; move it away")
     if edited:
         found = f"was changed since gyrotc wrote it: {_some(edited)}"
-        raise InputError(
-            str(out), found, "a result as it was written; move the changed file away or delete it"
-        )
+        raise InputError(str(out), found, "a result as it was written; move the changed file away or delete it")
     return marker
 
 

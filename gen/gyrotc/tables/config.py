@@ -36,9 +36,7 @@ def needs_of(models: Sequence[Model]) -> dict[str, int]:
         "GTC_MAX_TERMS": terms,
         "GTC_WITH_BANK": int(any(len(m.networks) > 1 for m in models)),
     }
-    return needs | {
-        switch: int(any(part not in m.left_out for m in models)) for part, switch in SWITCHES.items()
-    }
+    return needs | {switch: int(any(part not in m.left_out for m in models)) for part, switch in SWITCHES.items()}
 
 
 def config_text(models: Sequence[Model]) -> bytes:

@@ -60,9 +60,7 @@ class Emission:
     refused: dict[str, str]
 
 
-def quantise_all(
-    model: Model, numerics: Sequence[str] | None, say: Callable[[str], None] = lambda _: None
-) -> Emission:
+def quantise_all(model: Model, numerics: Sequence[str] | None, say: Callable[[str], None] = lambda _: None) -> Emission:
     """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
 
     Raises:
@@ -253,9 +251,7 @@ def prior_of(model: Model, tables: Mapping[str, Table]) -> ServicePrior | None:
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
     """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
     template = c_environment().get_template("board_test.c.j2")
-    text = template.render(
-        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING
-    )
+    text = template.render(id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING)
     return text.encode("ascii")
 
 

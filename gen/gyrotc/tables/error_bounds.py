@@ -342,9 +342,7 @@ def _ramps(axis: Axis, pairs: list[tuple[float, float]], limits: tuple[float, fl
     """Model and table side by side in one input."""
     low, high = (axis.factor * limit + axis.offset for limit in limits)
     edges = axis.factor * np.array(pairs) + axis.offset
-    rises, falls = (
-        np.array([p[k] > limits[0] if k == 0 else p[k] < limits[1] for p in pairs]) for k in (0, 1)
-    )
+    rises, falls = (np.array([p[k] > limits[0] if k == 0 else p[k] < limits[1] for p in pairs]) for k in (0, 1))
     same = (rises == (axis.edges[:, 0] > axis.limits[0])) & (falls == (axis.edges[:, 1] < axis.limits[1]))
     ramp = rises | falls
     width, table_width = (e[:, 1] - e[:, 0] for e in (edges, axis.edges))
@@ -366,25 +364,19 @@ def _ramps(axis: Axis, pairs: list[tuple[float, float]], limits: tuple[float, fl
     down = (axis.edges[:, 1:] - ends) / table_width[:, None] - (edges[:, 1:] - ends) / width[:, None]
     off = np.maximum(np.where(rises[:, None], np.abs(up), 0.0), np.where(falls[:, None], np.abs(down), 0.0))
     error = np.where(ramp, off.max(axis=1) + axis.moved / table_width, 0.0)
-    return _Ramps(
-        (low, high), np.where(ramp[:, None], edges, edges + np.array([0.0, 1.0])), rises, falls, near, error
-    )
+    return _Ramps((low, high), np.where(ramp[:, None], edges, edges + np.array([0.0, 1.0])), rises, falls, near, error)
 
 
 def _over_cells(values: FloatArray, least: np.ufunc) -> FloatArray:
     """`least` (or greatest) of the corners of every cell; a single line is a cell of its own."""
     for axis in (0, 1):
         n = values.shape[axis]
-        first, second = (
-            np.take(values, part, axis=axis) for part in (range(max(n - 1, 1)), range(min(1, n - 1), n))
-        )
+        first, second = (np.take(values, part, axis=axis) for part in (range(max(n - 1, 1)), range(min(1, n - 1), n)))
         values = least(first, second)
     return values
 
 
-def _spread(
-    model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]
-) -> FloatArray:
+def _spread(model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]) -> FloatArray:
     """Bound of how far from one another the networks are that count in a cell, deg/h."""
     center, half = model.scale.temperature_c
     inputs = [(x - a.offset) / a.factor for x, a in zip(lines, axes, strict=True)]

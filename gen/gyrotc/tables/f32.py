@@ -61,9 +61,7 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
-        stand_in_bounds_dph=tuple(
-            math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins
-        ),
+        stand_in_bounds_dph=tuple(math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins),
     )
 
 
@@ -73,8 +71,7 @@ def _bound_parts(
     """The error bound part by part, deg/h: of a bank the largest of its networks, and what the hand-over adds."""
     per_block = model.block_s / 60.0
     bounds = [
-        _bound(network, own, scale, envelope, per_block)
-        for network, own in zip(model.networks, centers, strict=True)
+        _bound(network, own, scale, envelope, per_block) for network, own in zip(model.networks, centers, strict=True)
     ]
     parts = {part: max(bound[part] for bound in bounds) for part in bounds[0]}
     if len(model.networks) > 1:
@@ -131,9 +128,7 @@ def _centers(network: Network, scale: Words, per_block: float) -> NDArray[np.flo
     """Records of the centers, shape (n, 5): c_T, g_T, c_r, g_r, weight."""
     records = np.zeros((len(network.weights), 5))
     positions = _positions(network, scale, per_block)
-    for record, position, widths, weight in zip(
-        records, positions, network.widths, network.weights, strict=True
-    ):
+    for record, position, widths, weight in zip(records, positions, network.widths, network.weights, strict=True):
         for k in (0, 1):
             width = widths[k]
             if width is not None:

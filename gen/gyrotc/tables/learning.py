@@ -74,7 +74,5 @@ def learning_text(prior: ServicePrior) -> list[dict[str, Any]]:
         else:
             cells = [float_text(int(word)) for word in value.view(np.uint32)]
         rows = [c_code(", ".join(cells[k : k + _ROW])) for k in range(0, len(cells), _ROW)]
-        found.append(
-            {"name": name, "rows": rows, "array": len(cells) > 1, "comment": _COMMENTS.get(name, "")}
-        )
+        found.append({"name": name, "rows": rows, "array": len(cells) > 1, "comment": _COMMENTS.get(name, "")})
     return found

@@ -182,9 +182,7 @@ class _Gaussians:
     def fits(self) -> bool:
         """Whether every argument, and every factor of one, fits its word."""
         reach = np.maximum(np.abs(self.offset), np.abs(self.offset + self.factor * (POSITIONS - 1)))
-        return bool(
-            np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR
-        )
+        return bool(np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR)
 
     def on(self, surface: Surface) -> Surface:
         """The surface with these Gaussians in place of its own."""
@@ -218,12 +216,8 @@ def table_of(model: Model) -> Table:
     chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
     fraction = min(_fraction(surface) for surface in chosen)
     if fraction < _COARSEST:
-        raise CheckFailed(
-            "q31: a Gaussian is too narrow for the envelope, or too far from it, for its argument"
-        )
-    networks = [
-        _fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)
-    ]
+        raise CheckFailed("q31: a Gaussian is too narrow for the envelope, or too far from it, for its argument")
+    networks = [_fixed(whole, part, keep, fraction) for whole, part, keep in zip(surfaces, chosen, felt, strict=True)]
     largest = max(_size(network.solved) for network in networks)
     size = max(largest, abs(model.fallback_dph)) + term_size_dph(model) + model.rezero_dph
     frac_bits = _frac_bits(size, model.q31_bias_frac_bits)
@@ -282,9 +276,7 @@ def _felt(surface: Surface, reach: Floats) -> NDArray[np.bool_]:
 
 
 def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
-    return replace(
-        surface, alpha=surface.alpha[keep], center=surface.center[keep], weights=surface.weights[keep]
-    )
+    return replace(surface, alpha=surface.alpha[keep], center=surface.center[keep], weights=surface.weights[keep])
 
 
 def _fraction(surface: Surface) -> int:
@@ -342,9 +334,7 @@ def _frac_bits(size: float, stated: int | None) -> int:
         if size * 2.0**bits <= _LARGEST_SIZE:
             return bits
     unit = "" if stated is None else f" in the product's unit of 2^-{stated} deg/h (q31_bias_frac_bits)"
-    raise CheckFailed(
-        f"q31: weights, terms and re-zero of {size:.3g} deg/h in all leave the range of 32 bits{unit}"
-    )
+    raise CheckFailed(f"q31: weights, terms and re-zero of {size:.3g} deg/h in all leave the range of 32 bits{unit}")
 
 
 def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:
@@ -411,9 +401,7 @@ def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
     """A network's region in positions."""
     per_block = model.block_s / 60.0
     edges = []
-    for scale, pair, unit in zip(
-        inputs, (region.temperature_c, region.slope_c_per_min), (1.0, per_block), strict=True
-    ):
+    for scale, pair, unit in zip(inputs, (region.temperature_c, region.slope_c_per_min), (1.0, per_block), strict=True):
         for value in pair:
             edges.append(min(max(round(scale.position(value * unit * _UNITS_PER_C)), 0), POSITIONS - 1))
     return edges

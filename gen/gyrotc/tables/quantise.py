@@ -114,9 +114,7 @@ def _terms(table: Table, limits: Limits) -> Iterator[str]:
     width, last = ARRAYS["terms"] - 2, table.n_networks
     if last < 1:
         yield "no network is left to the map"
-    for record, channel, stand_in in zip(
-        table.records("terms"), table.channels, table.stand_ins, strict=True
-    ):
+    for record, channel, stand_in in zip(table.records("terms"), table.channels, table.stand_ins, strict=True):
         kind = int(record[0])
         last += stand_in != 0
         if stand_in and (stand_in != last or channel == 0):
@@ -141,9 +139,7 @@ def _regions(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
 def _f32(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
     center, *gains = table.numbers(table.scale)
     edges = table.numbers(table.envelope).reshape(2, 2)
-    for axis, ((low, high), gain, offset) in enumerate(
-        zip(edges, gains, (center, np.float32(0.0)), strict=True)
-    ):
+    for axis, ((low, high), gain, offset) in enumerate(zip(edges, gains, (center, np.float32(0.0)), strict=True)):
         if not (high - low >= _WIDTH or table.envelope[2 * axis] == table.envelope[2 * axis + 1]):
             yield "envelope is reversed or too narrow"
         with np.errstate(all="ignore"):
@@ -285,9 +281,7 @@ def _quantised(known: _Known, numeric: str) -> Table:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
             rounded = with_authority(model, _MAKERS[numeric](model))
     except (FloatingPointError, ZeroDivisionError, OverflowError) as error:
-        raise CheckFailed(
-            f"{numeric}: a number of the model leaves the range of this arithmetic ({error})"
-        ) from error
+        raise CheckFailed(f"{numeric}: a number of the model leaves the range of this arithmetic ({error})") from error
     refused = outside(rounded)
     if refused is not None:
         raise CheckFailed(f"{numeric}: the runtime would refuse the table: {refused}")

@@ -178,15 +178,11 @@ def _width(width: float | None) -> str:
     return "infinite" if width is None else f"{width:.3f}"
 
 
-def _array(
-    numeric: str, name: str, body: list[int], counts: dict[str, list[int]], comments: list[str]
-) -> _Array:
+def _array(numeric: str, name: str, body: list[int], counts: dict[str, list[int]], comments: list[str]) -> _Array:
     width = _RECORDS.get(name, (counts["sigma_cells"][0] or 6) if name == "sigma" else 6)
     rows = []
     for start in range(0, len(body), width):
-        cells = [
-            _word(numeric, w, integer=_is_integer(name, k)) for k, w in enumerate(body[start : start + width])
-        ]
+        cells = [_word(numeric, w, integer=_is_integer(name, k)) for k, w in enumerate(body[start : start + width])]
         number = start // width
         rows.append(_Row(c_code(", ".join(cells)), comments[number] if number < len(comments) else ""))
     return _Array(name, _ARRAY_COMMENTS[name], len(body), tuple(rows))

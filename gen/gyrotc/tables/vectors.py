@@ -269,9 +269,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
     if model.stand_ins:
         # Lost, and a ramp over the envelope beside it; then it comes back.
         longest_s = max(guard_of(model, name).missing_s for name in channel_names(model))
-        yield replace(
-            ramp(min(round(longest_s / model.block_s * n) + 2 * n, 4000), t, noise=40), kind="ALONE"
-        )
+        yield replace(ramp(min(round(longest_s / model.block_s * n) + 2 * n, 4000), t, noise=40), kind="ALONE")
         yield replace(ramp(span, t1, -step, noise=40), kind="ALONE")
         yield ramp(window, t, noise=40)
     if model.stuck_s:
@@ -283,8 +281,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
 def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
     """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
     parts = [
-        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows)
-        for numeric, rows in expected.items()
+        f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows) for numeric, rows in expected.items()
     ]
     return b"".join(parts)
 

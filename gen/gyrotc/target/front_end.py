@@ -204,9 +204,7 @@ def _is_enough(count: NDArray[np.integer], n: int) -> NDArray[np.bool_]:
     return np.asarray((2 * count >= n) | (count >= 2))
 
 
-def _accepted(
-    arithmetic: Arithmetic, x: Numbers, settings: Settings
-) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+def _accepted(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Verdict on every sample, and blocks after which the fallback is in force.
 
     What is accepted after a loss depends on when the blocks made it one: judged again from each loss on.

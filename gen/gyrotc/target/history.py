@@ -139,9 +139,7 @@ class FollowedHistory:
         )
 
 
-def followed(
-    table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int
-) -> FollowedHistory:
+def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> FollowedHistory:
     """Front end, terms, map and uncertainty over a history; arguments as of `replay`."""
     settings, arithmetic = _settings(table, samples_per_block), F32 if table.numeric == "f32" else Q31
     readings = table.numbers(channels)
@@ -207,9 +205,7 @@ def _corrections(table: Table, steps: Steps, outcome: TermOutcome) -> tuple[NDAr
     return status, bits
 
 
-def _total(
-    table: Table, bits: Words, added: Numbers, remarks: NDArray[np.int32]
-) -> tuple[Words, NDArray[np.int32]]:
+def _total(table: Table, bits: Words, added: Numbers, remarks: NDArray[np.int32]) -> tuple[Words, NDArray[np.int32]]:
     """Bits of the map's results with what the terms add, each within its bounds, and the remarks of the terms."""
     if not table.terms.size:
         return bits, remarks

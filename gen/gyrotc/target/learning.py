@@ -120,9 +120,7 @@ class Learner:
 
     def __init__(self, prior: ServicePrior, axes: int = 1, number: Any = np.float32) -> None:
         self.prior, self.axes, self._number = prior, axes, number
-        self._numbers = {
-            one.name: number(getattr(prior, one.name)) for one in fields(prior) if one.type != "int"
-        }
+        self._numbers = {one.name: number(getattr(prior, one.name)) for one in fields(prior) if one.type != "int"}
         self.x: Numbers = np.zeros((STATES, axes), dtype=number)
         self.p: Numbers = np.zeros((_PAIRS, axes), dtype=number)
         self.p[:_KNOT_PAIRS] = self._numbers["map_var"][:, None]
@@ -187,9 +185,7 @@ class Learner:
 
     def save(self, axis: int = 0) -> list[int]:
         """The words that `gtc_learn_save` keeps."""
-        service, refused = (
-            int(x) for x in np.array([self.service_s, self.refused_dph[axis]]).view(np.uint32)
-        )
+        service, refused = (int(x) for x in np.array([self.service_s, self.refused_dph[axis]]).view(np.uint32))
         counts = (self.power_ons & 0xFFFF) << 16 | (int(self.since_refused[axis]) & 255) << 8
         words = [self.prior.id, counts | int(self.refused[axis]) & 255]
         words.append((service + 0xFFFF) & 0xFFFF0000 | refused >> 16)
@@ -207,9 +203,7 @@ class Learner:
         self.__init__(self.prior, self.axes, self._number)  # type: ignore[misc]
         self.power_ons = words[1] >> 16
         self.since_refused[:], self.refused[:] = words[1] >> 8 & 255, words[1] & 255
-        halves = np.array([words[2] & 0xFFFF0000, words[2] << 16 & 0xFFFFFFFF], dtype=np.uint32).view(
-            np.float32
-        )
+        halves = np.array([words[2] & 0xFFFF0000, words[2] << 16 & 0xFFFFFFFF], dtype=np.uint32).view(np.float32)
         self.service_s, self.refused_dph[:] = halves
         limit = self._numbers["authority_dph"]
         self.x[:KNOTS] = self._within(numbers[:KNOTS, None], -limit, limit)
@@ -252,15 +246,11 @@ class Learner:
         left = self._exp_minus(way + dt * known["memory_per_s"])
         along = left * d_temp
         memory = (left + left * way, along, -(length * length) * along, left + left * -way)
-        u = self._within(
-            (temp - known["low_c"]) * known["knots_per_c"], self._number(0.0), self._number(KNOTS - 1)
-        )
+        u = self._within((temp - known["low_c"]) * known["knots_per_c"], self._number(0.0), self._number(KNOTS - 1))
         k = min(int(u), KNOTS - 2)
         u = u - self._number(k)
         h = [one - u, u, one, temp - known["reference_c"], one, one, self._number(0.0)]
-        return _Step(
-            dt, self._exp_minus(dt * known["warm_up_per_s"]), memory, [k, k + 1, *range(KNOTS, STATES)], h
-        )
+        return _Step(dt, self._exp_minus(dt * known["warm_up_per_s"]), memory, [k, k + 1, *range(KNOTS, STATES)], h)
 
     def _propagate(self, step: _Step) -> None:
         p, f = self.p, step.memory

@@ -14,9 +14,7 @@ from .table import MISSING_Q31, Table, Words
 __all__ = ["evaluate_map", "governed", "stand_in"]
 
 
-def evaluate_map(
-    table: Table, inputs: Words, fused: f32.Fused = frozenset()
-) -> tuple[NDArray[np.int32], Words]:
+def evaluate_map(table: Table, inputs: Words, fused: f32.Fused = frozenset()) -> tuple[NDArray[np.int32], Words]:
     """`gtc_<n>_map` for many inputs.
 
     Args:

@@ -236,9 +236,7 @@ def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Nu
     return np.concatenate([of.accumulate(part) for part in parts])
 
 
-def _drift(
-    table: Table, steps: Steps, began: IntArray, blocks: IntArray
-) -> tuple[NDArray[np.bool_], Numbers]:
+def _drift(table: Table, steps: Steps, began: IntArray, blocks: IntArray) -> tuple[NDArray[np.bool_], Numbers]:
     """Whether the slope is known, and it: that of the window, or from the start of the front end on."""
     warming = (steps.remarks & WARMING) != 0
     young = (blocks >= 2) & (blocks < table.slope_blocks)

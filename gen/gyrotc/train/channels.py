@@ -112,15 +112,11 @@ def shape_of(id: ShapeId, values: FloatArray, reference: float, samples: Trainin
     fixed = _fixed(id, values, reference, samples)
     median = float(np.nanmedian(values))
     shown = np.where(np.isfinite(values), values, median)
-    columns, lost = (
-        _columns(cause, fixed, samples, channel) for channel in (shown, np.full(len(values), median))
-    )
+    columns, lost = (_columns(cause, fixed, samples, channel) for channel in (shown, np.full(len(values), median)))
     return ChannelShape(id, cause, fixed, columns, lost)
 
 
-def _columns(
-    cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: FloatArray
-) -> FloatArray:
+def _columns(cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: FloatArray) -> FloatArray:
     assert cause.features is not None
     found = cause.features(History(samples.time_s, samples.temperature_c, channel=channel), fixed).columns
     # Of a line alone the reference is no parameter of its column: the constant is the map's.
@@ -201,9 +197,7 @@ _MOST_MISSING = 0.1  # a channel that is away for longer has not been seen besid
 _STILL = 1e-9  # change of a channel, of its size, that is rounding
 _OWN = 1e-3  # share of its spread: noise and steps of a sensor alone are more
 _DEGREE = 10  # in temperature: compensations in firmware have polynomials of a lower one
-_CARRIES = (
-    0.25  # correlation of fast changes with those of the rate; below it most of the noise is not in common
-)
+_CARRIES = 0.25  # correlation of fast changes with those of the rate; below it most of the noise is not in common
 _SIGMAS = 6.0  # and it must be no luck: 1/sqrt(n) is one of these
 _ALIKE = 0.98  # correlation beside the map: weights of both would be a seventh as well known as that of one
 
@@ -335,9 +329,7 @@ def _bent(
     return replace(trial, chosen=plain.chosen, weights=weights, left_out_rms_dph=path), found
 
 
-def _objection(
-    dataset: Dataset, name: str, values: FloatArray, samples: TrainingData, scaling: Scaling
-) -> str:
+def _objection(dataset: Dataset, name: str, values: FloatArray, samples: TrainingData, scaling: Scaling) -> str:
     """Why a channel must not be an input; empty if it may."""
     if channel_kind(name, dataset.units) == "rate":
         return "it is a rate: it would compensate the gyro with what it measures"
@@ -358,9 +350,7 @@ def _objection(
 
 def _common_noise(values: FloatArray, samples: TrainingData) -> float:
     """Correlation of second differences with those of the rate where it is more than luck; else 0."""
-    next_to = (np.diff(samples.run) == 0) & (
-        np.diff(samples.time_s) < 1.5 * float(np.median(samples.duration_s))
-    )
+    next_to = (np.diff(samples.run) == 0) & (np.diff(samples.time_s) < 1.5 * float(np.median(samples.duration_s)))
     both = next_to[1:] & next_to[:-1] & np.isfinite(np.diff(values, 2))
     x, y = np.diff(values, 2)[both], np.diff(samples.bias_dph, 2)[both]
     if len(x) < 3 or not x.std() or not y.std():

@@ -103,9 +103,7 @@ class Span:
     kind: Literal["branch", "part", "run"]
     guard_s: float
 
-    def contains(
-        self, run: NDArray[np.int64], time_s: FloatArray, *, guard: bool = False
-    ) -> NDArray[np.bool_]:
+    def contains(self, run: NDArray[np.int64], time_s: FloatArray, *, guard: bool = False) -> NDArray[np.bool_]:
         """Which samples lie in the span, with `guard` also those in the guard gap around it."""
         gap = self.guard_s if guard else 0.0
         return np.asarray((run == self.run) & (time_s >= self.from_s - gap) & (time_s < self.to_s + gap))

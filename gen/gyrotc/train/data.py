@@ -59,13 +59,9 @@ class Scaling:
     temperature_c: tuple[float, float]
     slope_c_per_min: tuple[float, float]
 
-    def normalise(
-        self, temperature_c: FloatArray, slope_c_per_min: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def normalise(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(z_T, z_r) of inputs in C and C/min, not clamped."""
-        return (
-            temperature_c - self.center_c
-        ) / self.half_range_c, slope_c_per_min / self.half_range_c_per_min
+        return (temperature_c - self.center_c) / self.half_range_c, slope_c_per_min / self.half_range_c_per_min
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +106,7 @@ def _checked(data: TrainingData) -> dict[str, FloatArray]:
     """Columns by name, after the checks of `cleaned`."""
     columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
-        raise InputError(
-            "training data", "arrays differ in length", "one value of each kind for every sample"
-        )
+        raise InputError("training data", "arrays differ in length", "one value of each kind for every sample")
     if len(columns["run"]) == 0:
         raise InputError("training data", "no samples", "at least one valid sample of a training run")
     for name, column in columns.items():

@@ -150,6 +150,4 @@ def _solved(z: FloatArray, y: FloatArray, base: FloatArray, centers: FloatArray,
     ridge = np.sqrt(_RIDGE * n) * np.eye(columns.shape[1])[1:]
     stacked = np.concatenate([columns, ridge])
     weights = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(len(ridge))]), rcond=None)[0]
-    return _Network(
-        float(weights[0]), weights[1 : d + 1], centers, np.full(centers.shape, width), weights[d + 1 :]
-    )
+    return _Network(float(weights[0]), weights[1 : d + 1], centers, np.full(centers.shape, width), weights[d + 1 :])

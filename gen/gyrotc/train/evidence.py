@@ -26,15 +26,9 @@ from .noise import difference_sigma
 MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
 _TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
 _TRIMS = 3  # rounds of dropping and fitting again
-_TRIM_SHARE = (
-    0.1  # more than this share cannot be outliers: then the process does not fit, and nothing more is dropped
-)
-_TRIM_NOISE = (
-    0.8  # of what differences show, less their own scatter: a smaller residual has been followed, not left
-)
-_LEAST_NOISE = (
-    0.25  # of what differences show: smooth structure makes them larger than the noise, hardly smaller
-)
+_TRIM_SHARE = 0.1  # more than this share cannot be outliers: then the process does not fit, and nothing more is dropped
+_TRIM_NOISE = 0.8  # of what differences show, less their own scatter: a smaller residual has been followed, not left
+_LEAST_NOISE = 0.25  # of what differences show: smooth structure makes them larger than the noise, hardly smaller
 _LEAST_SIGMA = 1e-4  # of the spread: below it the normal equations lose their last digits
 GRID = 2.0**24  # of the standardised bias, so that the last digit of its unit (deg/h, rad/s) steers nothing
 
@@ -187,14 +181,10 @@ def conditioned(
         TrainingFailed: The equations cannot be solved.
     """
     center = weighted_mean(bias_dph, weight)
-    return conditioned_on(
-        process, gather(t, r, (bias_dph - center) / process.spread, weight / median(weight)), center
-    )
+    return conditioned_on(process, gather(t, r, (bias_dph - center) / process.spread, weight / median(weight)), center)
 
 
-def conditioned_on(
-    process: Process, bins: Bins, center: float
-) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def conditioned_on(process: Process, bins: Bins, center: float) -> Callable[[FloatArray, FloatArray], FloatArray]:
     """The same for means that are gathered: `bins.mean` is their bias less `center` (deg/h), over the spread."""
     model = _core.EvidenceModel(bins.t, bins.r, bins.count, bins.mean, bins.within, bins.samples)
     try:

@@ -209,9 +209,7 @@ class _Read:
     longest_same_s: float
 
 
-def _read(
-    dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool
-) -> _Read:
+def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool) -> _Read:
     """Reads the training runs. Raises InputError where too few samples are usable."""
     parts, columns = [], []
     left_out: list[LeftOutRows] = []
@@ -281,9 +279,7 @@ def _fit(
     )
 
 
-def _left_out(
-    data: TrainingData, spans: Sequence[Span], options: FitOptions, say: Progress
-) -> list[Averages]:
+def _left_out(data: TrainingData, spans: Sequence[Span], options: FitOptions, say: Progress) -> list[Averages]:
     """Each span left out in turn with its guard gap: residuals of a fit that has not seen it."""
     results = []
     for k, span in enumerate(spans):
@@ -370,9 +366,7 @@ def model_of(
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
             "uncertainty_dph": known,
-            "rezero_dph": rezero_dph(known["rules"]["between_dph"], len(np.unique(data.run)))
-            if known
-            else 0.0,
+            "rezero_dph": rezero_dph(known["rules"]["between_dph"], len(np.unique(data.run))) if known else 0.0,
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,
@@ -399,11 +393,7 @@ def _joined(fitted: Fit, bumps: Bumps | None) -> Sequence[Mapping[str, Any]]:
 
 def _earth_rate(dataset: Dataset) -> str:
     """What was done about Earth's rate, in words; computed terms with their standard uncertainties."""
-    terms = {
-        f"{run.earth.rate_dph:.4f} +- {run.earth.sigma_dph:.4f}"
-        for run in dataset.runs
-        if run.earth is not None
-    }
+    terms = {f"{run.earth.rate_dph:.4f} +- {run.earth.sigma_dph:.4f}" for run in dataset.runs if run.earth is not None}
     if terms:
         return f"computed and taken off: {', '.join(sorted(terms))} deg/h (1 sigma)"
     return dataset.earth_rate or "not stated"

@@ -44,9 +44,7 @@ def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average
         distance = np.abs(values - process.mean_dph(*z)) / sigma
         if distance.max() > _SIGMAS:
             k = int(np.argmax(distance))
-            return (
-                f"it leaves the process that it stands for by {distance[k]:.3g} sigma at {_place(t[k], r[k])}"
-            )
+            return f"it leaves the process that it stands for by {distance[k]:.3g} sigma at {_place(t[k], r[k])}"
         if process.asked is not None:  # a lot knows what lies beyond the unit's own means
             return ""
     means = average(samples, average_s).bias_dph

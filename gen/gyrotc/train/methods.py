@@ -86,9 +86,7 @@ def fit(
     reason = ""
     like_auto = method in (AUTO, "mrbf") and centers is None
     given = (
-        prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s)
-        if like_auto and prior
-        else None
+        prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s) if like_auto and prior else None
     )
     findings += given.findings if given else []
     if given is not None and given.map is not None:

@@ -121,16 +121,13 @@ class BesideSmooth:
         y: Weighted bias beside the splines, the same shape.
     """
 
-    def __init__(
-        self, data: TrainingData, weight: FloatArray, sigma: float, scaling: Scaling, seconds: float
-    ) -> None:
+    def __init__(self, data: TrainingData, weight: FloatArray, sigma: float, scaling: Scaling, seconds: float) -> None:
         cell = np.floor(data.temperature_c / _CELL_C).astype(np.int64) * 1_000_003
         cell += np.floor(data.slope_c_per_min / _CELL_C_PER_MIN + 0.5).astype(np.int64)
         _, index = np.unique(cell, return_inverse=True)
         count = np.bincount(index, weight)
         self.t, r, y = (
-            np.bincount(index, weight * x) / count
-            for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph)
+            np.bincount(index, weight * x) / count for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph)
         )
         slow = _SLOW_S / float(np.median(data.duration_s))
         self.root = 1.0 / (sigma * np.sqrt(1.0 / count + 1.0 / slow))
@@ -210,9 +207,7 @@ class _Search:
         low = np.r_[np.full(n, self.range[0] - _BEYOND_C), np.full(n, np.log(_LIMITS_C[0]))]
         high = np.r_[np.full(n, self.range[1] + _BEYOND_C), np.full(n, np.log(_LIMITS_C[1]))]
         start = np.clip(x, low + 1e-6, high - 1e-6)
-        solved = least_squares(
-            lambda x: np.asarray(self._solved(x)[1]), start, bounds=(low, high), max_nfev=_ROUNDS
-        )
+        solved = least_squares(lambda x: np.asarray(self._solved(x)[1]), start, bounds=(low, high), max_nfev=_ROUNDS)
         return np.asarray(solved.x), 2.0 * float(solved.cost)
 
     def _solved(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -300,9 +295,7 @@ def fit_mrbf(
     )
 
 
-def fit_mrbf_t(
-    data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float
-) -> Outcome:
+def fit_mrbf_t(data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float) -> Outcome:
     """A map of T alone, valid over the rates of the samples; arguments and errors as `fit_mrbf`."""
     still = replace(data, slope_c_per_min=np.zeros(len(data)))
     outcome = fit_mrbf(still, scaling_of(still), seed=seed, centers=centers, average_s=average_s)
@@ -343,9 +336,7 @@ def _compress(
     sizes = solver.path(nodes, limit, stop, _SETTLED * enough, 0.01 * enough)
     target = model.mean(bins.t, bins.r)
     columns: dict[bytes, FloatArray] = {}  # networks that only grew have most of their Gaussians in common
-    departures = [
-        float(np.average((target - _evaluated(n, bins, columns)) ** 2, weights=bins.count)) for n in sizes
-    ]
+    departures = [float(np.average((target - _evaluated(n, bins, columns)) ** 2, weights=bins.count)) for n in sizes]
     if centers is not None:
         return sizes, len(sizes) - 1, departures
     good = [m for m, d in enumerate(departures) if d * total <= enough]
@@ -378,7 +369,5 @@ def _physical(found: _core.Network, process: Process, scaling: Scaling) -> dict[
     order = np.lexsort((found.shapes[1], found.shapes[0]))
     w = found.weights * process.spread
     c, d, s, q = found.shapes[:, order]
-    centers = np.stack(
-        [c * scaling.half_range_c + scaling.center_c, d * scaling.half_range_c_per_min], axis=1
-    )
+    centers = np.stack([c * scaling.half_range_c + scaling.center_c, d * scaling.half_range_c_per_min], axis=1)
     return network(w[0] + process.center, w[1:3], centers, np.exp(np.stack([s, q], axis=1)), w[3:][order])

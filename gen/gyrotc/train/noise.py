@@ -32,9 +32,7 @@ _LEAST_SPAN_C_PER_MIN = 0.1  # a chamber at rest wanders by this
 _S_PER_H = 3600.0  # s in an hour
 
 
-def stretches(
-    values: FloatArray, time_s: FloatArray, run: NDArray[np.int64], step_s: float
-) -> list[FloatArray]:
+def stretches(values: FloatArray, time_s: FloatArray, run: NDArray[np.int64], step_s: float) -> list[FloatArray]:
     """Values of gap-free stretches: cut where the run changes or a step of time is longer than 1.5 `step_s`."""
     cuts = np.flatnonzero((np.diff(run) != 0) | (np.diff(time_s) > 1.5 * step_s)) + 1
     return list(np.split(values, cuts))
@@ -55,9 +53,7 @@ def allan_variance(residuals: Sequence[FloatArray], step_s: float) -> list[Allan
             square, count = total.get(factor, (0.0, 0))
             total[factor] = (square + 0.5 * float(differences @ differences), count + len(differences))
     return [
-        AllanPoint(
-            tau_s=factor * step_s, deviation_dph=float(np.sqrt(square / count)), freedom=count / factor
-        )
+        AllanPoint(tau_s=factor * step_s, deviation_dph=float(np.sqrt(square / count)), freedom=count / factor)
         for factor, (square, count) in sorted(total.items())
         if count / factor >= _LEAST_PAIRS
     ]
@@ -160,9 +156,7 @@ def _profile(shapes: FloatArray, square: FloatArray, freedom: FloatArray, k: int
     return _likeliest(others, square, freedom, value * shapes[:, k])[1]
 
 
-def _limit(
-    shapes: FloatArray, square: FloatArray, freedom: FloatArray, k: int, value: float, top: float
-) -> float:
+def _limit(shapes: FloatArray, square: FloatArray, freedom: FloatArray, k: int, value: float, top: float) -> float:
     """The term, not its square, above the likeliest at which the likelihood has fallen far."""
     from scipy.optimize import brentq
 

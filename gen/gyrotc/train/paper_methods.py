@@ -35,9 +35,7 @@ _HOLD = 0.1  # |dT/dt| of a hold, share of the half range; the hold's region rea
 _MIN_SAMPLES = 100  # a quarter of an hour in blocks of 10 s: with fewer a region has no map of its own
 
 
-def fit_bank(
-    data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float
-) -> Outcome:
+def fit_bank(data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float) -> Outcome:
     """Trains up to three networks; one without a region where the samples do not allow three.
 
     `centers` counts for each network.

@@ -223,9 +223,7 @@ class _Course:
 
     def _averaged(self, held: NDArray[np.bool_], columns: FloatArray) -> FloatArray:
         of = self.means.select(held)
-        return np.stack(
-            [average(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1
-        )
+        return np.stack([average(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1)
 
     def _weight(self, held: NDArray[np.bool_]) -> FloatArray:
         return average(self.means.select(held), self.average_s).weight
@@ -233,10 +231,7 @@ class _Course:
     def squares(self, folds: Sequence[_Fold], chosen: Sequence[str]) -> FloatArray:
         """Mean square on every stretch with some parts, (deg/h)², shape (folds,)."""
         return np.array(
-            [
-                np.average((fold.left @ self._mix(fold.normal, chosen)) ** 2, weights=fold.weight)
-                for fold in folds
-            ]
+            [np.average((fold.left @ self._mix(fold.normal, chosen)) ** 2, weights=fold.weight) for fold in folds]
         )
 
     def _mix(self, normal: FloatArray, chosen: Sequence[str]) -> FloatArray:
@@ -270,9 +265,7 @@ class _Course:
         count = next(k for k, square in enumerate(way) if not self._clearly_worse(square, best))
         return taken[:count] if self._surely_better(way[count], way[0]) else []
 
-    def bent(
-        self, folds: Sequence[_Fold], plain: Sequence[str], richer: Mapping[str, Sequence[str]]
-    ) -> list[str]:
+    def bent(self, folds: Sequence[_Fold], plain: Sequence[str], richer: Mapping[str, Sequence[str]]) -> list[str]:
         """These parts, the most earned first with one more behind: the simplest not clearly worse than the best."""
         chosen, left, count = list(plain), dict(richer), sum(map(len, richer.values()))
         while left and len(folds) >= 2:

@@ -150,8 +150,7 @@ def snapped(network: Network, scale: Mapping[str, Any]) -> dict[str, Any]:
     """
     (center, half), slope = scale["temperature_c"], scale["slope_c_per_min"]
     centers = [
-        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)]
-        for t, r in network["centers"]
+        [center + half * _on_grid((t - center) / half), slope * _on_grid(r / slope)] for t, r in network["centers"]
     ]
     return {**network, "centers": centers}
 
@@ -170,8 +169,7 @@ def rescaled(network: Network, old: Mapping[str, Any], new: Mapping[str, Any]) -
         "w0": network["w0"] + linear_t * (c_new - c_old) / h_old,
         "linear": [linear_t * wider[0], linear_r * wider[1]],
         "widths": [
-            [None if w is None else w / k for w, k in zip(pair, wider, strict=True)]
-            for pair in network["widths"]
+            [None if w is None else w / k for w, k in zip(pair, wider, strict=True)] for pair in network["widths"]
         ],
     }
 
@@ -217,15 +215,11 @@ def networks_dph(
     return np.asarray(total / shares)
 
 
-def _network_dph(
-    network: Network, scaling: Scaling, temperature_c: FloatArray, slope: FloatArray
-) -> FloatArray:
+def _network_dph(network: Network, scaling: Scaling, temperature_c: FloatArray, slope: FloatArray) -> FloatArray:
     """One network (docs/FORMAT.md, section 1), deg/h."""
     t, r = scaling.normalise(temperature_c, slope)
     bias = network["w0"] + network["linear"][0] * t + network["linear"][1] * r
-    for (c_t, c_r), (d_t, d_r), weight in zip(
-        network["centers"], network["widths"], network["weights"], strict=True
-    ):
+    for (c_t, c_r), (d_t, d_r), weight in zip(network["centers"], network["widths"], network["weights"], strict=True):
         u = ((t - (c_t - scaling.center_c) / scaling.half_range_c) / d_t) ** 2
         u = u + ((r - c_r / scaling.half_range_c_per_min) / d_r) ** 2
         bias = bias + weight * np.exp(-u)
@@ -262,9 +256,7 @@ class Prior(Protocol):
     def check_axis(self, axis: str | None) -> None:
         """Raises InputError where it is not of this axis."""
 
-    def with_samples(
-        self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float
-    ) -> Given:
+    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
         """Tests whether cleaned samples agree with it, and makes a map of both if they do.
 
         Args:

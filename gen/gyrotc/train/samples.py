@@ -168,9 +168,7 @@ def _last_map(steps: Steps, k: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.where(k >= 0, made[k], -1)
 
 
-def _in_force(
-    steps: Steps, k: NDArray[np.int64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+def _in_force(steps: Steps, k: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Input and status in force during each block, from the correction at its last sample (-1: none)."""
     started = k >= 0
     source, made = k[started], _last_map(steps, k)[started]
@@ -185,9 +183,7 @@ def _in_force(
     return temperature, slope, status
 
 
-def _time_of(
-    samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _time_of(samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Times of samples, shape (k,), between the rows beside them."""
     if len(time_s) == 0:
         return np.empty(0)

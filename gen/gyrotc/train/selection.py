@@ -190,9 +190,7 @@ def compare_candidates(
     least = max(_LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
     noise = max(_difference_rms(judged), least)
     rest = Rest(means, kept, scaling, process, _on(means, power_on), rate=rate)
-    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(
-        len(folds), len(CANDIDATES)
-    )
+    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(len(folds), len(CANDIDATES))
     count = np.array([len(average(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
     return CandidateScores(folds, np.sqrt(square), noise, max(white, least), count)
 
@@ -334,9 +332,7 @@ class Rest:
         return lambda t, r: mean(t, seen * r)
 
 
-def fit_mixed(
-    samples: TrainingData, scaling: Scaling, power_on: NDArray[np.int64] | None, average_s: float
-) -> Outcome:
+def fit_mixed(samples: TrainingData, scaling: Scaling, power_on: NDArray[np.int64] | None, average_s: float) -> Outcome:
     """The cubic with a slope in dT/dt whose coefficients are shrunk, as a network.
 
     Raises:
@@ -403,10 +399,7 @@ def chosen_by_cross_validation(
         if not against:
             break
         refused[name] = against
-    rows = [
-        row | ({"refused": refused[row["id"]]} if row["id"] in refused else {})
-        for row in comparison.rows(name)
-    ]
+    rows = [row | ({"refused": refused[row["id"]]} if row["id"] in refused else {}) for row in comparison.rows(name)]
     findings = [_refusal(one, text) for one, text in refused.items()]
     misses = name == "constant" and _misses(comparison)
     if misses:
@@ -461,9 +454,7 @@ def _does_not_generalise(comparison: CandidateScores) -> dict[str, Any]:
     """The finding, with its reason and what would help."""
     rms = {name: comparison.rms_of(name) for name in CANDIDATES}
     able = {n: v for n, v in rms.items() if n not in ("nothing", "constant") and v is not None}
-    text = (
-        "No correction is shown to hold on thermal history that it has not seen, so the model is a constant."
-    )
+    text = "No correction is shown to hold on thermal history that it has not seen, so the model is a constant."
     evidence: dict[str, Any] = {"noise_dph": comparison.noise_dph, "stretches": comparison.stretches()}
     if able:
         best = min(able, key=lambda n: able[n])

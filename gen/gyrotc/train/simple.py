@@ -142,9 +142,7 @@ def outcome_of(weights: FloatArray, data: TrainingData, scaling: Scaling, averag
     )
 
 
-def _as_gaussians(
-    square: float, cube: float, tolerance: float
-) -> tuple[FloatArray, FloatArray, float, FloatArray]:
+def _as_gaussians(square: float, cube: float, tolerance: float) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     """(constant and linear part, centers, width, weights) of square · z² + cube · z³ over |z| <= 1."""
     z = np.linspace(-1.0, 1.0, _GRID)
     target = square * z**2 + cube * z**3
@@ -236,9 +234,7 @@ def fit_mixed_model(means: TrainingData, scaling: Scaling, power_on: NDArray[np.
     y = np.round((cells.bias_dph - center) / spread * GRID) / GRID
     x, r = scaling.normalise(cells.temperature_c, cells.slope_c_per_min)
     rate = max(float(np.sqrt(np.mean(r**2))), 1e-6)
-    columns = np.stack(
-        [np.ones_like(x), x, (3.0 * x**2 - 1.0) / 2.0, (5.0 * x**3 - 3.0 * x) / 4.0, r / rate], axis=1
-    )
+    columns = np.stack([np.ones_like(x), x, (3.0 * x**2 - 1.0) / 2.0, (5.0 * x**3 - 3.0 * x) / 4.0, r / rate], axis=1)
     numbers = np.unique(on, return_inverse=True)[1].astype(np.int32)
     group = numbers if numbers[-1] > 0 else _branches(cells.time_s, cells.temperature_c)
     differences = np.diff(y)[np.diff(cells.run) == 0]

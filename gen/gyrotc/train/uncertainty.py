@@ -116,9 +116,7 @@ def start_sigma(
         left = _warm_up_left(samples, parameters["tau_s"])
         if id == "cavity_lag":
             per_min = 60.0 / parameters["tau_s"]
-            amplitude = float(
-                np.hypot(rules["beyond_dph_per_c"], rules["beyond_dph_per_c_per_min"] * per_min)
-            )
+            amplitude = float(np.hypot(rules["beyond_dph_per_c"], rules["beyond_dph_per_c_per_min"] * per_min))
         return amplitude * left
     if channel is not None and np.isfinite(channel).any():
         departure = channel[np.isfinite(channel)] - parameters["reference"]
@@ -128,10 +126,7 @@ def start_sigma(
 
 def _played(samples: TrainingData, width_c: float) -> float:
     """The same of a play; its width where training did not move it."""
-    squares = [
-        (play(width_c, samples.temperature_c[own]) - samples.temperature_c[own]) ** 2
-        for own in _runs(samples)
-    ]
+    squares = [(play(width_c, samples.temperature_c[own]) - samples.temperature_c[own]) ** 2 for own in _runs(samples)]
     found = float(np.sqrt(np.mean(np.concatenate(squares))))
     return found if found > 0.0 else width_c
 
@@ -239,14 +234,10 @@ def _correlation_s(known: Known, block_s: float) -> float:
 
 _POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
 _SPANS = 5  # a single run is cut into so many
-_MOST_LEFT_OUT = (
-    24  # fits without some runs: of more runs neighbours are left out together, at most a 24th and one
-)
+_MOST_LEFT_OUT = 24  # fits without some runs: of more runs neighbours are left out together, at most a 24th and one
 _PATCHES = (12, 8)  # over which residuals of a run left out are averaged
 _SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))  # of κ², which its prior keeps within
-_NOISES = np.exp(
-    np.linspace(np.log(0.7), np.log(4.0), 12)
-)  # of its variance over a patch, beside white noise
+_NOISES = np.exp(np.linspace(np.log(0.7), np.log(4.0), 12))  # of its variance over a patch, beside white noise
 _SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
 _LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
 
@@ -332,9 +323,7 @@ def _points(fit: Fit) -> tuple[FloatArray, FloatArray]:
     def inner(span: tuple[float, float], n: int) -> FloatArray:
         return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
 
-    t, r = np.meshgrid(
-        inner(fit.scaling.temperature_c, _POINTS[0]), inner(fit.scaling.slope_c_per_min, _POINTS[1])
-    )
+    t, r = np.meshgrid(inner(fit.scaling.temperature_c, _POINTS[0]), inner(fit.scaling.slope_c_per_min, _POINTS[1]))
     return t.reshape(-1), r.reshape(-1)
 
 
@@ -391,8 +380,7 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
         rest = means.select(np.r_[: edges_of_means[first], edges_of_means[after] : len(means)])
         process = fit_process(rest, fit.scaling, like=whole)
         rows += [
-            _surprises(process, samples.select(np.arange(edges[k], edges[k + 1])), fit)
-            for k in range(first, after)
+            _surprises(process, samples.select(np.arange(edges[k], edges[k + 1])), fit) for k in range(first, after)
         ]
     if not rows:
         return 1.0, 0.0

@@ -143,9 +143,7 @@ def read_log(text: str) -> BoardLog:
                 outside.append((number, line))
         if part is not None:
             if part.numeric in running:
-                raise CheckFailed(
-                    f"line {part.line}: {part.numeric} begins again, and no `done` stands before it"
-                )
+                raise CheckFailed(f"line {part.line}: {part.numeric} begins again, and no `done` stands before it")
             running.add(part.numeric)
             parts.append(part)
         position = stop
@@ -190,9 +188,7 @@ def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tup
     number, text = lines[stop]
     end = _END.fullmatch(text)
     if end is None:
-        raise CheckFailed(
-            f"line {number} is damaged, or the board test did not run to its end: {text[:80]!r}"
-        )
+        raise CheckFailed(f"line {number} is damaged, or the board test did not run to its end: {text[:80]!r}")
     n_results = int(end[1], 16)
     expected = n_results if head["mode"] == "all" else -(-n_results // _GROUP)
     if stop - start - 1 != expected:
@@ -254,9 +250,7 @@ def _compare_groups(crcs: Words, expected: Words) -> BoardComparison:
         if int(got) != want:
             mismatches += len(group)
             start = k * _GROUP
-            first.append(
-                f"vectors {start} to {start + len(group) - 1}: CRC {int(got):08x}, reference {want:08x}"
-            )
+            first.append(f"vectors {start} to {start + len(group) - 1}: CRC {int(got):08x}, reference {want:08x}")
     return BoardComparison(len(expected), mismatches, tuple(first[:_SHOWN_MISMATCHES]))
 
 
@@ -280,9 +274,7 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
     numerics = [n for n in job.tables if n in target.numerics]
     package = target.missing()
     if package is not None:
-        return [
-            VerifiedTarget(name=target.name, status="missing", numeric=n, package=package) for n in numerics
-        ]
+        return [VerifiedTarget(name=target.name, status="missing", numeric=n, package=package) for n in numerics]
     with scratch_folder() as work:
         return list(_entries(job, target, numerics, work))
 
@@ -340,9 +332,7 @@ def _shared(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> _
     )
 
 
-def _functions(
-    job: Job, target: Target, c: Path, work: Path, runtime: Object
-) -> dict[str, dict[str, FunctionCost]]:
+def _functions(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> dict[str, dict[str, FunctionCost]]:
     """Code, stack and the most instructions of each public function, by arithmetic.
 
     Code of other levels may have loops that no line of the text bounds: then no bound is stated, and the bits count.
@@ -460,8 +450,7 @@ def log_entries(job: Job, vectors: Vectors, log: Path) -> tuple[list[VerifiedTar
         file=log.name,
         lines=found.lines,
         parts=tuple(
-            LogPart(line=p.line, numeric=p.numeric, vectors=c.vectors, mismatches=c.mismatches)
-            for p, c in compared
+            LogPart(line=p.line, numeric=p.numeric, vectors=c.vectors, mismatches=c.mismatches) for p, c in compared
         ),
         absent=tuple(n for n in job.tables if all(p.numeric != n for p, _ in compared)),
         outside=len(found.outside),
@@ -495,9 +484,7 @@ def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> BoardComparison:
     return compared_words(part, answers(table, replace(vectors, n_random=part.random)))
 
 
-def _entry(
-    job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, BoardComparison]]
-) -> VerifiedTarget:
+def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, BoardComparison]]) -> VerifiedTarget:
     """What one board showed of one arithmetic; the cost of the calls is that of the last part."""
     mismatches = sum(c.mismatches for _, c in parts)
     several = len(parts) > 1

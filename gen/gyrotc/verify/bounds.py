@@ -73,9 +73,7 @@ class Program:
     def hooks(self, numeric: str, slot: str) -> list[tuple[int, int]]:
         """Functions behind a pointer of a term's code: address, and how many terms of the table have it."""
         found: dict[int, int] = {}
-        twin = (
-            "q31" if numeric == "f32" else "f32"
-        )  # what is the same in both is linked by one of the two names
+        twin = "q31" if numeric == "f32" else "f32"  # what is the same in both is linked by one of the two names
         for kind in self.text.counts.kinds:
             hooks = (f"{TERM_CODES[kind - 1]}_{slot}", "nothing")
             names = [f"gtc_{n}_{what}" for what in hooks for n in (numeric, twin)]
@@ -109,9 +107,7 @@ class Paths:
     entered: list[tuple[str, str, int]] = field(default_factory=list)  # caller, function, edge into it
     turns: dict[str, list[dict[int, float]]] = field(default_factory=dict)  # of loops, by text
     begun: dict[str, list[int]] = field(default_factory=dict)  # edges into loops from outside, by text
-    stored: dict[str, list[int]] = field(
-        default_factory=dict
-    )  # nodes that write to memory for a line, by text
+    stored: dict[str, list[int]] = field(default_factory=dict)  # nodes that write to memory for a line, by text
     long_quotients: list[int] = field(default_factory=list)  # edges into libgcc's way of dividing for these
 
     def whole(self, address: int) -> None:
@@ -165,9 +161,7 @@ class Paths:
         if block.hook:
             slot = re.search(r"->(begin|step|apply)\(", self.program.text.at(block.last.line))
             if slot is None:
-                raise CheckFailed(
-                    f"{copy.flow.name}: a call through a pointer at {start:x} cannot be followed"
-                )
+                raise CheckFailed(f"{copy.flow.name}: a call through a pointer at {start:x} cannot be followed")
             callees = self.program.hooks(self.numeric, slot[1])
         elif block.call is not None:
             callees = [(block.call, 0)]
@@ -219,9 +213,7 @@ class Paths:
 
     def _around(self, copy: _Copy, start: int) -> str:
         """The text of the innermost loop around a block; where there is none, of the loop that calls the function."""
-        loops = [
-            (len(loop.body), line) for loop, line in self.program.loops_of(copy.flow) if start in loop.body
-        ]
+        loops = [(len(loop.body), line) for loop, line in self.program.loops_of(copy.flow) if start in loop.body]
         return self.program.text.at(min(loops)[1]) if loops else copy.around
 
     def _bounded(self, copy: _Copy, loop: Loop, line: int) -> None:
@@ -230,9 +222,7 @@ class Paths:
         outer = [(len(o.body), n) for o, n in self.program.loops_of(copy.flow) if o.body > loop.body]
         most = text.most(line, text.at(min(outer)[1]) if outer else copy.around, STAND_IN in copy.flow.name)
         back = [e for b in loop.latches for e in copy.ways[b, loop.header]]
-        entries = [
-            e for (a, b), es in copy.ways.items() for e in es if b == loop.header and a not in loop.body
-        ]
+        entries = [e for (a, b), es in copy.ways.items() for e in es if b == loop.header and a not in loop.body]
         tested_last = self._is_tested_last(copy.flow, loop, text.at(line))
         turns = dict.fromkeys(back, 1.0) | (dict.fromkeys(entries, 1.0) if tested_last else {})
         self.limits.append((_less(turns, entries, float(most)), float(most) if not entries else 0.0))
@@ -404,15 +394,12 @@ def _bounds(
             continue
         of_table = Program(flows, addresses, LoopText(lines, macros, known))
         found[numeric] = {
-            f: _bound(of_table, numeric, f, addresses[str(linked_name(addresses, numeric, f))])
-            for f in functions
+            f: _bound(of_table, numeric, f, addresses[str(linked_name(addresses, numeric, f))]) for f in functions
         }
     return found
 
 
-def _linked(
-    target: Target, c_folder: Path, named: Sequence[str], symbol: str, runtime: Object, work: Path
-) -> Path:
+def _linked(target: Target, c_folder: Path, named: Sequence[str], symbol: str, runtime: Object, work: Path) -> Path:
     """A program with the functions and tables that are named."""
     source = work / "bound.c"
     rows = "\n".join(f"    {name}," for name in named)

@@ -322,9 +322,7 @@ POWER = ("while (rest != 0U) {", "for (rest = blocks; rest != 0U; rest >>= 1) {"
 #: Loops that are no plain count, by their text; docs/numerics.md says why each ends.
 _OTHER: dict[str, Callable[[Counts, int], int]] = {
     "for (i = state->table->slope_blocks - 1U; i > 0U; i--) {": lambda c, _: c.by_name["slope_blocks"] - 1,
-    "for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {": lambda c, _: (
-        c.by_name["slope_blocks"] - 1
-    ),
+    "for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {": lambda c, _: c.by_name["slope_blocks"] - 1,
     "for (i = 1U; i < number; i++) {": lambda c, _: c.by_name["n_networks"] - 1,  # before a fallback model
     # A running block, those until every channel counts as missing, and the rest of the last one.
     "while (rest > 0U) {": lambda c, _: c.missing_blocks + 3,

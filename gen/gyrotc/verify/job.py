@@ -181,9 +181,7 @@ class _Counter:
 def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:
     """Lines that one process printed, without its progress."""
     kept: list[str] = []
-    with confined(
-        [str(program)], program.parent, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, cpu_s=_LIMIT_S
-    ) as process:
+    with confined([str(program)], program.parent, stdin=PIPE, stdout=PIPE, stderr=DEVNULL, cpu_s=_LIMIT_S) as process:
         assert process.stdin is not None and process.stdout is not None
         with suppress(BrokenPipeError), process.stdin:  # its status says that it ended early
             process.stdin.write(("\n".join(lines) + "\n").encode("ascii"))
@@ -280,9 +278,7 @@ def verify(
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     if exhaustive and not barred:
         errors = [_every_input(job, exact, say) if e.numeric == "q31" else e for e in errors]
-    passed, failed, missing = _counts(
-        entries, [*emitted, *errors, *([signed] if signed else [])], set(targets)
-    )
+    passed, failed, missing = _counts(entries, [*emitted, *errors, *([signed] if signed else [])], set(targets))
     return Verification(
         gyrotc_version=__version__,
         serial=model.serial,

@@ -81,8 +81,7 @@ class ReplayedPart:
         """In words, with the number of the row."""
         for row in self.wrong.tolist():
             texts = [
-                " ".join(f"{int(words[row]):08x}" for words in side)
-                for side in (self.words, _words_of(self.reference))
+                " ".join(f"{int(words[row]):08x}" for words in side) for side in (self.words, _words_of(self.reference))
             ]
             yield f"row {self.rows.start + row}: statuses and bits {texts[0]}, reference {texts[1]}"
 

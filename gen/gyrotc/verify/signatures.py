@@ -182,9 +182,7 @@ def _serialization() -> Any:
     try:
         from cryptography.hazmat.primitives import serialization
     except ImportError as error:
-        raise InputError(
-            "signatures", "the package cryptography is not installed", install_command("sign")
-        ) from error
+        raise InputError("signatures", "the package cryptography is not installed", install_command("sign")) from error
     return serialization
 
 

@@ -168,9 +168,7 @@ def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
         return {}
     graph = parse_graph(runtime.graph)
     sizes = {s.name: s.size for s in runtime.symbols}
-    return {
-        n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)
-    }
+    return {n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)}
 
 
 def linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:

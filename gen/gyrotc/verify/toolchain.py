@@ -118,9 +118,7 @@ def run_to_end(
     with tempfile.TemporaryFile() as own, tempfile.TemporaryFile() as stderr:
         stdout = printed or own
         # The clock ends it; the limit of processor time is for what escapes the clock, and must not come first.
-        with confined(
-            command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S
-        ) as process:
+        with confined(command, folder, stdin=stdin, stdout=stdout, stderr=stderr, cpu_s=2 * LIMIT_S) as process:
             try:
                 process.wait(LIMIT_S)
             except subprocess.TimeoutExpired as error:
@@ -353,9 +351,7 @@ def _processor() -> str:
     """What tells the code that `-march=native` makes here from that of another machine; empty: not known."""
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
-        lines = re.findall(
-            r"^(?:model name|vendor_id|cpu family|model|flags|Features|CPU \w+)\s*:.*$", text, re.M
-        )
+        lines = re.findall(r"^(?:model name|vendor_id|cpu family|model|flags|Features|CPU \w+)\s*:.*$", text, re.M)
         return digest_of([platform.machine(), *lines]) if lines else ""
     return ""
 
@@ -365,8 +361,7 @@ def _bare_objects(target: Target) -> tuple[tuple[str, Object], ...]:
     """The parts of `bare/` that a target is linked with, by the names of their files."""
     with scratch_folder() as work:
         return tuple(
-            (f"{Path(name).stem}.o", shared_object(target, _BARE / name, work, include=_BARE))
-            for name in target.bare
+            (f"{Path(name).stem}.o", shared_object(target, _BARE / name, work, include=_BARE)) for name in target.bare
         )
 
 
@@ -416,9 +411,7 @@ def run_program(
 def symbols(target: Target, *files: Path) -> list[Symbol]:
     """Symbols with a size, of objects or programs."""
     rows = [_SYMBOL.fullmatch(line) for line in _inspected(target, "nm", ("-S",), files)]
-    return [
-        Symbol(row["name"], row["kind"], int(row["size"], 16), int(row["address"], 16)) for row in rows if row
-    ]
+    return [Symbol(row["name"], row["kind"], int(row["size"], 16), int(row["address"], 16)) for row in rows if row]
 
 
 def disassembly(target: Target, program: Path) -> list[str]:

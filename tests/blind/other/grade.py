@@ -104,6 +104,4 @@ def answers(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
         of = found.setdefault(hidden, {})
         of[answer] = of.get(answer, 0) + 1
     order = ["nothing", "foreign", *FAMILY]
-    return {
-        name: dict(sorted(found[name].items(), key=lambda item: -item[1])) for name in order if name in found
-    }
+    return {name: dict(sorted(found[name].items(), key=lambda item: -item[1])) for name in order if name in found}

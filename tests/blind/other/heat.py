@@ -73,9 +73,7 @@ def draw_body(rng: np.random.Generator) -> Body:
     )
 
 
-def run_heat(
-    body: Body, command: Array, lead_s: float, rng: np.random.Generator, *, lit: bool = True
-) -> Heat:
+def run_heat(body: Body, command: Array, lead_s: float, rng: np.random.Generator, *, lit: bool = True) -> Heat:
     """A gyro soaked at the first temperature, switched on `lead_s` before the programme begins.
 
     Args:
@@ -107,9 +105,7 @@ def _step(body: Body, state: Array, outside: float, power: float) -> Array:
     """One backward step of all volumes."""
     dx = body.half_m / _CELLS
     glass = state[1:-1]
-    capacity = np.r_[
-        _CASE * body.case_m, _GLASS * (1.0 + _GLASS_PER_C * (glass - 20.0)) * dx, _GLASS * body.mirror_m
-    ]
+    capacity = np.r_[_CASE * body.case_m, _GLASS * (1.0 + _GLASS_PER_C * (glass - 20.0)) * dx, _GLASS * body.mirror_m]
     between = (_CONDUCTS + _CONDUCTS_PER_C * (0.5 * (glass[1:] + glass[:-1]) - 20.0)) / dx
     chain = np.r_[1.0 / (1.0 / body.contact + 0.5 * dx / _CONDUCTS), between]
     matrix = np.zeros((state.size, state.size))

@@ -29,9 +29,7 @@ class Map:
 
     def __call__(self, t: Array, r: Array) -> Array:
         x = (t[:, None] - self.places) / self.widths
-        return np.arctan(x) @ self.weights + self.flow * r / np.sqrt(1.0 + (r / 6.0) ** 2) * (
-            1.0 + t / self.flow_c
-        )
+        return np.arctan(x) @ self.weights + self.flow * r / np.sqrt(1.0 + (r / 6.0) ** 2) * (1.0 + t / self.flow_c)
 
 
 def draw_map(rng: np.random.Generator) -> Map:
@@ -147,8 +145,7 @@ def leak(scene: Scene, rng: np.random.Generator) -> Effect:
     """Helium through glass: the bias follows a power of the days since the first run."""
     power = float(rng.uniform(0.6, 1.3))
     return [
-        np.full(h.sensor.size, (d - scene.day[0]) ** power)
-        for h, d in zip(scene.heat, scene.day, strict=True)
+        np.full(h.sensor.size, (d - scene.day[0]) ** power) for h, d in zip(scene.heat, scene.day, strict=True)
     ], False
 
 
@@ -172,8 +169,7 @@ def kinks(scene: Scene, rng: np.random.Generator) -> Effect:
     """An adhesive's glass transition, a relay of the housing: two narrow steps of the static map."""
     at, wide, size = rng.uniform(-25, 55, 2), rng.uniform(1.0, 3.0, 2), rng.choice([-1.0, 1.0], 2)
     return [
-        sum(s * np.tanh((h.sensor - a) / w) for a, w, s in zip(at, wide, size, strict=True))
-        for h in scene.heat
+        sum(s * np.tanh((h.sensor - a) / w) for a, w, s in zip(at, wide, size, strict=True)) for h in scene.heat
     ], False
 
 

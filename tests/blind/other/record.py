@@ -97,9 +97,7 @@ def _supply(h: Heat, rng: np.random.Generator) -> Array:
     return np.asarray(12.0 + slow + 0.02 * np.sign(np.gradient(h.air)) + rng.normal(0, 0.004, h.sensor.size))
 
 
-def _hidden(
-    truth: Truth, scene: Scene, yardstick: Yardstick, rng: np.random.Generator
-) -> tuple[list[Array], float]:
+def _hidden(truth: Truth, scene: Scene, yardstick: Yardstick, rng: np.random.Generator) -> tuple[list[Array], float]:
     """What is added to the map, for each run at `STEP_S`, deg/h, and the map's own contrast."""
     nothing = [np.zeros(h.sensor.size) for h in scene.heat]
     if truth.stratum == "clean":

@@ -107,9 +107,7 @@ def _sweep(folder: Path) -> None:
 def _line(row: Row) -> str:
     hidden = f"{row['name'] or row['kind'] or 'nothing'} {row['k']:.2f}"
     found = ", ".join([*row["named"], *row["noise"]]) or "-"
-    return (
-        f"{row['number']:4d} {row['row_s']:2d} s {row['declared']:5s} {hidden} -> {row['verdict']}: {found}"
-    )
+    return f"{row['number']:4d} {row['row_s']:2d} s {row['declared']:5s} {hidden} -> {row['verdict']}: {found}"
 
 
 def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:

@@ -91,9 +91,7 @@ class Yardstick:
     def _of_another_input(self, effect: Sequence[Array], energy: float) -> float:
         """Share of what map and effect leave of the plain map that the same map of a lagged or shifted T takes."""
         runs = [self.scene.heat[k] for k in self.train]
-        static = self.white(
-            self._column([self.scene.map(h.sensor, rate_of(h.sensor)) for h in self.scene.heat])
-        )
+        static = self.white(self._column([self.scene.map(h.sensor, rate_of(h.sensor)) for h in self.scene.heat]))
         held = (self.map @ (self.map.T @ static))[:, 0]
         own = self.white(self._column(effect))[:, 0]
         moved = [[_follow(h.sensor, tau) for h in runs] for tau in _LAGS_S]

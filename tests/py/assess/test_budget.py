@@ -277,9 +277,7 @@ def test_every_noise_figure_has_an_uncertainty_and_a_short_exam_says_less() -> N
     shorter = uncertainties(exam(draw, 1, 1.0)[:1])
     assert shorter["rms_dph"].standard > 2.0 * known["rms_dph"].standard
     one_sample = Averages(np.zeros(1), np.ones(1), np.ones(1), np.zeros(1))
-    assert figure_uncertainties([one_sample], reported_of([one_sample]), 100.0).keys() <= {
-        "first_10min_rms_dph"
-    }
+    assert figure_uncertainties([one_sample], reported_of([one_sample]), 100.0).keys() <= {"first_10min_rms_dph"}
 
 
 def test_the_largest_of_many_scatters_as_stated() -> None:

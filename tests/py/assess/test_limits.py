@@ -33,12 +33,8 @@ from recordings import columns, described, write_csv
 _NOTHING = dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
 
 
-def run_of(
-    role: Literal["train", "exam"], half_hour: float, angle: float | None, first: float
-) -> EvaluatedRun:
-    after = RunStatistics(
-        **_NOTHING, rms_30min_dph=half_hour, angle_1h_arcsec=angle, first_10min_rms_dph=first
-    )
+def run_of(role: Literal["train", "exam"], half_hour: float, angle: float | None, first: float) -> EvaluatedRun:
+    after = RunStatistics(**_NOTHING, rms_30min_dph=half_hour, angle_1h_arcsec=angle, first_10min_rms_dph=first)
     return EvaluatedRun(
         file="a.csv", role=role, environment=None, samples=1, before=Statistics(**_NOTHING), after=after
     )
@@ -124,14 +120,10 @@ def test_what_was_not_measured_does_not_keep_a_limit(tmp_path: Path, model: Mode
 
 
 def test_ranges_and_needs(tmp_path: Path, model: Model) -> None:
-    assert (
-        met(tmp_path, model, "[covers]\ntemperature_c = [-40, 60]\nslope_c_per_min = [-1, 1]") == [True] * 2
-    )
+    assert met(tmp_path, model, "[covers]\ntemperature_c = [-40, 60]\nslope_c_per_min = [-1, 1]") == [True] * 2
     assert met(tmp_path, model, "[covers]\ntemperature_c = [-40.5, 60]") == [False]
     assert met(tmp_path, model, '[needs]\narithmetics = ["f32", "q31"]') == [True, False]
-    assert met(tmp_path, model, '[needs]\ntargets = ["host-gcc-O2", "cortex-m4f"]') == [True, False], (
-        "missing"
-    )
+    assert met(tmp_path, model, '[needs]\ntargets = ["host-gcc-O2", "cortex-m4f"]') == [True, False], "missing"
     assert met(tmp_path, model, '[needs]\nno_findings = ["large_weights", "run_outlier", "any"]') == [
         True,
         False,
@@ -216,10 +208,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     changes = json.loads((tmp_path / "two" / "changes.json").read_text())
     assert changes["map"]["mean_dph"] == pytest.approx(0.01, rel=1e-3)
     assert changes["recordings"]["other_bytes"] == ["run-01.csv"]
-    assert (
-        "c/gtc_rlg_1.c" in changes["files"]["other_bytes"]
-        and "c/gtc.c" not in changes["files"]["other_bytes"]
-    )
+    assert "c/gtc_rlg_1.c" in changes["files"]["other_bytes"] and "c/gtc.c" not in changes["files"]["other_bytes"]
     assert "maps 0.0100 deg/h RMS difference" in done.stdout
     assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     assert json.loads((tmp_path / "two" / "model.json").read_text())["q31_bias_frac_bits"] == 30

@@ -30,9 +30,7 @@ def test_white_noise_passes() -> None:
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
     drawn = [judged([rng.normal(size=n) for n in LENGTHS]) for _ in range(200)]
-    assert sum(bool(one.reasons) for one in drawn) <= 1, (
-        "two figures at four sigma: one clean build in thousands"
-    )
+    assert sum(bool(one.reasons) for one in drawn) <= 1, "two figures at four sigma: one clean build in thousands"
 
 
 @pytest.mark.parametrize(
@@ -99,9 +97,7 @@ def test_short_runs_have_no_autocorrelation_and_no_runs_no_test() -> None:
     short = residual_test([np.zeros(12)], 1.0, 1.0, [12])
     assert short and short.autocorrelation is None and short.autocorrelation_limit is None
     assert not short.reasons
-    assert residual_test([np.zeros(12)], 1.4, 1.0, [1]) is not None, (
-        "runs of an exam alone: the floor is known"
-    )
+    assert residual_test([np.zeros(12)], 1.4, 1.0, [1]) is not None, "runs of an exam alone: the floor is known"
     assert residual_test([np.ones(100)], 1.0, None, [100]) is None
     assert residual_test([], None, 1.0, []) is None
 

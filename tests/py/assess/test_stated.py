@@ -142,9 +142,7 @@ def test_a_fail_that_was_edited_into_a_pass_is_refused(
     ):
         assert _status(*command) == 2
         reported = capsys.readouterr().err
-        assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), (
-            reported
-        )
+        assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), reported
     assert not (tmp_path / "C").exists() and not (folder / "c" / "release.json").exists()
 
 
@@ -175,9 +173,7 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
     assert _status("sign", folder, "--key", key) == 2
     reported = capsys.readouterr().err
     assert (
-        "its verdict is FAIL (" in reported
-        and "--accept-fail REASON" in reported
-        and len(reported.splitlines()) == 1
+        "its verdict is FAIL (" in reported and "--accept-fail REASON" in reported and len(reported.splitlines()) == 1
     )
     with pytest.raises(InputError, match="its verdict is FAIL"):
         certificate(folder, tmp_path / "C", draft=True)
@@ -199,9 +195,7 @@ def test_a_fail_needs_a_reason_which_is_signed_and_printed(
     assert f"released: FAIL, accepted: {reason}; valid until 2027-03-07" in capsys.readouterr().out
 
 
-def test_a_conditional_pass_needs_a_reason_which_is_released_and_printed(
-    passing: Path, tmp_path: Path
-) -> None:
+def test_a_conditional_pass_needs_a_reason_which_is_released_and_printed(passing: Path, tmp_path: Path) -> None:
     """Before: it was certified and signed as if it were a PASS."""
     [rms] = [limit.measured for limit in unit_of(passing).held if limit.limit == "at_most.rms_dph"]
     assert isinstance(rms, float)
@@ -303,8 +297,7 @@ def test_every_leaf_and_payload_is_guarded(
             content = json.loads(before)
             leaves = list(_leaves(content))
             texts = [
-                json.dumps(_mutated(content, leaf)).encode()
-                for leaf in rng.sample(leaves, min(of_a_file, len(leaves)))
+                json.dumps(_mutated(content, leaf)).encode() for leaf in rng.sample(leaves, min(of_a_file, len(leaves)))
             ]
         else:
             places = rng.sample(range(len(before)), min(1 + of_a_file // 100, 20, len(before)))

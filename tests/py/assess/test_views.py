@@ -103,9 +103,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         assert again == held, number
         assert banner == [shown.verdict or "No verdict"], number
         assert signed.verdict == shown.decision, number
-        assert re.findall(r"<strong>([^<]*)</strong>", page)[:1] == (
-            [shown.verdict] if shown.verdict else []
-        ), number
+        assert re.findall(r"<strong>([^<]*)</strong>", page)[:1] == ([shown.verdict] if shown.verdict else []), number
         assert re.findall(r'class="state"><span[^>]*>([^<]*)<', page) == table, number
         assert conformity == [_IN_DCC[one.decision] for one in shown.held], number
         assert Result(Path(), built).decision == shown.decision, number
@@ -117,9 +115,9 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         lines = list(limit_lines(held))
         assert said(lines[0])[:1] == ([held.decision] if held.decision else []), number
         marked = [line.rpartition(", ")[2] for line in lines[1:] if not line.startswith("  CONDITIONAL")]
-        assert [m if m in _VERDICTS.split("|") else "PASS" for m in marked] == [
-            one.decision for one in held.limits
-        ], number
+        assert [m if m in _VERDICTS.split("|") else "PASS" for m in marked] == [one.decision for one in held.limits], (
+            number
+        )
         where = {"left_out": "spans left out", "train": "training runs themselves"}
         judged = evaluation.judged()
         assert judged is not None
@@ -201,9 +199,7 @@ def test_structure_that_is_left_leads_to_a_diagnosis(
     evaluation = EVALUATION.model_copy(update={"residual": residual, "findings": found})
     assert evaluation.structure_left == left
     assert bool(evaluation.residual_words) == left
-    shown = UnitResults(
-        Model.from_dict(model_dict), evaluation, None, VERIFICATION, None, None, None, None, None
-    )
+    shown = UnitResults(Model.from_dict(model_dict), evaluation, None, VERIFICATION, None, None, None, None, None)
     page = page_environment().get_template("parts.html.j2").module.messages(shown)
     assert ("gyrotc diagnose DATASET" in page) == left
 

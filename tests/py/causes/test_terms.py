@@ -119,9 +119,7 @@ LINEAR = {
 
 
 @pytest.mark.parametrize("cause", LINEAR)
-def test_columns_hold_what_the_simulation_adds_and_give_its_amplitudes_back(
-    cause: str, wandering: Array
-) -> None:
+def test_columns_hold_what_the_simulation_adds_and_give_its_amplitudes_back(cause: str, wandering: Array) -> None:
     """Where the cavity is the sensor, the columns of a fit span the simulated effect exactly."""
     term, values = CATALOGUE[cause], LINEAR[cause]
     assert term.bias and term.features and term.amplitudes
@@ -154,9 +152,7 @@ def outcome_of(cause: str, values: dict[str, float], temperature_c: Array, chann
     assert table
     nothing = np.zeros_like(temperature_c)
     outcome = TermOutcome(temperature_c, nothing, nothing, np.zeros(len(nothing), dtype=np.int32))
-    seen = CourseChannel(
-        channel, np.zeros(len(nothing), dtype=np.int32), np.zeros(len(nothing), dtype=np.bool_)
-    )
+    seen = CourseChannel(channel, np.zeros(len(nothing), dtype=np.int32), np.zeros(len(nothing), dtype=np.bool_))
     table.recursion(values, 10.0).apply(course_of(temperature_c), seen, outcome)
     return outcome
 
@@ -187,9 +183,7 @@ def test_a_cavity_lag_gives_the_map_the_filtered_temperature(wandering: Array) -
     assert np.allclose(features.columns[:, 0], cavity)
     inner = slice(5, -5)
     slope = 60.0 * np.gradient(cavity, TIMES)
-    in_a_row = (
-        60.0 * np.abs(np.diff(wandering)).max() / 600.0
-    )  # how much the slope can change from row to row
+    in_a_row = 60.0 * np.abs(np.diff(wandering)).max() / 600.0  # how much the slope can change from row to row
     assert np.abs(features.columns[inner, 1] - slope[inner]).max() < in_a_row
     assert features.known.sum() == np.sum(TIMES >= 3 * 600.0)
     outcome = outcome_of("cavity_lag", values, wandering, wandering)
@@ -202,9 +196,7 @@ def test_a_sensor_lag_is_absorbed_by_a_static_map() -> None:
     """f(T) = f(T_s + tau dT_s/dt): nothing is left to find. The control must stay one."""
     bias_map = draw(np.random.default_rng(4), (5.8e-3, 8.5e-3))
     fine = np.arange(0.0, 20000.0)
-    true_c = first_order(
-        900.0, fine, np.interp(fine, [0, 3000, 4200, 9000, 11000], [0.0, 0.0, 60.0, 60.0, -40.0])
-    )
+    true_c = first_order(900.0, fine, np.interp(fine, [0, 3000, 4200, 9000, 11000], [0.0, 0.0, 60.0, 60.0, -40.0]))
     tau = 300.0
     sensed = first_order(tau, fine, true_c)
     recovered = sensed + tau * np.gradient(sensed, fine)

@@ -172,10 +172,7 @@ def test_an_empty_unit_is_one_message(place: Path) -> None:
 
 
 def _names(count: int) -> list[bytes]:
-    names = {
-        text.encode("utf-8", "surrogatepass").replace(b"/", b"|").replace(b"\x00", b"")[:200]
-        for text in TEXTS
-    }
+    names = {text.encode("utf-8", "surrogatepass").replace(b"/", b"|").replace(b"\x00", b"")[:200] for text in TEXTS}
     names |= {
         b"\xff\xfe",
         b"a\\b",
@@ -207,9 +204,7 @@ def test_any_name_of_a_file_ends_by_a_known_status(count: int, place: Path) -> N
         shown = os.fsdecode(file)
         _right(["check", str(folder)])
         _right(["import", shown, "--out", str(folder / "I")])
-        (folder / "dataset.toml").write_text(
-            toml(f"file = {_toml_text(Path(shown).name)}"), "utf-8", "replace"
-        )
+        (folder / "dataset.toml").write_text(toml(f"file = {_toml_text(Path(shown).name)}"), "utf-8", "replace")
         _right(["fit", str(folder), "--method", "constant", "--out", str(folder / "R")])
 
 

@@ -82,9 +82,7 @@ def test_what_a_text_tells_of_the_work_that_is_done() -> None:
     }
     for text, share in reported.items():
         assert course.share_of(text) == pytest.approx(share), text
-    assert (
-        StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
-    )
+    assert StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
     for stages in (BUILD, DIAGNOSE, EMIT, FIT):
         assert sum(share for _, share in stages) == pytest.approx(1.0)
 
@@ -203,9 +201,7 @@ def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
 def test_long_lines_are_broken_between_words_and_stay_to_be_copied() -> None:
     exclude = 'exclude = [{from_s = 10.0, to_s = 12.0, reason = "thermometer stuck for a while"}]'
     path = "/data/" + "long/" * 20 + "run-01.csv"
-    text = (
-        f"  finding stuck_temperature: it stays at 20.5 C from 10 to 12 s; look at {path} or write: {exclude}"
-    )
+    text = f"  finding stuck_temperature: it stays at 20.5 C from 10 to 12 s; look at {path} or write: {exclude}"
     lines = folded(text, 80).split("\n")
     assert " ".join(line.strip() for line in lines) == text.strip(), "no word is lost or cut"
     assert lines[0].startswith("  finding") and all(line.startswith("    ") for line in lines[1:])
@@ -315,9 +311,7 @@ def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
         assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command
 
 
-def test_the_cache_is_reported_cleared_and_kept_to_a_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_cache_is_reported_cleared_and_kept_to_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     cache.set_limit(2500)
     for k in range(4):
@@ -328,8 +322,7 @@ def test_the_cache_is_reported_cleared_and_kept_to_a_limit(
     assert cache.held() == (2, 2000) and cache.limit() == 2500
     reported = subprocess.run([PROGRAM, "cache", "--clear"], capture_output=True, text=True, check=True)
     assert (
-        "0 banks of signatures, 0 diagnoses, 0 objects of compilers, 0.000 GB of at most 2.5e-06 GB"
-        in reported.stdout
+        "0 banks of signatures, 0 diagnoses, 0 objects of compilers, 0.000 GB of at most 2.5e-06 GB" in reported.stdout
         and cache.held() == (0, 0)
     )
     (cache.folder() / "limit_bytes").write_text("much")

@@ -373,8 +373,6 @@ def test_names_in_a_manifest_that_are_no_paths(line: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("time", ["1e18", "nan", "5.0"])
 def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
     rows = [f"{t},20.0,1.0,1.0" for t in ("0.0", "10.0", time, "30.0")]
-    (tmp_path / "a.csv").write_text(
-        "\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n"
-    )
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n")
     run = EvaluatedRun.model_construct(file="a.csv")
     assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))

@@ -138,9 +138,7 @@ def test_quantiles_are_those_of_their_distributions() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("together", [10, 2**18])
-def test_the_median_of_parts_is_that_of_the_whole(
-    seed: int, together: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_median_of_parts_is_that_of_the_whole(seed: int, together: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also of numbers that hardly differ, of coarse ones, of an even number, and by digits of their bits."""
     rng = np.random.default_rng(seed)
     size = 3001 + seed

@@ -286,9 +286,7 @@ _MANIFEST = _HEAD | {
 }
 
 
-def _write_unit(
-    folder: Path, result: dict[str, Any], model_dict: dict[str, Any], text: Callable[[], str]
-) -> None:
+def _write_unit(folder: Path, result: dict[str, Any], model_dict: dict[str, Any], text: Callable[[], str]) -> None:
     """Everything that `build --extend --limits --previous` leaves, with these texts in it."""
     finding = {"id": "text", "text": "text", "evidence": {}}
     evaluation = result["evaluation"].content() | {"findings": [finding]}
@@ -628,9 +626,7 @@ def test_columns_of_a_recording_are_reported_as_they_are(tmp_path: Path, model_d
     names = [name for name in dict.fromkeys(names) if 1 <= len(name) <= 64]
     header = ",".join(["time_s", "temperature_c", "rate_dph", *(f'"{n}"' for n in names)])
     rows = [f"{10 * k},{20 + k / 10},0.001" for k in range(60)]
-    (tmp_path / "a.csv").write_text(
-        "\n".join([header, *(r + ",1.0" * len(names) for r in rows)]) + "\n", "utf-8"
-    )
+    (tmp_path / "a.csv").write_text("\n".join([header, *(r + ",1.0" * len(names) for r in rows)]) + "\n", "utf-8")
     (tmp_path / "b.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *rows]) + "\n", "utf-8")
     description = 'schema = 1\nserial = "s"\n[[run]]\nfile = "a.csv"\n[[run]]\nfile = "b.csv"\n'
     (tmp_path / "dataset.toml").write_text(description)
@@ -687,9 +683,7 @@ def test_names_of_files_stay_in_their_folder_and_differ(tmp_path: Path) -> None:
     assert file_stem("\udcff").isprintable()
 
 
-def test_terminals_show_every_text_and_obey_none(
-    result: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_terminals_show_every_text_and_obey_none(result: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     stream = io.StringIO()
     console = type(base.OUT)(file=stream, force_terminal=True, color_system=None, width=10**4)
     monkeypatch.setattr(base, "OUT", console)
@@ -698,9 +692,7 @@ def test_terminals_show_every_text_and_obey_none(
     assert stream.getvalue().count("\n") == len(HOSTILE), "each is reported in one line"
     evaluation = result["evaluation"]
     runs = tuple(evaluation.runs[0].model_copy(update={"environment": t, "file": t}) for t in HOSTILE[:400])
-    console.print(
-        evaluation_table(evaluation.model_copy(update={"runs": runs, "serial": "[/x] " + "".join(HOSTILE)}))
-    )
+    console.print(evaluation_table(evaluation.model_copy(update={"runs": runs, "serial": "[/x] " + "".join(HOSTILE)})))
     ran = VerifiedTarget(name="host", numeric="f32", status="fail", error="text", mismatches=1, vectors=2)
     named = [ran.model_copy(update={"name": text}) for text in HOSTILE]
     console.print(verify_table(result["verification"].model_copy(update={"targets": named})))
@@ -738,9 +730,7 @@ def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> 
 # ---- one place ----
 
 PACKAGE = Path(report.__file__).parents[1]
-_ELSEWHERE = re.compile(
-    r"jinja2\.Environment\(|\bMarkup\(|shell=True|os\.system|os\.popen|from_markup|autoescape"
-)
+_ELSEWHERE = re.compile(r"jinja2\.Environment\(|\bMarkup\(|shell=True|os\.system|os\.popen|from_markup|autoescape")
 
 
 def test_nothing_else_builds_such_text() -> None:

@@ -185,9 +185,7 @@ def test_digits_are_those_that_the_uncertainty_says_something_of() -> None:
     assert digits_of(10.65, 0.4).page == "10.65 ± 0.40"
 
 
-@pytest.mark.skipif(
-    not any(map(printing.shutil.which, printing._BROWSERS)), reason="chromium is not installed"
-)
+@pytest.mark.skipif(not any(map(printing.shutil.which, printing._BROWSERS)), reason="chromium is not installed")
 def test_the_certificate_prints_on_two_pages(built: Path, tmp_path: Path) -> None:
     facts = built.parent / "facts.toml"
     found = certificate(built, tmp_path / "cert", facts=facts, number="1", accept_fail=REASON)
@@ -196,9 +194,7 @@ def test_the_certificate_prints_on_two_pages(built: Path, tmp_path: Path) -> Non
     assert len(re.findall(rb"/Type\s*/Page\b", pdf)) == 2
 
 
-@pytest.mark.skipif(
-    not SCHEMAS, reason="GYROTC_DCC_SCHEMAS names no folder with PTB's dcc.xsd (LGPL, not shipped)"
-)
+@pytest.mark.skipif(not SCHEMAS, reason="GYROTC_DCC_SCHEMAS names no folder with PTB's dcc.xsd (LGPL, not shipped)")
 def test_the_dcc_is_valid_against_its_schema(made: Path) -> None:
     etree = pytest.importorskip("lxml.etree")
     schema = etree.XMLSchema(etree.parse(str(Path(SCHEMAS) / "dcc.xsd")))

@@ -66,9 +66,7 @@ class Imported:
         self.root = ElementTree.parse(folder / "modelDescription.xml").getroot()
         name = self.root.find("CoSimulation").attrib["modelIdentifier"]  # type: ignore[union-attr]
         self.library = ctypes.CDLL(str(folder / "binaries" / HERE / f"{name}.so"))
-        self.refs = {
-            v.attrib["name"]: int(v.attrib["valueReference"]) for v in self.root.findall("ModelVariables/*")
-        }
+        self.refs = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in self.root.findall("ModelVariables/*")}
         self.said: list[str] = []
         self._log = _LOG(lambda _e, _s, _c, text: self.said.append(text.decode()))
 
@@ -82,16 +80,12 @@ class Imported:
         )  # fmt: skip
         return ctypes.c_void_p(made) if made else None
 
-    def value(
-        self, call: str, unit: Any, name: str, kind: Any, value: float | None = None
-    ) -> tuple[int, Any]:
+    def value(self, call: str, unit: Any, name: str, kind: Any, value: float | None = None) -> tuple[int, Any]:
         refs, values = (
             (ctypes.c_uint32 * 1)(self.refs[name]),
             (kind * 1)(*(() if value is None else (value,))),
         )
-        done = getattr(self.library, f"fmi3{call}")(
-            unit, refs, ctypes.c_size_t(1), values, ctypes.c_size_t(1)
-        )
+        done = getattr(self.library, f"fmi3{call}")(unit, refs, ctypes.c_size_t(1), values, ctypes.c_size_t(1))
         return done, values[0]
 
     def step(self, unit: Any, at: float, size: float) -> int:
@@ -131,9 +125,7 @@ def bits(values: Any) -> NDArray[np.uint32]:
 
 
 @pytest.mark.parametrize("which", quick_and_slow(["channels"], ["plain"]))
-def test_every_step_gives_the_references_bits(
-    which: str, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
+def test_every_step_gives_the_references_bits(which: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     folder: Path = request.getfixturevalue(which)
     model = load_model(folder / "model.json")
     rows, period_us, answers = history(model)
@@ -162,9 +154,7 @@ def test_every_step_gives_the_references_bits(
     gyro.library.fmi3FreeInstance(unit)
 
 
-def test_a_long_step_takes_a_sample_for_each_period_and_a_state_is_taken_back(
-    plain: Path, tmp_path: Path
-) -> None:
+def test_a_long_step_takes_a_sample_for_each_period_and_a_state_is_taken_back(plain: Path, tmp_path: Path) -> None:
     gyro = Imported(plain / "gyro.fmu", tmp_path)
     period_s = example_period_us(load_model(plain / "model.json")) * 1e-6
 
@@ -239,9 +229,7 @@ def test_three_axes_are_one_unit_and_each_is_its_own_table(tmp_path: Path, gyrot
     gyro.library.fmi3FreeInstance(unit)
 
 
-def test_the_sources_are_those_of_the_result_and_compile_by_the_description_alone(
-    plain: Path, tmp_path: Path
-) -> None:
+def test_the_sources_are_those_of_the_result_and_compile_by_the_description_alone(plain: Path, tmp_path: Path) -> None:
     gyro = Imported(plain / "gyro.fmu", tmp_path)
     sources = tmp_path / "sources"
     for path in sources.glob("gtc*"):
@@ -282,9 +270,7 @@ def test_a_zip_file_of_somebody_else_stays(plain: Path, tmp_path: Path, gyrotc: 
 
 
 @pytest.mark.parametrize("which", ["plain", "channels"])
-def test_fmpy_finds_no_fault_and_simulates_the_references_bits(
-    which: str, request: pytest.FixtureRequest
-) -> None:
+def test_fmpy_finds_no_fault_and_simulates_the_references_bits(which: str, request: pytest.FixtureRequest) -> None:
     fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
     from fmpy.validation import validate_fmu
 

@@ -71,9 +71,7 @@ def test_the_grid_holds_the_envelope_its_edges_and_rest(model: Model) -> None:
 
 
 def test_an_envelope_without_width_has_one_point(model: Model) -> None:
-    still = model.model_copy(
-        update={"envelope": model.envelope.model_copy(update={"slope_c_per_min": (0.0, 0.0)})}
-    )
+    still = model.model_copy(update={"envelope": model.envelope.model_copy(update={"slope_c_per_min": (0.0, 0.0)})})
     grid = grid_of(still)
     assert grid.bias_dph.shape == (61, 1) and np.isfinite(grid.largest_dph)
 
@@ -86,10 +84,7 @@ def test_what_is_lost_between_the_points_is_what_is_reported(model: Model) -> No
         grid = grid_of(model, points)
         between = RegularGridInterpolator((grid.temperature_c, grid.slope_c_per_min), grid.bias_dph)
         draw = np.random.default_rng(7)
-        t, r = (
-            draw.uniform(*span, 4000)
-            for span in (model.envelope.temperature_c, model.envelope.slope_c_per_min)
-        )
+        t, r = (draw.uniform(*span, 4000) for span in (model.envelope.temperature_c, model.envelope.slope_c_per_min))
         lost = between(np.stack([t, r], axis=1)) - model.map_dph(t, r)
         assert 0.7 < np.sqrt(np.mean(lost**2)) / grid.rms_dph < 1.4
         assert np.abs(lost).max() < 1.1 * grid.largest_dph
@@ -111,9 +106,7 @@ def test_json_is_the_map_with_its_units(three: Path, tmp_path: Path) -> None:
         assert part["model_hash"] == model.hash
 
 
-def test_the_map_is_that_of_the_emitted_table(
-    one: Path, model: Model, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_the_map_is_that_of_the_emitted_table(one: Path, model: Model, tmp_path: Path, gyrotc: Command) -> None:
     shutil.copytree(one, tmp_path / "r")
     gyrotc("emit", tmp_path / "r" / "model.json", "--out", tmp_path / "r", "--zero-at", "20")
     shifted = json.loads(text_of(tmp_path / "r", "json", tmp_path))["maps"][0]
@@ -268,9 +261,7 @@ def _in_order(element: ElementTree.Element) -> None:
 
 
 def _numbers(instance: ElementTree.Element) -> Floats:
-    groups = instance.findall("SW-VALUE-CONT/SW-VALUES-PHYS/VG") or instance.findall(
-        "SW-VALUE-CONT/SW-VALUES-PHYS"
-    )
+    groups = instance.findall("SW-VALUE-CONT/SW-VALUES-PHYS/VG") or instance.findall("SW-VALUE-CONT/SW-VALUES-PHYS")
     return np.array([[float(v.text or "") for v in group.findall("V")] for group in groups]).squeeze()
 
 
@@ -279,9 +270,7 @@ def test_cdf_holds_the_values_of_what_the_a2l_names(three: Path, tmp_path: Path)
     root = ElementTree.fromstring(text_of(three, "cdf", tmp_path / "c"))
     _in_order(root)
     found = {one.findtext("SHORT-NAME") or "": one for one in root.iter("SW-INSTANCE")}
-    described = {
-        given[0]: given for keyword in ("AXIS_PTS", "CHARACTERISTIC") for given, _ in module[keyword]
-    }
+    described = {given[0]: given for keyword in ("AXIS_PTS", "CHARACTERISTIC") for given, _ in module[keyword]}
     assert set(found) == set(described)
     for axis in "xyz":
         model = load_model(three / axis / "model.json")
@@ -405,9 +394,7 @@ NAMES: dict[Autopilot, list[str]] = {
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_the_file_gives_the_firmwares_bits(
-    autopilot: Autopilot, model: Model, firmware: Path, tmp_path: Path
-) -> None:
+def test_the_file_gives_the_firmwares_bits(autopilot: Autopilot, model: Model, firmware: Path, tmp_path: Path) -> None:
     model.save(tmp_path / "model.json")
     export(tmp_path, autopilot, tmp_path / "gyro.params", Exporting(axis_as="z"))
     reported = export(
@@ -437,9 +424,7 @@ def test_no_other_cubic_is_closer_and_the_loss_is_reported(autopilot: Autopilot,
     for order in range(4):
         worse = list(found.x)
         worse[order] = np.float32(worse[order] * 1.2)
-        other = Cubic(
-            autopilot, found.reference_c, found.lowest_c, found.highest_c, tuple(worse), 0.0, 0.0, 0.0
-        )
+        other = Cubic(autopilot, found.reference_c, found.lowest_c, found.highest_c, tuple(worse), 0.0, 0.0, 0.0)
         assert lost(other, model) >= 0.9 * lost(found, model)
 
 

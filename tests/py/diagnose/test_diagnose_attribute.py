@@ -254,10 +254,7 @@ def test_a_pair_must_gain_and_need_both() -> None:
 
 
 def test_rivals_are_near_in_the_criterion() -> None:
-    singles = [
-        _point(g, (id, 1.0))
-        for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))
-    ]
+    singles = [_point(g, (id, 1.0)) for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))]
     [near] = map(near_of, ranked_rivals(singles, [], singles[0].members, 400))
     assert [r.id for r in near] == ["thermal_gradient"]
     prices = [p.criterion(400) for p in singles]
@@ -418,9 +415,7 @@ def test_signatures_are_columns_less_what_the_map_explains(campaign: Campaign) -
         if candidate.role != "columns":
             continue
         raw = columns_of(campaign.records, candidate.id, candidate.values)
-        again = (bank.signatures + bank.map @ bank.on_map)[:, signature.columns] * bank.scale[
-            signature.columns
-        ]
+        again = (bank.signatures + bank.map @ bank.on_map)[:, signature.columns] * bank.scale[signature.columns]
         assert again == pytest.approx(raw, abs=1e-9 * np.abs(raw).max())
     assert np.abs(bank.map.T @ bank.signatures).max() < 1e-6
 
@@ -455,9 +450,7 @@ def test_a_grid_leaves_less_than_a_hundredth_of_a_signature_between_its_points(c
     for here, there in itertools.pairwise(grid):
         middle = float(np.sqrt(here["tau_s"] * there["tau_s"]))
         column = columns_of(campaign.records, "thermal_gradient", {"tau_s": middle})[:, 0]
-        near = np.column_stack(
-            [columns_of(campaign.records, "thermal_gradient", v)[:, 0] for v in (here, there)]
-        )
+        near = np.column_stack([columns_of(campaign.records, "thermal_gradient", v)[:, 0] for v in (here, there)])
         cosine = near.T @ column / np.linalg.norm(near, axis=0) / np.linalg.norm(column)
         assert 1.0 - cosine.max() ** 2 < 0.01
 
@@ -497,9 +490,7 @@ def test_alternatives_are_finite_and_zero_where_the_temperature_stands(campaign:
         names.add(shape.name)
     assert len(names) == 6
     time = np.arange(0.0, 7200.0, 20.0)
-    still = replace(
-        campaign.records.runs[0], history=History(time_s=time, temperature_c=np.full(time.size, 20.0))
-    )
+    still = replace(campaign.records.runs[0], history=History(time_s=time, temperature_c=np.full(time.size, 20.0)))
     assert not _two_sided_lag(still.history, 100.0, 900.0).any()
 
 
@@ -592,9 +583,7 @@ def test_what_no_table_holds_has_its_own_remedy() -> None:
         (-3.0, -1.0, "loss", "does harm: RMS 9 -> 7 deg/h", "Build without the extension"),
     ],
 )
-def test_what_is_said_of_a_gain_follows_its_interval(
-    low: float, high: float, shown: str, said: str, step: str
-) -> None:
+def test_what_is_said_of_a_gain_follows_its_interval(low: float, high: float, shown: str, said: str, step: str) -> None:
     """Both ways: nothing is advised that unseen runs speak against, and a gain is never called none."""
     gain = gain_on_unseen(low, high)
     assert gain.shown == shown
@@ -609,9 +598,7 @@ def test_what_is_said_of_a_gain_follows_its_interval(
     assert ("--extend" in " ".join(steps)) == (shown == "gain")
 
 
-@pytest.mark.parametrize(
-    ("low", "said"), [(1.0, "left out in turn do not agree"), (-1.0, "no cause is shown to gain")]
-)
+@pytest.mark.parametrize(("low", "said"), [(1.0, "left out in turn do not agree"), (-1.0, "no cause is shown to gain")])
 def test_why_nothing_is_shipped_follows_the_gain_of_the_causes(low: float, said: str) -> None:
     found = result("explained")
     [cause] = found.causes
@@ -629,9 +616,7 @@ def gain_on_unseen(low: float, high: float) -> GainOnUnseen:
 
 
 def test_structure_without_a_name_is_described() -> None:
-    left = Unexplained(
-        p_value=1e-6, share_explained=0.4, best_partial_match=("hysteresis",), looks_like="a switch"
-    )
+    left = Unexplained(p_value=1e-6, share_explained=0.4, best_partial_match=("hysteresis",), looks_like="a switch")
     text = "\n".join(diagnosis_lines(result("unexplained").model_copy(update={"unexplained": left})))
     assert "40%" in text and "it looks more like a switch" in text
 
@@ -676,9 +661,7 @@ def test_noise_that_the_declaration_lacks_is_no_structure(campaign: Campaign, se
     found = attribute(search)
     assert [cause.candidate.id for cause in found.causes] == ["warm_up"]
     assert found.left.p_value > 0.01 and found.left.worst < 1e-6
-    assert holds(found) == (found.left.share >= 0.8), (
-        "beside a contradicted declaration a cause is most or nothing"
-    )
+    assert holds(found) == (found.left.share >= 0.8), "beside a contradicted declaration a cause is most or nothing"
 
 
 def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> None:
@@ -687,9 +670,7 @@ def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> No
     quieter = replace(search, declared=Colour(white=(0.5 * LEVEL_DPH) ** 2))
     louder = replace(search, declared=Colour(white=(2.0 * LEVEL_DPH) ** 2))
     assert (
-        left_by_true_cause(search).worst
-        == left_by_true_cause(search).p_value
-        == left_by_true_cause(quieter).p_value
+        left_by_true_cause(search).worst == left_by_true_cause(search).p_value == left_by_true_cause(quieter).p_value
     ), "its level is that of the data"
     assert left_by_true_cause(louder).p_value >= left_by_true_cause(search).p_value
 
@@ -697,9 +678,7 @@ def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> No
 @pytest.mark.slow
 def test_a_likeliest_colour_that_is_too_fast_is_not_believed_alone(campaign: Campaign) -> None:
     """Of twelve recordings of a true cause in a random walk, 5 left less than 1 % by the likeliest colour."""
-    p_values = [
-        left_by_true_cause(measured(campaign, Colour(walk=0.3), seed, None)).p_value for seed in range(12)
-    ]
+    p_values = [left_by_true_cause(measured(campaign, Colour(walk=0.3), seed, None)).p_value for seed in range(12)]
     assert sum(p < 0.01 for p in p_values) <= 1, p_values
 
 
@@ -758,9 +737,7 @@ def recorded(rng: np.random.Generator, wave: object) -> TrainingData:
 
 def test_overtones_have_the_size_and_phase_that_the_wave_has() -> None:
     print("seed", SEED_OF_OVERTONES)
-    found = overtones_of(
-        recorded(np.random.default_rng(SEED_OF_OVERTONES), airy), WAVE, {"period_c": PERIOD_C}
-    )
+    found = overtones_of(recorded(np.random.default_rng(SEED_OF_OVERTONES), airy), WAVE, {"period_c": PERIOD_C})
     assert [one["period_c"] for one in found] == [PERIOD_C / 2.0, PERIOD_C / 3.0]
     for number, one in zip((2, 3), found, strict=True):
         got = one["amplitude_dph"] * np.exp(1j * one["phase_rad"])

@@ -142,9 +142,7 @@ def test_the_truth_is_not_looked_at(built: Path, tmp_path: Path, gyrotc: Command
     shutil.copytree(built / "data", blind, ignore=shutil.ignore_patterns("truth*"))
     done = gyrotc("diagnose", blind, "--json", tmp_path / "result.json")
     assert done.returncode == 0, done.stderr
-    result, seen = (
-        read_json(p) for p in (tmp_path / "result.json", built / "result" / "diagnosis" / "diagnose.json")
-    )
+    result, seen = (read_json(p) for p in (tmp_path / "result.json", built / "result" / "diagnosis" / "diagnose.json"))
     for key in ("pictures", "series", "scenario"):
         seen.pop(key)
     assert result["extended"].pop("model") is None, "without --out nothing is written"
@@ -222,9 +220,7 @@ def _typed(*arguments: object) -> tuple[str, set[str]]:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_own_cache")
-def test_the_second_call_writes_the_same_and_loads_nothing_that_computes_or_draws(
-    data: Path, tmp_path: Path
-) -> None:
+def test_the_second_call_writes_the_same_and_loads_nothing_that_computes_or_draws(data: Path, tmp_path: Path) -> None:
     first, needed = _typed(data, "--out", tmp_path / "out")
     assert {"gyrotc.pages.chart", "scipy.optimize", "gyrotc.diagnose"} <= needed, "the check itself can fail"
     one = _contents(tmp_path / "out")
@@ -324,9 +320,7 @@ def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, co
         cache._packed("0" * 64 + ".diagnosis", whole[len(cache._packed("", b"")) :]),  # of another name
         cache._packed(path.name, b"[]"),
         cache._packed(path.name, json.dumps(content | {"files": {"../report.html": ""}}).encode()),
-        cache._packed(
-            path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()
-        ),
+        cache._packed(path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
         cache._packed(path.name, json.dumps(content | {"result": {}}).encode()),
     ):
         path.write_bytes(damaged)
@@ -432,9 +426,7 @@ def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     assert found.after_dph < 0.5 * found.before_dph
     wrong = replace(GRADIENT_TO_REMOVE, values={"tau_s": TAU_S, "amplitude_dph_per_c": -SIZE_DPH_PER_C})
     assert shipping(blind, [wrong]).shipped == []
-    assert shipping(blind, [GRADIENT_TO_REMOVE, wrong]).shipped == [GRADIENT_TO_REMOVE], (
-        "what makes it worse is left"
-    )
+    assert shipping(blind, [GRADIENT_TO_REMOVE, wrong]).shipped == [GRADIENT_TO_REMOVE], "what makes it worse is left"
     offset = replace(GRADIENT_TO_REMOVE, id="turn_on_offset", values={"sigma_dph": 1e-3})
     assert shipping(blind, [offset]).shipped == [], "no table holds it"
 

@@ -108,9 +108,7 @@ def test_the_likelihood_of_a_colour_is_that_of_a_dense_normal_distribution(quiet
 def test_the_true_colour_and_level_are_among_those_allowed(quiet: Search, planted: Search) -> None:
     for search in (quiet, planted):
         assert TRUE_COLOUR in search.allowed and search.best in search.allowed
-        assert search.views[TRUE_COLOUR].scale == pytest.approx(
-            LEVEL_DPH, rel=4.0 / np.sqrt(2.0 * search.freedom)
-        )
+        assert search.views[TRUE_COLOUR].scale == pytest.approx(LEVEL_DPH, rel=4.0 / np.sqrt(2.0 * search.freedom))
     assert residual_log_likelihood(2.0, 10, 3.0) == pytest.approx(-5.0 * np.log(0.2) - 1.5)
 
 
@@ -219,13 +217,9 @@ def test_a_detection_limit_is_the_amplitude_at_the_needed_signal_to_noise_ratio(
 
 
 def test_what_leaves_no_signature_has_no_limit() -> None:
-    nothing = limit_of(
-        "thermal_gradient", [(Candidate("thermal_gradient", {"tau_s": 100.0}, "columns"), 0.0)]
-    )
+    nothing = limit_of("thermal_gradient", [(Candidate("thermal_gradient", {"tau_s": 100.0}, "columns"), 0.0)])
     assert nothing.value is None and nothing.at == ()
-    shown = limit_of(
-        "cavity_lag", [(Candidate("cavity_lag", {"tau_s": t}, "input"), t) for t in (10.0, 90.0)]
-    )
+    shown = limit_of("cavity_lag", [(Candidate("cavity_lag", {"tau_s": t}, "input"), t) for t in (10.0, 90.0)])
     assert shown.value == 90.0 and shown.unit == "s", "d is 3.2 and 9.5"
 
 
@@ -352,9 +346,7 @@ def _record(hours: float) -> Record:
         (200.0, 140.0),  # 720000 s in 5000 blocks
     ],
 )
-def test_blocks_are_as_long_as_asked_unless_there_would_be_few_or_very_many(
-    hours: float, expected: float
-) -> None:
+def test_blocks_are_as_long_as_asked_unless_there_would_be_few_or_very_many(hours: float, expected: float) -> None:
     assert block_length([_record(hours)], 10.0, 100.0) == expected
 
 
@@ -403,9 +395,7 @@ def test_declared_white_noise_and_counts_average_as_they_should() -> None:
     assert np.sqrt(white.white) == pytest.approx(1e-3 * 60.0 / np.sqrt(BLOCK_OF_COLOURS_S))
     counts = Declared(1e-9, quantum_arcsec=0.5).colour(BLOCK_OF_COLOURS_S)
     cov = counts.matrix(np.arange(400), BLOCK_OF_COLOURS_S)
-    assert cov.sum() == pytest.approx(2.0 * counts.quantum, rel=1e-3), (
-        "the angle is wrong at its two ends only"
-    )
+    assert cov.sum() == pytest.approx(2.0 * counts.quantum, rel=1e-3), "the angle is wrong at its two ends only"
     assert counts.quantum * BLOCK_OF_COLOURS_S**2 == pytest.approx(0.5**2 / 12.0)
 
 

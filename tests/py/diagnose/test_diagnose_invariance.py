@@ -128,9 +128,7 @@ def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[st
     assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
     was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
     assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-3)
-    assert now["amplitude_dph_per_c"].value == pytest.approx(
-        1000.0 * was["amplitude_dph_per_c"].value, rel=1e-3
-    )
+    assert now["amplitude_dph_per_c"].value == pytest.approx(1000.0 * was["amplitude_dph_per_c"].value, rel=1e-3)
 
 
 def answer_of(dataset: Dataset) -> Answer:
@@ -143,9 +141,7 @@ SLOW = ("rate + 1000 deg/h", "each run twice", "rates in deg/s")
 
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
-def test_another_way_to_hand_over_the_recordings_changes_nothing(
-    made: Callable[[str], Case], name: str
-) -> None:
+def test_another_way_to_hand_over_the_recordings_changes_nothing(made: Callable[[str], Case], name: str) -> None:
     """`make invariance` asks the same of whole diagnoses of many sets, with figures."""
     case = made("hysteresis")
     same_answer(answer_of(VARIATIONS[name].change(load(case.folder))), case)
@@ -155,9 +151,7 @@ def same_answer(found: Answer, case: Case) -> None:
     """Verdict, causes and parameters, these to within a thousandth."""
     assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
     was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
-    assert {n: p.value for n, p in now.items()} == pytest.approx(
-        {n: p.value for n, p in was.items()}, rel=1e-3
-    )
+    assert {n: p.value for n, p in now.items()} == pytest.approx({n: p.value for n, p in was.items()}, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -274,9 +268,7 @@ def recording(axis: str) -> Table:
         pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
     names = SOURCE.read_text("utf-8").split("\n", 1)[0].split(",")
     table = dict(zip(names, np.loadtxt(SOURCE, delimiter=",", skiprows=1).T, strict=True))
-    return {name: table[name] for name in ("time_s", "temperature_c")} | {
-        "rate_dph": table[f"rate_{axis}_dph"]
-    }
+    return {name: table[name] for name in ("time_s", "temperature_c")} | {"rate_dph": table[f"rate_{axis}_dph"]}
 
 
 def handed_over(folder: Path, table: Table, cuts: list[float], later_s: float = 0.0) -> Dataset:
@@ -346,21 +338,15 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
 
 
 @pytest.mark.slow
-def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(
-    tmp_path: Path, gyrotc: Command
-) -> None:
+def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(tmp_path: Path, gyrotc: Command) -> None:
     result = diagnosed("mpu6000-chamber-cycle", 3130.0, "x", tmp_path, gyrotc)
     assert result["extended"]["exam_rms_dph"] < 0.5 * STATIC_MAP_DPH
     assert result["extended"]["terms"] == ["thermal_gradient", "thermal_gradient"]
-    assert result["verdict"] == "ambiguous", (
-        "a static dT/dt explains the cycle as well, unseen branches do not"
-    )
+    assert result["verdict"] == "ambiguous", "a static dT/dt explains the cycle as well, unseen branches do not"
     assert "a static dependence on dT/dt" in result["text"]
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "How much can be said" in page and "no memory: products of T and dT/dt" in page
-    assert {"warm_up", "turn_on_offset", "ageing"} <= {
-        c["id"] for c in result["considered"] if "not_testable" in c
-    }
+    assert {"warm_up", "turn_on_offset", "ageing"} <= {c["id"] for c in result["considered"] if "not_testable" in c}
 
 
 def cut_out(folder: Path, source: Path, spans: list[tuple[float, float]]) -> Dataset:
@@ -368,10 +354,7 @@ def cut_out(folder: Path, source: Path, spans: list[tuple[float, float]]) -> Dat
     if not source.is_file():
         pytest.skip(f"{source.parent.name} is absent: see GYROTC_REAL_DATA")
     (folder / source.name).write_bytes(source.read_bytes())
-    runs = [
-        f'[[run]]\nfile = "{source.name}"\npower_on_s = "unknown"\nfrom_s = {a}\nto_s = {b}\n'
-        for a, b in spans
-    ]
+    runs = [f'[[run]]\nfile = "{source.name}"\npower_on_s = "unknown"\nfrom_s = {a}\nto_s = {b}\n' for a, b in spans]
     (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{"".join(runs)}', "utf-8")
     return load(folder, axis="x")
 

@@ -120,9 +120,7 @@ def test_gradients_and_lags_that_the_catalogue_does_not_have_are_reported_apart(
     wrong = [reported for name, reported in zip(hidden, found, strict=True) if reported[0] != name]
     assert len(wrong) <= 2, wrong
     of_truth = [reported[1].get(name, 0.0) for name, reported in zip(hidden, found, strict=True)]
-    before = [
-        _reported(one, weighed=False)[1].get(name, 0.0) for name, one in zip(hidden, drawn, strict=True)
-    ]
+    before = [_reported(one, weighed=False)[1].get(name, 0.0) for name, one in zip(hidden, drawn, strict=True)]
     assert np.mean(of_truth) > 0.85 and np.mean(of_truth) > np.mean(before) + 0.1, (of_truth, before)
 
 
@@ -184,9 +182,7 @@ def test_rivals_keep_their_order_and_who_is_far_behind_stays_there(quiet: Gains,
     [ranked] = ranked_rivals(singles, [], chosen, gains.size)
     reported = evidence.judged(singles, chosen, 0, ranked)
     assert {r.id for r in reported} == {r.id for r in ranked}
-    assert [r.distance for r in reported] == sorted(r.distance for r in reported) and reported[
-        0
-    ].distance >= 0.0
+    assert [r.distance for r in reported] == sorted(r.distance for r in reported) and reported[0].distance >= 0.0
     asked = [r for r in reported if r.odds is not None]
     assert asked and all(r.odds == odds_of(Rival(r.id, r.distance)) for r in asked)
     assert all(r.distance > LOOKED_AT for r in reported if r.odds is None)

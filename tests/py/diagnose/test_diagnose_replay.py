@@ -357,9 +357,7 @@ def test_a_play_of_one_strength_is_not_reported_to_change(campaign: Campaign, se
 
 @pytest.mark.parametrize("shape", [gradient, local_gradient])
 @pytest.mark.parametrize("seed", range(2))
-def test_memory_that_fades_is_no_hysteresis(
-    campaign: Campaign, shape: Callable[[History], Array], seed: int
-) -> None:
+def test_memory_that_fades_is_no_hysteresis(campaign: Campaign, shape: Callable[[History], Array], seed: int) -> None:
     """However it acts over temperature: the rival is as wide as the family of plays."""
     gains = Gains(measured(campaign, campaign.records.columns(shape)[:, 0], 40.0, seed))
     assert rate_independent(gains, ()) is None
@@ -408,9 +406,7 @@ def cycle(branches: int) -> tuple[np.ndarray, np.ndarray]:
 
 def recorded_cycle(folder: Path, temperature: np.ndarray, rate: np.ndarray, exam_from_s: float) -> Path:
     """One recording, its last part for the exam."""
-    rows = [
-        f"{CYCLE_ROW_S * k:g},{t:.4f},{y:.6g}" for k, (t, y) in enumerate(zip(temperature, rate, strict=True))
-    ]
+    rows = [f"{CYCLE_ROW_S * k:g},{t:.4f},{y:.6g}" for k, (t, y) in enumerate(zip(temperature, rate, strict=True))]
     (folder / "data.csv").write_text("time_s,temperature_c,rate_dph\n" + "\n".join(rows) + "\n")
     run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
     (folder / "dataset.toml").write_text(

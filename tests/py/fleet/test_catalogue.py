@@ -227,9 +227,7 @@ def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, 
 def test_the_command(fleet: Path, gyrotc: Command) -> None:
     reported = gyrotc("catalogue", fleet, "RLG-1", "--on", "2026-08-31")
     assert (
-        reported.returncode == 0
-        and "2026-03-01 to 2027-03-01" in reported.stdout
-        and "run-01.csv" in reported.stdout
+        reported.returncode == 0 and "2026-03-01 to 2027-03-01" in reported.stdout and "run-01.csv" in reported.stdout
     )
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "2030-01-01").returncode == 1
     assert gyrotc("catalogue", fleet, "RLG-1", "--on", "soon").returncode == 2
@@ -249,9 +247,7 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
         head = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"'
         text = toml('file = "run-01.csv"', head=head) + "\n[meta]\ncalibrated_on = 2026-03-01\n"
         (folder / "d" / serial / "dataset.toml").write_text(text)
-    run_fleet(
-        load_manifest(folder / "d"), folder / "out", jobs=1, releases={"RLG-1": "copies", "RLG-2": "copies"}
-    )
+    run_fleet(load_manifest(folder / "d"), folder / "out", jobs=1, releases={"RLG-1": "copies", "RLG-2": "copies"})
     return folder / "out"
 
 
@@ -266,9 +262,7 @@ def test_what_all_gyros_have_stands_once_in_a_fleet(two: Path) -> None:
 
 
 @pytest.mark.parametrize("of", ["RLG-2", "no gyro"])
-def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(
-    two: Path, tmp_path: Path, of: str
-) -> None:
+def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(two: Path, tmp_path: Path, of: str) -> None:
     """Before: another gyro's whole image, under its own hash, was given out for this one."""
     place = shutil.copytree(two / "catalogue", tmp_path / "catalogue")
     day = "2026-03-02"
@@ -337,9 +331,7 @@ def test_a_result_that_was_replaced_or_changed_is_not_exported(two: Path, tmp_pa
     assert not (tmp_path / "x").exists()
 
 
-def test_without_second_names_every_gyro_has_its_own_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_second_names_every_gyro_has_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EPERM, "no hard links")
 

@@ -80,9 +80,7 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
     assert entry.model_copy(update={"key": None}) == whole.model_copy(update={"key": None})
     assert (tmp_path / "full" / "RLG-1" / "report.html").is_file()
     for name in ("model.json", "c/gtc_rlg_1.c", "c/gtc_rlg_1.bin"):
-        assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (
-            tmp_path / "full" / "RLG-1" / name
-        ).read_bytes()
+        assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (tmp_path / "full" / "RLG-1" / name).read_bytes()
 
 
 @pytest.mark.slow
@@ -261,9 +259,7 @@ def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) ->
         import distributed  # noqa: F401
     except ImportError:
         gyro(tmp_path / "d" / "RLG-1", "RLG-1")
-        done = gyrotc(
-            "fleet", tmp_path / "d", "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:8786"
-        )
+        done = gyrotc("fleet", tmp_path / "d", "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:8786")
         assert done.returncode == 2 and "Dask is not installed" in done.stderr
     else:
         pytest.skip("Dask is installed")
@@ -279,9 +275,7 @@ def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: 
     (tmp_path / "data" / "RLG-3" / "dataset.toml").write_text(described_as)
     done = gyrotc("fleet", tmp_path / "data", "--out", tmp_path / "out")
     assert done.returncode == 0
-    assert (
-        "copy of another: RLG-1 (serial RLG-1) has about 100% of its rows in common with RLG-3" in done.stdout
-    )
+    assert "copy of another: RLG-1 (serial RLG-1) has about 100% of its rows in common with RLG-3" in done.stdout
     summary = json.loads((tmp_path / "out" / "fleet.json").read_text())
     assert [(c["name"], c["other"]) for c in summary["copies"]] == [("RLG-1", "RLG-3")]
     found = {e["name"]: "copy_of_other" in e["findings"] for e in summary["serials"]}

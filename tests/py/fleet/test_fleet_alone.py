@@ -222,9 +222,7 @@ def test_limits_are_inside_the_result(task: Task, tmp_path: Path) -> None:
     assert done_before(limited) is None
 
 
-def test_recordings_that_change_while_they_are_read_are_refused(
-    task: Task, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recordings_that_change_while_they_are_read_are_refused(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
     from gyrotc.fleet import unit
 
     def load(folder: Path, **given: Any) -> Any:
@@ -293,9 +291,7 @@ def test_names_that_are_no_names(tmp_path: Path) -> None:
         assert bool(unit.refused) == (dataset != "..")
     loop = tmp_path / "loop"
     loop.symlink_to(loop)
-    (tmp_path / "fleet.toml").write_text(
-        'schema = 1\naxis = "all"\n[[unit]]\ndataset = "loop"\naxis = "all"\n'
-    )
+    (tmp_path / "fleet.toml").write_text('schema = 1\naxis = "all"\n[[unit]]\ndataset = "loop"\naxis = "all"\n')
     assert [unit.name for unit in load_manifest(tmp_path / "fleet.toml").units] == ["loop"]
 
 
@@ -340,9 +336,7 @@ def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch:
     assert sum(entry.status == "done" for entry in entries) == 3
 
 
-def test_a_summary_never_speaks_of_what_is_being_done_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_summary_never_speaks_of_what_is_being_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fleet that is stopped anywhere leaves a summary that says so."""
     for k in range(2):
         gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
@@ -386,9 +380,7 @@ def test_no_process_outlives_its_fleet(tmp_path: Path) -> None:
     while not list((tmp_path / "out").glob("RLG-*/entry.json")):
         assert job.poll() is None
         time.sleep(0.02)
-    children = [
-        int(c) for t in Path(f"/proc/{job.pid}/task").iterdir() for c in (t / "children").read_text().split()
-    ]
+    children = [int(c) for t in Path(f"/proc/{job.pid}/task").iterdir() for c in (t / "children").read_text().split()]
     assert len(children) >= 2
     job.kill()
     job.wait()
@@ -429,9 +421,7 @@ def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
     for kill in range(KILLS):
         for k in range(3):
             gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=10 * kill + k + 10)
-        job = subprocess.Popen(
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-        )
+        job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         time.sleep(draw.uniform(0.3, 1.0) * length_s)
         os.killpg(job.pid, draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))
         job.wait()

@@ -127,9 +127,7 @@ def alone(world: Path, tmp_path: Path) -> Iterator[Dask]:
         yield cluster
 
 
-def test_relative_paths_name_the_recordings_of_who_types_them(
-    world: Path, dask: Dask, gyrotc: Command
-) -> None:
+def test_relative_paths_name_the_recordings_of_who_types_them(world: Path, dask: Dask, gyrotc: Command) -> None:
     """Before: the worker took what lay under that path in its own folder, and the fleet said done, exit 0."""
     done = gyrotc("fleet", "fleet.toml", "--out", "fleet", "--scheduler", dask.address, cwd=world / "lab")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -271,9 +269,7 @@ def test_a_gyro_whose_worker_is_killed_is_done_by_another(
 
 
 @pytest.mark.slow
-def test_what_is_done_is_not_done_again_when_its_worker_is_killed(
-    world: Path, alone: Dask, tmp_path: Path
-) -> None:
+def test_what_is_done_is_not_done_again_when_its_worker_is_killed(world: Path, alone: Dask, tmp_path: Path) -> None:
     held = Held(world, tmp_path, held=SERIALS[1:])
     alone.worker("anna", "--no-nanny", preload=held.preload)
     held.start(alone.address)
@@ -350,9 +346,7 @@ def test_what_a_lost_scheduler_leaves_is_unfinished_and_done_by_the_next_call(
 
 
 @pytest.mark.slow
-def test_what_is_left_when_all_workers_are_lost_is_unfinished(
-    world: Path, alone: Dask, tmp_path: Path
-) -> None:
+def test_what_is_left_when_all_workers_are_lost_is_unfinished(world: Path, alone: Dask, tmp_path: Path) -> None:
     held = Held(world, tmp_path, held=SERIALS[1:])
     alone.worker("anna", "--no-nanny", preload=held.preload)
     held.start(alone.address, "--wait", "1")
@@ -365,9 +359,7 @@ def test_what_is_left_when_all_workers_are_lost_is_unfinished(
 
 
 @pytest.mark.slow
-def test_a_fleet_whose_client_was_killed_goes_on(
-    world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_a_fleet_whose_client_was_killed_goes_on(world: Path, alone: Dask, tmp_path: Path, gyrotc: Command) -> None:
     held = Held(world, tmp_path)
     alone.worker("anna", "--no-nanny", preload=held.preload)  # one, so that no gyro is begun twice at a time
     held.start(alone.address)
@@ -381,9 +373,7 @@ def test_a_fleet_whose_client_was_killed_goes_on(
 
 
 @pytest.mark.slow
-def test_a_worker_with_another_gyrotc_refuses_with_both_versions(
-    world: Path, alone: Dask, tmp_path: Path
-) -> None:
+def test_a_worker_with_another_gyrotc_refuses_with_both_versions(world: Path, alone: Dask, tmp_path: Path) -> None:
     older = 'from gyrotc.fleet import unit\nunit.__version__, unit.program_of = "0.0.1", lambda: 64 * "0"\n'
     alone.worker("anna", "--no-nanny", preload=older)
     fleet = load_manifest(world / "lab" / "few")
@@ -391,9 +381,7 @@ def test_a_worker_with_another_gyrotc_refuses_with_both_versions(
     [task, *_] = running.tasks_of(fleet, tmp_path / "out", False)
     for entry in entries:
         assert entry.status == "failed"
-        assert f"worker anna: is 0.0.1 ({16 * '0'}), and {task.version} ({task.program[:16]})" in (
-            entry.reason or ""
-        )
+        assert f"worker anna: is 0.0.1 ({16 * '0'}), and {task.version} ({task.program[:16]})" in (entry.reason or "")
 
 
 @pytest.mark.slow

@@ -81,9 +81,7 @@ def test_words_with_run_and_time() -> None:
     assert "mirror image of that of the other" in reported["sign_reversed"].text
     assert "shows what" in reported["axes_exchanged"].text
     assert "copy of another unit" in reported["copy_of_other"].text
-    assert reported["copy_of_other"].text.endswith(reported["copy_of_other"].name[-2:]), (
-        "the other's same axis"
-    )
+    assert reported["copy_of_other"].text.endswith(reported["copy_of_other"].name[-2:]), "the other's same axis"
 
 
 def test_the_picture_of_a_noisy_gyro_shows_the_run_that_is_named() -> None:

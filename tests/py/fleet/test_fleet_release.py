@@ -17,9 +17,7 @@ from gyrotc.results.fleet import FleetEntry, FleetSummary, FleetUnit
 from test_catalogue import gyro
 
 
-def test_a_barred_unit_is_not_entered_until_it_is_released(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_barred_unit_is_not_entered_until_it_is_released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
     manifest, out = load_manifest(tmp_path / "fleet.toml"), tmp_path / "out"
     summed = run._one_of_each_serial
@@ -46,9 +44,7 @@ def test_a_barred_unit_is_not_entered_until_it_is_released(
 
 
 @pytest.mark.parametrize("released", [None, "mounted upside down"])
-def test_the_page_of_a_fleet_names_a_barred_unit_and_its_finding(
-    tmp_path: Path, released: str | None
-) -> None:
+def test_the_page_of_a_fleet_names_a_barred_unit_and_its_finding(tmp_path: Path, released: str | None) -> None:
     unit = FleetEntry(
         name="a",
         axis=None,

@@ -65,9 +65,7 @@ def test_shares_are_the_same_to_the_byte(lot: Path, gyrotc: Command) -> None:
     assert f"share 1/{N}" in reported.stdout and not (out / "fleet.json").exists()
     early = gather(fleet, out)
     assert {e.status for e in early if e.name not in reported.stdout} <= {"unfinished"}
-    failed = [
-        e for k in range(2, N + 1) for e in run_share(fleet, out, Share(k, N), jobs=1) if e.status != "done"
-    ]
+    failed = [e for k in range(2, N + 1) for e in run_share(fleet, out, Share(k, N), jobs=1) if e.status != "done"]
     assert not (out / "fleet.json").exists(), "a summary outlasts what it says"
     assert ("RLG-3: failed" in reported.stdout) != ([entry.name for entry in failed] == ["RLG-3"])
     done = gyrotc("fleet", lot / "d", "--out", out, "--gather")

@@ -100,9 +100,7 @@ def test_the_simulated_floor_is_the_noise_that_was_added(demo: Path) -> None:
     assert evaluation["noise_floor_dph"] == pytest.approx(declared, rel=0.06)
 
 
-def test_fit_twice_gives_the_same_model_and_build_the_same_c(
-    demo: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_fit_twice_gives_the_same_model_and_build_the_same_c(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
     for out in ("a", "b"):
         done = gyrotc("fit", demo / "data", "--out", tmp_path / out)
         assert done.returncode == 0
@@ -179,9 +177,7 @@ def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyr
     assert "Beside simpler corrections" in (tmp_path / "r" / "report.html").read_text("utf-8")
 
 
-def test_an_existing_folder_of_somebody_else_is_not_replaced(
-    demo: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_an_existing_folder_of_somebody_else_is_not_replaced(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter1.tex").write_text("years of work")
     done = gyrotc("build", demo / "data", "--out", tmp_path / "thesis")
@@ -218,9 +214,7 @@ def _three_axes(source: Path, folder: Path) -> None:
         rows = np.genfromtxt(source / name, delimiter=",", names=True)
         columns = [rows["time_s"], rows["temperature_c"], *(rows["rate_dph"] + k for k in (0.0, 1.0, 2.0))]
         header = "time_s,temperature_c,rate_x_dph,rate_y_dph,rate_z_dph"
-        np.savetxt(
-            folder / name, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments=""
-        )
+        np.savetxt(folder / name, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments="")
 
 
 @pytest.mark.slow
@@ -296,9 +290,7 @@ def start(folder: Path, out: Path) -> subprocess.Popen[bytes]:
     """The installed command in a process group of its own, so that its compilers end with it."""
     program = Path(sys.executable).with_name("gyrotc")
     command = [str(program), "build", str(folder), "--out", str(out), "--numeric", "f32"]
-    return subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 def whole(out: Path) -> bool:

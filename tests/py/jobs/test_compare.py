@@ -67,9 +67,7 @@ def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_m
     assert row["exam_rms_dph"] < 1.02 * floor
 
 
-def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(folder: Path, tmp_path: Path) -> None:
     for path in folder.glob("run-0[1-6].csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     dataset = load(tmp_path)
@@ -81,10 +79,7 @@ def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(
         for k, held in enumerate(parts):
             rest = parts[:k] + parts[k + 1 :]
             seen = TrainingData(
-                **{
-                    n: np.concatenate([getattr(p, n) for p in rest])
-                    for n in TrainingData.__dataclass_fields__
-                }
+                **{n: np.concatenate([getattr(p, n) for p in rest]) for n in TrainingData.__dataclass_fields__}
             )
             found = fit(seen, method=row["id"])
             after = held.bias_dph - predict(found, held.temperature_c, held.slope_c_per_min)
@@ -123,6 +118,4 @@ def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: 
     difference = by_id["mrbf"]["exam_rms_dph"] - evaluation["exam"]["after"]["rms_dph"]
     assert abs(difference) < 1e-6 * evaluation["exam"]["after"]["rms_dph"]
     # Random centers and a plane differ here by 0.2 %, which is chance now that the delay is in the model.
-    assert by_id["mrbf"]["exam_rms_dph"] < min(
-        by_id[i]["exam_rms_dph"] for i in ("rbf_random", "mlr", "mrbf_paper")
-    )
+    assert by_id["mrbf"]["exam_rms_dph"] < min(by_id[i]["exam_rms_dph"] for i in ("rbf_random", "mlr", "mrbf_paper"))

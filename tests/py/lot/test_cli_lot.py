@@ -68,9 +68,7 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
 
 
 def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
-    reported = run_here(
-        "fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with"
-    )
+    reported = run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
     run_here("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
     lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
     use = json.loads((world / "with" / "training.json").read_text())["lot"]
@@ -117,9 +115,7 @@ def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_p
     assert rows[0] == "time_min,set_point_c" and float(rows[-1].split(",")[0]) == pytest.approx(
         60 * found.with_lot.hours
     )
-    assert (
-        len((tmp_path / "plan" / "programme.txt").read_text().splitlines()) == len(found.with_lot.steps) + 1
-    )
+    assert len((tmp_path / "plan" / "programme.txt").read_text().splitlines()) == len(found.with_lot.steps) + 1
     steeper = plan_with_lot(lot, str(world / "whole.toml"), 0.4 * before)
     assert steeper.with_lot.hours > found.with_lot.hours
     with pytest.raises(InputError, match="--require"):
@@ -134,9 +130,7 @@ def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Pa
     assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in reported
     assert all(p.programme.hours <= 0.5 and 0.0 <= p.removed_share < 1.0 for p in found.proposals)
     assert (tmp_path / "next" / "programme.csv").read_text().startswith("time_min,set_point_c")
-    run_here(
-        "plan", scenario, "--unit", unit, "--lot", world / "lot.json", *price, "--json", tmp_path / "lot.json"
-    )
+    run_here("plan", scenario, "--unit", unit, "--lot", world / "lot.json", *price, "--json", tmp_path / "lot.json")
     with_lot = NextRun.model_validate_json((tmp_path / "lot.json").read_text())
     assert with_lot.before_dph != found.before_dph
     with pytest.raises(InputError, match="--unit"):
@@ -166,10 +160,7 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
         *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),
         *("--json", tmp_path / "found.json"),
     )
-    assert (
-        "lot: not used: " in reported
-        and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
-    )
+    assert "lot: not used: " in reported and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
     with pytest.raises(InputError, match="--lot"):
         run_here("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--model", world)
 
@@ -194,9 +185,7 @@ def test_what_is_no_lot_of_units_is_reported(world: Path, tmp_path: Path) -> Non
     content = json.loads((world / "fleet" / "LOT-0005-001" / "training.json").read_text())
     content.pop("means")
     training.write_text(json_text(content))
-    (training.parent / "model.json").write_bytes(
-        (world / "fleet" / "LOT-0005-001" / "model.json").read_bytes()
-    )
+    (training.parent / "model.json").write_bytes((world / "fleet" / "LOT-0005-001" / "model.json").read_bytes())
     with pytest.raises(InputError, match="has no means"):
         run_here("lot", tmp_path / "fleet", "--out", tmp_path / "lot.json")
     assert not (tmp_path / "lot.json").exists()

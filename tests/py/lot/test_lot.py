@@ -63,9 +63,7 @@ def calibrated(rng: np.random.Generator, own: list[float], n: int = 300) -> Unit
 
 def short_run(rng: np.random.Generator, own: list[float]) -> TrainingData:
     """A rest, a ramp up, a rest, a ramp down: 100 samples of 50 s."""
-    t = np.concatenate(
-        [np.full(15, 0.0), np.linspace(0, 60, 15), np.full(40, 60.0), np.linspace(60, -40, 30)]
-    )
+    t = np.concatenate([np.full(15, 0.0), np.linspace(0, 60, 15), np.full(40, 60.0), np.linspace(60, -40, 30)])
     t = t + 0.05 * rng.normal(size=len(t))
     r = np.clip(np.gradient(t) * 1.2, -2.4, 2.4)
     n = len(t)
@@ -167,9 +165,7 @@ def test_scores_of_the_lots_own_units_are_as_expected() -> None:
     for _ in range(300):
         w = prior.means[0] + factor @ rng.normal(size=len(factor))
         moment = precision @ w + values.T @ rng.normal(size=len(values))
-        found.append(
-            p_value(*scores(precision, moment, prior.means[0], np.linalg.cholesky(prior.covariances[0])))
-        )
+        found.append(p_value(*scores(precision, moment, prior.means[0], np.linalg.cholesky(prior.covariances[0]))))
     assert kstest(found, "uniform").pvalue > 1e-3
 
 
@@ -371,9 +367,7 @@ def test_what_is_promised_is_what_the_posterior_has_after_the_run() -> None:
     for one in found.proposals:
         after = as_prior(known).with_runs(measured(rng, own, list(one.programme.steps)))
         assert one.programme.sigma_dph == pytest.approx(after.rms_sigma_dph(), rel=1e-3)
-        assert one.removed_share == pytest.approx(
-            1.0 - (one.programme.sigma_dph / found.before_dph) ** 2, abs=1e-9
-        )
+        assert one.removed_share == pytest.approx(1.0 - (one.programme.sigma_dph / found.before_dph) ** 2, abs=1e-9)
         assert one.price == pytest.approx(150.0 + 90.0 * one.programme.hours)
     worth = [p.removed_share / p.price for p in found.proposals]
     assert found.best == int(np.argmax(worth))
@@ -401,9 +395,7 @@ def test_posterior_covariances_are_inverses_of_the_sums(n: int) -> None:
     factor = rng.normal(size=(3, n, n + 2))
     precision = factor @ factor.transpose(0, 2, 1)
     covariance, log_determinant = posteriors(prior, precision)
-    np.testing.assert_allclose(
-        covariance @ (prior + precision), np.broadcast_to(np.eye(n), precision.shape), atol=1e-9
-    )
+    np.testing.assert_allclose(covariance @ (prior + precision), np.broadcast_to(np.eye(n), precision.shape), atol=1e-9)
     np.testing.assert_array_equal(covariance, covariance.transpose(0, 2, 1))
     np.testing.assert_allclose(log_determinant, -np.linalg.slogdet(prior + precision)[1], rtol=1e-12)
 

@@ -30,9 +30,7 @@ def _set(content: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     return changed
 
 
-def test_a_saved_model_reads_back_equal_with_the_same_hash(
-    model_dict: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_saved_model_reads_back_equal_with_the_same_hash(model_dict: dict[str, Any], tmp_path: Path) -> None:
     model = Model.from_dict(model_dict)
     model.save(tmp_path / "model.json")
     again = load_model(tmp_path / "model.json")
@@ -138,9 +136,7 @@ def test_a_bank_is_continuous_over_the_overlap_of_its_regions(model_dict: dict[s
         ("unknown_field", 1),
     ],
 )
-def test_tampered_fields_are_refused_by_name(
-    model_dict: dict[str, Any], tmp_path: Path, path: str, value: Any
-) -> None:
+def test_tampered_fields_are_refused_by_name(model_dict: dict[str, Any], tmp_path: Path, path: str, value: Any) -> None:
     file = tmp_path / "model.json"
     file.write_text(json.dumps(_set(model_dict, path, value)))
     with pytest.raises(InputError) as caught:

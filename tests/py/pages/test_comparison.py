@@ -202,9 +202,7 @@ def test_dates_stand_below_where_they_follow_one_another() -> None:
     assert {"as found: the correction before", "as left: the new one"} <= set(shown)
 
 
-@pytest.mark.parametrize(
-    "days", [(None,) * 4, ("2020-01-11",) * 4, ("spring", "2021", "2022", "2023"), DAYS[::-1]]
-)
+@pytest.mark.parametrize("days", [(None,) * 4, ("2020-01-11",) * 4, ("spring", "2021", "2022", "2023"), DAYS[::-1]])
 def test_without_dates_the_calibrations_are_counted(days: tuple[str | None, ...]) -> None:
     shown = labels(calibrations_over_time([calibration(k, day) for k, day in enumerate(days)]))
     assert shown.count("number of the calibration") == 2 and not set(DAYS) & set(shown)

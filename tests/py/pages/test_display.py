@@ -17,9 +17,7 @@ from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
 
 
-@pytest.mark.parametrize(
-    "name, factor", [("deg/h", 1.0), ("deg/s", 1 / 3600), ("mdps", 1 / 3.6), ("arcsec/s", 1.0)]
-)
+@pytest.mark.parametrize("name, factor", [("deg/h", 1.0), ("deg/s", 1 / 3600), ("mdps", 1 / 3.6), ("arcsec/s", 1.0)])
 def test_figures_change_by_the_factor_of_the_unit_and_other_numbers_stay(name: str, factor: float) -> None:
     noise = NoiseTerms(
         quantisation_arcsec=1.0, arw_deg_per_sqrt_h=2.0, bias_instability_dph=3.0, rate_random_walk_dph_per_sqrt_h=4.0,
@@ -57,9 +55,7 @@ def test_an_uncertainty_in_another_unit_keeps_it_and_its_sensitivity_changes() -
         rate = shown(Contribution(unit="deg/h", **part | {"sensitivity": 1.0}))
         assert (kelvin.standard_uncertainty, kelvin.unit) == (0.1, "C")
         assert (kelvin.sensitivity, kelvin.contribution_dph) == (pytest.approx(1.0), pytest.approx(0.1))
-        assert (rate.unit, rate.sensitivity) == ("mdps", 1.0) and rate.standard_uncertainty == pytest.approx(
-            0.1 / 3.6
-        )
+        assert (rate.unit, rate.sensitivity) == ("mdps", 1.0) and rate.standard_uncertainty == pytest.approx(0.1 / 3.6)
         table = Instrument(name="n", quantity="rate", expanded_uncertainty=3.6)
         assert shown(table).expanded_uncertainty == pytest.approx(1.0)
 
@@ -97,9 +93,7 @@ def test_limits_events_and_statistics_carry_their_unit_with_them() -> None:
         for name in ("rms_dph", "autocorrelation")
     )
     of_size, of_time = (
-        ParameterLikelihood(
-            cause="a", parameter=name, values=(3.6, 7.2), gain=(-1.0, 0.0), low=None, high=7.2
-        )
+        ParameterLikelihood(cause="a", parameter=name, values=(3.6, 7.2), gain=(-1.0, 0.0), low=None, high=7.2)
         for name in ("amplitude_dph", "tau_s")
     )
     with displayed("mdps"):

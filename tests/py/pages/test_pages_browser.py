@@ -90,9 +90,7 @@ def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_complains_and_text_can_be_read(
-    name: str, dark: bool, pages: dict[str, Path], tab: Browser
-) -> None:
+def test_nothing_complains_and_text_can_be_read(name: str, dark: bool, pages: dict[str, Path], tab: Browser) -> None:
     tab.open(pages[name], dark=dark)
     assert tab.console == []
     assert tab.value(_CONTRAST) == []

@@ -122,10 +122,7 @@ def test_a_constant_alone_improves_nearly_tenfold_at_constant_temperature() -> N
 
 def test_one_model_over_all_comes_closest_to_the_noise() -> None:
     for figures in RECORD["gyros"]["paper"].values():
-        total = {
-            method: sum(cell["rms_dph"] ** 2 for cell in of.values())
-            for method, of in figures["after"].items()
-        }
+        total = {method: sum(cell["rms_dph"] ** 2 for cell in of.values()) for method, of in figures["after"].items()}
         assert min(total, key=lambda method: total[method]) == "mrbf"
         assert np.sqrt(total["mrbf"] / 6.0) < 1.02 * figures["floor_dph"]
 

@@ -30,9 +30,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SEEDS = range(1, 1 + int(os.environ.get("GYROTC_PAPER_GYROS", "1")))
 
 NODES = 1e-9  # half ranges: 30 passes of a learning that forgets, so rounding is not amplified
-REDUCTION = (
-    1e-3  # of all that centers explain: what rounds in one step is divided by what is left in the next
-)
+REDUCTION = 1e-3  # of all that centers explain: what rounds in one step is divided by what is left in the next
 WEIGHTS = 1e-5  # of the largest weight: a ridge of 1e-8 amplifies rounding by up to 1e8, plain least squares by 1e10
 RMS = 1e-8  # relative: weights that are uncertain together hardly change the bias; the record has ten digits
 INPUT_C = 2e-5  # C: the front end computes in float32, of which 60 C has steps of 4e-6
@@ -104,9 +102,7 @@ def left(group: PaperGroup, predicted: Floats) -> float:
 
 
 def test_inputs_and_means_are_the_front_end_s(gyro: tuple[int, Path], groups: list[PaperGroup]) -> None:
-    runs = {
-        path.name: np.loadtxt(path, delimiter=",", skiprows=1) for path in sorted(gyro[1].glob("run-*.csv"))
-    }
+    runs = {path.name: np.loadtxt(path, delimiter=",", skiprows=1) for path in sorted(gyro[1].glob("run-*.csv"))}
     by_bias = {rows[1:, 2].tobytes(): rows for rows in runs.values()}
     for group in groups:
         for data in (group.train, group.exam):
@@ -139,9 +135,7 @@ def test_centers_are_chosen_in_the_same_order_up_to_the_same_stop(networks: dict
         assert curves["rho"] == pytest.approx(plain.rho, rel=1e-9), name
         assert curves["chosen"] == len(plain.centers), name
         reductions = np.array(curves["error_reduction"])
-        assert np.abs(reductions - plain.reductions).max() < REDUCTION * plain.reductions[1:].sum() + 1e-12, (
-            name
-        )
+        assert np.abs(reductions - plain.reductions).max() < REDUCTION * plain.reductions[1:].sum() + 1e-12, name
 
 
 def test_centers_and_weights_are_the_same(networks: dict[str, list[Both]]) -> None:
@@ -179,17 +173,12 @@ def test_table_1_is_the_reference_s(
     for number, group in enumerate(groups):
         data, exam = group.train, group.exam
         kept, weights = reference.regression(data.temperature_c, data.slope_c_per_min, data.bias_dph)
-        edges = reference.Scale(
-            *np.array([(x.min(), x.max()) for x in (data.temperature_c, data.slope_c_per_min)]).T
-        )
+        edges = reference.Scale(*np.array([(x.min(), x.max()) for x in (data.temperature_c, data.slope_c_per_min)]).T)
         x = np.clip(np.column_stack([exam.temperature_c, exam.slope_c_per_min]), edges.low, edges.high)
         cells = {
             "constant": np.full(len(exam), data.bias_dph.mean()),
             "mlr": np.column_stack([np.ones(len(exam)), x])[:, kept] @ weights,
-            **{
-                row: of[number].plain(exam.temperature_c, exam.slope_c_per_min)
-                for row, of in networks.items()
-            },
+            **{row: of[number].plain(exam.temperature_c, exam.slope_c_per_min) for row, of in networks.items()},
         }
         for row, predicted in cells.items():
             printed = after[row][group.environment]["rms_dph"]

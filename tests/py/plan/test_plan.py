@@ -35,9 +35,7 @@ def values(result: dict[str, Any]) -> dict[str, float | None]:
     return {c["id"]: c["detection_limit"]["value"] for c in result["limits"]}
 
 
-def test_limits_are_those_that_a_diagnosis_prints(
-    planned: dict[str, Any], tmp_path: Path, gyrotc: Command
-) -> None:
+def test_limits_are_those_that_a_diagnosis_prints(planned: dict[str, Any], tmp_path: Path, gyrotc: Command) -> None:
     """Same profiles, recorded: the limits follow the noise that the recordings have, within its uncertainty."""
     done = gyrotc("diagnose", simulated(tmp_path, seed=4), "--json", tmp_path / "d.json")
     assert done.returncode == 0, done.stderr
@@ -91,9 +89,7 @@ def test_two_ways_of_saying_the_same_cannot_be_reported_apart(planned: dict[str,
 
 
 def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Command) -> None:
-    done = gyrotc(
-        "plan", scenario(folder), "--out", tmp_path, "--require", "warm_up=3e-3", "--json", tmp_path / "p"
-    )
+    done = gyrotc("plan", scenario(folder), "--out", tmp_path, "--require", "warm_up=3e-3", "--json", tmp_path / "p")
     assert done.returncode == 0, done.stderr
     for text in ("What these runs will find", "thermal_gradient", "shortest profile", "Predicted accuracy"):
         assert text in done.stdout

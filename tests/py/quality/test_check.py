@@ -136,9 +136,7 @@ def test_earth_rate_that_is_not_stated(tmp_path: Path) -> None:
 
 def test_the_computed_earth_term_is_printed_with_its_uncertainty(tmp_path: Path) -> None:
     run = f"{RUN}\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 90.0"
-    described(
-        tmp_path / "R", run, head='schema = 1\nserial = "A"\nearth_rate = "compute"\nlatitude_deg = 30.0'
-    )
+    described(tmp_path / "R", run, head='schema = 1\nserial = "A"\nearth_rate = "compute"\nlatitude_deg = 30.0')
     result = check(tmp_path / "R")
     assert any("Earth's rate 7.5205 +- 0.0228 deg/h off" in line for line in result.lines())
     assert result.result().runs[0].earth_rate_dph == pytest.approx(7.5205, abs=1e-4)
@@ -234,9 +232,7 @@ EARTH = {
     for axis, angles in ANGLES.items()
 }
 COMPUTED = 'schema = 1\nserial = "RLG-0042"\nearth_rate = "compute"\nlatitude_deg = 48.0'
-GEOMETRY = (
-    "axis_azimuth_deg = {x = 0.0, y = 90.0, z = 0.0}\naxis_elevation_deg = {x = 0.0, y = 0.0, z = 90.0}"
-)
+GEOMETRY = "axis_azimuth_deg = {x = 0.0, y = 90.0, z = 0.0}\naxis_elevation_deg = {x = 0.0, y = 0.0, z = 90.0}"
 
 
 def three(seed: int, *, bias: tuple[float, float, float] = (2.0, -1.0, 0.5), earth: bool = False) -> Columns:
@@ -282,9 +278,7 @@ def test_against_the_other_runs(held: str, id: str, words: str, tmp_path: Path) 
         assert "mounting and wiring" in warning.next + warning.text
 
 
-@pytest.mark.parametrize(
-    ("held", "id"), [("x y z", ""), ("y x z", "axes_exchanged"), ("-x y z", "sign_reversed")]
-)
+@pytest.mark.parametrize(("held", "id"), [("x y z", ""), ("y x z", "axes_exchanged"), ("-x y z", "sign_reversed")])
 def test_against_earths_rate(held: str, id: str, tmp_path: Path) -> None:
     """One run is enough where the geometry is stated: a good gyro shows Earth's rate itself."""
     small = (0.02, -0.01, 0.03)
@@ -323,9 +317,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.mark.parametrize(
-    ("held", "id"), [("x y z", ""), ("y x z", "axes_exchanged"), ("x -y z", "sign_reversed")]
-)
+@pytest.mark.parametrize(("held", "id"), [("x y z", ""), ("y x z", "axes_exchanged"), ("x -y z", "sign_reversed")])
 def test_against_an_earlier_calibration(held: str, id: str, calibrated: Path, tmp_path: Path) -> None:
     write_csv(tmp_path / "RLG-0042" / "a.csv", swapped(three(5), held))
     earlier = earlier_models(calibrated)
@@ -415,9 +407,7 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
     assert text.count("<svg") == 1 + len(result.warnings)
     assert text.count("<b>Next:</b>") >= 2
     assert "b.csv: row 7" in text
-    write_check_page(
-        page, result.result(), pictures_of(folder, result), folder.name
-    )  # its own page is replaced ...
+    write_check_page(page, result.result(), pictures_of(folder, result), folder.name)  # its own page is replaced ...
     page.write_text("mine")
     with pytest.raises(Exception, match="was not written by gyrotc"):  # ... and nobody else's
         write_check_page(page, result.result(), pictures_of(folder, result), folder.name)
@@ -443,9 +433,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
     t = np.arange(-60.0, 126.0, 5.0)
     entries = []
     for k in range(10):
-        curve = (
-            g.normal(0.0, 5.0) + (1.0 + 0.3 * g.normal()) * 0.02 * (t - 20.0) + g.normal(0.0, 0.05, len(t))
-        )
+        curve = g.normal(0.0, 5.0) + (1.0 + 0.3 * g.normal()) * 0.02 * (t - 20.0) + g.normal(0.0, 0.05, len(t))
         curve = -curve if k == reversed_unit else curve
         inside = (t >= -40.0) & (t <= 60.0)
         held = [float(c) if i else None for c, i in zip(curve, inside, strict=True)]
@@ -529,14 +517,10 @@ def test_runs_of_noise_alone_are_not_accused(tmp_path: Path) -> None:
 def test_a_channel_that_is_a_copy_is_reported(tmp_path: Path) -> None:
     table = run(1)
     own = table["temperature_c"] + 1.0
-    write_csv(
-        tmp_path / "R" / "a.csv", table | {"case_temperature_c": table["temperature_c"], "inner_c": own}
-    )
+    write_csv(tmp_path / "R" / "a.csv", table | {"case_temperature_c": table["temperature_c"], "inner_c": own})
     reported = [d.text for d in check(tmp_path / "R").warnings if d.id == "channel_copy"]
     assert len(reported) == 1
-    assert reported[0].startswith(
-        "channel case_temperature_c of a.csv is a copy of the temperature, row by row"
-    )
+    assert reported[0].startswith("channel case_temperature_c of a.csv is a copy of the temperature, row by row")
 
 
 def test_a_stuck_thermometer_is_reported_and_the_line_mends_it(tmp_path: Path) -> None:

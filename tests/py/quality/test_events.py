@@ -43,9 +43,7 @@ def recording(rng: np.random.Generator, kind: int) -> EventColumns:
     return {"time_s": time, "temperature_c": temperature, "rate_dph": 0.01 + rate + walk + noise}
 
 
-def written(
-    folder: Path, change: EventColumns | None = None, run: int = 1, kept: np.ndarray | None = None
-) -> Path:
+def written(folder: Path, change: EventColumns | None = None, run: int = 1, kept: np.ndarray | None = None) -> Path:
     """Three runs; one, the second, has the rates of `change` added, and of its rows those that are `kept`."""
     rng = np.random.default_rng(SEED)
     print("seed", SEED)
@@ -89,9 +87,7 @@ def test_recordings_without_changes_have_none() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row_s", [1.0, 60.0])
-def test_one_record_in_as_many_as_is_said_has_a_change_by_chance(
-    monkeypatch: pytest.MonkeyPatch, row_s: float
-) -> None:
+def test_one_record_in_as_many_as_is_said_has_a_change_by_chance(monkeypatch: pytest.MonkeyPatch, row_s: float) -> None:
     """At an alarm rate of a fifth, where short records of white noise show it."""
     monkeypatch.setattr(changes_module, "FALSE_ALARMS", 0.2)
     rng = np.random.default_rng(SEED + 2)
@@ -171,9 +167,7 @@ def test_recordings_without_changes_have_none_though_temperatures_are_followed_l
         for r in runs:
             tau = rng.uniform(300.0, 3000.0)
             late = first_order(tau, r["time_s"], r["temperature_c"])
-            r["rate_dph"] = (
-                r["rate_dph"] + 5e-4 * (late - r["temperature_c"]) + 0.01 * np.exp(-r["time_s"] / tau)
-            )
+            r["rate_dph"] = r["rate_dph"] + 5e-4 * (late - r["temperature_c"]) + 0.01 * np.exp(-r["time_s"] / tau)
         alarms += bool(changes(*runs))
     print(f"{alarms} of 6 sets with a change")
     assert alarms == 0
@@ -391,9 +385,7 @@ NOISES: dict[str, Callable[[np.random.Generator, int], Floats]] = {
     "rare counts": lambda g, n: (g.random(n) < 0.002) * 1.0,
     "low pass": lambda g, n: np.convolve(g.normal(0.0, 1.0, n + 99), np.ones(100) / 100.0, "valid"),
     "Laplace": lambda g, n: g.laplace(0.0, 1.0, n),
-    "louder from the middle on": lambda g, n: (
-        g.normal(0.0, 1.0, n) * np.where(np.arange(n) < n // 2, 1.0, 10.0)
-    ),
+    "louder from the middle on": lambda g, n: g.normal(0.0, 1.0, n) * np.where(np.arange(n) < n // 2, 1.0, 10.0),
     "a lasting step": lambda g, n: g.normal(0.0, 1.0, n) + np.where(np.arange(n) < n // 2, 0.0, 40.0),
     "ramps": lambda g, n: np.abs(np.arange(n) - n / 2) / 60.0 + g.normal(0.0, 0.1, n),
     "constant": lambda g, n: np.zeros(n),
@@ -535,9 +527,7 @@ def lagged(time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(("size", "settles_s"), [(1.5, 0.0), (-4.0, 40.0), (0.0, 0.0)])
-def test_a_thermometer_that_shifts_or_comes_off_is_named_with_what_lies_behind(
-    size: float, settles_s: float
-) -> None:
+def test_a_thermometer_that_shifts_or_comes_off_is_named_with_what_lies_behind(size: float, settles_s: float) -> None:
     """A coarse converter, rows of ten seconds: what it does as nowhere else in the run."""
     rng = np.random.default_rng(SEED + 7)
     time, at = np.arange(0.0, 3600.0 * HOURS, 10.0), 10_000.0

@@ -65,9 +65,7 @@ def ids(dataset: Dataset, model: dict[str, Any], result: dict[str, Any], trainin
     return {f.id for f in found_in(dataset, model, result, training)}
 
 
-def found_in(
-    dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: Any = None
-) -> list[Finding]:
+def found_in(dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: Any = None) -> list[Finding]:
     facts = [facts_of(run, run.rows()) for run in dataset.runs]
     of_runs = [
         found
@@ -117,9 +115,7 @@ def test_what_a_map_has_not_seen(plain: Dataset, model_dict: dict[str, Any]) -> 
 
 
 @pytest.mark.parametrize(("factor", "found"), [(1.0, True), (0.2, True), (2.0, False), (1e4, False)])
-def test_earth_rate_follows_the_rate(
-    factor: float, found: bool, tmp_path: Path, model_dict: dict[str, Any]
-) -> None:
+def test_earth_rate_follows_the_rate(factor: float, found: bool, tmp_path: Path, model_dict: dict[str, Any]) -> None:
     table = columns(600)
     table["rate_dph"] = factor * (table["rate_dph"] - 10.0)
     reported = ids(dataset_of(tmp_path / "R", table), model_dict, result_of())

@@ -374,9 +374,7 @@ def test_uncertainty_of_earth_rate_agrees_with_drawn_directions() -> None:
     for _ in range(4000):
         a, b, c = rng.normal(0.0, sigma, 3)
         drawn.append(
-            earth_rate(
-                latitude + a, azimuth + b / np.cos(np.radians(elevation)), elevation + c, **exact
-            ).rate_dph
+            earth_rate(latitude + a, azimuth + b / np.cos(np.radians(elevation)), elevation + c, **exact).rate_dph
         )
     stated = earth_rate(latitude, azimuth, elevation, latitude_sigma_deg=sigma, axis_sigma_deg=sigma)
     assert stated.sigma_dph == pytest.approx(np.std(drawn), rel=0.1), "seed 20260301"
@@ -454,9 +452,7 @@ def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path)
         "print(rows, peak)"
     )
     # A fresh process, and the mark of its own memory: ru_maxrss would count this process's before exec.
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(folder)], capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", program, str(folder)], capture_output=True, text=True, check=True)
     rows, peak_kib = map(int, done.stdout.split())
     assert rows == 6 * n
     assert peak_kib < 512 * 1024
@@ -506,9 +502,7 @@ def _double(data: bytearray, draw: random.Random) -> None:
 
 
 def _insert(data: bytearray, draw: random.Random) -> None:
-    word = draw.choice(
-        [b",", b"\n", b'"', b"\x00", b"1e999", b"nan", b"[[", b"=", b"\xff", b"-", b"\r", b"{}"]
-    )
+    word = draw.choice([b",", b"\n", b'"', b"\x00", b"1e999", b"nan", b"[[", b"=", b"\xff", b"-", b"\r", b"{}"])
     at = draw.randrange(len(data))
     data[at:at] = word
 

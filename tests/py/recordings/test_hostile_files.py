@@ -42,10 +42,7 @@ def _foreign(log: Path, folder: Path) -> Iterator[str]:
     """Calls that read or wrote what is neither the input, nor the output, nor Python's own."""
     own = [folder, *(Path(p) for p in ("/dev/null", "/dev/shm", "/tmp", os.environ.get("TMPDIR", "/tmp")))]
     python = [Path(p).resolve() for p in (sys.prefix, sys.base_prefix, sysconfig.get_path("stdlib"), ROOT)]
-    system = [
-        Path(p)
-        for p in ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev/urandom", "/dev/null", "/bin")
-    ]
+    system = [Path(p) for p in ("/usr", "/lib", "/lib64", "/etc", "/proc", "/sys", "/dev/urandom", "/dev/null", "/bin")]
     for name, path, writes in _opened(log):
         places = own if writes else [*own, *python, Path(sys.prefix), *system]
         caches = path.suffix in (".pyc",) or "__pycache__" in path.parts
@@ -68,9 +65,7 @@ def test_500_hostile_files_are_read_or_refused_within_limits(tmp_path: Path) -> 
     done = subprocess.run(command, cwd=TESTS, env=environment, capture_output=True, text=True, check=False)
     results = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     assert len(results) == count, done.stderr[-2000:]
-    print(
-        Counter(one["status"] for one in results), f"slowest {max(one['seconds'] for one in results):.1f} s"
-    )
+    print(Counter(one["status"] for one in results), f"slowest {max(one['seconds'] for one in results):.1f} s")
     assert [one for one in results if one["status"] not in (0, 2)] == []
     assert [one for one in results if one["seconds"] > MOST_S] == []
     assert max(one["own_mib"] for one in results) <= MOST_MIB

@@ -58,9 +58,7 @@ def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
         kept = np.isin(np.round(seen.time_s, 6), np.round(rows.time_s - case.starts_at, 3))
         assert kept.sum() == case.rows
         np.testing.assert_allclose(rows.time_s - case.starts_at, seen.time_s[kept], atol=case.time_tolerance)
-        np.testing.assert_allclose(
-            rows.temperature_c, seen.temperature_c[kept], atol=case.temperature_tolerance
-        )
+        np.testing.assert_allclose(rows.temperature_c, seen.temperature_c[kept], atol=case.temperature_tolerance)
         np.testing.assert_allclose(rows.rate_dph, seen.rate_dph[kept, k], atol=case.tolerance)
         assert (dataset.runs[0].started == START) == case.started
 
@@ -136,9 +134,7 @@ def run(gyrotc: Command) -> Run:
 def lines(head: str, row: Callable[[int, float, float], str], rows: int = 600) -> str:
     """A laser gyro with Earth's rate in it: 0.0005 deg/sqrt(h), 20 to 50 C and back in 100 minutes."""
     rng = np.random.default_rng(3)
-    temperature = (
-        20.0 + 30.0 * (1.0 - np.abs(2.0 * np.arange(rows) / rows - 1.0)) + rng.normal(0.0, 0.01, rows)
-    )
+    temperature = 20.0 + 30.0 * (1.0 - np.abs(2.0 * np.arange(rows) / rows - 1.0)) + rng.normal(0.0, 0.01, rows)
     rate = 10.0 + rng.normal(0.0, 0.01, rows)
     every = zip(temperature.tolist(), rate.tolist(), strict=True)
     return "\n".join([head, *(row(k, t, r) for k, (t, r) in enumerate(every))]) + "\n"
@@ -218,9 +214,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
         ("--time-format", "%d/%m/%Y %H:%M:%S"),
     ),
     "stamps too coarse": (
-        lines(
-            "time,temp_c,rate_dph", lambda k, t, r: f"2026-03-01 08:{k // 100:02d}:{k // 10 % 60:02d},{t},{r}"
-        ),
+        lines("time,temp_c,rate_dph", lambda k, t, r: f"2026-03-01 08:{k // 100:02d}:{k // 10 % 60:02d},{t},{r}"),
         (),
         ("line 3", "the time of the row before", "--rate-hz"),
         ("--rate-hz", "0.1"),
@@ -265,9 +259,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     "points between thousands of a whole number": (
         lines(
             "Zeit [ms];T [C];rate [deg/h]",
-            lambda k, t, r: (
-                f"{10000 * k:,};{t:.4f};{r:.6f}".replace(",", "#").replace(".", ",").replace("#", ".")
-            ),
+            lambda k, t, r: f"{10000 * k:,};{t:.4f};{r:.6f}".replace(",", "#").replace(".", ",").replace("#", "."),
         ),
         (),
         ("no column that gives a time", "as Zeit [ms] holds", "--csv thousands=."),
@@ -342,9 +334,7 @@ def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_pat
     (tmp_path / "one-again.csv").write_text(text)
     kept = tmp_path / "A" / "map.toml"
     second = run("import", tmp_path / "one.csv", "--out", tmp_path / "B", "--map", kept)
-    third = run(
-        "import", tmp_path / "one-again.csv", "--out", tmp_path / "C", "--map", kept, "--serial", "RLG-2"
-    )
+    third = run("import", tmp_path / "one-again.csv", "--out", tmp_path / "C", "--map", kept, "--serial", "RLG-2")
     assert second[0] == third[0] == 0, second[2] + third[2]
     for name in ("dataset.toml", "map.toml", "one.parquet"):
         assert (tmp_path / "A" / name).read_bytes() == (tmp_path / "B" / name).read_bytes(), name
@@ -416,15 +406,11 @@ def test_the_last_file_becomes_the_exam_where_that_is_stated_or_answered(tmp_pat
     assert status == 2 and "--exam: with one file" in error
 
 
-def test_a_packed_file_larger_than_is_allowed_is_refused_while_it_is_unpacked(
-    tmp_path: Path, run: Run
-) -> None:
+def test_a_packed_file_larger_than_is_allowed_is_refused_while_it_is_unpacked(tmp_path: Path, run: Run) -> None:
     with gzip.open(tmp_path / "log.csv.gz", "wb", compresslevel=9) as file:
         for _ in range(30):
             file.write(bytes(2**20))
-    status, _, error = run(
-        "--max", "recording_mib=10", "import", tmp_path / "log.csv.gz", "--out", tmp_path / "R"
-    )
+    status, _, error = run("--max", "recording_mib=10", "import", tmp_path / "log.csv.gz", "--out", tmp_path / "R")
     assert status == 2 and "recording_mib" in error and not (tmp_path / "R").exists()
 
 
@@ -552,9 +538,7 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
             file.write("time_s,temperature_c,rate_dph,supply_v\n")
             for block in range(blocks):
                 start = block * 400_000
-                file.writelines(
-                    row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000)
-                )
+                file.writelines(row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000))
         program = (
             "import sys; from gyrotc.cli.main import run; status = run(sys.argv[1:]); "
             "facts = dict(line.split(':') for line in open('/proc/self/status')); "  # ru_maxrss has the parent's, too
@@ -692,9 +676,7 @@ def test_commas_between_columns_and_in_decimals_are_reported(tmp_path: Path, run
 
 def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path: Path, run: Run) -> None:
     """Before: read as hours and minutes, sixty times too slow, in silence."""
-    text = "\n".join(
-        ["Time,temp_c,rate_dph", *(f"{k // 6:02d}:{k % 6}0,20.{k % 10},{k % 7}" for k in range(120))]
-    )
+    text = "\n".join(["Time,temp_c,rate_dph", *(f"{k // 6:02d}:{k % 6}0,20.{k % 10},{k % 7}" for k in range(120))])
     (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
     status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 2

@@ -51,9 +51,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("has_many_columns", "1000 columns; expected at most 256"),
     ],
 )
-def test_what_a_reader_does_wrong_is_one_message_about_the_file(
-    reader: str, message: str, file: Path
-) -> None:
+def test_what_a_reader_does_wrong_is_one_message_about_the_file(reader: str, message: str, file: Path) -> None:
     with pytest.raises(InputError) as caught:
         opened(reader, file)
     assert message in str(caught.value) and str(caught.value).startswith("log.bin")
@@ -156,9 +154,7 @@ def _recording(folder: Path) -> Path:
     return folder / "run.parquet"
 
 
-def test_a_parquet_recording_is_read_in_a_process_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_parquet_recording_is_read_in_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before: pyarrow read it in the job."""
 
     def never(*_: object, **__: object) -> None:
@@ -175,9 +171,7 @@ def test_a_parquet_recording_is_read_in_a_process_of_its_own(
 
 
 @pytest.mark.parametrize("rows", [599, 601])
-def test_rows_that_were_not_stated_are_refused(
-    rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_that_were_not_stated_are_refused(rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = ParquetFile("run.parquet", _recording(tmp_path))
     monkeypatch.setattr(file, "_rows", rows)
     with pytest.raises(InputError, match="states"):

@@ -133,8 +133,7 @@ def test_a_copy_under_another_serial_is_named() -> None:
     words = [f"{k:016x}" for k in range(300)]
     own = {"A": words[:100], "B": words[100:200], "C": words[200:280] + words[:20]}
     entries = [
-        FleetEntry(name=name, axis=None, status="done", serial=name, sketch="".join(mine))
-        for name, mine in own.items()
+        FleetEntry(name=name, axis=None, status="done", serial=name, sketch="".join(mine)) for name, mine in own.items()
     ]
     [found] = copies(entries)
     assert (found.name, found.other, found.share) == ("A", "C", 0.2)

@@ -21,9 +21,7 @@ from recordings import Columns, columns, toml, write_csv
 HEAD = 'schema = 1\nserial = "RLG-1"\nearth_rate = "removed"\n'
 
 
-def made(
-    folder: Path, table: Columns, units: str = "", head: str = HEAD, run: str = 'file = "a.csv"'
-) -> Path:
+def made(folder: Path, table: Columns, units: str = "", head: str = HEAD, run: str = 'file = "a.csv"') -> Path:
     write_csv(folder / "a.csv", table)
     tail = f"[units]\n{units}" if units else ""
     (folder / "dataset.toml").write_text(toml(run, head=head, tail=tail), "utf-8")
@@ -178,9 +176,7 @@ def test_what_is_trusted_stands_in_training_json(tmp_path: Path) -> None:
     assert json.dumps(training)
 
 
-@pytest.mark.parametrize(
-    ("factor", "refused"), [(1.0, False), (1.0 / 3600.0, True), (np.pi / 648000.0, True)]
-)
+@pytest.mark.parametrize(("factor", "refused"), [(1.0, False), (1.0 / 3600.0, True), (np.pi / 648000.0, True)])
 def test_earths_rate_along_the_axis_tells_the_unit(factor: float, refused: bool, tmp_path: Path) -> None:
     """A noisy gyro: its noise could be that of a good one in deg/h, its mean could not be Earth's rate in deg/h."""
     earth = earth_rate(48.0, 0.0, 0.0, latitude_sigma_deg=0.01, axis_sigma_deg=0.1).rate_dph
@@ -231,9 +227,7 @@ def test_units_of_channels(tmp_path: Path) -> None:
         ('suply_v = "mV"', ("field units.suply_v", "no such column")),
     ],
 )
-def test_a_wrong_declaration_is_reported_by_its_field(
-    units: str, words: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_wrong_declaration_is_reported_by_its_field(units: str, words: tuple[str, ...], tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         load(made(tmp_path / "R", columns(600), units))
     assert all(word in str(refused.value) for word in words), refused.value

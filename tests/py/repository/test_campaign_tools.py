@@ -49,9 +49,7 @@ def test_what_it_changes_stands_there_once(fault: Fault) -> None:
 @pytest.mark.slow
 def test_each_way_of_seeing_one_sees_one() -> None:
     """A fault of the tables, one of the answers; the generator as it is passes both before."""
-    found = {
-        r["name"]: r["seen_by"] for r in tried(["width multiplied", "result rounded instead of cut off"])
-    }
+    found = {r["name"]: r["seen_by"] for r in tried(["width multiplied", "result rounded instead of cut off"])}
     assert found == {"width multiplied": "check_table", "result rounded instead of cut off": "verify"}
 
 
@@ -163,9 +161,7 @@ def test_without_the_tests_of_a_file_its_lines_are_reported(tmp_path: Path) -> N
 
 PAGE = (ROOT / "docs" / "proof.md").read_text("utf-8")
 REQUIREMENTS = re.findall(r"^\| (R-[A-Z]+-\d+) \| (.+?) \| (.+) \|$", PAGE, re.MULTILINE)
-PROVED_FAULTS = re.findall(
-    r"^\| ([^|]+) \| (`tests/[^|]+::[^|]+) \|$", PAGE.partition("\n## 6.")[2], re.MULTILINE
-)
+PROVED_FAULTS = re.findall(r"^\| ([^|]+) \| (`tests/[^|]+::[^|]+) \|$", PAGE.partition("\n## 6.")[2], re.MULTILINE)
 ANSWER = re.compile(r"`(tests/[\w/]+\.(?:py|c))::(\w+)`")
 
 
@@ -186,9 +182,7 @@ def test_there_are_requirements_and_no_id_twice() -> None:
 
 def test_every_fault_that_was_met_has_a_test() -> None:
     assert len(PROVED_FAULTS) >= 20
-    assert len(PROVED_FAULTS) == len(
-        re.findall(r"^\| (?!fault|---)", PAGE.partition("\n## 6.")[2], re.MULTILINE)
-    )
+    assert len(PROVED_FAULTS) == len(re.findall(r"^\| (?!fault|---)", PAGE.partition("\n## 6.")[2], re.MULTILINE))
     for _, answers in PROVED_FAULTS:
         _exist(answers)
 

@@ -102,9 +102,7 @@ def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
     assert {"numpy", "scipy", "pyarrow", "pydantic", "NLopt", "Eigen", "nanobind"} <= names
     (nlopt,) = (c for c in generator["components"] if c["name"] == "NLopt")
     called = {
-        a
-        for p in (ROOT / "gen" / "core").glob("*.cpp")
-        for a in re.findall(r"NLOPT_[LG][ND]_\w+", p.read_text())
+        a for p in (ROOT / "gen" / "core").glob("*.cpp") for a in re.findall(r"NLOPT_[LG][ND]_\w+", p.read_text())
     }
     assert called and all(algorithm in nlopt["description"] for algorithm in called)
     assert len(re.findall(r"NLOPT_\w+", nlopt["description"])) == len(called), "what is called, and no more"
@@ -181,9 +179,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
     _run("tools/release.sh", "archive", "v0.2.0", "--sdist", cwd=clone)
     made = clone / "build" / "release" / "0.2.0"
-    assert {"gyrotc-0.2.0.tar.gz", "sbom-c.cdx.json", "SHA256SUMS", "packages"} <= {
-        p.name for p in made.iterdir()
-    }
+    assert {"gyrotc-0.2.0.tar.gz", "sbom-c.cdx.json", "SHA256SUMS", "packages"} <= {p.name for p in made.iterdir()}
     packages = list((made / "packages").iterdir())
     assert len(packages) == 2 and all(p.is_file() and "0.2.0" in p.name for p in packages)
     (crate,) = (p for p in packages if "crate" in p.name)
@@ -198,9 +194,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     assert listed == files - {"SHA256SUMS"}
     (clone / "libc" / "gtc_crc.c").unlink()
     _run("git", "checkout", "-q", ".", cwd=clone)
-    assert "there is a tag v0.2.0 already" in _run(
-        "tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2
-    )
+    assert "there is a tag v0.2.0 already" in _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2)
 
 
 @pytest.mark.slow

@@ -31,9 +31,7 @@ def test_relative_links_lead_somewhere() -> None:
 def test_a_dead_link_and_a_dead_heading_are_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(documents, "ROOT", tmp_path)
     page = tmp_path / "a.md"
-    page.write_text(
-        "# One `two`\n[x](b.md) [y](#one-two) [z](#three) ![p](p.png) `[q](r)` [w](https://s/t)\n"
-    )
+    page.write_text("# One `two`\n[x](b.md) [y](#one-two) [z](#three) ![p](p.png) `[q](r)` [w](https://s/t)\n")
     assert [text.split(": ", 1)[1] for text in documents.dead_links(page)] == [
         "b.md: no such file", "#three: no such heading", "p.png: no such file",
     ]  # fmt: skip

@@ -48,9 +48,7 @@ def _at(model: Model, temperature: float) -> float:
 
 def test_every_example_is_on_the_page() -> None:
     listed = re.findall(r"^\| \[(\w+)\]", (EXAMPLES / "README.md").read_text(), re.MULTILINE)
-    assert sorted(listed) == sorted(
-        p.name for p in EXAMPLES.iterdir() if p.is_dir() and (p / "README.md").exists()
-    )
+    assert sorted(listed) == sorted(p.name for p in EXAMPLES.iterdir() if p.is_dir() and (p / "README.md").exists())
 
 
 @pytest.mark.slow
@@ -83,9 +81,7 @@ def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
     reported = re.findall(r"-?\d+\.\d+", _run(folder / "build" / "triad"))
     for axis, temperature, rate in zip("xyz", (20.0, 21.5, None), reported, strict=True):
         if temperature is not None:  # the third one's temperature moves
-            assert float(rate) == pytest.approx(
-                -_at(load_model(folder / f"model_{axis}.json"), temperature), abs=1e-6
-            )
+            assert float(rate) == pytest.approx(-_at(load_model(folder / f"model_{axis}.json"), temperature), abs=1e-6)
     assert len({abs(float(rate)) for rate in reported}) == 3
 
 
@@ -111,27 +107,19 @@ def firmware(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return program
 
 
-def test_one_firmware_takes_the_image_of_its_serial(
-    gyros: dict[str, Path], firmware: Path, tmp_path: Path
-) -> None:
+def test_one_firmware_takes_the_image_of_its_serial(gyros: dict[str, Path], firmware: Path, tmp_path: Path) -> None:
     flash = tmp_path / "flash.bin"
-    assert _run(sys.executable, EXAMPLES / "many_serials" / "pack.py", flash, *gyros.values()).startswith(
-        "3 images"
-    )
+    assert _run(sys.executable, EXAMPLES / "many_serials" / "pack.py", flash, *gyros.values()).startswith("3 images")
     flash.write_bytes(flash.read_bytes() + b"\xff" * 64)  # erased behind the last one
     for serial, folder in gyros.items():
         reported = _run(firmware, flash, serial)
         assert reported.startswith(f"{serial}: ")
-        assert float(reported.split()[-2]) == pytest.approx(
-            _at(load_model(folder / "model.json"), 20.0), abs=2e-7
-        )
+        assert float(reported.split()[-2]) == pytest.approx(_at(load_model(folder / "model.json"), 20.0), abs=2e-7)
     for other in ("RLG-0003", "RLG-001", "RLG-00100", ""):
         assert "-5" in _run(firmware, flash, other, status=1), "GTC_E_ID"
 
 
-def test_a_damaged_image_is_not_used_nor_passed_over(
-    gyros: dict[str, Path], firmware: Path, tmp_path: Path
-) -> None:
+def test_a_damaged_image_is_not_used_nor_passed_over(gyros: dict[str, Path], firmware: Path, tmp_path: Path) -> None:
     flash = tmp_path / "flash.bin"
     _run(sys.executable, EXAMPLES / "many_serials" / "pack.py", flash, *gyros.values())
     content = bytearray(flash.read_bytes())
@@ -188,7 +176,5 @@ def test_the_notebook_builds_a_result(tmp_path: Path, monkeypatch: pytest.Monkey
         shown.append(eval(compile(ast.Expression(last.value), "map.ipynb", "eval"), names))
     data, result, series, bias = shown
     assert isinstance(data, gyrotc.Dataset) and isinstance(result, gyrotc.Result)
-    assert (
-        result._repr_html_().count("<svg") == 4 and (tmp_path / "build" / "result" / "report.html").is_file()
-    )
+    assert result._repr_html_().count("<svg") == 4 and (tmp_path / "build" / "result" / "report.html").is_file()
     assert float(series["max"]) < 0.02 and len(bias) == 2  # type: ignore[index, arg-type]

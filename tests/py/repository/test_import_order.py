@@ -33,9 +33,7 @@ def _exists(module: str) -> bool:
 def test_what_stands_beside_the_package_imports_modules_that_are_there() -> None:
     """Much of it runs in an hour of `make bench` or `make blind` only: a module that moved must not wait for that."""
     root = PACKAGE.parents[1]
-    for path in (
-        p for folder in ("tests", "bench", "tools", "examples") for p in (root / folder).rglob("*.py")
-    ):
+    for path in (p for folder in ("tests", "bench", "tools", "examples") for p in (root / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             found = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             found += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

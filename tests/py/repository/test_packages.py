@@ -140,9 +140,7 @@ def test_a_file_with_another_version_is_reported_and_mended(name: str, copies: P
 @pytest.mark.slow
 def test_a_new_version_is_set_in_one_place_and_reaches_all(copies: Path) -> None:
     version.set_header(copies, "1.20.3")
-    assert version.header_version(copies) == "1.20.3" and len(version.differing(copies)) == len(
-        version.PLACES
-    )
+    assert version.header_version(copies) == "1.20.3" and len(version.differing(copies)) == len(version.PLACES)
     version.write(copies)
     assert version.differing(copies) == []
 
@@ -246,17 +244,13 @@ def _asked(path: Path) -> set[str]:
 @pytest.mark.slow
 def test_zephyr_finds_the_module_and_its_options(tmp_path: Path, ramp: str) -> None:
     """`zephyr/module.yml` names the folders, each option that CMake asks for is one of Kconfig."""
-    named = dict(
-        re.findall(r"^  (cmake|kconfig): (\S+)$", (ROOT / "zephyr" / "module.yml").read_text(), re.M)
-    )
+    named = dict(re.findall(r"^  (cmake|kconfig): (\S+)$", (ROOT / "zephyr" / "module.yml").read_text(), re.M))
     options = _kconfig(ROOT / named["kconfig"])
     assert _asked(ROOT / named["cmake"] / "CMakeLists.txt") == set(options)
     chosen = {key: "1" if value in ("y", "n") else value for key, value in options.items()}
     module, terms = ROOT / named["cmake"], {"CONFIG_GYROTC_MAX_TERMS": "6"}
     assert _run(_image(module, tmp_path / "image", **chosen | terms)) == ramp
-    unused = dict.fromkeys(
-        ("CONFIG_GYROTC_WITH_IMAGE", "CONFIG_GYROTC_WITH_SAVE", "CONFIG_GYROTC_WITH_TIME"), "0"
-    )
+    unused = dict.fromkeys(("CONFIG_GYROTC_WITH_IMAGE", "CONFIG_GYROTC_WITH_SAVE", "CONFIG_GYROTC_WITH_TIME"), "0")
     assert _run(_image(module, tmp_path / "least", **chosen | unused)) == ramp
     image, least = (
         (tmp_path / name / "build" / "gyrotc" / "libgyrotc.a").stat().st_size for name in ("image", "least")
@@ -430,9 +424,7 @@ def test_gprbuild_builds_a_user_of_the_project(ramp: str, tmp_path: Path) -> Non
     gprbuild = _need("gprbuild")
     ada = PACKAGES / "ada"
     (tmp_path / "firmware.gpr").write_text(
-        GPR.format(
-            binding=ada / "gyrotc.gpr", example=ada / "example", minimal=MINIMAL, include=ROOT / "include"
-        )
+        GPR.format(binding=ada / "gyrotc.gpr", example=ada / "example", minimal=MINIMAL, include=ROOT / "include")
     )
     _run(gprbuild, "-q", "-P", "firmware.gpr", f"-XGYROTC_OBJECTS={tmp_path / 'gyrotc'}", cwd=tmp_path)
     assert _run(tmp_path / "firmware") == ramp
@@ -554,9 +546,7 @@ def test_pkg_config_finds_it(prefix: Path, user: Path) -> None:
     found = ["env", f"PKG_CONFIG_PATH={folder}", "pkg-config"]
     assert _printed(*found, "--modversion", "gyrotc").strip() == ".".join(VERSION)
     flags = _printed(*found, "--cflags", "--libs", "gyrotc").split()
-    _printed(
-        "gcc", "-std=c99", "-ffp-contract=off", "user.c", "gtc_rlg_0042.c", *flags, "-o", "user", cwd=user
-    )
+    _printed("gcc", "-std=c99", "-ffp-contract=off", "user.c", "gtc_rlg_0042.c", *flags, "-o", "user", cwd=user)
     _printed(user / "user")
 
 

@@ -59,9 +59,7 @@ def test_a_breach_is_exit_status_1_and_an_unknown_check_2(tree: Path) -> None:
         [sys.executable, str(TOOL), "words", "--root", str(tree)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 1 and "libc/gtc_crc.c:30: 'double' is double" in done.stdout
-    assert (
-        subprocess.run([sys.executable, str(TOOL), "word"], capture_output=True, check=False).returncode == 2
-    )
+    assert subprocess.run([sys.executable, str(TOOL), "word"], capture_output=True, check=False).returncode == 2
 
 
 @pytest.mark.parametrize(
@@ -138,9 +136,7 @@ def test_an_expression_that_could_be_fused_is_seen(tree: Path, monkeypatch: pyte
         r"f = center\[4\]\.value \* f;\n    f = acc \+ f;",
         "f = acc + (center[4].value * f);",
     )
-    assert "gtc_f32.c: gtc_f32_gaussian has a product and a sum in one expression" in list(
-        objects.fused(tree)
-    )
+    assert "gtc_f32.c: gtc_f32_gaussian has a product and a sum in one expression" in list(objects.fused(tree))
     monkeypatch.setattr(objects, "DOCUMENTED", ("-std=gnu99", "-ffp-contract=fast", *UNGUARDED))
     assert next(f for f in objects.fused(tree) if f.startswith("Cortex-M4F: ") and "vfma" in f)
 
@@ -165,9 +161,7 @@ def test_a_breach_of_misra_is_seen_where_it_is_not_permitted(tree: Path, one_fil
     spoil(tree / CRC, r"    int bit;\n", "    int bit = 017;\n")
     found = list(analysers.misra(tree))
     breach = any("gtc_crc.c:10: MISRA C:2012, rule 7.1" in f for f in found)
-    version = subprocess.run(
-        ["cppcheck", "--version"], capture_output=True, text=True, check=False
-    ).stdout.strip()
+    version = subprocess.run(["cppcheck", "--version"], capture_output=True, text=True, check=False).stdout.strip()
     if not breach and version != "Cppcheck 2.10":
         pytest.skip(f"{version} does not report rule 7.1 as 2.10 does: {found[:3]}")
     assert breach, found

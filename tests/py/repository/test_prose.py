@@ -62,8 +62,6 @@ def test_long_sentences_and_private_words_are_seen(tmp_path: Path) -> None:
     (tmp_path / "docs" / "a.md").write_text("word " * 46 + "end.\nOne. `odd` two.\n")
     (tmp_path / "gen" / "gyrotc" / "a.py").write_text("odd_name = 1  # odd\n")
     (tmp_path / "tools" / "promises").mkdir(parents=True)
-    (tmp_path / "tools" / "promises" / "words.toml").write_text(
-        '[instead]\nodd = "rare"\n[most.sources]\nodd = 1\n'
-    )
+    (tmp_path / "tools" / "promises" / "words.toml").write_text('[instead]\nodd = "rare"\n[most.sources]\nodd = 1\n')
     assert len(list(prose.long_sentences(tmp_path))) == 2  # too long, and not at a sentence's end
     assert list(prose.private_words(tmp_path)) == ["sources: 'odd' stands 2 times, more than 1; write rare"]

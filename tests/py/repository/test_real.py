@@ -26,8 +26,7 @@ def built(name: str, out: Path, gyrotc: Command) -> dict[str, dict[str, Any]]:
     assert done.returncode == 0, done.stderr
     return {
         axis: {
-            part: json.loads((out / axis / f"{part}.json").read_text())
-            for part in ("evaluate", "model", "training")
+            part: json.loads((out / axis / f"{part}.json").read_text()) for part in ("evaluate", "model", "training")
         }
         for axis in "xyz"
     }
@@ -37,9 +36,7 @@ def found(result: dict[str, Any]) -> set[str]:
     return {finding["id"] for finding in result["evaluate"]["findings"]}
 
 
-def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(
-    tmp_path: Path, gyrotc: Command
-) -> None:
+def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(tmp_path: Path, gyrotc: Command) -> None:
     """Whatever is emitted is, on branches left out, no worse than a constant; and it is said."""
     for result in built("mpu6000-chamber-cycle", tmp_path / "out", gyrotc).values():
         assert ("does_not_generalise" in found(result)) == (result["model"]["method"] == "constant")
@@ -69,9 +66,7 @@ def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Co
     if name in ABSENT:
         pytest.skip(SKIPPED)
     rows = (REAL / name / "data.csv").read_text().splitlines()
-    scaled = [
-        ",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) / 1000.0!r}"]) for line in rows[1:]
-    ]
+    scaled = [",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) / 1000.0!r}"]) for line in rows[1:]]
     folder = tmp_path / SETS[1]
     folder.mkdir()
     (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")

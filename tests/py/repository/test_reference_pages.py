@@ -33,11 +33,7 @@ def test_pages_are_the_same_every_time(made: Path) -> None:
 
 
 def test_every_public_function_of_c_has_its_heading(made: Path) -> None:
-    named = [
-        name
-        for heading in _headings(made / "reference-c.md")
-        for name in re.findall(r"gtc_<n>_(\w+)", heading)
-    ]
+    named = [name for heading in _headings(made / "reference-c.md") for name in re.findall(r"gtc_<n>_(\w+)", heading)]
     assert sorted([*named, "map"]) == sorted(PUBLIC), "the map is for tests"
 
 

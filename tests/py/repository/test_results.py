@@ -132,9 +132,7 @@ def test_the_selection_depends_neither_on_units_nor_on_order_nor_on_duplicates()
     invariance = recorded(DOCS, "bench")["invariance"]
     *ours, peer = invariance["rows"]
     for row in ours:
-        assert [change["same"] for change in row["changes"].values()] == [invariance["gyros"]] * 3, row[
-            "name"
-        ]
+        assert [change["same"] for change in row["changes"].values()] == [invariance["gyros"]] * 3, row["name"]
     assert peer["changes"]["rad/s"]["same"] < invariance["gyros"]
 
 
@@ -210,11 +208,7 @@ def test_every_target_agreed_in_every_bit() -> None:
     result = recorded(DOCS, "targets")
     for model in result["models"]:
         assert (model["failed"], model["mismatches"], model["rows_that_differ"]) == (0, 0, 0)
-        assert (
-            model["names"] >= 12
-            and model["passed"] == model["targets"]
-            and model["smallest_vectors"] >= 20000
-        )
+        assert model["names"] >= 12 and model["passed"] == model["targets"] and model["smallest_vectors"] >= 20000
     assert [n["differing_lines"] for n in result["nav_loop"]] == [0, 0]
 
 
@@ -254,9 +248,7 @@ def test_the_diagram_of_reliability_is_of_the_newest_runs() -> None:
 
 
 @pytest.mark.parametrize(("world", "name"), [(blind, "blind"), (other, "blind-other")])
-def test_a_blind_run_written_again_takes_the_place_of_itself_alone(
-    world: Any, name: str, tmp_path: Path
-) -> None:
+def test_a_blind_run_written_again_takes_the_place_of_itself_alone(world: Any, name: str, tmp_path: Path) -> None:
     runs = recorded(DOCS, name)["runs"]
     keep(tmp_path / "docs", name, {"runs": runs})
     blind.write_section(tmp_path / "docs", name, runs[1], {"written": "in another year"}, world.section)
@@ -268,8 +260,7 @@ def test_a_blind_run_written_again_takes_the_place_of_itself_alone(
 
 def test_a_blind_run_fails_by_its_published_requirements(capsys: pytest.CaptureFixture[str]) -> None:
     met, missed, free = (
-        {"name": n, "goal": g, "met": m}
-        for n, g, m in (("a", "0", True), ("b", "0", False), ("c", "-", False))
+        {"name": n, "goal": g, "met": m} for n, g, m in (("a", "0", True), ("b", "0", False), ("c", "-", False))
     )
     assert ended([met, free]) == 0
     assert ended([met, missed, free]) == 1 and capsys.readouterr().out == "missed: b\n"
@@ -288,9 +279,7 @@ def test_what_is_gained_is_counted_over_all_that_was_hidden() -> None:
     assert of_all["value"] == pytest.approx(0.5) and of_all["of"] == 2 and not of_all["met"]
 
 
-@pytest.mark.parametrize(
-    ("after", "high", "worse", "surely"), [(0.9, 0.2, 0, 0), (1.1, 0.1, 1, 0), (1.1, -0.05, 1, 1)]
-)
+@pytest.mark.parametrize(("after", "high", "worse", "surely"), [(0.9, 0.2, 0, 0), (1.1, 0.1, 1, 0), (1.1, -0.05, 1, 1)])
 def test_what_is_worse_than_before_is_reported_apart_from_what_is_worse_by_more_than_noise(
     after: float, high: float, worse: int, surely: int
 ) -> None:

@@ -49,9 +49,7 @@ def setup(house: Path, level: str, unknown: str = "") -> tuple[int, list[str], s
     )  # fmt: skip
     lines = calls.read_text().splitlines() if calls.exists() else []
     assert lines.count("update -qq") == 1, "the lists are fetched once"
-    asked = [
-        word for line in lines if line.startswith("install") for word in line.split()[1:] if word[0] != "-"
-    ]
+    asked = [word for line in lines if line.startswith("install") for word in line.split()[1:] if word[0] != "-"]
     return done.returncode, asked, done.stderr
 
 

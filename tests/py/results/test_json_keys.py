@@ -245,9 +245,7 @@ def test_a_marker_is_written_by_name_and_says_no_more_than_it_has_to() -> None:
     marker = marker_of("result", "build").but(files={"b": "1", "a": "2"}, parts=("z", "y"))
     assert list(json.loads(marker_text(marker))["files"]) == ["a", "b"]
     assert json.loads(marker_text(marker))["parts"] == ["y", "z"]
-    assert not {"pending", "unfinished"} & set(
-        json.loads(marker_text(marker.but(pending={}, unfinished=False)))
-    )
+    assert not {"pending", "unfinished"} & set(json.loads(marker_text(marker.but(pending={}, unfinished=False))))
     again = checked_result(json.loads(marker_text(marker.but(unfinished=True))), Marker, "marker")
     assert again.unfinished and again.known("a") == {"2"} and again.entries() == {"a", "b", "y", "z"}
 
@@ -263,9 +261,7 @@ def test_a_result_that_is_no_number_cannot_be_made() -> None:
 def test_the_command_prints_a_schema_or_all(gyrotc: Command) -> None:
     done = gyrotc("schema", "limits")
     assert done.returncode == 0 and json.loads(done.stdout) == HeldLimits.model_json_schema()
-    assert json.loads(gyrotc("schema").stdout) == {
-        name: json.loads(gyrotc("schema", name).stdout) for name in KINDS
-    }
+    assert json.loads(gyrotc("schema").stdout) == {name: json.loads(gyrotc("schema", name).stdout) for name in KINDS}
     done = gyrotc("schema", "limit")
     assert done.returncode == 2 and "changes, check" in done.stderr
 

@@ -10,9 +10,7 @@ from gyrotc.target.table import Numeric
 from bench.faults import CLASSES, FIRST_SEED, outcomes
 
 _RMS = 2.0  # of error / sigma of one gyro; all 54 of the campaign together stay below 1.5
-_SWAPPED = (
-    "channel and thermometer swapped"  # both go on for a moment: a block passes before they are refused
-)
+_SWAPPED = "channel and thermometer swapped"  # both go on for a moment: a block passes before they are refused
 _BLOCK_S = 10.0
 
 

@@ -82,9 +82,7 @@ def test_a_program_links_without_a_c_library(compiler: str, level: str, tmp_path
         (tmp_path / "alone.c").write_text(ALONE.format(n=numeric, number=number))
         files = ["alone.c", str(MINIMAL / "gtc_rlg_0042.c"), *SOURCES]
         command = [*COMPILERS[compiler], level, *RIGHT, *options, *files, "-nostdlib", "-static", "-lgcc"]
-        done = subprocess.run(
-            [*command, "-o", "alone"], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
+        done = subprocess.run([*command, "-o", "alone"], cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:2000]
 
 
@@ -101,9 +99,7 @@ def test_units_with_different_options_do_not_link_and_the_linker_says_which(
     units = {"the program": ["main.c"], "a table with terms": [str(table)], "the runtime": SOURCES}
     done = _linked_of(tmp_path, table, units, {unit: option})
     assert done.returncode != 0
-    assert re.search(r"undefined reference to .gtc_f32_init_[0-9]+blocks_[0-9]+terms", done.stderr), (
-        done.stderr
-    )
+    assert re.search(r"undefined reference to .gtc_f32_init_[0-9]+blocks_[0-9]+terms", done.stderr), done.stderr
     # A table is the same in all of them.
     done = _linked_of(tmp_path, table, units, {"a table with terms": "-DGTC_MAX_SLOPE_BLOCKS=32"})
     assert done.returncode == 0, done.stderr
@@ -137,9 +133,7 @@ def test_an_emitted_runtime_holds_the_arithmetics_asked_for_alone(numeric: str, 
     (tmp_path / "gtc.h").write_text(header)
     (tmp_path / "gtc.c").write_text(source)
     (tmp_path / "gtc_config.h").touch()
-    subprocess.run(
-        ["gcc", *RIGHT[:2], "-Wall", "-Wextra", "-Werror", "-c", "gtc.c"], cwd=tmp_path, check=True
-    )
+    subprocess.run(["gcc", *RIGHT[:2], "-Wall", "-Wextra", "-Werror", "-c", "gtc.c"], cwd=tmp_path, check=True)
     names = subprocess.run(["nm", "gtc.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert f"gtc_{other}_" not in names and f"gtc_{numeric}_init_20blocks_4terms" in names
 
@@ -203,9 +197,7 @@ def test_a_plain_table_links_the_front_end_and_the_map(library: Path, tmp_path: 
     ("table", "terms"),
     [("gtc_test_t", {"memory", "play", "warm_up", "auxiliary"}), ("gtc_test_h", {"memory", "harmonic"})],
 )
-def test_a_table_links_the_terms_that_it_names(
-    library: Path, tmp_path: Path, table: str, terms: set[str]
-) -> None:
+def test_a_table_links_the_terms_that_it_names(library: Path, tmp_path: Path, table: str, terms: set[str]) -> None:
     found = _terms(_symbols(library, tmp_path, table, ROOT / "tests" / "c" / "table"))
     assert found == terms and found < ALL
 
@@ -269,9 +261,7 @@ def test_macros_of_an_emitted_header_are_those_of_the_model(tmp_path: Path) -> N
         'strcmp(GTC_SIM_0002_CHANNEL_2, "supply_v") == 0',
         f"GTC_SIM_0002_Q31_BIAS_FRAC_BITS == {emission.tables['q31'].bias_frac_bits}",
     ]  # fmt: skip
-    checks = "".join(
-        f"    if (!({claim})) {{\n        return {k + 1};\n    }}\n" for k, claim in enumerate(claims)
-    )
+    checks = "".join(f"    if (!({claim})) {{\n        return {k + 1};\n    }}\n" for k, claim in enumerate(claims))
     includes = '#include <math.h>\n#include <string.h>\n#include "gtc_sim_0002.h"\n'
     text = f"{includes}int main(void)\n{{\n{checks}    return 0;\n}}\n"
     (tmp_path / "c" / "user.c").write_text(text)
@@ -347,25 +337,19 @@ def _cplusplus(work: Path, compiler: str, wrong: str) -> int:
     include = [f"-I{ROOT / 'include'}", f"-I{MINIMAL}"]
     (work / "user.cpp").write_text(CPLUSPLUS.replace("WRONG", wrong))
     flags = ["-std=c++11", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-fno-exceptions"]
-    done = subprocess.run(
-        [compiler, *flags, *include, "-c", "user.cpp"], cwd=work, capture_output=True, check=False
-    )
+    done = subprocess.run([compiler, *flags, *include, "-c", "user.cpp"], cwd=work, capture_output=True, check=False)
     return done.returncode
 
 
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
-def test_the_cplusplus_face_gives_what_c_gives_and_refuses_swapped_units(
-    compiler: str, tmp_path: Path
-) -> None:
+def test_the_cplusplus_face_gives_what_c_gives_and_refuses_swapped_units(compiler: str, tmp_path: Path) -> None:
     for wrong in SWAPPED:
         assert _cplusplus(tmp_path, compiler, wrong) != 0, wrong
     assert _cplusplus(tmp_path, compiler, "") == 0
     flags = [*C_FLAGS[:2], f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}"]
     files = [*SOURCES, str(MINIMAL / "gtc_rlg_0042.c")]
     subprocess.run(["gcc", *flags, "-c", *files], cwd=tmp_path, check=True)
-    subprocess.run(
-        [compiler, *(p.name for p in tmp_path.glob("*.o")), "-o", "user"], cwd=tmp_path, check=True
-    )
+    subprocess.run([compiler, *(p.name for p in tmp_path.glob("*.o")), "-o", "user"], cwd=tmp_path, check=True)
     subprocess.run([tmp_path / "user"], check=True)
 
 
@@ -378,9 +362,7 @@ def test_the_rule_of_the_header_is_free_of_races_and_a_breach_is_seen(broken: bo
     extra = ["-DBREAK_THE_RULE"] if broken else []
     subprocess.run(["clang", *flags, *extra, *include, *files, "-o", "threads"], cwd=tmp_path, check=True)
     # Without randomised addresses, which older sanitizers do not find their way in.
-    done = subprocess.run(
-        ["setarch", "-R", "./threads"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(["setarch", "-R", "./threads"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert "FATAL" not in done.stderr, done.stderr[:500]
     assert ("data race" in done.stderr) == broken, done.stderr[:2000]
     assert broken or done.returncode == 0

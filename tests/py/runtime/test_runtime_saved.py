@@ -103,9 +103,7 @@ def _first(device: Device, state: Any, sample: Words) -> Words:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_a_play_outlasts_a_time_without_power(
-    build: Runtime, numeric: str, model_dict: dict[str, Any]
-) -> None:
+def test_a_play_outlasts_a_time_without_power(build: Runtime, numeric: str, model_dict: dict[str, Any]) -> None:
     term = Term(id="hysteresis", parameters={"width_c": 2.0, "amplitude_dph_per_c": 0.01})
     model = Model.from_dict(model_dict).model_copy(update={"terms": (term,)})
     device = Device(build, quantise(model, numeric))
@@ -118,9 +116,7 @@ def test_a_play_outlasts_a_time_without_power(
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_a_memory_relaxes_over_a_time_without_power(
-    build: Runtime, numeric: str, model_dict: dict[str, Any]
-) -> None:
+def test_a_memory_relaxes_over_a_time_without_power(build: Runtime, numeric: str, model_dict: dict[str, Any]) -> None:
     """And over two such times with a start without a sample between them as over both together."""
     parameters = {"tau_s": 600.0, "amplitude_dph_per_c": 0.01}
     term = Term(id="thermal_gradient", parameters=parameters)

@@ -152,9 +152,7 @@ def test_temperature_and_its_rate_explain_the_plain_bias_far_below_the_noise(see
     assert np.sqrt(np.mean((y - x @ weights) ** 2)) < 0.02 * 7e-4
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_gyro(
-    short: Path, tmp_path: Path
-) -> None:
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_gyro(short: Path, tmp_path: Path) -> None:
     first, again, other = (made(short, tmp_path / n, seed=s) for n, s in (("a", 3), ("b", 3), ("c", 4)))
     for file in sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file()):
         assert (first / file).read_bytes() == (again / file).read_bytes(), file
@@ -214,9 +212,7 @@ def test_every_cause_is_switched_on_from_a_scenario_file(cause: str, short: Path
 
 
 @pytest.mark.parametrize("raw_hz", [0.05, 0.5, 2.0, 50.0])
-def test_rows_of_any_length_show_the_same_angle_and_temperature(
-    short: Path, tmp_path: Path, raw_hz: float
-) -> None:
+def test_rows_of_any_length_show_the_same_angle_and_temperature(short: Path, tmp_path: Path, raw_hz: float) -> None:
     long = columns(made(short, tmp_path / "long", row_s=60.0) / "run-01.csv")
     fine = columns(made(short, tmp_path / "fine", raw_hz=raw_hz) / "run-01.csv")
     each = round(60.0 * raw_hz)
@@ -275,9 +271,7 @@ def test_a_folder_of_recordings_has_no_truth_and_is_never_overwritten(short: Pat
     assert [path.name for path in folder.iterdir()] == ["run.csv"]
 
 
-def test_a_simulated_folder_is_replaced_and_an_interrupted_run_leaves_no_trace(
-    short: Path, tmp_path: Path
-) -> None:
+def test_a_simulated_folder_is_replaced_and_an_interrupted_run_leaves_no_trace(short: Path, tmp_path: Path) -> None:
     folder = made(short, tmp_path / "data")
     (folder / "notes.txt").write_text("years of work", "utf-8")
     with pytest.raises(InputError, match=r"notes\.txt"):
@@ -303,9 +297,7 @@ def test_progress_rises_to_one(short: Path, tmp_path: Path) -> None:
     assert shares == sorted(shares) and shares[-1] == 1.0 and 0.0 < shares[0] < 1.0
 
 
-@pytest.mark.parametrize(
-    ("row_s", "raw_hz"), [(0.3, None), (1.5, None), (0.0, None), (10.0, 2.5), (10.0, -1.0)]
-)
+@pytest.mark.parametrize(("row_s", "raw_hz"), [(0.3, None), (1.5, None), (0.0, None), (10.0, 2.5), (10.0, -1.0)])
 def test_a_row_length_that_does_not_fit_a_second_is_refused(row_s: float, raw_hz: float | None) -> None:
     with pytest.raises(InputError, match="row length"):
         RowLength.of(row_s, raw_hz)
@@ -416,9 +408,7 @@ def test_scenarios_that_extend_each_other_are_refused(tmp_path: Path) -> None:
 def test_the_truth_names_the_causes(tmp_path: Path) -> None:
     folder = made("hysteresis", tmp_path / "data", row_s=100.0)
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
-    assert truth["causes"] == [
-        {"id": "hysteresis", "channel": None, "width_c": 4.0, "amplitude_dph_per_c": 1.2e-4}
-    ]
+    assert truth["causes"] == [{"id": "hysteresis", "channel": None, "width_c": 4.0, "amplitude_dph_per_c": 1.2e-4}]
     described = (folder / "dataset.toml").read_text("utf-8")
     assert "truth" not in described and "seed" not in described
 
@@ -486,9 +476,7 @@ def test_rate_random_walk_rises_with_the_root_of_tau(seed: int) -> None:
     k = 5e-3
     taus = np.array([30.0, 100.0, 300.0])
     levels = NoiseLevels(rate_random_walk_dph_per_sqrt_h=k)
-    several = [
-        allan(noise_of_cells(levels, 100_000, seed + j) / CELL_S, taus.tolist())[0] ** 2 for j in range(4)
-    ]
+    several = [allan(noise_of_cells(levels, 100_000, seed + j) / CELL_S, taus.tolist())[0] ** 2 for j in range(4)]
     deviation = np.sqrt(np.mean(several, axis=0))
     # Means over m cells of a walk with one step a cell: K²τ/3 times 1 + 1/(2 m²).
     expected = k * np.sqrt(taus / HOUR_S / 3.0 * (1.0 + 0.5 / taus**2))

@@ -91,9 +91,7 @@ def test_intensity_falls_with_losses_with_a_hotter_gas_and_with_the_years() -> N
 
 
 def test_the_bias_is_the_map_with_what_differences_and_laser_add() -> None:
-    whole, bare = (
-        next(campaign(planned(**changes), 3)) for changes in ({}, {"difference": [], "laser": None})
-    )
+    whole, bare = (next(campaign(planned(**changes), 3)) for changes in ({}, {"difference": [], "laser": None}))
     added = (whole.bias_dph - bare.bias_dph)[:-1]
     s = whole.states
     x = s["mirror_c"] - s["block_c"]
@@ -242,17 +240,13 @@ def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp
     assert first == again == ["LOT-0004-001", "LOT-0004-002", "LOT-0004-003"]
     for serial in first:
         for file in ("run-01.csv", "truth.json", "dataset.toml"):
-            assert (tmp_path / "a" / serial / file).read_bytes() == (
-                tmp_path / "b" / serial / file
-            ).read_bytes()
+            assert (tmp_path / "a" / serial / file).read_bytes() == (tmp_path / "b" / serial / file).read_bytes()
         dataset = load(tmp_path / "a" / serial)
         assert dataset.serial == serial
         truth = read_truth(tmp_path / "a" / serial)
         assert truth is not None and truth.content.lot is not None
         assert set(truth.content.lot.scores) == set(SCORES)
-    reported = [
-        json.loads((tmp_path / "a" / s / "truth.json").read_text())["lot"]["unrelated"] for s in first
-    ]
+    reported = [json.loads((tmp_path / "a" / s / "truth.json").read_text())["lot"]["unrelated"] for s in first]
     assert sum(reported) == 1
 
 

@@ -151,9 +151,7 @@ def test_nothing_foreign_is_changed_at_a_name_that_is_opened(
     opened = {os.path.relpath(path, work) for path in map(os.path.abspath, traced)}
     names = {name for name in opened if not name.startswith("..") and MADE not in name}
     assert any(name.endswith(".lock") for name in names)
-    names |= {
-        path.name for path in work.iterdir()
-    } - there  # and the outputs, which are renamed into their places
+    names |= {path.name for path in work.iterdir()} - there  # and the outputs, which are renamed into their places
     for name in sorted(names):
         for plant in (link, hard_link, pipe, folder, file):
             _refused_or_replaced(command, _fresh(start, work), name, plant, capfd)
@@ -240,8 +238,7 @@ def _writes(tree: ast.AST) -> Iterator[str]:
         plain = [a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
         flags = " ".join(ast.unparse(argument) for argument in call.args[1:])
         if name in _WRITING or (
-            name == "open"
-            and (any(set(text) <= set("rwaxbt+") - {"r"} for text in plain) or "O_CREAT" in flags)
+            name == "open" and (any(set(text) <= set("rwaxbt+") - {"r"} for text in plain) or "O_CREAT" in flags)
         ):
             yield name
 

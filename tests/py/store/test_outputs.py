@@ -201,9 +201,7 @@ def test_parts_have_markers_of_their_own(out: Path) -> None:
 def test_a_second_job_is_reported_who_holds_the_place(out: Path) -> None:
     with result_folder(out, "build"), pytest.raises(InputError) as caught:
         write(out, "two", "fit")
-    assert f"gyrotc build, process {os.getpid()} on " in str(caught.value) and ", since 2" in str(
-        caught.value
-    )
+    assert f"gyrotc build, process {os.getpid()} on " in str(caught.value) and ", since 2" in str(caught.value)
     write(out, "two")
     assert not list(out.parent.glob(".*.lock"))
 
@@ -220,9 +218,7 @@ def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
     mine.mkdir()
     (mine / "thesis.tex").write_text("years")
     write(out, "one")
-    left = {p.name for p in out.parent.iterdir() if p.name != "out"} - {
-        out.readlink().name if out.is_symlink() else ""
-    }
+    left = {p.name for p in out.parent.iterdir() if p.name != "out"} - {out.readlink().name if out.is_symlink() else ""}
     assert left == {mine.name} and (mine / "thesis.tex").read_text() == "years"
 
 
@@ -258,9 +254,7 @@ def test_a_forged_marker_reaches_nothing_outside(out: Path, way: str) -> None:
     assert thesis.read_text() == "years" and faults(out.parent / "other") == []
 
 
-def test_what_a_forged_leftover_holds_goes_nowhere_else(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_forged_leftover_holds_goes_nowhere_else(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """A file that somebody put into a result is carried over into the next, and never through a link out of it."""
     (tmp_path / "home").mkdir()
     project, left = tmp_path / "project", tmp_path / ".project.gyrotc-part-00000000"
@@ -370,9 +364,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> Path:
 
 
 def tree(folder: Path) -> dict[str, bytes]:
-    return {
-        p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()
-    }
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def refused(command: Command, folder: Path, *arguments: object, reported: str) -> None:
@@ -385,9 +377,7 @@ def refused(command: Command, folder: Path, *arguments: object, reported: str) -
 
 
 @pytest.mark.parametrize("decoy", ["model.json", "manifest.json", "c"])
-def test_a_firmware_project_is_not_taken_for_a_result(
-    decoy: str, made: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_a_firmware_project_is_not_taken_for_a_result(decoy: str, made: Path, tmp_path: Path, gyrotc: Command) -> None:
     project = tmp_path / "firmware"
     (project / ".git").mkdir(parents=True)
     (project / ".git" / "HEAD").write_text("ref")
@@ -407,17 +397,11 @@ def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> No
         refused(gyrotc, made, command, data, "--out", data, reported="is the data set")
         refused(gyrotc, made, command, data, "--out", data / "x", reported="inside the data set")
         refused(gyrotc, made, command, data, "--out", made, reported="above the data set")
-    refused(
-        gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", reported="run-01.csv"
-    )
-    refused(
-        gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", reported="is a file"
-    )
+    refused(gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", reported="run-01.csv")
+    refused(gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", reported="is a file")
 
 
-def test_emit_puts_code_beside_the_users_own_and_deletes_none(
-    made: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_emit_puts_code_beside_the_users_own_and_deletes_none(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     (tmp_path / "src.c").write_text("mine")
     for _ in range(2):
         assert gyrotc("emit", made / "result", "--out", tmp_path, "--numeric", "f32").returncode == 0
@@ -436,9 +420,7 @@ def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path, 
     refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, reported=MARKER)
 
 
-def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(
-    made: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     out = tmp_path / "result"
     steps = (
         ("fit", made / "A", "--out", out),
@@ -485,9 +467,7 @@ def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) ->
 def test_a_full_disk_and_a_place_that_cannot_be_written(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     refused(gyrotc, tmp_path, "check", made / "A", "--json", "/dev/full", reported="No space left")
     refused(gyrotc, tmp_path, "fit", made / "A", "--out", "/proc/out", reported="/proc")
-    refused(
-        gyrotc, tmp_path, "fit", made / "A", "--out", made / "A" / "run-01.csv" / "x", reported="run-01.csv"
-    )
+    refused(gyrotc, tmp_path, "fit", made / "A", "--out", made / "A" / "run-01.csv" / "x", reported="run-01.csv")
     program = Path(sys.executable).with_name("gyrotc")
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -514,17 +494,13 @@ def test_a_closed_pipe_is_reported_as_shells_expect(made: Path) -> None:
     program = Path(sys.executable).with_name("gyrotc")
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run(
-        [program, "check", made / "A"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False
-    )
+    done = subprocess.run([program, "check", made / "A"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
 
 
 @pytest.mark.parametrize("number", quick_and_slow([signal.SIGTERM], [signal.SIGINT, signal.SIGHUP]))
-def test_a_signal_cleans_up_and_ends_as_shells_expect(
-    number: signal.Signals, made: Path, tmp_path: Path
-) -> None:
+def test_a_signal_cleans_up_and_ends_as_shells_expect(number: signal.Signals, made: Path, tmp_path: Path) -> None:
     """While it waits for a compiler, which says that it was started and then never ends."""
     tools, started, place = tmp_path / "tools", tmp_path / "started", tmp_path / "place"
     for folder in (tools, place):

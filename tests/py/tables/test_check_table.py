@@ -100,17 +100,13 @@ def test_a_table_with_uncertainties_is_the_model(uncertain: Path) -> None:
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("word", [0, 45, 80, 81, 89, 90])
 @pytest.mark.slow
-def test_seeded_fault_in_the_uncertainty_is_seen(
-    word: int, numeric: str, tmp_path: Path, few_vectors: None
-) -> None:
+def test_seeded_fault_in_the_uncertainty_is_seen(word: int, numeric: str, tmp_path: Path, few_vectors: None) -> None:
     """A cell of either grid, the first rules, noise and correlation time."""
     model = load_model(UNCERTAIN)
     table = quantise_all(model, [numeric]).tables[numeric]
     words = _words(table, "sigma")
     words[word] += 4
-    write_texts(
-        tmp_path, emit_texts(model, Emission({numeric: replace(table, sigma=words)}, {}), asked=True), model
-    )
+    write_texts(tmp_path, emit_texts(model, Emission({numeric: replace(table, sigma=words)}, {}), asked=True), model)
     model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1 and f"word {word} of the uncertainty" in done.stdout, done.stdout
@@ -291,9 +287,7 @@ def test_seeded_fault_of_quantisation_is_seen(
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("name", EXTENDED_FAULTS)
 @pytest.mark.slow
-def test_seeded_fault_in_terms_or_bank_is_seen(
-    name: str, numeric: str, tmp_path: Path, few_vectors: None
-) -> None:
+def test_seeded_fault_in_terms_or_bank_is_seen(name: str, numeric: str, tmp_path: Path, few_vectors: None) -> None:
     model = _extended(3)
     table = EXTENDED_FAULTS[name](quantise_all(model, [numeric]).tables[numeric])
     write_texts(tmp_path, emit_texts(model, Emission({numeric: table}, {}), asked=True), model)

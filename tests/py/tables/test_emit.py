@@ -108,9 +108,7 @@ def test_main_prints_no_wild_correction_whatever_a_channel_reads(reading: str, t
 
     As emitted it feeds what is used where the channel is lost.
     """
-    term = Term(
-        id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v"
-    )
+    term = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")
     guard = Guard(
         low=27.0, high=29.0, max_step=2.0, max_rate_per_min=0.0, agree_s=1.0, stuck_s=0.0,
         missing_s=300.0, fallback=28.4,
@@ -125,9 +123,7 @@ def test_main_prints_no_wild_correction_whatever_a_channel_reads(reading: str, t
     assert turns == 1
     (c / "main.c").write_text(longer, "ascii")
     sources = [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"]
-    subprocess.run(
-        ["gcc", "-std=c99", "-ffp-contract=off", "-w", "-o", tmp_path / "main", *sources], check=True
-    )
+    subprocess.run(["gcc", "-std=c99", "-ffp-contract=off", "-w", "-o", tmp_path / "main", *sources], check=True)
     printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
     temperature, bias = float(printed.split()[2]), float(printed.split()[4])
     expected = float(model.map_dph(temperature, 0.0)) + READINGS[reading]
@@ -157,9 +153,7 @@ def test_zero_at_emits_a_table_that_is_zero_there_and_verifies(tmp_path: Path, g
 LEFT_OUT = ("uncertainty", "rezero", "coverage", "known_answers", "image", "saved_state", "time")
 
 
-def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(
-    tmp_path: Path, gyrotc: Command
-) -> None:
+def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: Path, gyrotc: Command) -> None:
     """The map stays, bit for bit; the header names what is missing, and the small runtime passes every vector."""
     whole = load_model(ROOT / "examples" / "nav_loop" / "filter_model.json")
     assert whole.coverage is not None and whole.uncertainty_dph is not None
@@ -220,9 +214,7 @@ def test_the_example_builds_from_the_library_s_folders_by_its_one_command(tmp_pa
     assert done.returncode == 0, done.stderr
     assert "deg/h" in done.stdout and not done.stderr
     assert (
-        (ROOT / "libc" / "README.md")
-        .read_text()
-        .startswith("libc = the C library of gyrotc that runs on the target")
+        (ROOT / "libc" / "README.md").read_text().startswith("libc = the C library of gyrotc that runs on the target")
     )
 
 

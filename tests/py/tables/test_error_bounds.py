@@ -52,9 +52,7 @@ def test_the_bound_holds_for_any_legal_model(make: Callable[[int], Model]) -> No
 @pytest.mark.parametrize(
     ("make", "seed"), [(extreme_model, 1100841351), (extreme_model, 1022696059), (extreme_bank, 51000272)]
 )
-def test_what_is_narrower_than_the_grid_is_within_the_authority(
-    make: Callable[[int], Model], seed: int
-) -> None:
+def test_what_is_narrower_than_the_grid_is_within_the_authority(make: Callable[[int], Model], seed: int) -> None:
     """A ridge that crosses another one or is highest at the envelope's edge, a region: 2.6e-6, 0.03, 3 deg/h short."""
     model = make(seed)
     table = quantise(model, "f32")
@@ -65,9 +63,7 @@ def test_what_is_narrower_than_the_grid_is_within_the_authority(
 def test_the_bound_holds_in_an_envelope_narrower_than_fixed_point_tells(width: float) -> None:
     """Both its ends round to the same 2^-16 C, 6 positions beside the center: fixed point bounds it or refuses it."""
     center = 19.6 / 65536.0
-    gaussian = Network(
-        w0=0.0, linear=(0.0, 0.0), centers=((center, 0.0),), widths=((width, None),), weights=(1.0,)
-    )
+    gaussian = Network(w0=0.0, linear=(0.0, 0.0), centers=((center, 0.0),), widths=((width, None),), weights=(1.0,))
     model = random_model(
         3,
         scale=Scale(temperature_c=(center, 2e-6), slope_c_per_min=1.0),
@@ -237,9 +233,7 @@ def test_weights_below_the_smallest_float_are_lost_and_counted() -> None:
 def test_a_gaussian_that_no_shift_of_32_bits_can_hold_is_refused() -> None:
     model = random_model(6)
     n = len(model.networks[0].weights)
-    network = model.networks[0].model_copy(
-        update={"widths": ((1e-3, 1e-3),) * n, "centers": ((400.0, 1000.0),) * n}
-    )
+    network = model.networks[0].model_copy(update={"widths": ((1e-3, 1e-3),) * n, "centers": ((400.0, 1000.0),) * n})
     far = network.model_copy(update={"centers": ((model.envelope.temperature_c[0], -1e-3),) * n})
     for one in (network, far):
         try:

@@ -57,10 +57,7 @@ class Unit:
         assert self.c.gtc_learn_start(self.state, self.prior) == OK
 
     def power_on(self, off_s: float, temp_c: float) -> None:
-        assert (
-            self.c.gtc_learn_power_on(self.state, self.prior, ctypes.c_float(off_s), ctypes.c_float(temp_c))
-            == OK
-        )
+        assert self.c.gtc_learn_power_on(self.state, self.prior, ctypes.c_float(off_s), ctypes.c_float(temp_c)) == OK
 
     def rest(self, stop: Stop) -> int:
         given = _Stop(stop.time_s, stop.temp_c, stop.span_c, float(np.asarray(stop.rate_dph)), stop.duration_s,
@@ -116,9 +113,7 @@ def test_the_unit_has_the_bits_of_its_mirror(library: ctypes.CDLL) -> None:
             time = 0.0
             for _ in range(12):
                 time = float(np.float32(time + draw.choice([0.0, 1.0, 60.0, 3600.0, 1e5])))
-                temp = float(
-                    np.float32(temp + draw.choice([0.0, 1e-4, 0.3, 7.0, 60.0]) * draw.choice([-1, 1]))
-                )
+                temp = float(np.float32(temp + draw.choice([0.0, 1e-4, 0.3, 7.0, 60.0]) * draw.choice([-1, 1])))
                 stop = Stop(
                     time, temp, float(np.float32(draw.normal(0.0, 10.0 ** draw.uniform(-5, 0)))),
                     float(draw.choice([1.0, 60.0, 1800.0])), span_c=float(draw.choice([0.0, 2.0, 2.5])),

@@ -28,9 +28,7 @@ CURVE_ERROR = GAUSS_ERROR + 0.715 * 2.0**-28 + 2.0**-30
 F32_CURVE_ERROR = F32_GAUSS_ERROR + (3.5 * 0.736 + 2.0) * 2.0**-24
 
 
-def _run(
-    name: str, work: Path, *arguments: str, libc: Path = ROOT / "libc", half: int = 0
-) -> dict[str, list]:
+def _run(name: str, work: Path, *arguments: str, libc: Path = ROOT / "libc", half: int = 0) -> dict[str, list]:
     """Words of each line that a program prints, by its first word."""
     program = work / name
     parts = ("gtc_crc.c", "gtc_q31.c", "gtc_f32.c")
@@ -62,9 +60,7 @@ def test_float32_gaussian_over_every_seventh_argument(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "bound"), [("primitives_q31", CURVE_ERROR), ("primitives_f32", F32_CURVE_ERROR)]
-)
+@pytest.mark.parametrize(("name", "bound"), [("primitives_q31", CURVE_ERROR), ("primitives_f32", F32_CURVE_ERROR)])
 def test_the_gaussians_of_a_channel_over_every_97th_reading(name: str, bound: float, tmp_path: Path) -> None:
     """`make prove` takes every one."""
     visited, wrong, worst = _run(name, tmp_path, "curve", "97")["curve"]
@@ -91,9 +87,7 @@ def test_a_curve_with_one_wrong_bit_is_seen(tmp_path: Path) -> None:
         ("primitives_f32", "gtc_num_f32.h", r"0x1\.71549ep\+6", "0x1.7154a0p+6"),
     ],
 )
-def test_one_wrong_bit_is_seen(
-    program: str, file: str, pattern: str, replacement: str, tmp_path: Path
-) -> None:
+def test_one_wrong_bit_is_seen(program: str, file: str, pattern: str, replacement: str, tmp_path: Path) -> None:
     libc = Path(shutil.copytree(ROOT / "libc", tmp_path / "libc"))
     spoil(libc / file, pattern, replacement)
     found = _run(program, tmp_path, "61", libc=libc)
@@ -180,9 +174,7 @@ def test_a_coarse_sensor_is_never_taken_for_stuck() -> None:
 @pytest.mark.parametrize("reading", [0.0, 4095.0, 1e20, -1e20])
 def test_no_reading_of_a_channel_leaves_the_authority(numeric: str, reading: float) -> None:
     """A supply of 0 V gave -0.28 deg/h, a raw 4095 42 deg/h, and 1e20 what it liked, all with status 0."""
-    term = Term(
-        id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v"
-    )
+    term = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")
     guard = Guard(
         low=27.0, high=29.0, max_step=2.0, max_rate_per_min=0.0, agree_s=1.0, stuck_s=0.0,
         missing_s=300.0, fallback=28.0,
@@ -212,9 +204,7 @@ def test_however_samples_are_missed_results_are_the_same_bits(numeric: str, seed
     c = runtime()
     status, bits = c.steps(table, channels, missed, 7)
     gaps = np.flatnonzero(missed)
-    every = np.full(
-        (int(missed[gaps].sum()), channels.shape[1]), table.encode_inputs(np.nan), dtype=np.uint32
-    )
+    every = np.full((int(missed[gaps].sum()), channels.shape[1]), table.encode_inputs(np.nan), dtype=np.uint32)
     parts, at, start = [], 0, 0
     for gap in gaps.tolist():
         parts += [channels[start:gap], every[at : at + missed[gap]]]

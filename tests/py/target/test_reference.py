@@ -210,9 +210,7 @@ def _spoiled(rng: np.random.Generator, table: Table) -> Table:
         k = int(rng.integers(len(words)))
         words[k] = _word(rng, words[k])
         return replace(table, **{name: tuple(words)})
-    names = [
-        n for n in ("networks", "centers", "guards", "guards", "terms", "sigma") if getattr(table, n).size
-    ]
+    names = [n for n in ("networks", "centers", "guards", "guards", "terms", "sigma") if getattr(table, n).size]
     name = str(rng.choice(names))
     array = getattr(table, name).copy()
     k = int(rng.integers(array.size))
@@ -272,6 +270,4 @@ HEADER = Path(__file__).resolve().parents[3] / "include" / "gtc.h"
 def test_the_bits_of_python_are_those_of_the_header() -> None:
     statuses = HEADER.read_text("utf-8").split("#define GTC_OK", 1)[1].split("#define GTC_TEMP_MISSING", 1)[0]
     found = re.findall(r"#define GTC_(\w+) \(?(-?\d+)\)?", "#define GTC_OK" + statuses)
-    assert {name: int(value) for name, value in found} == {
-        n: value for n, value in vars(status).items() if n.isupper()
-    }
+    assert {name: int(value) for name, value in found} == {n: value for n, value in vars(status).items() if n.isupper()}

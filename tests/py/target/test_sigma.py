@@ -34,9 +34,7 @@ def test_snapshots_are_those_of_the_reference_in_any_history(build: Runtime, num
     seen = 0
     for trial in range(40):
         model = variant(seed + trial)
-        model = model.model_copy(
-            update={"uncertainty_dph": random_uncertainty(seed + trial, len(model.terms))}
-        )
+        model = model.model_copy(update={"uncertainty_dph": random_uncertainty(seed + trial, len(model.terms))})
         try:
             table = quantise(model, numeric)
         except CheckFailed:  # a model that this arithmetic cannot hold

@@ -50,9 +50,7 @@ def history(rng: np.random.Generator, noise: float = 1e-3) -> TrainingData:
     """Six runs over a triangle of temperature; a bias that curves with T."""
     time = 10.0 * np.arange(_BLOCKS)
     t = np.concatenate([20.0 + 30.0 * np.sin(2 * np.pi * time / 7200.0 + k) for k in range(_RUNS)])
-    r = np.concatenate(
-        [30.0 * 60 * 2 * np.pi / 7200.0 * np.cos(2 * np.pi * time / 7200.0 + k) for k in range(_RUNS)]
-    )
+    r = np.concatenate([30.0 * 60 * 2 * np.pi / 7200.0 * np.cos(2 * np.pi * time / 7200.0 + k) for k in range(_RUNS)])
     n = len(t)
     bias = 7e-3 + 1e-3 * np.tanh(t / 20.0) + rng.normal(0.0, noise, n)
     run = np.repeat(np.arange(_RUNS), _BLOCKS)
@@ -138,10 +136,7 @@ def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, seed: int) -> 
 def test_a_gaussian_too_narrow_for_a_word_of_fixed_point_is_not_tried(rng: np.random.Generator) -> None:
     """A current of half a milliampere about 1 A, in A."""
     samples, u = history(rng), wander(rng)
-    held = {
-        size: {id for id in SHAPES if shape_of(id, 1.0 + size * u, 1.0, samples).is_held}
-        for size in (5e-4, 5e-2)
-    }
+    held = {size: {id for id in SHAPES if shape_of(id, 1.0 + size * u, 1.0, samples).is_held} for size in (5e-4, 5e-2)}
     assert held == {5e-4: {"line", "product"}, 5e-2: {"line", "product", "curve"}}
 
 
@@ -195,9 +190,7 @@ def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_reported(
 
 
 def test_a_difference_of_columns_is_formed_by_its_name() -> None:
-    rows = Rows(
-        np.arange(3.0), np.full(3, 20.0), np.zeros(3), {"case_c": np.full(3, 25.0), "lid_c": np.full(3, 30.0)}
-    )
+    rows = Rows(np.arange(3.0), np.full(3, 20.0), np.zeros(3), {"case_c": np.full(3, 25.0), "lid_c": np.full(3, 30.0)})
     assert rows.channel("case_c - temperature_c").tolist() == [5.0] * 3
     assert rows.channel("lid_c - case_c").tolist() == [5.0] * 3
     assert rows.has_channel("lid_c - case_c")
@@ -442,9 +435,7 @@ def test_bumps_have_their_place_and_width_and_mend_what_a_smooth_map_cannot() ->
     print(f"error of the map {before:.2e} -> {after:.2e} deg/h")
     assert after < 0.5 * before
     whole = replace(finer, outcome=replace(finer.outcome, networks=[_beside(found, finer)]))
-    assert np.allclose(predict(whole, t, r), predict(finer, t, r) + found(t), atol=1e-9), (
-        "one network holds both"
-    )
+    assert np.allclose(predict(whole, t, r), predict(finer, t, r) + found(t), atol=1e-9), "one network holds both"
 
 
 def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
@@ -455,7 +446,6 @@ def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
 def test_a_smooth_map_gets_no_bumps() -> None:
     rng = np.random.default_rng(SEED_OF_BUMPS + 1)
     counts = [
-        len(find_bumps(data, scaling_of(data)).centers_c)
-        for data in (samples(rng, bumps=False) for _ in range(6))
+        len(find_bumps(data, scaling_of(data)).centers_c) for data in (samples(rng, bumps=False) for _ in range(6))
     ]
     assert sum(counts) <= 1, counts

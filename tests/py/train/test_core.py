@@ -23,9 +23,7 @@ def cloud(seed: int, n: int = 400) -> tuple[Floats, Floats, Floats, Floats]:
 
 def design(t: Floats, r: Floats, centers: Floats, width_t: float, width_r: float) -> Floats:
     """A constant and one Gaussian for each center, as columns."""
-    g = np.exp(
-        -(((t[:, None] - centers[:, 0]) / width_t) ** 2) - ((r[:, None] - centers[:, 1]) / width_r) ** 2
-    )
+    g = np.exp(-(((t[:, None] - centers[:, 0]) / width_t) ** 2) - ((r[:, None] - centers[:, 1]) / width_r) ** 2)
     return np.concatenate([np.ones((len(t), 1)), g], axis=1)
 
 
@@ -69,9 +67,7 @@ def both(seed: int, width_t: float, width_r: float) -> list[_core.EqualGaussians
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("widths", [(0.2, 0.4), (0.6, 0.6), (1.5, 0.9)])
-def test_closed_form_normal_equations_are_those_of_the_columns(
-    seed: int, widths: tuple[float, float]
-) -> None:
+def test_closed_form_normal_equations_are_those_of_the_columns(seed: int, widths: tuple[float, float]) -> None:
     t, r, y, weight = cloud(seed)
     for dictionary in both(seed, *widths):
         dictionary.add(_core.Samples(t[:150], r[:150], y[:150], weight[:150]))
@@ -156,9 +152,7 @@ def test_weights_by_qr_are_least_squares(n: int) -> None:
     """Block borders of the streamed QR included; with a ridge, the minimum of the penalised sum."""
     t, r, y, weight = cloud(5, n)
     gaussians = np.array([[-0.5, 0.0, 0.4, 0.6], [0.3, 0.2, 0.7, 0.5], [0.9, -0.4, 0.5, 1.0]])
-    p = np.concatenate(
-        [np.ones((n, 1)), *[design(t, r, g[None, :2], g[2], g[3])[:, 1:] for g in gaussians]], axis=1
-    )
+    p = np.concatenate([np.ones((n, 1)), *[design(t, r, g[None, :2], g[2], g[3])[:, 1:] for g in gaussians]], axis=1)
     root = np.sqrt(weight)
     for ridge in (0.0, 0.5):
         penalty = np.sqrt(ridge) * np.eye(4)[1:]
@@ -272,9 +266,7 @@ def test_mean_and_variance_are_those_of_the_conditioned_process() -> None:
     np.testing.assert_allclose(
         process.mean(at_t, at_r), cross @ np.linalg.solve(covariance, np.asarray(data["mean"])), atol=1e-8
     )
-    variance = np.sum(columns**2 * prior, axis=1) - np.sum(
-        cross * np.linalg.solve(covariance, cross.T).T, axis=1
-    )
+    variance = np.sum(columns**2 * prior, axis=1) - np.sum(cross * np.linalg.solve(covariance, cross.T).T, axis=1)
     np.testing.assert_allclose(process.variance(at_t, at_r), variance, rtol=1e-6)
     # Effective parameters: the trace of the hat matrix.
     count = np.asarray(data["count"])
@@ -346,9 +338,7 @@ def test_variance_keeps_its_digits_where_hardly_any_noise_is_left(sigma: float) 
     reach = REACH * np.abs(t).max(), REACH * np.abs(r).max()
     phi, w_t, w_r = basis(t, r, *reach)
     root = np.sqrt(prior_variance(np.exp(log_p), w_t, w_r))
-    factor = np.linalg.qr(
-        np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r"
-    )
+    factor = np.linalg.qr(np.concatenate([phi * root * np.sqrt(count)[:, None] / sigma, np.eye(121)]), mode="r")
     at = np.linspace(-1.0, 1.0, 37), np.linspace(0.9, -0.9, 37)
     columns, *_ = basis(*at, *reach)
     expected = np.sum(np.linalg.solve(factor.T, (columns * root).T) ** 2, axis=0)

@@ -73,9 +73,7 @@ def test_the_loss_of_a_deletion_is_that_of_a_projection_without_it(seed: int) ->
     """Also of a Gaussian beyond the walls, whose price goes with it, and of two that nearly coincide."""
     t, r, weight = points(seed)
     solver = _core.VariableProjection(t, r, weight, np.sin(3.0 * t) + r * t, 0.1)
-    shapes = shapes_of(
-        (-0.5, 0.2, 0.4, 0.8), (-0.5, 0.21, 0.4, 0.8), (0.6, -0.3, 0.3, 1.5), (1.4, 0.1, 0.5, 0.9)
-    )
+    shapes = shapes_of((-0.5, 0.2, 0.4, 0.8), (-0.5, 0.21, 0.4, 0.8), (0.6, -0.3, 0.3, 1.5), (1.4, 0.1, 0.5, 0.9))
     whole = solver.project(shapes).cost
     exact = [solver.project(np.delete(shapes, j, axis=1)).cost - whole for j in range(4)]
     np.testing.assert_allclose(solver.losses(shapes), exact, rtol=1e-6, atol=1e-9 * whole)
@@ -145,6 +143,4 @@ def test_a_network_that_only_grows_is_projected_as_if_from_scratch(ridge: float)
         again = solver.project(network.shapes)
         assert network.cost == pytest.approx(again.cost, rel=1e-6)
     last = solver.project(sizes[-1].shapes)
-    assert np.array_equal(sizes[-1].weights, last.weights), (
-        "what is emitted comes from the columns themselves"
-    )
+    assert np.array_equal(sizes[-1].weights, last.weights), "what is emitted comes from the columns themselves"

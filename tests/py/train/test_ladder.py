@@ -91,14 +91,9 @@ def candidates(**rms: list[float]) -> CandidateScores:
 def test_the_least_score_is_taken_the_network_only_where_pieces_agree() -> None:
     constant, cubic = [900.0, 1100.0, 1000.0, 950.0], [20.0, 90.0, 30.0, 60.0]
     assert candidates(constant=constant, cubic=cubic).chosen() == "cubic"
-    assert (
-        candidates(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen()
-        == "cubic_slope"
-    )
+    assert candidates(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen() == "cubic_slope"
     assert candidates(constant=constant, cubic=cubic, mixed=[0.9 * x for x in cubic]).chosen() == "mixed"
-    assert (
-        candidates(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
-    )
+    assert candidates(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
     assert candidates(constant=constant, cubic=cubic, mrbf=[0.9 * x for x in cubic]).chosen() == "mrbf"
     assert candidates(constant=constant, cubic=cubic, mrbf=[12.0, 91.0, 29.0, 60.0]).chosen() == "cubic"
 
@@ -157,9 +152,7 @@ def test_coefficients_that_scatter_between_power_ons_are_shrunk() -> None:
     """Six power-ons with a slope of their own about none: least squares follows their mean, the mixed model less."""
     data = samples(0)
     parts = [replace(data, run=data.run + 3 * k) for k in range(2)]
-    data = TrainingData(
-        *(np.concatenate([getattr(p, n) for p in parts]) for n in TrainingData.__dataclass_fields__)
-    )
+    data = TrainingData(*(np.concatenate([getattr(p, n) for p in parts]) for n in TrainingData.__dataclass_fields__))
     slope = np.array([3e-4, -4e-4, 1e-4, 2e-4, -1e-4, 3e-4])[data.run]
     data = with_bias(data, 5.0 + slope * data.temperature_c)
     fits = [fit(data, method=name) for name in ("cubic_slope", "mixed")]
@@ -247,9 +240,7 @@ def test_the_choice_does_not_depend_on(name: str, repeats: bool) -> None:
     change, shift = INVARIANCES[name]
     data = samples(1)
     if not repeats:
-        data = replace(
-            data, bias_dph=data.bias_dph + np.array([3e-4, -4e-4, 1e-4])[data.run] * data.temperature_c
-        )
+        data = replace(data, bias_dph=data.bias_dph + np.array([3e-4, -4e-4, 1e-4])[data.run] * data.temperature_c)
     same(auto(data), auto(change(data)), shift)
 
 
@@ -259,9 +250,7 @@ def same(one: Fit, two: Fit, shift: float = 0.0, share: float = 1e-3) -> None:
     for a, b in zip(one.candidates, two.candidates, strict=True):
         if a["id"] != "nothing":
             assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=max(share, 1e-6))
-    t, r = np.meshgrid(
-        np.linspace(*one.scaling.temperature_c, 21), np.linspace(*one.scaling.slope_c_per_min, 11)
-    )
+    t, r = np.meshgrid(np.linspace(*one.scaling.temperature_c, 21), np.linspace(*one.scaling.slope_c_per_min, 11))
     assert np.abs(predict(two, t, r) - shift - predict(one, t, r)).max() < share * one.noise_floor_dph
 
 
@@ -462,9 +451,7 @@ def test_spans_cover_every_sample_once() -> None:
 
 def test_the_guard_gap_lies_around_the_span_in_its_own_run_only() -> None:
     one = profile((20, -60.0), (30, 90.0), (20, -40.0))
-    both = Samples(
-        *(np.tile(x, 2) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1], len(one.time_s))
-    )
+    both = Samples(*(np.tile(x, 2) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1], len(one.time_s)))
     spans = training_spans(runs(2), both)
     assert {s.run for s in spans} == {0, 1}
     middle = spans[1]
@@ -481,9 +468,7 @@ def test_a_short_span_has_a_short_guard_gap() -> None:
 
 def test_three_runs_are_left_out_whole() -> None:
     one = profile((20, -60.0), (30, 90.0))
-    three = Samples(
-        *(np.tile(x, 3) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1, 2], len(one.time_s))
-    )
+    three = Samples(*(np.tile(x, 3) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1, 2], len(one.time_s)))
     assert training_spans(runs(3), three) == ()
 
 

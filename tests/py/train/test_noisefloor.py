@@ -124,9 +124,7 @@ def test_a_constant_temperature_has_no_slope() -> None:
     assert found.residual_rms_dph == pytest.approx(np.arange(50.0).std())
 
 
-def cells_of(
-    data: TrainingData, found: object, cells: tuple[int, int]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cells_of(data: TrainingData, found: object, cells: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Cell of T and of dT/dt of every sample, by the formula of docs/numerics.md."""
     spans = (found.envelope["temperature_c"], found.envelope["slope_c_per_min"])  # type: ignore[attr-defined]
     values = (data.temperature_c, data.slope_c_per_min)
@@ -189,9 +187,7 @@ def test_offsets_between_runs_are_part_of_it() -> None:
         one = one.select(one.run == 1 + k % 2)
         offset = rng.normal(0.0, 3e-4)
         runs.append(replace(one, run=np.full(len(one), k), bias_dph=one.bias_dph + offset))
-    data = TrainingData(
-        **{k: np.concatenate([getattr(x, k) for x in runs]) for k in TrainingData.__dataclass_fields__}
-    )
+    data = TrainingData(**{k: np.concatenate([getattr(x, k) for x in runs]) for k in TrainingData.__dataclass_fields__})
     sigma = np.array(uncertainty(data, fit(data))["rows"])
     assert 1.5e-4 < np.median(sigma) < 8e-4
 
@@ -205,9 +201,7 @@ def test_a_single_run_is_cut_into_spans() -> None:
     assert (sigma > 0.0).all()
 
 
-def drawn(
-    rng: np.random.Generator, runs: int, patches: int, between: float, misfit: float
-) -> list[FloatArray]:
+def drawn(rng: np.random.Generator, runs: int, patches: int, between: float, misfit: float) -> list[FloatArray]:
     """What runs left out leave in units of the noise of a patch: a constant of each run, a misfit of each patch."""
     ones = np.ones(patches)
     return [

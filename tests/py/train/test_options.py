@@ -58,9 +58,7 @@ def test_a_command_refuses_a_bad_value_in_one_line_before_it_reads_anything(
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)
-def test_a_manifest_refuses_what_the_commands_refuse_and_names_the_field(
-    name: str, value: str, tmp_path: Path
-) -> None:
+def test_a_manifest_refuses_what_the_commands_refuse_and_names_the_field(name: str, value: str, tmp_path: Path) -> None:
     one_run(tmp_path / "RLG-1")
     manifest = tmp_path / "fleet.toml"
     quoted = f'"{value}"' if name == "method" else value
@@ -106,8 +104,7 @@ def test_means_shorter_than_a_block_are_the_blocks(tmp_path: Path) -> None:
     """However short: a billionth of a second took a word of memory for each billionth of the run."""
     recordings = load(one_run(tmp_path / "RLG-1"))
     found = [
-        fit_dataset(recordings, FitOptions(method="cubic", average_s=average_s)).training
-        for average_s in (1e-3, 1e-9)
+        fit_dataset(recordings, FitOptions(method="cubic", average_s=average_s)).training for average_s in (1e-3, 1e-9)
     ]
     assert found[0].left_out is not None
     assert found[0].left_out == found[1].left_out

@@ -146,9 +146,7 @@ def test_a_stand_in_keeps_to_its_bound(numeric: str) -> None:
     t, slope = table.decode_inputs(inputs).T
     for k, (network, bound) in enumerate(zip(model.stand_ins, table.stand_in_bounds_dph, strict=True)):
         made = stand_in(table, table.n_networks + 1 + k, *table.numbers(inputs.ravel()).reshape(-1, 2).T)
-        wrong = made * 2.0**-table.bias_frac_bits - model.network_dph(
-            network, t, slope * 60.0 / model.block_s
-        )
+        wrong = made * 2.0**-table.bias_frac_bits - model.network_dph(network, t, slope * 60.0 / model.block_s)
         assert np.abs(wrong).max() <= bound
 
 
@@ -160,9 +158,7 @@ def test_a_network_in_another_scale_is_the_same_function() -> None:
     own = model.model_copy(update={"scale": Scale(temperature_c=(20.0, 30.0), slope_c_per_min=2.0)})
     other = Network.model_validate_json(json.dumps(moved))
     t, r = np.linspace(*model.envelope.temperature_c, 50), np.linspace(*model.envelope.slope_c_per_min, 50)
-    assert model.network_dph(other, t, r) == pytest.approx(
-        own.network_dph(model.stand_ins[0], t, r), abs=1e-12
-    )
+    assert model.network_dph(other, t, r) == pytest.approx(own.network_dph(model.stand_ins[0], t, r), abs=1e-12)
 
 
 @dataclass(frozen=True)
@@ -176,9 +172,7 @@ class World:
     @property
     def columns(self) -> list[str]:
         """Recorded channels that the table reads, alone or in a difference."""
-        return sorted(
-            {c for t in self.model.terms for c in (t.channel or "").split(" - ")} - {"temperature_c"}
-        )
+        return sorted({c for t in self.model.terms for c in (t.channel or "").split(" - ")} - {"temperature_c"})
 
 
 @pytest.fixture(scope="module", params=_SEEDS)

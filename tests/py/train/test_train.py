@@ -175,9 +175,7 @@ def test_inputs_beyond_the_envelope_are_clamped() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(
-    "case", ["equal targets", "nothing", "few", "one temperature rate", "two places", "huge"]
-)
+@pytest.mark.parametrize("case", ["equal targets", "nothing", "few", "one temperature rate", "two places", "huge"])
 def test_odd_samples_never_give_a_nan(method: str, case: str) -> None:
     data = samples(8, hours=1.0)
     if case == "equal targets":

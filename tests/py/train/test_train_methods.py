@@ -80,9 +80,7 @@ def test_a_number_of_centers_asked_for_is_given(method: str) -> None:
 def test_candidates_are_what_the_method_says() -> None:
     data = samples(3)
     random = fit(data, method="rbf_random", centers=12, average_s=10.0)
-    points = {
-        (round(t, 6), round(r, 6)) for t, r in zip(data.temperature_c, data.slope_c_per_min, strict=True)
-    }
+    points = {(round(t, 6), round(r, 6)) for t, r in zip(data.temperature_c, data.slope_c_per_min, strict=True)}
     assert all((round(t, 6), round(r, 6)) in points for t, r in random.networks[0]["centers"])
     grid = fit(data, method="rbf_ols", centers=12)
     t, r = np.array(grid.networks[0]["centers"]).T
@@ -128,9 +126,7 @@ def test_linear_regression_minimises_bic_over_its_subsets() -> None:
         data = samples(seed)
         fitted = fit(data, method="mlr")
         n = len(data) // 10
-        t, r, y = (
-            x.reshape(n, 10).mean(axis=1) for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph)
-        )
+        t, r, y = (x.reshape(n, 10).mean(axis=1) for x in (data.temperature_c, data.slope_c_per_min, data.bias_dph))
         bic = []
         for columns in ([], [t], [r], [t, r]):
             x = np.column_stack([np.ones(n), *columns])

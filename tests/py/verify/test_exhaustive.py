@@ -139,12 +139,8 @@ def test_the_deepest_call_counts_and_a_pointer_goes_to_a_hook_of_its_arithmetic(
 
 
 def test_a_function_that_both_arithmetics_share_is_counted_under_its_one_name() -> None:
-    shared = (
-        '\nedge: { sourcename: "gtc_f32_sample" targetname: "gtc.c:gtc_f32_shared" label: "gtc.c:7:5" }\n'
-    )
-    node = (
-        '\nnode: { title: "gtc.c:gtc_q31_shared" label: "gtc_q31_shared\\ngtc.c:9:1\\n100 bytes (static)" }'
-    )
+    shared = '\nedge: { sourcename: "gtc_f32_sample" targetname: "gtc.c:gtc_f32_shared" label: "gtc.c:7:5" }\n'
+    node = '\nnode: { title: "gtc.c:gtc_q31_shared" label: "gtc_q31_shared\\ngtc.c:9:1\\n100 bytes (static)" }'
     graph = parse_graph(GRAPH + node + shared)
     assert graph.deepest("gtc_f32_sample") == 8 + 100
     assert graph.helpers("gtc_f32_sample") == {"__aeabi_uldivmod"}

@@ -32,21 +32,15 @@ def touching(path: Path) -> str:
 
 
 FIELDS = {
-    "a warning of the recordings": lambda code: {
-        "warnings": [f"channel {code} is left out: b.csv has no such column"]
-    },
+    "a warning of the recordings": lambda code: {"warnings": [f"channel {code} is left out: b.csv has no such column"]},
     "a value of [meta]": lambda code: {"operator": code},
     "a key of [meta]": lambda code: {code: "x"},
-    "keys of [meta] one after another": lambda code: {
-        f"k{i}*/": part for i, part in enumerate(code.split(";"))
-    },
+    "keys of [meta] one after another": lambda code: {f"k{i}*/": part for i, part in enumerate(code.split(";"))},
 }
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_text_of_a_recording_does_not_become_code(
-    field: str, model_dict: dict[str, Any], tmp_path: Path
-) -> None:
+def test_text_of_a_recording_does_not_become_code(field: str, model_dict: dict[str, Any], tmp_path: Path) -> None:
     with tempfile.TemporaryDirectory() as short:  # a value of [meta] is cut at 120 characters
         shown = Path(short) / "x"
         model = Model.from_dict(model_dict | {"meta": FIELDS[field](touching(shown))})
@@ -98,9 +92,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("plant", PLANTED)
-def test_code_planted_in_a_folder_is_neither_compiled_nor_run(
-    plant: str, whole: Path, tmp_path: Path
-) -> None:
+def test_code_planted_in_a_folder_is_neither_compiled_nor_run(plant: str, whole: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copytree(whole, tmp_path / "copy"))
     name, pattern, text = PLANTED[plant]
     shown = tmp_path / "shown"
@@ -147,9 +139,7 @@ def test_the_user_may_trust_code_of_his_own(whole: Path, tmp_path: Path, gyrotc:
     refused = gyrotc("verify", copy, "--target", FAST)
     assert refused.returncode == 1 and "gtc.c is not what gyrotc makes" in refused.stdout
     trusted = gyrotc("verify", copy, "--target", FAST, "--trust-code")
-    assert (
-        trusted.returncode == 1 and "not compiled" not in trusted.stdout
-    )  # run, and still not gyrotc's file
+    assert trusted.returncode == 1 and "not compiled" not in trusted.stdout  # run, and still not gyrotc's file
 
 
 def test_an_entry_of_meta_is_not_taken_for_the_options_of_the_emission(
@@ -197,9 +187,7 @@ def _ended(pid: int) -> None:
     pytest.fail(f"process {pid} still runs")
 
 
-def test_nothing_of_the_users_environment_but_the_path(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_of_the_users_environment_but_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SECRET_TOKEN", "s3cret")
     done = run_to_end(["env"], tmp_path, "the test")
     seen = dict(line.split("=", 1) for line in done.stdout.decode().splitlines())
@@ -227,9 +215,7 @@ def test_an_argument_is_never_read_by_the_shell(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_does_not_end_is_ended_with_all_its_children(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_does_not_end_is_ended_with_all_its_children(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gyrotc.verify.toolchain.LIMIT_S", 1)
     command = ["sh", "-c", "sleep 1000 & echo $! > child; sleep 1000"]
     with pytest.raises(CheckFailed, match="the test did not end within 1 s"):

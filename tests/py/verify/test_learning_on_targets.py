@@ -31,9 +31,7 @@ def learning_model() -> Model:
 
 
 @pytest.mark.parametrize("numerics", [None, ("q31",)])
-def test_targets_learn_save_and_restore_as_the_mirror_does(
-    numerics: tuple[str, ...] | None, tmp_path: Path
-) -> None:
+def test_targets_learn_save_and_restore_as_the_mirror_does(numerics: tuple[str, ...] | None, tmp_path: Path) -> None:
     """Also beside a table in fixed point alone, and where a write was cut off after any number of words."""
     model = learning_model()
     model.save(tmp_path / "model.json")

@@ -53,9 +53,7 @@ def test_gyrotc_signs_and_openssl_agrees(key: Path, tmp_path: Path, gyrotc: Comm
     assert "released: no limits were given" in done.stdout
 
 
-def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(
-    key: Path, tmp_path: Path, gyrotc: Command
-) -> None:
+def test_openssl_signs_and_gyrotc_agrees_until_a_byte_changes(key: Path, tmp_path: Path, gyrotc: Command) -> None:
     folder = emitted(tmp_path / "result")
     done = gyrotc("sign", folder)
     assert done.returncode == 0 and "not signed" in done.stdout

@@ -189,9 +189,7 @@ def test_another_compiler_of_the_same_name_makes_its_own_objects(
     known = toolchain._identity(HOST.compiler)
     assert len(known) == 4, "version, driver, compiler proper, assembler"
     for changed in range(len(known)):
-        monkeypatch.setattr(
-            toolchain, "_identity", lambda _, k=changed: [*known[:k], known[k] + "1", *known[k + 1 :]]
-        )
+        monkeypatch.setattr(toolchain, "_identity", lambda _, k=changed: [*known[:k], known[k] + "1", *known[k + 1 :]])
         _asked(source, tmp_path)
         assert compiled.count == 2 + changed
     monkeypatch.setattr(toolchain, "_identity", lambda _: [])
@@ -199,9 +197,7 @@ def test_another_compiler_of_the_same_name_makes_its_own_objects(
     assert compiled.count == 6, "a compiler that cannot be distinguished from others compiles each time"
 
 
-def test_what_is_damaged_or_foreign_is_never_linked(
-    source: Path, tmp_path: Path, compiled: _Compiled
-) -> None:
+def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path, compiled: _Compiled) -> None:
     sound = _asked(source, tmp_path)
     [path] = cache.folder().glob("*.object")
     whole = path.read_bytes()

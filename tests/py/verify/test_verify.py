@@ -50,9 +50,7 @@ def test_every_target_of_the_common_tools_agrees_in_every_bit(whole: Path) -> No
         assert (entry["status"], entry["mismatches"]) == ("pass", 0), entry
         assert entry["vectors"] >= 20000
         assert entry["ram_bytes"] == 0
-        assert (
-            entry["code_bytes"] > 0
-        )  # how many is the compiler's decision: clang 14 at -O3 makes 68,042 on a host
+        assert entry["code_bytes"] > 0  # how many is the compiler's decision: clang 14 at -O3 makes 68,042 on a host
     for name in ("cortex-m0", "cortex-m4f"):
         for entry in (e for e in result["targets"] if e["name"] == name):
             cost = entry["instructions"]
@@ -122,9 +120,7 @@ def test_a_flipped_bit_of_the_reference_fails(whole: Path, monkeypatch: pytest.M
 
 
 def test_a_program_that_stops_half_way_is_no_pass(copy: Path) -> None:
-    spoil(
-        copy / "c" / "board_test.c", r"static void end\(void\)\n\{", "static void end(void)\n{\n    return;"
-    )
+    spoil(copy / "c" / "board_test.c", r"static void end\(void\)\n\{", "static void end(void)\n{\n    return;")
     for entry in entries(copy, FAST).values():
         assert entry["status"] == "fail" and "did not run to its end" in entry["error"]
 
@@ -184,9 +180,9 @@ def test_named_target_without_its_compiler_exits_1_and_names_the_package(copy: P
     )
     assert done.returncode == 1
     named = [line for line in done.stdout.splitlines() if "s390x" in line]
-    assert named == [
-        "not installed: s390x: apt-get install gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user"
-    ], "one line, no rows of the table"
+    assert named == ["not installed: s390x: apt-get install gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user"], (
+        "one line, no rows of the table"
+    )
 
 
 # ---- the board test's own output ----
@@ -501,9 +497,7 @@ DAMAGE = {
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_line_is_named(
-    damage: str, numeric: str, whole: Path, run: list[str], tmp_path: Path
-) -> None:
+def test_a_damaged_line_is_named(damage: str, numeric: str, whole: Path, run: list[str], tmp_path: Path) -> None:
     k = _at(run, damage.partition("'")[0], numeric)
     lines = list(run)
     lines[k] = DAMAGE[damage](lines[k])

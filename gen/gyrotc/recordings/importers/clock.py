@@ -80,9 +80,7 @@ def text_of(column: Column, values: Any) -> Any:
     return pa.array(texts, pa.string())
 
 
-_EPOCH_S = (
-    1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
-)
+_EPOCH_S = 1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
 _NAT = np.iinfo(np.int64).min
 _WRAPS = (2**16, 2**24, 2**32)  # counters of 16, 24 and 32 bits
 _PERIODS_S = (86_400.0, 604_800.0)  # seconds of the day, time of the GPS week
@@ -133,9 +131,7 @@ class Clock:
         elif columns and columns[0].kind == "number" and self._unit is None:
             raise InputError(file, "a counter without a unit", "--time-unit")
         self._known_zone = bool(columns) and (
-            self._stamps.known_zone
-            if self._stamps
-            else columns[0].kind == "stamp" and columns[0].unit == "UTC"
+            self._stamps.known_zone if self._stamps else columns[0].kind == "stamp" and columns[0].unit == "UTC"
         )
 
     @property
@@ -149,9 +145,7 @@ class Clock:
         if self._table.started is not None and not (self._columns and self._columns[0].kind == "stamp"):
             return self._table.started if self.origin in (None, 0) else None
         if self._known_zone and self.origin is not None and (self._stamps is None or self._stamps.dated):
-            return datetime(1970, 1, 1, tzinfo=timezone.utc) + timedelta(
-                microseconds=int(self.origin) // 1000
-            )
+            return datetime(1970, 1, 1, tzinfo=timezone.utc) + timedelta(microseconds=int(self.origin) // 1000)
         return None
 
     @property
@@ -184,9 +178,7 @@ class Clock:
             parts = [text_of(column, chunk.columns[column.name]) for column in self._columns]
             texts = pc.binary_join_element_wise(*parts, " ")
         ns, good = self._stamps.parse(texts)
-        held = np.asarray(
-            pc.not_equal(pc.fill_null(texts, ""), "").to_numpy(zero_copy_only=False), dtype=bool
-        )
+        held = np.asarray(pc.not_equal(pc.fill_null(texts, ""), "").to_numpy(zero_copy_only=False), dtype=bool)
         if np.any(held & ~good):
             row = int(np.argmax(held & ~good))
             where = f"{self._file}, {self._table.place(chunk.first + row)}, column {self._columns[0].name}"
@@ -244,9 +236,7 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     if columns[0].kind == "number":
         form = form_of_parts(columns)
         if not form:
-            raise InputError(
-                file, f"parts of a time in {', '.join(c.name for c in columns)}", "--time-format"
-            )
+            raise InputError(file, f"parts of a time in {', '.join(c.name for c in columns)}", "--time-format")
         return form
     if columns[-1].kind == "number":
         return f"{_form(file, columns[:-1])} %f"
@@ -256,9 +246,7 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     where = f"{file}, column {' and '.join(c.name for c in columns)}"
     if not forms:
         expected = '--time-format such as "%Y-%m-%d %H:%M:%S.%f"'
-        raise InputError(
-            where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected
-        )
+        raise InputError(where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected)
     if forms == ["%H:%M"]:
         found = f"{texts[0]!r}: hours and minutes, or minutes and seconds"
         raise InputError(where, found, '--time-format "%H:%M" or --time-format "%M:%S"')

@@ -63,9 +63,7 @@ def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> st
 
 def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
     """Whether a cell is a number, with marks between thousands where nothing else can be meant, or as stated."""
-    if thousands and re.fullmatch(
-        rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell
-    ):
+    if thousands and re.fullmatch(rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell):
         cell = cell.replace(thousands, "")
     if _GROUPED[decimal].fullmatch(cell) or HEXADECIMAL.fullmatch(cell):
         return True
@@ -141,9 +139,7 @@ def header_of(
 ) -> tuple[int, int, tuple[str, ...], tuple[str, ...]]:
     """Line of the names, line of the units, names, units; made-up names where there is no header."""
     rows = [
-        (k, cells)
-        for k, cells in above
-        if _fits_header(cells, count, decimal) and not _UNITS_LABEL.fullmatch(cells[0])
+        (k, cells) for k, cells in above if _fits_header(cells, count, decimal) and not _UNITS_LABEL.fullmatch(cells[0])
     ]
     rows += [(k, _rejoined(cells, count)) for k, cells in above if len(cells) > count]
     rows = sorted((k, cells) for k, cells in rows if _fits_header(cells, count, decimal))
@@ -153,9 +149,7 @@ def header_of(
     if not rows:
         return 0, 0, tuple(f"column {k + 1}" for k in range(count)), ("",) * count
     units_line, units = _labelled(above, count)
-    of_units = [
-        k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.get("units_line")
-    ]
+    of_units = [k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.get("units_line")]
     if of_units:
         units_line, cells = rows[of_units[-1]]
         rows = rows[: of_units[-1]]
@@ -197,11 +191,7 @@ def _is_units(cells: Sequence[str]) -> bool:
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
     known = sum(kind_of(word) is not None or _in_brackets(cells, word) for word in words)
     of_kinds = sum(kind_of(word) is not None for word in words)
-    return (
-        bool(words)
-        and of_kinds > 0
-        and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
-    )
+    return bool(words) and of_kinds > 0 and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
 
 
 def _in_brackets(cells: Sequence[str], word: str) -> bool:
@@ -333,9 +323,7 @@ def _kept(name: str, lines: Sequence[str], comment: tuple[str, ...]) -> list[tup
     Raises:
         InputError: There is none.
     """
-    kept = [
-        (k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)
-    ]
+    kept = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith(comment)]
     if not kept:
         raise InputError(name, "no lines of rows", "a header and rows of numbers")
     return kept
@@ -349,9 +337,7 @@ def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]]
     """
     if not header and above and 2 * len(above[-1][1]) == count > 2:
         found = f"{count // 2} names above rows of {count} cells: one mark parts columns and decimals"
-        raise InputError(
-            f"{name}, line {above[-1][0]}", found, "the file exported again with semicolons or tabs"
-        )
+        raise InputError(f"{name}, line {above[-1][0]}", found, "the file exported again with semicolons or tabs")
 
 
 def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -382,15 +368,11 @@ def _encoding(head: bytes) -> str:
 def _text(name: str, head: bytes, encoding: str) -> str:
     strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
     if strange > 0.01 * len(head) or (b"\x00" in head and not encoding.startswith("utf-16")):
-        raise InputError(
-            name, "binary data of no known format", "text, or a format that docs/import.md lists"
-        )
+        raise InputError(name, "binary data of no known format", "text, or a format that docs/import.md lists")
     try:
         text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
     except LookupError as error:
-        raise InputError(
-            "[csv] encoding", repr(encoding), "an encoding such as utf-8, utf-16, cp1252"
-        ) from error
+        raise InputError("[csv] encoding", repr(encoding), "an encoding such as utf-8, utf-16, cp1252") from error
     except UnicodeDecodeError as error:
         line = head[: error.start].count(b"\n") + 1
         found = f"bytes that are no {encoding}"
@@ -449,9 +431,7 @@ def _usual_count(split: Sequence[tuple[int, list[str]]]) -> int:
     return Counter(len(cells) for _, cells in _last(split)).most_common(1)[0][0]
 
 
-def _first_row(
-    name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int
-) -> int:
+def _first_row(name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int) -> int:
     """Index of the first row of numbers: it and most of the next lines have the kinds of cells of the last ones."""
     tail = [cells for _, cells in _last(split) if len(cells) == count]
     kinds = [kind_of_cells(column, decimal) for column in zip(*tail, strict=True)]
@@ -460,9 +440,7 @@ def _first_row(
             following = [_like(cells, kinds, decimal, count) for _, cells in split[k : k + 8]]
             if sum(following) >= _ENOUGH * len(following):
                 return k
-    raise InputError(
-        name, "no rows of numbers", "rows of numbers; --csv header_line=N names the line of the header"
-    )
+    raise InputError(name, "no rows of numbers", "rows of numbers; --csv header_line=N names the line of the header")
 
 
 def _like(cells: Sequence[str], kinds: Sequence[str], decimal: str, count: int) -> bool:

@@ -102,9 +102,7 @@ class CsvTable(LoggerTable):
 
     def _blocks(self) -> Iterator[tuple[bytes, int, float]]:
         one = self.dialect
-        return blocks_of_lines(
-            self.path, self.size, self.path.name, first=one.data_line, encoding=one.encoding
-        )
+        return blocks_of_lines(self.path, self.size, self.path.name, first=one.data_line, encoding=one.encoding)
 
     def _is_row(self, text: str) -> bool:
         return bool(text.strip()) and not text.startswith(self.dialect.comment) and not self._is_header(text)
@@ -187,9 +185,7 @@ class CsvTable(LoggerTable):
             for name, values in cells.items()
         }
 
-    def _parsed(
-        self, line: int, row: list[str], names: Sequence[str], index: dict[str, int]
-    ) -> dict[str, Any]:
+    def _parsed(self, line: int, row: list[str], names: Sequence[str], index: dict[str, int]) -> dict[str, Any]:
         where = f"{self.path.name}, line {line}"
         if len(row) != len(self.columns):
             found = f"{len(row)} cells: {self.dialect.delimiter.join(row)[:60]!r}"
@@ -230,9 +226,7 @@ def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:
     lines = re.split(r"\r\n|\n|\r", text)
     lines = lines[dialect.data_line - 1 :] if whole else lines[dialect.data_line - 1 : -1]
     rows = [
-        cells_of(line, dialect.delimiter)
-        for line in lines
-        if line.strip() and not line.startswith(dialect.comment)
+        cells_of(line, dialect.delimiter) for line in lines if line.strip() and not line.startswith(dialect.comment)
     ]
     rows = [row for row in rows if len(row) == len(dialect.names)]
     return rows if len(rows) <= _SAMPLE else [*rows[: _SAMPLE // 2], *rows[-_SAMPLE // 2 :]]
@@ -269,11 +263,7 @@ def _stated_rate(dialect: Dialect) -> dict[str, Any]:
     """Rows per second where a line above the header states them: `Sample rate: 100 Hz`."""
     for key, value in dialect.facts.items():
         found = re.match(r"([\d.,]+)\s*(k?hz|/s|sps|samples/s)?", value.lower())
-        if (
-            re.search(r"sampl\w*.{0,3}(rate|freq)|abtastrate|^fs$|output data rate|^odr$", key)
-            and found
-            and found[2]
-        ):
+        if re.search(r"sampl\w*.{0,3}(rate|freq)|abtastrate|^fs$|output data rate|^odr$", key) and found and found[2]:
             rate = float(found[1].replace(",", ".")) * (1000.0 if found[2] == "khz" else 1.0)
             return {"rate_hz": rate, "why_rate": f"{key}: {value}, above the rows"} if rate > 0.0 else {}
     return {}

@@ -61,8 +61,6 @@ def _read(reader: Any, path: Path) -> dict[str, dict[str, array[float]]]:
 def _table(name: str, columns: dict[str, array[float]]) -> LoggerTable:
     rows = min(len(values) for values in columns.values())
     arrays = {column: np.frombuffer(values)[:rows] for column, values in columns.items()}
-    described = tuple(
-        Column(column, _FIELDS[column], "ArduPilot's definition of the message") for column in arrays
-    )
+    described = tuple(Column(column, _FIELDS[column], "ArduPilot's definition of the message") for column in arrays)
     parts = {column: part_of(values) for column, values in arrays.items()}
     return ArrayTable(name, described, rows=rows, parts=parts)

@@ -41,9 +41,7 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
     units["temperature"] = plan.temperature.unit or ""
     if plan.values[0].unit:
         units["rate"] = plan.values[0].unit
-    units |= {
-        choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units
-    }
+    units |= {choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units}
     time = TimeMap(format=rows.clock.form or None, zone=chosen.time.zone, rate_hz=plan.rate_hz)
     csv = {
         k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal", "thousands")
@@ -59,19 +57,13 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
 
 
 def serial_of(stated: str | None, chosen: Map, file: LoggerFile, out: Path) -> str:
-    in_file = next(
-        (v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None
-    )
+    in_file = next((v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None)
     known = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
     serial = known or out.resolve().name
     try:
         return check_serial(serial)
     except PydanticCustomError as error:
-        where = (
-            "--serial"
-            if stated
-            else f"the serial {'in the file' if known else 'from the name of the folder'}"
-        )
+        where = "--serial" if stated else f"the serial {'in the file' if known else 'from the name of the folder'}"
         raise InputError(where, repr(serial), f"{error.message()}; --serial names one") from error
 
 
@@ -383,9 +375,7 @@ def _run(
                 progress(file.path.name, done)
     if rows.count < MIN_ROWS:
         left = ", ".join(f"{count} with {reason}" for reason, count in rows.left_out.items())
-        raise InputError(
-            file.path.name, f"{rows.count} rows" + (f" ({left})" if left else ""), f"at least {MIN_ROWS}"
-        )
+        raise InputError(file.path.name, f"{rows.count} rows" + (f" ({left})" if left else ""), f"at least {MIN_ROWS}")
     trusted = _judged(file, rows, chosen, options)
     started = rows.clock.started
     return {
@@ -418,14 +408,10 @@ def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOp
     """
     noise = (chosen.noise or {}).get("arw_deg_per_sqrt_h")
     found: list[Suspicion] = list(
-        suspicions(
-            rows.evidence, rows.layout, rows.units, earth_stated=chosen.earth_rate is not None, noise=noise
-        )
+        suspicions(rows.evidence, rows.layout, rows.units, earth_stated=chosen.earth_rate is not None, noise=noise)
     )
     for one in found:
         if not options.trust_units:
-            expected = (
-                f'--{one.kind}-unit "{one.likely}", or --trust-units if the values are right as they are'
-            )
+            expected = f'--{one.kind}-unit "{one.likely}", or --trust-units if the values are right as they are'
             raise InputError(f"{file.path.name}, column {one.column}", one.found, expected)
     return [f"{one.column}: {one.found}" for one in found]

@@ -16,9 +16,7 @@ from ..tables import Column, LoggerTable
 MAP_FILE = "map.toml"
 
 Text = Annotated[str, Field(min_length=1, max_length=256)]
-Texts = Annotated[
-    tuple[Text, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else tuple(value))
-]
+Texts = Annotated[tuple[Text, ...], BeforeValidator(lambda value: (value,) if isinstance(value, str) else tuple(value))]
 
 
 class _Part(BaseModel):
@@ -120,9 +118,7 @@ def map_text(chosen: Map) -> str:
         if isinstance(table, dict):
             kept = {k: v for k, v in table.items() if v not in (None, ())}
             if kept or (name == "channels" and content["channels"] is not None):
-                tables[name] = {
-                    k: v[0] if isinstance(v, tuple) and len(v) == 1 else v for k, v in kept.items()
-                }
+                tables[name] = {k: v[0] if isinstance(v, tuple) and len(v) == 1 else v for k, v in kept.items()}
     return dataset_toml(head, tables)
 
 

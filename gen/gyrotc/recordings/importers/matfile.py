@@ -58,9 +58,7 @@ def open_mat(path: Path) -> LoggerFile:
     tables = grouped([_with_unit(c, units) for c in columns], rates)
     if not tables:
         hint = "arrays: in MATLAB, save('file.mat', '-struct', 'S') of plain vectors, or a timetable by table2struct"
-        raise InputError(
-            path.name, f"no numeric vectors (there is {', '.join(opaque[:6]) or 'nothing'})", hint
-        )
+        raise InputError(path.name, f"no numeric vectors (there is {', '.join(opaque[:6]) or 'nothing'})", hint)
     return LoggerFile(path, "MATLAB file", tables)
 
 
@@ -96,9 +94,7 @@ def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, str, int, Col
         yield "", "", len(flat), Column(name + axis), part_of(flat)
 
 
-def _with_unit(
-    entry: tuple[str, str, int, Column, Part], units: dict[str, str]
-) -> tuple[str, str, int, Column, Part]:
+def _with_unit(entry: tuple[str, str, int, Column, Part], units: dict[str, str]) -> tuple[str, str, int, Column, Part]:
     """The unit that a text beside a vector states: `rate_unit`, `units.rate`, `rate.unit`."""
     group, table, rows, column, part = entry
     base = column.name.removesuffix("_x").removesuffix("_y").removesuffix("_z")

@@ -14,9 +14,7 @@ from ..units import Kind, UnitError, conversion, kind_of
 _LONGEST = 256  # characters of a name that is searched for a unit: the search takes the square of it or more
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({<]\s*(?P<unit>[^\])}>]+?)\s*[\])}>]\s*$")
 _AFTER_SIGN = re.compile(r"^(?P<base>[^/,]*[^/,\s])\s*(?:/|,|\bin\b)\s*(?P<unit>\S.*)$")
-_WITH_SIGN = re.compile(
-    r"^(?P<base>.*\S)\s+(?P<unit>[^\s/]+\s*/\s*[^\s/]+)$"
-)  # Rate deg/h: not the hours of a name
+_WITH_SIGN = re.compile(r"^(?P<base>.*\S)\s+(?P<unit>[^\s/]+\s*/\s*[^\s/]+)$")  # Rate deg/h: not the hours of a name
 _ENDINGS: dict[str, tuple[str, Kind]] = {
     "s": ("s", "time"),
     "sec": ("s", "time"),
@@ -212,7 +210,5 @@ def axis_of(name: str) -> str:
     for form in (r"([xyz])", r"(?:gyro?|gyroscope|w|g|omega|rate|ω|ang(?:ular)?vel(?:ocity)?)_?([xyz])\d?"):
         if found := re.fullmatch(form, last):
             return found[1]
-    tail = re.search(r"\.([xyz])$", base.lower()) or re.search(
-        r"(?:^|[_\s.])([xyz])(?=[_\s.])", base.lower() + " "
-    )
+    tail = re.search(r"\.([xyz])$", base.lower()) or re.search(r"(?:^|[_\s.])([xyz])(?=[_\s.])", base.lower() + " ")
     return tail[1] if tail else ""

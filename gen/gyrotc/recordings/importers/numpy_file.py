@@ -31,14 +31,10 @@ def open_numpy(path: Path) -> LoggerFile:
             arrays = {"": np.load(path, allow_pickle=False)}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         what = " ".join(str(error).split())[:100]
-        raise InputError(
-            path.name, f"cannot be read as a file of numpy ({what})", "arrays of numbers"
-        ) from error
+        raise InputError(path.name, f"cannot be read as a file of numpy ({what})", "arrays of numbers") from error
     columns: list[tuple[str, str, int, Column, Part]] = []
     rates: dict[str, tuple[float, str]] = {}
-    units = {
-        name: str(values) for name, values in arrays.items() if values.dtype.kind == "U" and values.ndim == 0
-    }
+    units = {name: str(values) for name, values in arrays.items() if values.dtype.kind == "U" and values.ndim == 0}
     for name, values in arrays.items():
         if values.size == 1 and values.dtype.kind in "iuf":
             found = rate_of(name, float(values.reshape(-1)[0]))

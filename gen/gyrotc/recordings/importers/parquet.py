@@ -47,9 +47,7 @@ class ParquetBatches:
                 self.rows: int = file.metadata.num_rows
                 unpacked = _unpacked(file.metadata)
         except _DAMAGE as error:
-            raise InputError(
-                name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file"
-            ) from error
+            raise InputError(name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file") from error
         refuse_above("columns", len(self.schema), name, "columns")
         refuse_above("rows", self.rows, name, "rows")
         _refuse_bomb(name, self.size, max(unpacked, 8 * self.rows * len(self.schema)))
@@ -147,8 +145,7 @@ def _column_of(field: Any, sample: Any) -> Column | None:
         sample: The first rows, None where there are none.
     """
     metadata = {
-        k.decode("utf-8", "replace").lower(): v.decode("utf-8", "replace")
-        for k, v in (field.metadata or {}).items()
+        k.decode("utf-8", "replace").lower(): v.decode("utf-8", "replace") for k, v in (field.metadata or {}).items()
     }
     unit = metadata.get("unit") or metadata.get("units")
     if pa.types.is_integer(field.type) or pa.types.is_floating(field.type) or pa.types.is_decimal(field.type):
@@ -158,9 +155,7 @@ def _column_of(field: Any, sample: Any) -> Column | None:
     if pa.types.is_duration(field.type):
         return Column(field.name, field.type.unit, "the type of the column")
     if pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
-        cells = (
-            tuple(str(v or "") for v in sample.column(field.name).to_pylist()) if sample is not None else ()
-        )
+        cells = tuple(str(v or "") for v in sample.column(field.name).to_pylist()) if sample is not None else ()
         kind = kind_of_cells(cells, ".")
         return Column(field.name, kind="stamp" if kind == "stamp" else "text", sample=cells)
     return None

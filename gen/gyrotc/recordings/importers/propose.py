@@ -45,15 +45,11 @@ class Units:
                 conversion(in_file, kind)
             except UnitError:
                 found = f"the file gives it in {in_file!r}, which is no {kind}"
-                expected = (
-                    f"{OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
-                )
+                expected = f"{OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
                 raise InputError(f"{self._file}, column {column.name}", found, expected) from None
             return in_file
         if kind not in self._asked:
-            answer = self._ask(
-                f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})"
-            )
+            answer = self._ask(f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})")
             if answer:
                 self._asked[kind] = self._checked(kind, answer, "the answer")
         if kind not in self._asked:
@@ -213,9 +209,7 @@ def _find(file: LoggerFile, name: str, near: LoggerTable | None = None) -> tuple
     raise InputError(file.path.name, f"no column {name!r}", f"one of: {', '.join(every[:40])}")
 
 
-def _values(
-    file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map
-) -> list[tuple[str, LoggerTable, Column, str]]:
+def _values(file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map) -> list[tuple[str, LoggerTable, Column, str]]:
     """Roles, tables, columns and reasons of what is measured; all of one table."""
     stated = chosen.columns.values()
     if stated:
@@ -273,9 +267,7 @@ def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]
     best = max(one.score for _, one in rates)
     triad = [sorted(axes.get(axis, []), key=lambda cm: -cm[1].score) for axis in "xyz"]
     if all(triad) and all(len(t) == 1 or t[0][1].score > t[1][1].score for t in triad):
-        return [
-            (f"rate_{a}", t[0][0], f"its name, axis {a}") for a, t in zip("xyz", triad, strict=True)
-        ], best + 1
+        return [(f"rate_{a}", t[0][0], f"its name, axis {a}") for a, t in zip("xyz", triad, strict=True)], best + 1
     top = [(column, one) for column, one in rates if one.score == best]
     if len(top) > 1:
         raise InputError(
@@ -322,9 +314,7 @@ def _instance(name: str) -> str:
     return "".join(mark for mark in name if mark.isdigit())
 
 
-def _time(
-    file: LoggerFile, main: LoggerTable, chosen: Map
-) -> tuple[list[tuple[Column, str]], float | None, str]:
+def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[Column, str]], float | None, str]:
     """Columns of time with reasons; or rows per second with the reason."""
     if chosen.time.rate_hz is not None:
         return [], chosen.time.rate_hz, "rows are counted, as stated"
@@ -347,9 +337,7 @@ def _time(
         return [(top[0], "its name" if len(top) == 1 else "its name, the first of that kind")], None, ""
     if main.rate_hz is not None:
         return [], main.rate_hz, main.why_rate
-    expected = (
-        '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
-    )
+    expected = '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
     unseen = f"no column that gives a time among {listed(file)}"
     raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 
@@ -376,9 +364,7 @@ def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str])
         for name, source in chosen.channels.items():
             table, column = _find(file, source, main)
             if table is not main:
-                raise InputError(
-                    file.path.name, f"channel {name} of another table", f"a column of {main.name!r}"
-                )
+                raise InputError(file.path.name, f"channel {name} of another table", f"a column of {main.name!r}")
             yield Choice(name, main, column, chosen.units.get(name, column.unit), "named by the map")
         return
     count = 0
@@ -391,9 +377,7 @@ def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str])
             continue
         count += 1
         unit = column.unit or split_unit(column.name)[1]
-        yield Choice(
-            _channel_name(column.name, unit, _CHANNELS[known]), main, column, unit, "its name: a channel"
-        )
+        yield Choice(_channel_name(column.name, unit, _CHANNELS[known]), main, column, unit, "its name: a channel")
 
 
 def _channel_name(name: str, unit: str | None, native: str) -> str:

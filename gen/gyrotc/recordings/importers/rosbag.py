@@ -65,9 +65,7 @@ def open_rosbag(path: Path) -> LoggerFile:
     )
     if not tables:
         held = ", ".join(f"{topic} ({kind})" for topic, kind, _ in topics[:8])
-        raise InputError(
-            path.name, f"no topic of {' or '.join(_KINDS)} among {held}", "a bag with such topics"
-        )
+        raise InputError(path.name, f"no topic of {' or '.join(_KINDS)} among {held}", "a bag with such topics")
     return LoggerFile(path, "ROS bag", tables)
 
 

@@ -93,9 +93,7 @@ class ImportedRows:
             time = self.clock(chunk)
             columns = {"time_s": time}
             self._time = time
-            columns |= {
-                self.name_of(choice): self._native(choice, chunk) for choice in (plan.temperature, *choices)
-            }
+            columns |= {self.name_of(choice): self._native(choice, chunk) for choice in (plan.temperature, *choices)}
             self._keep_first(chunk, columns)
             kept, rows = self._whole(columns)
             if len(rows):
@@ -130,9 +128,7 @@ class ImportedRows:
         times, values = self._held
         at = np.searchsorted(times, self._time, "right") - 1
         unit = self.units.get(self.name_of(choice))
-        found = (
-            np.where(at >= 0, values[np.maximum(at, 0)], np.nan) if len(values) else np.full(len(at), np.nan)
-        )
+        found = np.where(at >= 0, values[np.maximum(at, 0)], np.nan) if len(values) else np.full(len(at), np.nan)
         return unit(found) if unit else found
 
     def _readings(self, choice: Choice) -> tuple[FloatArray, FloatArray]:
@@ -177,9 +173,7 @@ class ImportedRows:
         rows = np.flatnonzero(good)
         return ({n: v if good.all() else v[good] for n, v in columns.items()}, rows)
 
-    def _in_order(
-        self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk
-    ) -> dict[str, FloatArray]:
+    def _in_order(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> dict[str, FloatArray]:
         """Without rows that repeat the one before in every value; times must go on.
 
         Raises:
@@ -189,9 +183,9 @@ class ImportedRows:
         before = {name: np.r_[last[name], values[:-1]] for name, values in kept.items()}
         copies = np.all([values == before[name] for name, values in kept.items()], axis=0)
         if copies.any():
-            self.left_out["copies of the row before"] = self.left_out.get(
-                "copies of the row before", 0
-            ) + int(copies.sum())
+            self.left_out["copies of the row before"] = self.left_out.get("copies of the row before", 0) + int(
+                copies.sum()
+            )
         wrong = (kept["time_s"] <= before["time_s"]) & ~copies
         if wrong.any():
             at = int(np.argmax(wrong))
@@ -214,9 +208,7 @@ class ImportedRows:
             expected = "--time-zone with the zone of a fixed offset that the logger kept, or --rate-hz R"
         else:
             found = f"time goes back: {time:.10g} s after {before:.10g} s"
-            expected = (
-                "times that go on: cut the file there and import its parts, or --rate-hz R to count rows"
-            )
+            expected = "times that go on: cut the file there and import its parts, or --rate-hz R to count rows"
         raise InputError(where, found, expected)
 
     def _check(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> None:

@@ -27,9 +27,7 @@ def open_spreadsheet(path: Path) -> LoggerFile:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
-        raise InputError(
-            path.name, f"cannot be read as a spreadsheet ({what})", "a whole .xlsx file"
-        ) from error
+        raise InputError(path.name, f"cannot be read as a spreadsheet ({what})", "a whole .xlsx file") from error
     folder = Path(tempfile.mkdtemp())
     tables: list[LoggerTable] = []
     refused: list[InputError] = []

@@ -156,9 +156,7 @@ def zone_of(text: str) -> ZoneInfo | int:
     try:
         return ZoneInfo(text.strip())
     except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        raise InputError(
-            "[time] zone", repr(text), "a name such as Europe/Berlin or UTC, or +01:00"
-        ) from error
+        raise InputError("[time] zone", repr(text), "a name such as Europe/Berlin or UTC, or +01:00") from error
 
 
 class Stamps:
@@ -319,9 +317,7 @@ def _offsets(ns: IntArray, zone: ZoneInfo, good: NDArray[np.bool_]) -> tuple[Int
     """
     quarters = np.where(good, ns, 0) // (900 * 1_000_000_000)
     unique, index = np.unique(quarters, return_inverse=True)
-    ahead = np.array(
-        [[_ahead_s(int(q) * 900, zone, fold) for fold in (0, 1)] for q in unique], dtype=np.int64
-    )
+    ahead = np.array([[_ahead_s(int(q) * 900, zone, fold) for fold in (0, 1)] for q in unique], dtype=np.int64)
     both = ahead.reshape(-1, 2)[index] * 1_000_000_000
     return both[:, 0], both[:, 1]
 

@@ -72,9 +72,7 @@ def _column(channel: Any) -> Column | None:
 def _part(channel: Any) -> Part:
     def part(first: int, last: int) -> Any:
         values = channel[first:last]
-        return (
-            values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)
-        )
+        return values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)
 
     return part
 

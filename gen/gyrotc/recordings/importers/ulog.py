@@ -43,9 +43,7 @@ def open_ulog(path: Path) -> LoggerFile:
         raise InputError(path.name, f"cannot be read as ULog ({what})", "a whole PX4 log") from error
     topics = sorted(log.data_list, key=lambda d: (d.name, d.multi_id))
     gyros = {d.multi_id for d in topics if d.name == "sensor_gyro"}
-    tables: list[LoggerTable] = [
-        _table(topic) for topic in topics if not (topic.name == "sensor_combined" and gyros)
-    ]
+    tables: list[LoggerTable] = [_table(topic) for topic in topics if not (topic.name == "sensor_combined" and gyros)]
     if not tables:
         raise InputError(
             path.name,
