@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from ..common.errors import InputError
 from ..model import Guard, Model
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
-from ..train.samples import PLAUSIBLE_C
+from ..target.samples import PLAUSIBLE_C
 
 _MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 

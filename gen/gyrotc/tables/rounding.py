@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..model import Guard, Model, Rules, Term, Uncertainty
 from ..target.recursions import TableKind
+from ..target.samples import PLAUSIBLE_C
 from ..target.table import SERIAL_WORDS, Numeric, Words, f32_words
-from ..train.samples import PLAUSIBLE_C
 
 _S_PER_MIN = 60.0  # a minute
 _S_PER_H = 3600.0  # an hour

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import f32
+from .samples import PLAUSIBLE_C
 from .sigma import Squares
 
 Numbers = NDArray[Any]  # of the learner's type: float32 or float64
@@ -28,7 +29,6 @@ _KNOT_PAIRS, _PAIRS = 36, 91  # packed triangles of 8 and 13 rows
 _LAYOUT = 0x47544C32  # where the CRC of kept words starts: libc/gtc_learn.c
 _EXP2_UNITS = np.float32(float.fromhex("0x1.715476p+6"))  # 64 / ln 2
 _AGREEING = 0.25  # two innovations that agree differ by at most this part of the later one
-_PLAUSIBLE_C = -90.0, 200.0  # libc/gtc_num_f32.h
 _LONGEST_S = 3.6e9  # a century in service: libc/gtc_learn.c
 OK, DISAGREES, REFUSED, WRONG = 0, 64, -8, -1  # what gtc_learn_rest() returns
 E_IMAGE, E_ID = -4, -5  # and gtc_learn_restore()
@@ -226,7 +226,7 @@ class Learner:
             mean, earth = number(stop.mean_var), number(stop.earth_var)
             usable = (
                 number(stop.time_s) >= known["settle_s"]
-                and _PLAUSIBLE_C[0] <= number(stop.temp_c) <= _PLAUSIBLE_C[1]
+                and PLAUSIBLE_C[0] <= number(stop.temp_c) <= PLAUSIBLE_C[1]
                 and number(stop.span_c) <= known["span_c"]
                 and mean <= known["noise_ratio"] * least
                 and earth >= 0.0

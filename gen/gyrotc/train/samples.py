@@ -23,12 +23,11 @@ from ..target.front_end import (
     period_us,
     samples_per_block,
 )
-from ..target.samples import Guarded
+from ..target.samples import PLAUSIBLE_C, Guarded
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
 
-PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond
 _PART = 2**18  # rows that are looked at together: bounds memory
 _GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
