@@ -173,7 +173,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
     emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
     command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
-    command.write_text(command.read_text("utf-8").replace("fish.", "fish of the tag."), "utf-8")
+    command.write_text(command.read_text("utf-8").replace("in a shell, on", "in a shell of the tag, on"), "utf-8")
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
@@ -187,7 +187,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
         assert "not of the tag" not in archive.read("gyrotc/c/libc/gtc_crc.c").decode()
         assert "gyrotc/LICENSE" in archive.namelist()
     page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
-    assert "fish of the tag." in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
+    assert "in a shell of the tag, on" in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
     _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
     listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
     files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}
