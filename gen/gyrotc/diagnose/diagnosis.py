@@ -22,13 +22,14 @@ from ..train.data import TrainingData
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, front_end, map_method, model_of, training_of
 from ..train.guards import channel_guard, longest_same_s, stuck_after_s
 from ..train.uncertainty import start_sigma
-from .blocks import records_of
+from .blocks import Records, records_of
 from .extension import Extension, extend, refittable, stand_ins_of
 from .gain import emitted_means, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refit import Effect, added_range, play_runs, terms_of
 from .single_cycle import Cycle, cycle_of, is_single_cycle
+from .static_map import fits_exactly
 from .summary import holds, not_testable, result_of
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -98,9 +99,9 @@ def _about(events: Sequence[Finding], accept: bool) -> list[str]:
 def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis:
     """All stages behind the events."""
     records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
-    temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
-    if float(np.ptp(temperature)) < LEAST_SPAN_C:
-        return Diagnosis(not_testable(dataset, chosen, float(np.ptp(temperature))), None, None, None)
+    undecidable = _undecidable(records)
+    if undecidable:
+        return Diagnosis(not_testable(dataset, chosen, undecidable), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if is_single_cycle(records) else None
     if not refittable(dataset, analysis.attribution.causes, chosen):
@@ -121,6 +122,16 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
     extension = _as_emitted(dataset, extension, extended, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
+
+
+def _undecidable(records: Records) -> str:
+    """Why these recordings cannot decide anything; empty where they may."""
+    temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
+    if float(np.ptp(temperature)) < LEAST_SPAN_C:
+        return f"Temperature spans only {np.ptp(temperature):.2f} C: nothing can be learnt about temperature here."
+    if fits_exactly(records):
+        return f"A map of (T, dT/dt) fits {records.size} blocks of {records.block_s:.4g} s exactly: record more."
+    return ""
 
 
 def _options_of(model: Model | None) -> FitOptions:

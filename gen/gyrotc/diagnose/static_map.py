@@ -93,6 +93,12 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
     return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[:, keep]
 
 
+def fits_exactly(records: Records) -> bool:
+    """Whether the coarsest map has a function for every block: nothing is left that could tell of noise or a cause."""
+    n_t, n_a, n_r = LEVELS[0]
+    return records.size <= 3 + n_t + n_a * n_r and make_basis(records, 0)[1].shape[1] >= records.size
+
+
 def fine_columns(records: Records, spacing_c: float = _FINE_C) -> FloatArray:
     """Local functions of T over the recorded range, as block means, shape (N, k); none that is zero."""
     low = min(float(r.history.temperature_c.min()) for r in records.runs)

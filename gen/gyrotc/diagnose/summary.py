@@ -210,9 +210,8 @@ def _block_s(dataset: Dataset, options: FitOptions) -> float:
     return front_end([r for r in dataset.runs if r.role == "train"], options.block_s).block_s
 
 
-def not_testable(dataset: Dataset, options: FitOptions, span_c: float) -> Diagnosed:
-    """The result where temperature hardly changes: nothing can be decided."""
-    text = f"Temperature spans only {span_c:.2f} C: nothing can be learnt about temperature here."
+def not_testable(dataset: Dataset, options: FitOptions, text: str) -> Diagnosed:
+    """The result where nothing can be decided, and why: before any search."""
     return Diagnosed(
         gyrotc_version=__version__,
         serial=dataset.serial,

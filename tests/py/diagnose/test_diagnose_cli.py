@@ -474,6 +474,17 @@ def test_recordings_at_one_temperature_cannot_decide(tmp_path: Path) -> None:
     assert found.result.verdict == "not_testable" and found.analysis is None
 
 
+def test_ten_blocks_that_a_map_fits_exactly_are_not_testable(tmp_path: Path) -> None:
+    """Rows of five minutes, as bursts give them."""
+    time = 305.0 * np.arange(10)
+    rate = 100.0 * np.random.default_rng(SEED).standard_normal(time.size)
+    write_csv(tmp_path / "a.csv", {"time_s": time, "temperature_c": 24.0 - 0.01 * time, "rate_dph": rate})
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    found = diagnose(load(tmp_path))
+    assert found.result.verdict == "not_testable" and found.analysis is None
+    assert "10 blocks" in found.result.text
+
+
 @pytest.mark.parametrize("verdict", get_args(DiagnosisVerdict))
 def test_each_verdict_has_a_sentence_and_all_but_ambiguous_a_step(verdict: DiagnosisVerdict) -> None:
     assert VERDICTS[verdict].endswith(".")
@@ -483,7 +494,7 @@ def test_each_verdict_has_a_sentence_and_all_but_ambiguous_a_step(verdict: Diagn
 
 def test_where_temperature_hardly_changes_nothing_is_decided(tmp_path) -> None:  # type: ignore[no-untyped-def]
     ACCEPTED["Parquet"](tmp_path / "RLG-1")
-    result = not_testable(load(tmp_path / "RLG-1"), FitOptions(), 0.25)
+    result = not_testable(load(tmp_path / "RLG-1"), FitOptions(), "Temperature spans only 0.25 C.")
     assert result.verdict == "not_testable"
     assert "0.25 C" in result.text
     assert not result.causes and result.extended is None
