@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.config import SWITCHES
+from gyrotc.tables.emit import SWITCHES
 from gyrotc.tables.emit import emit_texts, quantise_all
 from results import table as markdown
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import gyrotc
 from gyrotc.model import Model
-from gyrotc.tables.config import config_text
-from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables.emit import config_text, emit_texts, quantise_all
 from gyrotc.verify.toolchain import Target, link, run_to_end
 from models import random_model, random_terms
 

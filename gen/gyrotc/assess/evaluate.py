@@ -49,8 +49,7 @@ from ..target.table import Table, Words
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
-from .findings import findings_of
-from .residual import residual_findings, residual_test
+from .findings import findings_of, residual_findings, residual_test
 from .uncertainties import figure_uncertainties, root_mean, squares_in_all, squares_of
 
 __all__ = [

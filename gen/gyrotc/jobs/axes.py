@@ -14,8 +14,7 @@ from ..results.verification import JointVerification, Verification
 from ..store.files import write_atomically, write_own
 from ..store.scratch import scratch_folder
 from ..tables.amalgamate import ARITHMETICS
-from ..tables.config import config_text
-from ..tables.emit import emitted_tables, runtime_texts
+from ..tables.emit import config_text, emitted_tables, runtime_texts
 from ..tables.record import RECORD, joint_record_text
 from ..tables.text import example_period_us, example_samples
 from ..verify.emitted import file_entries

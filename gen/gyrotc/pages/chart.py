@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..common.arrays import FloatArray
 from ..common.texts import checked_svg, picture_text, pictures_in_rows
 from .display import power
-from .marks import Box, Drawn, mark_svg, sample, text_svg
-from .scales import AxisScale, scale_of
+from .marks import AxisScale, Box, Drawn, mark_svg, sample, scale_of, text_svg
 
 _CIVIDIS = ("#00224e", "#35456c", "#666970", "#948e77", "#c8b866", "#fee838")
 """Steps of cividis, which looks alike to people who see few colours (Nuñez, Anderton and Renslow 2018)."""

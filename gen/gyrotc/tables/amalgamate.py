@@ -28,7 +28,7 @@ def amalgamate(
 ) -> tuple[str, str]:
     """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
 
-    `gtc.h` includes a `gtc_config.h` beside it, with the options of the tables (`tables.config`).
+    `gtc.h` includes a `gtc_config.h` beside it, with the options of the tables (`tables.emit`).
 
     Args:
         include_dir, libc_dir: As `common.runtime.runtime_folders` gives them.

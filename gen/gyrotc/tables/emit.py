@@ -3,11 +3,15 @@
 A pure function of the model: no date,
 no path, no host, no version, so one model gives the same bytes on every machine. All arithmetic was
 done in `tables.quantise`; here integers are printed.
+
+`gtc_config.h` names the smallest runtime that holds the tables, and what each of its options costs: the costs were
+measured (`python -m bench docs --only costs`) and stand in `costs.json`.
 """
 
 from __future__ import annotations
 
 import functools
+import json
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,14 +25,13 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..common.runtime import runtime_folders
 from ..common.texts import CText, c_code, c_environment, c_literal
-from ..model import Model
+from ..model import Model, RuntimePart
 from ..store.files import write_own
 from ..store.folder import result_folder
 from ..target.history import answers
 from ..target.learning import ServicePrior
 from ..target.table import LAYOUT, Table
 from .amalgamate import LEARNING, amalgamate
-from .config import config_text, needs_of
 from .error_bounds import MARGIN, channel_error_dph
 from .learning import learning_text, service_prior
 from .quantise import NUMERICS, quantise
@@ -36,6 +39,57 @@ from .record import RECORD, Options, read_options, record_text
 from .rounding import channel_names
 from .text import example_values, table_text
 from .vectors import MISSING, Vectors, answers_text, make_vectors
+
+COSTS = Path(__file__).resolve().parent / "costs.json"
+#: Options of gtc_config.h by the part that a product may leave out.
+SWITCHES: dict[RuntimePart, str] = {
+    "uncertainty": "GTC_WITH_UNCERTAINTY",
+    "rezero": "GTC_WITH_REZERO",
+    "coverage": "GTC_WITH_COVERAGE",
+    "known_answers": "GTC_WITH_PROBES",
+    "image": "GTC_WITH_IMAGE",
+    "saved_state": "GTC_WITH_SAVE",
+    "time": "GTC_WITH_TIME",
+}
+
+
+def needs_of(models: Sequence[Model]) -> dict[str, int]:
+    """The least options of the runtime that hold the tables of all these models, by name."""
+    terms = max(max(len(m.terms), len(channel_names(m))) for m in models)
+    needs = {
+        "GTC_MAX_SLOPE_BLOCKS": max(m.slope_blocks for m in models),
+        "GTC_MAX_TERMS": terms,
+        "GTC_WITH_BANK": int(any(len(m.networks) > 1 for m in models)),
+    }
+    return needs | {switch: int(any(part not in m.left_out for m in models)) for part, switch in SWITCHES.items()}
+
+
+def config_text(models: Sequence[Model]) -> bytes:
+    """`gtc_config.h` of the tables of models that stand in one folder."""
+    needs = needs_of(models)
+    template = c_environment().get_template("gtc_config.h.j2")
+    text = template.render(
+        options=[{"name": name, "value": value} for name, value in needs.items()],
+        cost_lines=list(_cost_lines(needs)),
+    )
+    return text.encode("ascii")
+
+
+@functools.cache
+def _costs() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(COSTS.read_text("ascii"))
+    return found
+
+
+def _cost_lines(needs: dict[str, int]) -> Iterator[str]:
+    """A table of the costs in a comment: flash/RAM/stack by core and level."""
+    costs = _costs()
+    yield f"{'':<28} " + " ".join(f"{column:>16}" for column in costs["columns"])
+    for row in costs["rows"]:
+        cells = ("/".join(map(str, cell)) for cell in row["cells"])
+        state = f"{needs.get(row['option'], 0)}"
+        yield f"{row['name']:<24} {state:>3} " + " ".join(f"{cell:>16}" for cell in cells)
+
 
 __all__ = [
     "Emission",

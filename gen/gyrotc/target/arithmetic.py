@@ -1,6 +1,6 @@
 """The operations of front end and terms in each arithmetic, and in float64.
 
-`target.operations` has those of the target: float32 and fixed point.
+`target.history` has those of the target: float32 and fixed point.
 
 Element by element only: `np.sum`, `@` and the like may add in any order and are not used.
 """

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, run_here
-from gyrotc.assess.residual import residual_test
+from gyrotc.assess.findings import residual_test
 from gyrotc.results.evaluation import RMS_OVER_FLOOR, ResidualTest
 from gyrotc.train.noise import robust_sigma
 from numpy.typing import NDArray

@@ -17,8 +17,7 @@ import pytest
 from conftest import ROOT, Command
 from gyrotc.cli.deliver import address_of, points_of
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.deliver.autopilots import Autopilot, Cubic, best_cubic
-from gyrotc.deliver.export import Exporting, Format, export
+from gyrotc.deliver.export import Autopilot, Cubic, Exporting, Format, best_cubic, export
 from gyrotc.deliver.grid import csv_text, grid_of
 from gyrotc.model import Model, load_model
 from numpy.typing import NDArray

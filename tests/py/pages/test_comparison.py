@@ -18,7 +18,7 @@ from gyrotc.pages.comparison import (
     comparison_tables,
     with_published,
 )
-from gyrotc.pages.plots import calibrations_over_time
+from gyrotc.pages.report import calibrations_over_time
 from gyrotc.results.evaluation import (
     Calibration,
     Comparison,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text, significant
-from gyrotc.pages.scales import AxisScale, scale_of
+from gyrotc.pages.marks import AxisScale, scale_of
 from gyrotc.pages.words import sci, with_uncertainty, words
 from gyrotc.results.diagnosed import ComparedStatistic, ParameterLikelihood
 from gyrotc.results.findings import Size

@@ -17,8 +17,8 @@ from gyrotc.common.errors import InputError
 from gyrotc.recordings import parser_process
 from gyrotc.recordings.importers import formats
 from gyrotc.recordings.importers.map_file import Map
-from gyrotc.recordings.parquet_file import ParquetFile
 from gyrotc.recordings.parser_process import Parser, open_confined
+from gyrotc.recordings.reading import ParquetFile
 from gyrotc.recordings.sandbox import landlock_version
 from gyrotc.recordings.tables import LoggerFile
 from logger_binaries import BINARY_CASES

@@ -16,8 +16,7 @@ import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.model import Guard, Model, Term, load_model
-from gyrotc.tables.config import COSTS, SWITCHES, config_text
-from gyrotc.tables.emit import emit, emit_texts, quantise_all
+from gyrotc.tables.emit import COSTS, SWITCHES, config_text, emit, emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.f32 import gauss
 from gyrotc.target.maps import evaluate_map

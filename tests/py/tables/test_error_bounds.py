@@ -19,7 +19,7 @@ from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.error_bounds import channel_error_dph
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.operations import recursions
+from gyrotc.target.history import recursions
 from gyrotc.target.recursions import Course, CourseChannel, Recursion, TermOutcome
 from gyrotc.target.table import Numeric
 from models import bank_of, random_model
