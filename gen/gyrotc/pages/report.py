@@ -1,4 +1,4 @@
-"""`report.html`: one self-contained page from DIR/*.json and DIR/trace/*.csv, with its pictures. Computes nothing new."""
+"""`report.html`: one self-contained page from DIR/*.json and DIR/trace/*.csv, with pictures. Computes nothing new."""
 
 from __future__ import annotations
 
