@@ -3,7 +3,8 @@
 Every axis of every set in a folder, with each of its parts left out in turn: a run of several; of a single chamber
 cycle its branches, its hot and its cold end; of a single ramp its ends and its middle. The ratio is the RMS over means
 of 100 s on the part left out, over that of the best of a constant, a cubic, and a cubic with a slope in dT/dt: the best
-in hindsight, which no choice can know.
+in hindsight, which no choice can know. Each split is diagnosed, too: what `gyrotc build --extend` would emit is judged
+beside what it would emit without states, and an internal fault is kept as the split's verdict.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from gyrotc.common.errors import GyrotcError
+from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.recordings.records import Dataset
 from gyrotc.train.cross_validation import turning_points
@@ -32,6 +34,7 @@ _GOOD, _FAIR = (
     1.03,
     1.10,
 )  # times the best trivial correction: what no worse means, and what little worse means
+_HARM = 1.05  # times what would be emitted without states: more is harm
 _END = 0.25  # of a ramp, left out at either end; of the range of a cycle's temperature
 _MIDDLE = (0.4, 0.65)  # shares of the time of a ramp
 _HALVES = (0.33, 0.67)  # shares of the time of a recording at one temperature
@@ -66,6 +69,8 @@ class Judged:
         t: Of the gain over a constant, over pieces of history; 0 where there is none.
         rms_dph: What it leaves on the part left out, deg/h.
         trivial_dph: What the trivial corrections leave there, deg/h.
+        verdict: Of the diagnosis; the name of an exception where it ended in one.
+        emitted_dph: What the emitted tables leave there without and with states, deg/h; None where none are shipped.
     """
 
     split: Split
@@ -74,6 +79,8 @@ class Judged:
     t: float
     rms_dph: float
     trivial_dph: dict[str, float]
+    verdict: str
+    emitted_dph: tuple[float, float] | None
 
     @property
     def ratio(self) -> float:
@@ -166,7 +173,21 @@ def judged(split: Split) -> Iterator[Judged]:
         t = next((row.t or 0.0 for row in fitted.training.candidates if row.chosen), 0.0)
         model = fitted.model
         left = _rms(exam, model.map_dph(exam.temperature_c, exam.slope_c_per_min))
-        yield Judged(split, axis, model.method, t, left, trivial)
+        yield Judged(split, axis, model.method, t, left, trivial, *extended(dataset))
+
+
+def extended(dataset: Dataset) -> tuple[str, tuple[float, float] | None]:
+    """The verdict, and what the emitted tables leave on the exam without and with states where any are shipped."""
+    try:
+        found = diagnose(dataset, options=FitOptions(average_s=AVERAGE_S)).result
+    except GyrotcError as refused:
+        return f"refused: {refused}", None
+    except Exception as fault:  # each is an exit 70 of the command
+        return f"fault: {type(fault).__name__}", None
+    if found.extended is None:
+        return found.verdict, None
+    gain = found.extended.gain
+    return found.verdict, (gain.exam_rms_before_dph, gain.exam_rms_after_dph)
 
 
 def of_trivial(train: TrainingData, name: str, exam: TrainingData) -> NDArray[np.float64]:
@@ -200,6 +221,7 @@ def counts(rows: Sequence[Judged]) -> dict[str, Any]:
     of_constant = np.array([row.of_constant for row in rows])
     constant = np.array([row.method == "constant" for row in rows])
     good = ratio <= _GOOD
+    shipped = np.array([row.emitted_dph[1] / row.emitted_dph[0] for row in rows if row.emitted_dph is not None])
     return {
         "splits": len(rows),
         "good": int(good.sum()),
@@ -209,6 +231,11 @@ def counts(rows: Sequence[Judged]) -> dict[str, Any]:
         "worse_than_constant": int((of_constant > _GOOD).sum()),
         "worst_through_richer": float(ratio[~constant].max(initial=1.0)),
         "geometric_mean": float(np.exp(np.log(ratio).mean())),
+        "faults": sum(row.verdict.startswith("fault") for row in rows),
+        "with_states": int(shipped.size),
+        "states_at_not_testable": sum(r.emitted_dph is not None and r.verdict == "not_testable" for r in rows),
+        "states_harm": int((shipped > _HARM).sum()),
+        "states_worst": float(shipped.max(initial=0.0)),
     }
 
 
@@ -231,6 +258,8 @@ def write_splits(docs: Path, sets: Path, say: Say) -> None:
             "t": row.t,
             "rms_dph": row.rms_dph,
             "trivial_dph": row.trivial_dph,
+            "verdict": row.verdict,
+            "emitted_dph": row.emitted_dph,
         }
         for row in rows
     ]
@@ -244,11 +273,13 @@ def write_splits(docs: Path, sets: Path, say: Say) -> None:
 
 
 def section(result: dict[str, Any]) -> str:
-    """The counts as a table."""
-    return (
-        "## Measured gyros, parts of their history left out (`python -m bench docs --only splits`)\n\n"
-        + table(
-            ("splits", "count "),
-            [(name.replace("_", " "), f"{count:.4g}") for name, count in result["counts"].items()],
-        )
-    )
+    """The counts as a table, and each split: RMS without states, with them, and of the best trivial correction."""
+    counted = [(name.replace("_", " "), f"{count:.4g}") for name, count in result["counts"].items()]
+    rows = []
+    for row in result.get("rows", []):
+        without, with_states = row["emitted_dph"] or (row["rms_dph"], None)
+        cells = [f"{x:.4g}" if x else "" for x in (without, with_states, min(row["trivial_dph"].values()))]
+        rows.append((row["set"], row["left_out"], row["axis"], row["method"], *cells, row["verdict"]))
+    head = ("set", "left out", "axis", "method", "without ", "with states ", "best trivial ", "verdict")
+    title = "## Measured gyros, parts of their history left out (`python -m bench docs --only splits`)\n\n"
+    return title + table(("splits", "count "), counted) + "\n" + table(head, rows)

@@ -43,7 +43,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "service": ("libc/gtc_learn.c", "gen/gyrotc/target/learning.py", "gen/gyrotc/lot/service.py"),
     "sigma": ("gen/gyrotc/train/uncertainty.py", *_RUNTIME),
     "signals": _TRAIN,
-    "splits": _TRAIN,
+    "splits": _DIAGNOSE,
     "recalibration": ("gen/gyrotc/lot",),
     "planted": ("gen/gyrotc/fleet", "gen/gyrotc/quality"),
     "sizes": _RUNTIME,

@@ -24,6 +24,7 @@ from bench import page as bench_page  # noqa: E402
 from bench import runtime  # noqa: E402
 from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
+from bench.splits import Judged, Split, counts  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
@@ -34,6 +35,17 @@ WRITING = {
     "build", "check", "compare", "diagnose", "emit", "evaluate", "fit", "fleet", "import", "plan", "report", "sign",
     "simulate", "stamp", "verify",
 }  # fmt: skip
+
+
+def test_states_that_harm_a_split_and_faults_of_its_diagnosis_are_counted() -> None:
+    trivial = {"constant": 2.0, "cubic": 1.0, "cubic_slope": 1.5}
+    answers = (
+        ("explained", (1.0, 0.5)), ("not_testable", (1.0, 1.06)), ("consistent", None), ("fault: ValueError", None)
+    )  # fmt: skip
+    rows = [Judged(Split("set", "run", ROOT), "x", "cubic", 1.0, 1.0, trivial, *answer) for answer in answers]
+    found = counts(rows)
+    assert [found[name] for name in ("faults", "with_states", "states_at_not_testable", "states_harm")] == [1, 2, 1, 1]
+    assert found["states_worst"] == pytest.approx(1.06)
 
 
 def test_the_figures_of_pages_are_those_of_the_summary() -> None:
