@@ -229,11 +229,24 @@ def _targets_begun(incomplete: str) -> list[str]:
 
 
 AnyAverageOption = Annotated[float | None, _of_build("average_s")]
+
+
+def _displayed(context: typer.Context, name: str | None) -> str | None:
+    """The unit holds for the whole call; results and files stay in deg/h."""
+    if name is not None:
+        from ..pages.display import displayed
+
+        context.with_resource(displayed(name))
+    return name
+
+
 DisplayOption = Annotated[
     str | None,
     typer.Option(
         "--display",
-        help="Unit of rates on page and terminal: deg/h, deg/s, mdps or arcsec/s; default: that of the limits file.",
+        callback=_displayed,
+        help="Unit of rates on page and terminal: deg/h, deg/s, mdps or arcsec/s; default: that of the limits file, "
+        "else deg/h. JSON, CSV, certificate and DCC stay in deg/h, the unit of the tables.",
         autocompletion=completing(("deg/h", "deg/s", "mdps", "arcsec/s")),
     ),
 ]

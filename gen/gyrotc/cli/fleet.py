@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
+from ..pages.display import displayed, in_unit, rate_unit, shown
 from ..pages.words import sci, words
 from .base import (
     LOT,
+    DisplayOption,
     JsonOption,
     LotOption,
     OutOption,
@@ -60,6 +62,7 @@ def fleet(
     ] = None,
     why: Annotated[str, typer.Option("--reason", help="Why, for --release.")] = "",
     lot: LotOption = None,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that are outliers.
@@ -79,9 +82,10 @@ def fleet(
     if share and gathered:
         raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
-    wanted = replace(wanted, options=replace(wanted.options, prior=lot_in(lot)))
+    options = replace(wanted.options, prior=lot_in(lot))
+    wanted = replace(wanted, options=options, display=display or wanted.display)
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
-    with progress() as say:
+    with displayed(wanted.display), progress() as say:
         done = _Done(len(wanted.units), say)
         if share:
             entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, done=done)
@@ -96,13 +100,8 @@ def fleet(
         return
     summary = summary_of(entries)
     write_json(json_file, summary.content())
-    _tell_comparison(summary)
-    for unit in summary.serials:
-        if unit.barred:
-            tell(
-                f"{unit.name}: not in the catalogue, in no lot: {', '.join(unit.barred)}; look at it, or "
-                f"--release {unit.serial} --reason TEXT"
-            )
+    with displayed(wanted.display):
+        _tell_comparison(shown(summary))
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
@@ -130,6 +129,7 @@ def catalogue(
         str | None,
         typer.Option("--withdraw", metavar="HASH", help="Mark the model of this hash as withdrawn."),
     ] = None,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
@@ -155,9 +155,9 @@ def catalogue(
     if exported is not None and out is not None and answer.found:
         export(place, exported, asked, out)
     write_json(json_file, answer.content())
-    for one in answer.found:
+    for one in shown(answer).found:
         until = f" to {one.valid_until}" if one.valid_until else ""
-        spread = f", U {sci(one.expanded_dph, 1)} deg/h" if one.expanded_dph is not None else ""
+        spread = f", U {sci(one.expanded_dph, 1)} {rate_unit()}" if one.expanded_dph is not None else ""
         tell(
             f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
             f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
@@ -183,8 +183,7 @@ def _day(text: str | None) -> str:
 
 
 def _tell_comparison(summary: FleetSummary) -> None:
-    """A line for what each gyro was found by, when it was compared with the others."""
-
+    """A line for what each gyro was found by, when it was compared with the others, and one for each that is barred."""
     for reason in summary.reasons:
         tell(f"outlier: {reason.name}: {reason.text}")
     named = {reason.name for reason in summary.reasons}
@@ -198,6 +197,12 @@ def _tell_comparison(summary: FleetSummary) -> None:
             f"copy of another: {copy.name} (serial {copy.serial}) has {copy.words} with {copy.other} "
             f"(serial {copy.other_serial}): one gyro under two serials"
         )
+    for unit in summary.serials:
+        if unit.barred:
+            tell(
+                f"{unit.name}: not in the catalogue, in no lot: {', '.join(unit.barred)}; look at it, or "
+                f"--release {unit.serial} --reason TEXT"
+            )
 
 
 class _Done:
@@ -222,8 +227,9 @@ def _tell_entry(entry: FleetEntry) -> None:
     text = f"{entry.name}: {entry.status}{kept}"
     if entry.after_rms_dph is not None:
         floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
+        before, after = in_unit([entry.before_rms_dph or 0.0, entry.after_rms_dph])
         text += (
-            f"; RMS {sci(entry.before_rms_dph, 3)} -> {sci(entry.after_rms_dph, 3)} deg/h{floor}, "
+            f"; RMS {sci(float(before), 3)} -> {sci(float(after), 3)} {rate_unit()}{floor}, "
             f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
     if entry.status != "done":
@@ -241,6 +247,7 @@ def lot(
         str | None,
         typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own."),
     ] = None,
+    display: DisplayOption = None,
 ) -> None:
     """Learn what units of one type share, so that the next ones need fewer runs (build --lot).
 
@@ -253,9 +260,9 @@ def lot(
     with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
-    checked = found.cross_validation
+    checked = shown(found.cross_validation)
     tell(f"{out}: {found.text}")
     tell(
-        f"a new unit, before any run: {sci(checked.left_rms_dph)} deg/h about the lot's map, "
+        f"a new unit, before any run: {sci(checked.left_rms_dph)} {rate_unit()} about the lot's map, "
         f"{sci(checked.constant_rms_dph)} about its own mean"
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..pages.display import NATIVE, check_display, displayed, rate_unit, shown
+from ..pages.display import NATIVE, displayed, rate_unit, shown
 from ..pages.words import sci, words
 from ..train.options import BuildOptions
 from .base import (
@@ -291,6 +291,7 @@ def compare(
     options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train every method on this data and show them side by side, as in the paper's Table 1.
@@ -315,9 +316,9 @@ def compare(
         result = with_published(run(recordings, trained, progress=say))
         if stage:
             write_atomically(stage.folder / "compare.json", json_text(result.content()))
-            write_atomically(stage.folder / "compare.svg", comparison_picture(result))
+            write_atomically(stage.folder / "compare.svg", comparison_picture(shown(result)))
     write_json(json_file, result.content())
-    for table in comparison_tables(result):
+    for table in comparison_tables(shown(result)):
         show(table)
 
 
@@ -359,7 +360,6 @@ def diagnose(
     from ..store.folder import result_folder
     from ..train.fitting import FitOptions
 
-    check_display(display)
     if lot is not None and model is not None:
         raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
     known = load_model(model) if model else None
@@ -371,7 +371,7 @@ def diagnose(
 
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
-        with displayed(display or NATIVE), progress(DIAGNOSE) as say:
+        with progress(DIAGNOSE) as say:
             results[name or ""] = diagnosed(
                 recordings,
                 into,
@@ -392,8 +392,7 @@ def diagnose(
     contents = {name: result.content() for name, result in results.items()}
     write_json(json_file, contents if several else next(iter(contents.values())))
     for name, result in results.items():
-        with displayed(display or NATIVE):
-            for line in diagnosis_lines(shown(result)):
-                tell(line)
+        for line in diagnosis_lines(shown(result)):
+            tell(line)
         if out is not None:
             tell(f"report: {(out / name if several else out) / 'report.html'}")

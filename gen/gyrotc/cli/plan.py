@@ -12,8 +12,9 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..common.errors import InputError
+from ..pages.display import rate_unit, shown
 from ..pages.words import plain, sci
-from .base import PLAN, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
+from .base import PLAN, DisplayOption, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .words import NoiseLevel
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
     low, high = result.bias_range_dph
     yield (
         f"{result.scenario}: {len(result.runs)} runs, {result.hours:g} h; "
-        f"noise {sci(result.noise.arw_deg_per_sqrt_h)} deg/sqrt(h); simulated bias {sci(low)} … {sci(high)} deg/h"
+        f"noise {sci(result.noise.arw_deg_per_sqrt_h)} deg/sqrt(h); "
+        f"simulated bias {sci(low)} … {sci(high)} {rate_unit()}"
     )
     yield _limits(result)
     for id, why in result.not_testable.items():
@@ -81,7 +83,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
 
 def _places(found: Sequence[ThermometerPlace]) -> Table:
     title = "Where a further thermometer would add most"
-    table = _table(title, "node", "difference, C", "not seen so far, C", "shows from, deg/h/C")
+    table = _table(title, "node", "difference, C", "not seen so far, C", f"shows from, {rate_unit()}/C")
     for place in found:
         limit = "never" if place.limit_dph_per_c is None else sci(place.limit_dph_per_c, 1)
         name = f"{place.node} (there is one)" if place.there else place.node
@@ -142,7 +144,8 @@ def _separability(result: Plan) -> Table:
 
 def _accuracy(result: Plan) -> Table:
     title = "Predicted accuracy of the compensated bias over the whole programme"
-    table = _table(title, "after run", "hours", "error of the map, deg/h", "RMS of 100 s means", "over the floor")
+    error = f"error of the map, {rate_unit()}"
+    table = _table(title, "after run", "hours", error, "RMS of 100 s means", "over the floor")
     for entry, run in zip(result.accuracy, result.runs, strict=True):
         table.add_row(
             run.profile, f"{entry.hours:g}", sci(entry.map_error_dph, 1), sci(entry.rms_dph),
@@ -204,6 +207,7 @@ def plan(
         typer.Option("--price-per-run", help="With --unit: of mounting and settling once, in the same."),
     ] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Predict what a programmed profile can detect, before it is run; with a lot, the shortest programme.
@@ -238,7 +242,7 @@ def plan(
         if stage:
             write_plan(stage.folder, result)
     write_json(json_file, result.content())
-    for part in plan_parts(result):
+    for part in plan_parts(shown(result)):
         if isinstance(part, str):
             tell(part)
         else:
@@ -271,10 +275,11 @@ def _next_run(
             write_atomically(stage.folder / "programme.csv", programme_csv(best))
             write_atomically(stage.folder / "programme.txt", programme_text(best))
     write_json(json_file, result.content())
-    tell(f"{result.serial} as it is known now: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
+    result = shown(result)
+    tell(f"{result.serial} as it is known now: {sci(result.before_dph)} {rate_unit()} (1 sigma over the envelope)")
     for k, one in enumerate(result.proposals):
         tell(
-            f"{one.programme.hours:.1f} h, price {plain(one.price)}: {sci(one.programme.sigma_dph)} deg/h, "
+            f"{one.programme.hours:.1f} h, price {plain(one.price)}: {sci(one.programme.sigma_dph)} {rate_unit()}, "
             f"{one.removed_share:.0%} of the variance removed{', most for its price' if k == result.best else ''}"
         )
     for line in programme_text(best).splitlines():
@@ -300,12 +305,13 @@ def _plan_with_lot(scenario: str, path: Path, require: Sequence[str], out: Path 
             write_atomically(stage.folder / "programme.csv", programme_csv(result.with_lot))
             write_atomically(stage.folder / "programme.txt", programme_text(result.with_lot))
     write_json(json_file, result.content())
-    tell(f"the lot alone, before any run: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
-    for name, found in (("with the lot", result.with_lot), ("without", result.without)):
+    visible = shown(result)
+    tell(f"the lot alone, before any run: {sci(visible.before_dph)} {rate_unit()} (1 sigma over the envelope)")
+    for name, found in (("with the lot", visible.with_lot), ("without", visible.without)):
         short = "" if found.reached else ", which is all that a day reaches"
         tell(
-            f"{name}: {found.hours:.1f} h for {sci(found.sigma_dph)} deg/h, RMS {found.rms_over_floor:.3f} x noise "
-            f"floor{short}"
+            f"{name}: {found.hours:.1f} h for {sci(found.sigma_dph)} {rate_unit()}, "
+            f"RMS {found.rms_over_floor:.3f} x noise floor{short}"
         )
     for line in programme_text(result.with_lot).splitlines():
         tell(line)

@@ -272,11 +272,10 @@ def check(
     Example: gyrotc check recordings --plots check.html
     """
     from ..assess.changes import earlier_models
-    from ..pages.display import NATIVE, displayed
     from ..quality.check import check as run
     from ..quality.check import envelope_of
 
-    with displayed(display or NATIVE), progress() as say:
+    with progress() as say:
         result = run(
             dataset,
             axis=axis,
@@ -293,8 +292,7 @@ def check(
             say("drawing")
             write_check_page(plots, result.result(), pictures_of(dataset, result), str(dataset))
     write_json(json_file, result.result().content())
-    with displayed(display or NATIVE):
-        for line in result.lines():
-            tell(line, wrong=bool(result.problems))
+    for line in result.lines():
+        tell(line, wrong=bool(result.problems))
     if result.problems:
         raise typer.Exit(2)

@@ -103,13 +103,12 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..jobs.recalibration import with_prior
-    from ..pages.display import NATIVE, check_display, displayed, shown
+    from ..pages.display import shown
     from ..recordings.load import load
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
     from ..train.fitting import FitOptions, fit_dataset
 
-    check_display(display)
     fitting = FitOptions(**options, prior=lot_in(lot))
     known = applied_in(applied)
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
@@ -120,13 +119,12 @@ def fit(
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
     write_json(json_file, fitted.training.content())
-    with displayed(display or NATIVE):
-        training = shown(fitted.training)
-        for line in training_lines(training):
-            tell(line)
-        for finding in training.findings:
-            tell(f"finding {finding.id}: {finding.text}")
-        tell(prediction_line(training))
+    training = shown(fitted.training)
+    for line in training_lines(training):
+        tell(line)
+    for finding in training.findings:
+        tell(f"finding {finding.id}: {finding.text}")
+    tell(prediction_line(training))
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
 
 
@@ -282,11 +280,10 @@ def evaluate(
     """
     from ..assess.evaluate import evaluate as run
     from ..model import load_model
-    from ..pages.display import NATIVE, check_display, displayed, shown
+    from ..pages.display import shown
     from ..recordings.load import load
     from ..store.files import json_text, write_atomically
 
-    check_display(display)
     if average_s is not None:
         BuildOptions(average_s=average_s)
     axis = load_model(folder / "model.json").axis
@@ -304,8 +301,7 @@ def evaluate(
         )
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())
-    with displayed(display or NATIVE):
-        show(evaluation_table(shown(result)))
+    show(evaluation_table(shown(result)))
     if result.mismatches:
         raise CheckFailed(f"{result.mismatches} steps differ from the reference")
 
@@ -318,15 +314,13 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
     """
     from ..jobs.axes import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
-    from ..pages.display import NATIVE, displayed
     from ..pages.plan import is_plan, write_plan_page
     from ..pages.report import axes_page, write_page, write_report
 
     with progress() as say:
         say("drawing")
         if is_diagnosis(folder) or is_plan(folder):
-            with displayed(display or NATIVE):
-                path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
+            path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
         elif axes := axes_in(folder):
             path = write_page(folder, axes_page(folder, axes, display))
         else:

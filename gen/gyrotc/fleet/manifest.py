@@ -60,11 +60,7 @@ class Fleet:
     options: FitOptions
     numerics: tuple[str, ...] | None
     limits: Limits | None
-
-    @property
-    def display(self) -> str:
-        """Unit of rates on the page: that of the limits, else deg/h."""
-        return self.limits.display if self.limits else NATIVE
+    display: str = NATIVE
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +141,7 @@ def load_manifest(path: Path) -> Fleet:
     limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
     options = FitOptions(**options_in(manifest.options, f"{path}, field options."))
     numerics = tuple(manifest.numeric) if manifest.numeric else None
-    return _distinct(path, Fleet(units, options, numerics, limits))
+    return _distinct(path, Fleet(units, options, numerics, limits, limits.display if limits else NATIVE))
 
 
 def _units(folder: Path, axis: str | None) -> Iterator[Unit]:

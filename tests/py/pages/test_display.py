@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from gyrotc.cli.commands import app
 from gyrotc.common.errors import InputError
 from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text, significant
 from gyrotc.pages.marks import AxisScale, scale_of
@@ -15,6 +16,8 @@ from gyrotc.results.findings import Size
 from gyrotc.results.planned import DetectionLimit
 from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
+from typer.main import get_command
+from typer.testing import CliRunner
 
 
 @pytest.mark.parametrize("name, factor", [("deg/h", 1.0), ("deg/s", 1 / 3600), ("mdps", 1 / 3.6), ("arcsec/s", 1.0)])
@@ -142,3 +145,15 @@ def test_ticks_are_round_and_lie_on_the_axis() -> None:
         log = scale_of(np.array([abs(low), abs(low) + high - low]), (None, None), True, 0.04)
         assert all(log.low * 0.999 <= at <= log.high * 1.001 for at, _ in log.ticks(6))
     assert AxisScale(0.0, 1.0).ticks(5)[0] == (0.0, "0.0")
+
+
+def test_every_command_that_states_rates_takes_the_unit_and_refuses_another() -> None:
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    takes = {name for name, one in commands.items() if any(p.name == "display" for p in one.params)}
+    assert takes >= {
+        "fit", "evaluate", "check", "build", "diagnose", "compare", "plan", "fleet", "catalogue", "lot", "report",
+    }  # fmt: skip
+    for name in sorted(takes):
+        done = CliRunner().invoke(app, [name, "--display", "knots", *["nowhere"] * 3])
+        assert isinstance(done.exception, InputError) and "knots" in str(done.exception), name
+    assert rate_unit() == "deg/h"

@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 from campaigns import scenario, simulated
 from conftest import Command, invoked
-from gyrotc.cli.plan import limits_of, pair_of
+from gyrotc.cli.plan import limits_of, pair_of, plan_parts
 from gyrotc.common.errors import InputError
+from gyrotc.pages.display import displayed, shown
+from gyrotc.pages.words import sci
 from gyrotc.plan.plan import plan, shortest
 from gyrotc.plan.sensitivity import Sensitivity, programme_of
+from gyrotc.results.planned import Plan
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +103,9 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
     (tmp_path / "report.html").unlink()
     assert gyrotc("report", tmp_path).returncode == 0
     assert (tmp_path / "report.html").read_text("utf-8") == page
+    assert gyrotc("report", tmp_path, "--display", "mdps").returncode == 0
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "error of the map, mdps" in page and "error of the map, deg/h" not in page
 
 
 @pytest.mark.parametrize(
@@ -116,6 +122,18 @@ def test_bad_options_are_reported(folder: Path, options: tuple[str, str], report
     """In this process: what is refused costs less than a start of the program."""
     done = invoked("plan", scenario(folder), *options)
     assert isinstance(done.exception, InputError) and reported in str(done.exception)
+
+
+def test_what_is_printed_is_in_the_unit_that_is_asked_for(planned: dict[str, Any]) -> None:
+    result = Plan.model_validate(json.loads(json.dumps(planned)), strict=False)
+    with displayed("mdps"):
+        first, *_ = plan_parts(shown(result))
+        tables = [part for part in plan_parts(shown(result)) if not isinstance(part, str)]
+    low, high = result.bias_range_dph
+    assert f"{sci(low / 3.6)} … {sci(high / 3.6)} mdps" in first
+    accuracy = next(table for table in tables if "accuracy" in str(table.title))
+    assert accuracy.columns[2].header == "error of the map, mdps"
+    assert list(accuracy.columns[2].cells) == [sci(a.map_error_dph / 3.6, 1) for a in result.accuracy]
 
 
 def test_options_are_read() -> None:
