@@ -23,9 +23,9 @@ FLAGS = (
 )
 HOST = [(c, (o, *f)) for c, o, f in product(("gcc", "clang"), ("-O1", "-O2", "-O3", "-Os"), FLAGS)]
 TARGETS = ("cortex-m4f", "aarch64", "s390x", "rv32imafc")
+FUSED = ("-std=gnu99", "-ffp-contract=fast")
 TARGET_FLAGS = (
-    ("-std=gnu99", "-ffp-contract=fast"),
-    ("-std=gnu99", "-ffp-contract=fast", *UNGUARDED),
+    (*FUSED, *UNGUARDED),
     ("-ffast-math", "-U__FAST_MATH__"),
     ("-funsafe-math-optimizations",),
 )
@@ -96,6 +96,16 @@ def test_builds_of_targets(
     _reported(results, name, flags, right, verdict)
     assert verdict.differing(right), "the control changes no result"
     assert verdict.missed(right) == []
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_source_keeps_gcc_from_fusing(
+    name: str, sources: list[Path], right: Verdict, tmp_path: Path, results: Results
+) -> None:
+    """Before: these builds gave other bits, and the self-test refused them. The control is the one above, unguarded."""
+    verdict = on_target(with_flags(name), ("-std=c99", "-ffp-contract=off", *FUSED), sources, tmp_path / "build")
+    _reported(results, name, FUSED, right, verdict)
+    assert set(verdict.statuses) == {OK} and verdict.differing(right) == []
 
 
 @pytest.mark.parametrize("name", TARGETS)
