@@ -83,16 +83,14 @@ def test_every_correction_lies_within_the_authority(results: Results) -> None:
 
 @pytest.mark.tool("z3")
 @pytest.mark.parametrize(
-    ("changes", "which"),
+    ("statement", "wrong", "which"),
     [
         # comparisons that are false for what is no number let it pass
-        ((("(not (fp.geq x low))", "(fp.lt x low)"), ("(not (fp.leq x high))", "(fp.gt x high)")), 0),
-        ((("(not (bvsge y (wide least)))", "(not (bvuge y (wide least)))"),), 1),
+        ("(and (fp.geq x low) (fp.leq x high))", "(not (or (fp.lt x low) (fp.gt x high)))", 0),
+        ("(bvsge y (wide least))", "(bvuge y (wide least))", 1),
     ],
 )
-def test_another_bound_is_not_proved(changes: tuple[tuple[str, str], ...], which: int) -> None:
+def test_another_bound_is_not_proved(statement: str, wrong: str, which: int) -> None:
     text = (HERE / "smt" / "authority.smt2").read_text()
-    for statement, wrong in changes:
-        assert text.count(statement) == 1
-        text = text.replace(statement, wrong)
-    assert _z3(text)[which] == "sat"
+    assert text.count(statement) == 1
+    assert _z3(text.replace(statement, wrong))[which] == "sat"

@@ -31,7 +31,7 @@ def json_text(content: Any) -> str:
 
 
 def _text(content: Any, level: int) -> str:
-    """As `json.dumps(content, indent=1)` but for series; that goes value by value in Python, and takes ten times as long.
+    """As `json.dumps(content, indent=1)` but for series; that goes value by value in Python: ten times as long.
 
     What holds no list or object itself is written in one go, with line ends for blanks.
     """
