@@ -201,7 +201,7 @@ blind-other: setup
 
 ## events planted in recordings (steps, drifts, gains, a loose thermometer): found, named, placed (EACH=36, SEED=)
 events: setup
-	@$(PYTHON) -m tests.events --workers 2 --each "$$SET_EACH" $${SET_SEED:+"--seed=$$SET_SEED"}
+	@$(PYTHON) -m tests.events --workers 2 --docs docs --each "$$SET_EACH" $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## the same recordings handed over in other ways (constant, clock, cuts, units, blocks, means): same diagnosis? (30 minutes)
 invariance: setup

@@ -1,21 +1,26 @@
 """How often planted events are found, named and placed: `make events`.
 
-    python -m tests.events [--each 30] [--seed N] [--only "step, hold 12"]
+    python -m tests.events [--each 36] [--seed N] [--only "step, hold 12"] [--json FILE] [--docs docs]
 
 Every set is a gyro of its own in a chamber of its own (`tests.blind.chamber`): four runs, a smooth bias over
 temperature and its rate, white and flicker noise, one of three thermometers and of three row lengths, and one event, or
 none. The seed comes from the operating system unless it is given, and is printed; a seed makes the same sets again.
+What `--json` names is written after every kind, and a call that finds it there goes on with its seed.
+Set OMP_NUM_THREADS=1, as make does: with two threads a set takes ten times as long.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import secrets
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -28,11 +33,21 @@ from gyrotc.results.findings import Finding
 from .blind.chamber import Array, draw_unit, expose, steps
 from .blind.noise import Noise, draw
 
+sys.path.insert(0, str(Path(__file__).resolve().parent / "py"))
+from results import table
+from results import write as write_record
+
 FLOOR_DPH = 7e-4  # of 100-s means
 RUNS, HOURS, STILL_C_PER_MIN = 4, 8.0, 0.1
 ROWS_S, RESOLUTIONS_C = (1, 10, 60), (0.001, 0.0625, 0.1)
 NEAR_S = 900.0  # of an event that is reported, from the planted one
-WARNINGS = ("sign_reversed", "axes_exchanged", "runs_contradict", "thermometer_changed", "rate_outliers")
+WARNINGS = (
+    "sign_reversed",
+    "axes_exchanged",
+    "runs_contradict",
+    "thermometer_changed",
+    "rate_outliers",
+)
 
 
 @dataclass
@@ -171,7 +186,11 @@ def draw_temperatures(rng: np.random.Generator) -> list[tuple[Array, Array]]:
     runs = []
     for k in range(RUNS):
         legs = [
-            (float(rng.uniform(0.7, 4.0)), float(rng.uniform(*((30, 60) if j % 2 else (-40, 0)))), 60.0 * m)
+            (
+                float(rng.uniform(0.7, 4.0)),
+                float(rng.uniform(*((30, 60) if j % 2 else (-40, 0)))),
+                60.0 * m,
+            )
             for j, m in enumerate(rng.uniform(25.0, 150.0, 8))
         ]
         start = float(rng.uniform(-10.0, 30.0))
@@ -226,7 +245,11 @@ def draw_place(temperature: Array, where: str, rng: np.random.Generator) -> floa
     """A time well within the run, in a hold or on a ramp."""
     times = np.arange(4200, temperature.size - 4200)
     slope = np.abs(np.gradient(temperature))[times] * 60.0
-    there = {"hold": slope < STILL_C_PER_MIN, "ramp": slope > 5.0 * STILL_C_PER_MIN, "any": slope >= 0.0}[where]
+    there = {
+        "hold": slope < STILL_C_PER_MIN,
+        "ramp": slope > 5.0 * STILL_C_PER_MIN,
+        "any": slope >= 0.0,
+    }[where]
     return float(rng.choice(times[there])) if there.any() else float(rng.choice(times))
 
 
@@ -242,7 +265,10 @@ def write(runs: list[Recording], row_s: int, averaged: bool, folder: Path) -> No
             "temperature_c": np.round(read.mean(axis=1), 4) if averaged else read[:, -1],
             "rate_dph": np.round(run.rate_dph[:n].reshape(-1, row_s).mean(axis=1), 9),
         }
-        pq.write_table(pa.table({name: v[kept] for name, v in columns.items()}), folder / f"{k}.parquet")
+        pq.write_table(
+            pa.table({name: v[kept] for name, v in columns.items()}),
+            folder / f"{k}.parquet",
+        )
         lines += ["", "[[run]]", f'file = "{k}.parquet"']
     (folder / "dataset.toml").write_text("\n".join(lines) + "\n", "utf-8")
 
@@ -280,7 +306,12 @@ def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
     right = [time for id, time in near if id in planted.names]
     at = planted.at_s
     holds = at is not None and any(low <= at <= high for of_event in right for low, high in of_event)
-    return Score(bool(ids), any(id in planted.names for id in ids), holds, tuple(id for id, _ in other))
+    return Score(
+        bool(ids),
+        any(id in planted.names for id in ids),
+        holds,
+        tuple(id for id, _ in other),
+    )
 
 
 def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
@@ -292,19 +323,50 @@ def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
         runs, planted = draw_set(kind, resolution, rng)
         with tempfile.TemporaryDirectory(prefix="events-") as name:
             write(runs, row_s, bool(rng.integers(2)), Path(name))
-            yield judge(Path(name), planted, warnings=planted.at_s is None or kind == "lost contact")
+            yield judge(
+                Path(name),
+                planted,
+                warnings=planted.at_s is None or kind == "lost contact",
+            )
 
 
-def line(job: tuple[str, int, int]) -> str:
-    """A row of the table, for a kind, a seed and so many sets."""
-    kind, of = job[0], list(scores(*job))
-    reported = sorted({id for s in of for id in s.other})
-    false = sum(bool(s.other) for s in of)
-    by_row = "/".join(str(sum(s.named for s in of[k::3])) for k in range(3))
-    return (
-        f"{kind:22} {len(of):4} {sum(s.found for s in of):6} {sum(s.named for s in of):6}  {by_row:10}"
-        f"{sum(s.holds for s in of):6} {false:6}  {', '.join(reported)}"
+def row(job: tuple[str, int, int]) -> dict[str, Any]:
+    """A row of the table, for a kind, a seed and so many sets; `by_row` counts what is named in rows of 1, 10, 60 s."""
+    of = list(scores(*job))
+    return {
+        "name": job[0],
+        "sets": len(of),
+        "found": sum(s.found for s in of),
+        "named": sum(s.named for s in of),
+        "by_row": [sum(s.named for s in of[k::3]) for k in range(3)],
+        "holds": sum(s.holds for s in of),
+        "false": sum(bool(s.other) for s in of),
+        "other": sorted({id for s in of for id in s.other}),
+    }
+
+
+def section(record: dict[str, Any]) -> str:
+    head = (
+        "event",
+        "sets ",
+        "found ",
+        "named ",
+        "in rows of 1, 10, 60 s ",
+        "limits hold ",
+        "false ",
+        "reported",
     )
+    rows = [
+        (
+            *(r[k] for k in ("name", "sets", "found", "named")),
+            "/".join(map(str, r["by_row"])),
+            r["holds"],
+            r["false"],
+            ", ".join(r["other"]),
+        )
+        for r in record["rows"]
+    ]
+    return f"## Events planted in recordings\n\nSeed {record['seed']}.\n\n{table(head, rows)}"
 
 
 def main() -> None:
@@ -313,16 +375,28 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=secrets.randbits(31))
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--only", action="append", choices=list(KINDS))
-    given = parser.parse_args()
-    print(f"seed {given.seed}")
-    print(
-        f"{'event':22} {'sets':>4} {'found':>6} {'named':>6}  {'1/10/60 s':10}{'holds':>6} {'false':>6}",
-        flush=True,
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="what was found so far: kinds in it are not drawn again",
     )
-    jobs = [(kind, given.seed, given.each) for kind in given.only or KINDS]
+    parser.add_argument("--docs", type=Path, help="the folder docs, whose record is written")
+    given = parser.parse_args()
+    record: dict[str, Any] = {"seed": given.seed, "rows": []}
+    if given.json and given.json.exists():
+        record = json.loads(given.json.read_text("utf-8"))
+    print(f"seed {record['seed']}", flush=True)
+    done = {r["name"] for r in record["rows"]}
+    jobs = [(kind, record["seed"], given.each) for kind in given.only or KINDS if kind not in done]
     with ProcessPoolExecutor(given.workers) as pool:
-        for of_kind in pool.map(line, jobs):
+        for of_kind in pool.map(row, jobs):
             print(of_kind, flush=True)
+            record["rows"] = sorted([*record["rows"], of_kind], key=lambda r: list(KINDS).index(r["name"]))
+            if given.json:
+                given.json.write_text(json.dumps(record, indent=1), "utf-8")
+    print(section(record))
+    if given.docs:
+        write_record(given.docs, "events", record, section)
 
 
 if __name__ == "__main__":

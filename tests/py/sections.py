@@ -37,7 +37,7 @@ from bench import (  # noqa: E402  # noqa: E402
     splits,
 )
 from bench import page as bench_page  # noqa: E402
-from tests import invariance  # noqa: E402
+from tests import events, invariance  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
 from tests.kills import page as kills  # noqa: E402
@@ -58,6 +58,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "service": service.section,
     "blind": blind.section,
     "blind-other": other.section,
+    "events": events.section,
     "invariance": invariance.section,
     "lot": fleet.lot_section,
     "lot-prior": lot_prior.section,

@@ -27,6 +27,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "bounds": ("gen/gyrotc/tables",),
     "budget": ("gen/gyrotc/assess", *_TRAIN),
     "catalogue": ("gen/gyrotc/fleet/catalogue.py",),
+    "events": ("gen/gyrotc/quality",),
     "faults": (*_RUNTIME, *_TRAIN),
     "fleet": _MANY,
     "growth": _MANY,
