@@ -9,6 +9,7 @@ of the check run. Full: the check run alone. Chosen: `--prior`.
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -42,10 +43,9 @@ Change = Callable[[Floats, Floats], Floats]
 _ANOTHER = "another unit's map"
 UNITS, SEED, _JOBS = 50, 36, 2
 _EARLIER = 5  # runs of the earlier calibration; the check run is of the sixth
-_SIZE_DPH = (
-    2e-3  # of a change: about three sigma of the noise of 100-s means, a fortieth of the bias's own range
-)
+_SIZE_DPH = 2e-3  # of a change: about three sigma of the noise of 100-s means, a fortieth of the bias's own range
 _NOISE = 0.02  # an RMS may be larger by this much by noise
+_SIGMAS = 2.0  # of the excess's own standard error, beyond which the noise of the exam does not explain it
 CHECKS_H = (5.0, 2.5)
 WAYS = ("as found", "offset only", "full", "chosen")
 
@@ -102,7 +102,27 @@ def _ways(
     moved = change(*there) - (predict(of_unit, *there) if of_unit else 0.0)
     judged = Exam(*there, exam.bias_dph + moved, exam.truth_dph + moved, exam.mean)
     ratios = dict(zip(WAYS, (judged.judged(one)[0] for one in by_way), strict=True))
-    return ratios | {"answer": new.prior.chosen, "significant": new.prior.moved.significant}
+    best, chosen = by_way[0 if ratios["as found"] < ratios["offset only"] else 1], by_way[3]
+    low, high = float(run.temperature_c.min()), float(run.temperature_c.max())
+    seen = (low <= there[0]) & (there[0] <= high)
+    return ratios | {
+        "answer": new.prior.chosen,
+        "significant": new.prior.moved.significant,
+        "sigmas": _sigmas(judged, chosen, best),
+        "seen": math.sqrt(_mse(judged, chosen, seen) / _mse(judged, best, seen)),
+    }
+
+
+def _mse(judged: Exam, predicted: Floats, kept: NDArray[np.bool_]) -> float:
+    """Mean square of what is left of the 100-s means that lie in the temperatures that are kept."""
+    return float(np.mean(judged.means(judged.bias_dph - predicted)[judged.means(kept.astype(float)) == 1.0] ** 2))
+
+
+def _sigmas(judged: Exam, chosen: Floats, best: Floats) -> float:
+    """Mean excess of the squares that the chosen map leaves, over its standard error by the noise of the exam."""
+    excess = judged.means(judged.bias_dph - chosen) ** 2 - judged.means(judged.bias_dph - best) ** 2
+    error = float(np.std(excess)) / math.sqrt(len(excess))
+    return float(np.mean(excess)) / error if error else 0.0
 
 
 def _changed(data: TrainingData, change: Change, replaced: Fit | None) -> TrainingData:
@@ -163,6 +183,8 @@ def _pooled(hours: float, kind: str, units: list[dict[str, Any]]) -> dict[str, A
         **{way.replace(" ", "_"): float(np.median([u[way] for u in units])) for way in WAYS},
         "worst": max(against),
         "beyond": sum(ratio > 1.0 + _NOISE for ratio in against),
+        "beyond_noise": sum(r > 1.0 + _NOISE and u["sigmas"] > _SIGMAS for r, u in zip(against, units, strict=True)),
+        "beyond_seen": sum(u["seen"] > 1.0 + _NOISE and r > 1.0 + _NOISE for r, u in zip(against, units, strict=True)),
         "answers": {name: answers[name] for name in ("unchanged", "offset", "slope", "full")},
         "significant": sum(bool(u["significant"]) for u in units),
     }
@@ -175,13 +197,25 @@ def _cells(row: dict[str, Any]) -> Iterator[str]:
         yield f"{row[way.replace(' ', '_')]:.3f}"
     yield f"{row['worst']:.3f}"
     yield str(row["beyond"])
+    yield str(row["beyond_noise"])
+    yield str(row["beyond_seen"])
     yield ", ".join(f"{name} {n}" for name, n in row["answers"].items() if n)
     yield str(row["significant"])
 
 
 def section(quoted: dict[str, Any]) -> str:
     """The table as text."""
-    head = ("h ", "change", *(f"{way} " for way in WAYS), "worst ", "beyond 2 % ", "answers", "significant ")
+    head = (
+        "h ",
+        "change",
+        *(f"{way} " for way in WAYS),
+        "worst ",
+        "beyond 2 % ",
+        "by 2 sigma ",
+        "where seen ",
+        "answers",
+        "significant ",
+    )
     text = (
         f"## Recalibration (`python -m bench docs --only recalibration`)\n\n{quoted['units']} units from seed "
         f"{quoted['seed']}, RMS ÷ noise floor, medians; worst: chosen over the better of as found and offset only.\n\n"
