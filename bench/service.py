@@ -12,38 +12,23 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from gyrotc.lot.service import PowerOn, fitted_spread
+from gyrotc.lot.service import Learned, Method, PowerOn, Service, Spoil, fitted_spread, missions, served
 from gyrotc.model import BiasSpread, Learning
-from gyrotc.tables.learning import data_sheet_spread, service_prior
-from gyrotc.target.learning import Learner, ServicePrior, Stop
+from gyrotc.tables.learning import MONTH_H, data_sheet_spread, service_prior
+from gyrotc.target.learning import ServicePrior
 from numpy.typing import NDArray
 from results import recorded, write
 from results import table as markdown
 
 Floats = NDArray[np.float64]
 
-_MONTH_H = 30.44 * 24.0
-_STEP_S = 300.0  # between two looks at the error
 _AGEING = 2e-4  # deg/h in a month, of the constant; half of it in the map's shape
 _CELLS = [(te, on, arw) for te in (2e-4, 2e-3) for on in (1e-4, 3e-4) for arw in (1.2e-4, 5e-4, 2e-3)]
 AUTHORITY = 0.03  # deg/h: three times what a gyro of this class may read
-_POWER_ONS = 100
 _AXES, _SEED = 8, 100  # of the draw on the page
-
-
-class Method(Protocol):
-    """What corrects the table, of all axes at once. Times in s: of the clock, since power-on."""
-
-    def power_on(self, clock_s: float, temp_c: float) -> None: ...
-
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None: ...
-
-    def shift(self, clock_s: float, time_s: float, temp_c: float) -> tuple[Floats, Floats]: ...
 
 
 class Nothing:
@@ -55,9 +40,7 @@ class Nothing:
     def power_on(self, clock_s: float, temp_c: float) -> None:
         pass
 
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
+    def rest(self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float) -> None:
         pass
 
     def shift(self, clock_s: float, time_s: float, temp_c: float) -> tuple[Floats, Floats]:
@@ -67,9 +50,7 @@ class Nothing:
 class Hold(Nothing):
     """The last rest's mean."""
 
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
+    def rest(self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float) -> None:
         self.y = np.array(rate)
 
 
@@ -84,10 +65,8 @@ class Rezero(Nothing):
         self.x[1] = 0.0
         self.p = np.diag([self.p[0, 0], self.turn_on**2])
 
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
-        self.p[0, 0] += _AGEING**2 / _MONTH_H * (clock_s - self.clock_s) / 3600.0
+    def rest(self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float) -> None:
+        self.p[0, 0] += _AGEING**2 / MONTH_H * (clock_s - self.clock_s) / 3600.0
         self.clock_s = clock_s
         both = self.p.sum(axis=1)
         gain = both / (both.sum() + var)
@@ -155,9 +134,7 @@ class Android(Nothing):
     def __init__(self, axes: int, jump: float) -> None:
         self.axes = [_AndroidAxis(jump) for _ in range(axes)]
 
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
+    def rest(self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float) -> None:
         for axis, value in zip(self.axes, rate, strict=True):
             axis.rest(clock_s, temp_c, float(value))
 
@@ -166,135 +143,25 @@ class Android(Nothing):
         return y, np.zeros_like(y)
 
 
-class Learned:
-    """The unit of the runtime."""
-
-    def __init__(self, prior: ServicePrior, axes: int) -> None:
-        self.unit, self.off_s = Learner(prior, axes), None
-        self.refused = 0
-
-    def power_on(self, clock_s: float, temp_c: float) -> None:
-        self.unit.power_on(np.nan if self.off_s is None else clock_s - self.off_s, temp_c)
-        self.off_s = clock_s
-
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
-        noise = float(self.unit.prior.noise_var) / last_s
-        found = self.unit.rest(Stop(time_s, temp_c, rate, last_s, mean_var=var if var > noise else 0.0))
-        self.refused += int((found < 0).sum())
-        self.off_s = clock_s
-
-    def shift(self, clock_s: float, time_s: float, temp_c: float) -> tuple[Floats, Floats]:
-        y, sigma = self.unit.shift(time_s, temp_c)
-        return y.astype(np.float64), sigma.astype(np.float64)
-
-
-@dataclass(frozen=True)
-class Mission:
-    """A power-on: instants since then, temperatures, number of the stop (-1: under way), true biases (n, axes)."""
-
-    clock_s: float
-    time_s: Floats
-    temp_c: Floats
-    stop: NDArray[np.int64]
-    bias: Floats
-
-
-def missions(draw: np.random.Generator, axes: int, table: float, turn_on: float) -> list[Mission]:
-    """A gyro's service of about seven months: what its table leaves, its turn-on offsets and its ageing."""
-    center, width = draw.uniform(-40, 60, (axes, 4)), draw.uniform(15, 30, (axes, 4))
-
-    def shape(temp_c: Floats, height: Floats) -> Floats:
-        z = (temp_c[:, None, None] - center) / width
-        return np.asarray((height * np.exp(-0.5 * z**2)).sum(axis=2))
-
-    height, aged, level = draw.normal(size=(axes, 4)), np.zeros((axes, 4)), np.zeros(axes)
-    height *= (table / np.sqrt(np.mean(shape(np.linspace(-40, 60, 60), height) ** 2, axis=0)))[:, None]
-    found, clock_s = [], 0.0
-    for _ in range(_POWER_ONS):
-        gap_s = draw.uniform(1, 3) * 86400.0
-        clock_s += gap_s
-        months = np.sqrt(gap_s / 3600.0 / _MONTH_H)
-        level = level + draw.normal(0, _AGEING, axes) * months
-        aged = aged + draw.normal(0, _AGEING / 2, (axes, 4)) * months
-        n = int(draw.uniform(4, 10) * 3600 / _STEP_S)
-        time_s = np.arange(n) * _STEP_S
-        wander, speed = np.zeros(n), 0.0
-        for i in range(1, n):
-            speed = speed * np.exp(-_STEP_S / 2400.0) + draw.normal(0, 0.45 * np.sqrt(_STEP_S / 120.0))
-            wander[i] = wander[i - 1] * np.exp(-_STEP_S / 7200.0) + speed
-        warm = draw.uniform(15, 25) * (1 - np.exp(-time_s / 2400.0))
-        temp_c = np.clip(draw.uniform(-35, 30) + warm + wander, -40, 60)
-        stop, i, number = np.full(n, -1), 0, 0
-        while i < n:
-            length = max(1, round(draw.uniform(60, 1800) / _STEP_S))
-            stop[i : i + length] = number
-            number, i = number + 1, i + length + int(draw.uniform(1, 4) * 3600 / _STEP_S)
-        bias = shape(temp_c, height + aged) + level + draw.normal(0, turn_on, axes)
-        found.append(Mission(clock_s, time_s, temp_c, stop, bias))
-        clock_s += time_s[-1]
-    return found
-
-
 def data_sheet_prior(table: float, turn_on: float, arw: float) -> ServicePrior:
     """From what a data sheet says: the table's error, turn-on offsets, ageing; noise as of a mean over an hour."""
     spread = data_sheet_spread(table, turn_on, _AGEING)
-    learning = Learning(
-        spread=spread, reference_c=10.0, authority_dph=AUTHORITY, noise_deg_per_sqrt_h=arw, span_c=1e6
-    )
+    learning = Learning(spread=spread, reference_c=10.0, authority_dph=AUTHORITY, noise_deg_per_sqrt_h=arw, span_c=1e6)
     return service_prior(learning, (-40.0, 60.0))
-
-
-Spoil = Callable[[int, Floats, float], Floats]
-
-
-def served(
-    service: Sequence[Mission],
-    method: Method,
-    draw: np.random.Generator,
-    arw: float,
-    spoil: Spoil | None = None,
-) -> tuple[Floats, Floats]:
-    """Errors under way and stated sigmas, (n, axes)."""
-    errors, sigmas = [], []
-    for number, mission in enumerate(service):
-        method.power_on(mission.clock_s, float(mission.temp_c[0]))
-        i, n = 0, len(mission.time_s)
-        while i < n:
-            clock_s = mission.clock_s + mission.time_s[i]
-            if mission.stop[i] < 0:
-                y, sigma = method.shift(clock_s, mission.time_s[i], float(mission.temp_c[i]))
-                errors.append(mission.bias[i] - y)
-                sigmas.append(sigma)
-                i += 1
-                continue
-            j = i + int(np.argmin(np.append(mission.stop[i:] == mission.stop[i], False)))
-            last_s = (j - i) * _STEP_S
-            var = arw**2 / (last_s / 3600.0)
-            rate = mission.bias[i:j].mean(axis=0) + draw.normal(0, np.sqrt(var), mission.bias.shape[1])
-            if spoil is not None:
-                rate = spoil(number, rate, var)
-            temp_c = float(mission.temp_c[i:j].mean())
-            method.rest(clock_s + last_s - _STEP_S, float(mission.time_s[j - 1]), temp_c, rate, var, last_s)
-            i = j
-    return np.array(errors), np.array(sigmas)
 
 
 def _rms(errors: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
 
 
-def laser(
-    axes: int, seeds: Sequence[int], cells: Sequence[tuple[float, float, float]]
-) -> list[dict[str, Any]]:
+def laser(axes: int, seeds: Sequence[int], cells: Sequence[tuple[float, float, float]]) -> list[dict[str, Any]]:
     """RMS of every method in every cell, median and worst of the axes, deg/h; error over sigma of the learner."""
     rows = []
     for table, turn_on, arw in cells:
         found: dict[str, list[Floats]] = {}
         ratio: list[Floats] = []
         for seed in seeds:
-            service = missions(np.random.default_rng(seed), axes, table, turn_on)
+            service = missions(np.random.default_rng(seed), axes, Service(table, turn_on, _AGEING))
             methods: Mapping[str, Method] = {
                 "table": Nothing(axes), "hold": Hold(axes), "re-zero": Rezero(axes, table, turn_on),
                 "Android": Android(axes, 3 * max(table, turn_on, arw)),
@@ -386,9 +253,7 @@ class _EachAxis:
         for axis in self.axes:
             axis.power_on(clock_s, temp_c)
 
-    def rest(
-        self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float
-    ) -> None:
+    def rest(self, clock_s: float, time_s: float, temp_c: float, rate: Floats, var: float, last_s: float) -> None:
         for axis, value in zip(self.axes, rate, strict=True):
             axis.rest(clock_s, time_s, temp_c, np.array([value]), var, last_s)
 
@@ -415,9 +280,7 @@ def measured(folder: Path, spoil: Spoil | None = None) -> list[dict[str, Any]]:
             spread=spread, reference_c=center, authority_dph=1e5, noise_deg_per_sqrt_h=noise, span_c=1e6,
             jump_sigma=8.0, agreeing_rests=2, agreeing_power_ons=1,
         )  # fmt: skip
-        priors = [
-            service_prior(known.model_copy(update={"spread": spread.scaled(s)}), envelope) for s in scale
-        ]
+        priors = [service_prior(known.model_copy(update={"spread": spread.scaled(s)}), envelope) for s in scale]
         for every_s in _EVERY_S:
             android, clock_s = Android(3, 144.0), 0.0
             learned = _EachAxis(priors)
@@ -462,9 +325,7 @@ _WRONG: dict[str, Callable[[np.random.Generator, Floats, float], Floats]] = {
     "30 % with ten times the noise": lambda draw, rate, var: _some(
         draw, 0.3, rate, draw.normal(0, 10 * np.sqrt(var), len(rate))
     ),
-    "all with up to 10 deg/h of Earth's rate": lambda draw, rate, var: (
-        rate + draw.uniform(-10, 10, len(rate))
-    ),
+    "all with up to 10 deg/h of Earth's rate": lambda draw, rate, var: rate + draw.uniform(-10, 10, len(rate)),
 }
 
 
@@ -478,7 +339,7 @@ def wrong_rests(axes: int, seed: int) -> list[dict[str, Any]]:
     for name, wrong in _WRONG.items():
         row: dict[str, Any] = {"rests": name, "ratio": [], "largest": 0.0}
         for error, turn_on, arw in ((2e-4, 3e-4, 1.2e-4), (2e-3, 3e-4, 5e-4), (2e-4, 1e-4, 2e-3)):
-            service = missions(np.random.default_rng(seed), axes, error, turn_on)
+            service = missions(np.random.default_rng(seed), axes, Service(error, turn_on, _AGEING))
             draw = np.random.default_rng(seed + 2)
             method = _Watched(data_sheet_prior(error, turn_on, arw), axes)
             spoil: Spoil = lambda _, rate, var, draw=draw, wrong=wrong: wrong(draw, rate, var)  # noqa: E731
@@ -519,10 +380,7 @@ def section(record: dict[str, Any]) -> str:
         f"(authority {AUTHORITY:g} deg/h).",
         markdown(
             ["rests", "ratios", "largest, deg/h "],
-            [
-                [r["rests"], ", ".join(f"{x:.2f}" for x in r["ratio"]), f"{r['largest']:.4f}"]
-                for r in record["wrong"]
-            ],
+            [[r["rests"], ", ".join(f"{x:.2f}" for x in r["ratio"]), f"{r['largest']:.4f}"] for r in record["wrong"]],
         ),
     ]
     if record.get("measured"):

@@ -38,7 +38,7 @@ extern "C" {
 
 /* What is known of the type of gyro before it learns: constant, written by the generator for one table. */
 typedef struct {
-    uint_least32_t id;          /* of the table, GTC_<ID>_ID */
+    uint_least32_t id;          /* the table's CRC: words of an older one are refused */
     float low_c;                /* knot k lies at low_c + k / knots_per_c */
     float knots_per_c;          /* 1/C */
     float reference_c;          /* T0 */

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 GROUPS = {
     "Record": ("plan", "simulate", "import", "check"),
-    "Calibrate": ("build", "diagnose", "compare", "fit", "emit"),
+    "Calibrate": ("build", "diagnose", "compare", "fit", "emit", "recalibrate"),
     "Judge": ("evaluate", "verify", "report"),
     "Many units": ("fleet", "catalogue", "lot"),
     "Share": ("certificate", "sign", "export", "stamp"),

@@ -46,6 +46,7 @@ from .results import (
     evaluation_table,
     limit_lines,
     not_installed_lines,
+    service_lines,
     summary,
     training_lines,
     verified_line,
@@ -248,6 +249,43 @@ def build(
     failures = [(f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures]
     if failures:
         raise CheckFailed("; ".join(failures))
+
+
+@app.command()
+def recalibrate(
+    unit: Annotated[Path, typer.Argument(help="The result of gyrotc build whose table was in service.")],
+    learned: Annotated[Path, typer.Option("--learned", help="What gtc_learn_save kept: 48 words in hexadecimal.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for service.json and the new table.")] = None,
+    limits: Annotated[
+        Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if it drifted further.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Show what a unit learned in service beside the chamber's table, and make a new table of it.
+
+    Example: gyrotc recalibrate build/RLG-0042 --learned learned.txt --out build/RLG-0042-served
+    """
+    from ..assess.limits import load_limits
+    from ..jobs.recalibration import learned_in_service
+    from ..store.files import json_text, write_atomically
+    from ..store.folder import result_folder
+    from ..tables.emit import emit
+
+    result, model = learned_in_service(unit, learned, load_limits(limits) if limits else None)
+    if out is not None:
+        with result_folder(out, "recalibrate", inputs=[unit]) as stage:
+            stage.of(result.serial, result.axis)
+            write_atomically(stage.folder / "service.json", json_text(result.content()))
+            if model is not None:
+                model.save(stage.folder / "model.json")
+                emit(model, stage.folder)
+    write_json(json_file, result.content())
+    for line in service_lines(result):
+        tell(line)
+    if out is not None and model is not None:
+        tell(f"{out / 'c'}: a new table; firmware with it refuses the words of the old one and learns anew")
+    if result.findings:
+        raise CheckFailed("; ".join(finding.text for finding in result.findings))
 
 
 def _left_out(model: Model) -> Iterator[str]:

@@ -13,7 +13,7 @@ from ..pages.display import rate_unit
 from ..pages.words import COVERAGE, bound_words, measured_words, plain, rounded, sci, with_uncertainty
 
 if TYPE_CHECKING:
-    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
+    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, InService, Pooled
     from ..results.release import HeldLimits
     from ..results.training import Training
     from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
@@ -324,3 +324,25 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
     yield f"  as found: RMS {sci(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
+
+
+_MOVED = {"offset": "an offset", "slope": "an offset and a slope", "shape": "a new shape"}
+
+
+def service_lines(result: InService) -> Iterator[str]:
+    """What a unit learned in service, knot by knot, and what it means for the table."""
+    yield (
+        f"{result.serial} after {result.power_ons} power-ons in {result.days:.0f} days; authority "
+        f"{sci(result.authority_dph)} deg/h"
+    )
+    for knot in result.knots:
+        yield (
+            f"  {knot.temperature_c:6.1f} C: table {sci(knot.table_dph)}, learned {sci(knot.shift_dph)} +- "
+            f"{sci(knot.sigma_dph)} deg/h (1 sigma; {sci(knot.unlearned_dph)} without)"
+        )
+    if result.moved == "nothing":
+        yield "the table holds: what was learned is within 1 sigma of it"
+    else:
+        yield f"learned, within 1 sigma: {_MOVED[result.moved]}"
+    for finding in result.findings:
+        yield f"finding {finding.id}: {finding.text}; {finding.next}"

@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..model import Model
 from ..results.base import MapOnGrid, Marker
 from ..results.diagnosed import Diagnosed, DiagnosisSeries
-from ..results.evaluation import Changes, Comparison, Evaluation
+from ..results.evaluation import Changes, Comparison, Evaluation, InService
 from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
 from ..results.lot import Lot
 from ..results.planned import LotPlan, NextRun, Plan
@@ -50,6 +50,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "plan": Plan,
     "release": Release,
     "result": Marker,
+    "service": InService,
     "training": Training,
     "truth": SimulatedTruth,
     "verify-axes": JointVerification,

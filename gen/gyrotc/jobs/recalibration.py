@@ -1,27 +1,36 @@
-"""`--prior DIR`: from the folder of an earlier calibration to the prior of a unit's recalibration."""
+"""`--prior DIR`: from an earlier calibration to the prior of a unit's recalibration; what a unit learned in service."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from .. import __version__
 from ..assess.budget import DAYS_A_YEAR, yearly_drifts
 from ..assess.changes import Earlier, load_earlier, started_on
 from ..assess.limits import Limits
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..common.ranges import MOST_CENTERS
 from ..lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, stated_sigma_dph, widened
 from ..lot.learn import FALSE_ALARM
 from ..lot.prior import MapPosterior
+from ..lot.service import learning_in, words_in
 from ..lot.use import prior_of
-from ..model import Model, load_model
+from ..model import Model, Network, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_result
+from ..results.evaluation import InService, LearnedKnot
+from ..results.findings import Finding, Size
 from ..results.lot import Lot
 from ..results.training import MapMeans, Training
+from ..target.learning import E_ID, KNOTS, OK, Learner, full
 from ..train.fitting import FitOptions
 from ..train.means import means_of
 
@@ -150,3 +159,137 @@ def _years(before: str | None, after: str | None) -> float | None:
     except ValueError:
         return None
     return max(days, 0) / DAYS_A_YEAR
+
+
+Moved = Literal["nothing", "offset", "slope", "shape"]
+_DAY_S = 86400.0  # by definition
+_AT_AUTHORITY = 0.99  # of it: a knot that far was held there
+_STRAIGHT = 1e-6  # of a change: rounding leaves less of one that is straight
+_COVERAGE = 2.0  # sigmas that a drift must exceed its limit by
+
+
+def learned_in_service(unit: Path, words: Path, limits: Limits | None = None) -> tuple[InService, Model | None]:
+    """What a unit learned, beside the chamber's table, and the model that has it in its map.
+
+    Args:
+        unit: The result whose table was in service.
+        words: What `gtc_learn_save` kept of it, as hexadecimal text.
+        limits: Limits of the product, for the drift of its type.
+
+    Raises:
+        InputError: The words are damaged, of another table, or the result has no learning.
+    """
+    model, learning, prior = learning_in(unit)
+    learner = Learner(prior)
+    if (status := learner.restore(words_in(words))) != OK:
+        found = "of another table" if status == E_ID else "damaged or cut off"
+        raise InputError(str(words), f"is {found}", f"words of a unit with the table in {unit}")
+    knots_c = np.linspace(*model.envelope.temperature_c, KNOTS)
+    shift, age_s = learner.x[:KNOTS, 0].astype(np.float64), float(learner.service_s)
+    sigma, unlearned = (
+        np.sqrt(np.maximum(np.diag(full(p)), 0.0))
+        for p in (learner.p[: len(prior.map_var), 0], prior.map_var + age_s * prior.ageing_var)
+    )
+    sigma = np.minimum(sigma, unlearned)
+    moved, change = _simplest(knots_c, shift, sigma)
+    years = age_s / _DAY_S / DAYS_A_YEAR
+    drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
+    limit = None if drift is None else drift * years
+    findings = tuple(_findings(knots_c, shift, sigma, learning.authority_dph, limit))
+    new = None if findings or moved == "nothing" else _with_shift(model, knots_c, change, sigma)
+    table = model.map_dph(knots_c, 0.0)
+    rows = zip(knots_c.tolist(), table.tolist(), shift.tolist(), sigma.tolist(), unlearned.tolist(), strict=True)
+    result = InService(
+        gyrotc_version=__version__,
+        serial=model.serial,
+        axis=model.axis,
+        model_hash=model.hash,
+        power_ons=learner.power_ons,
+        days=age_s / _DAY_S,
+        authority_dph=learning.authority_dph,
+        drift_limit_dph=limit,
+        knots=tuple(
+            LearnedKnot(temperature_c=t, table_dph=b, shift_dph=y, sigma_dph=s, unlearned_dph=u)
+            for t, b, y, s, u in rows
+        ),
+        moved=moved,
+        new_model_hash=new.hash if new else None,
+        findings=findings,
+    )
+    return result, new
+
+
+def _findings(
+    knots_c: FloatArray, shift: FloatArray, sigma: FloatArray, authority: float, limit: float | None
+) -> Iterator[Finding]:
+    at = int(np.argmax(np.abs(shift) - _COVERAGE * sigma))
+    low, high = abs(shift[at]) - _COVERAGE * sigma[at], abs(shift[at]) + _COVERAGE * sigma[at]
+    if limit is not None and low > limit:
+        yield Finding(
+            id="drift_beyond_limit",
+            text=f"at {knots_c[at]:.0f} C the bias moved by {abs(shift[at]):.2g} deg/h, more than the {limit:.2g} "
+            "deg/h that the type drifts in this time",
+            next="calibrate it again in the chamber",
+            size=Size(value=abs(float(shift[at])), low=float(low), high=float(high), unit="deg/h"),
+        )
+    if np.max(np.abs(shift)) >= _AT_AUTHORITY * authority:
+        yield Finding(
+            id="at_authority",
+            text=f"what was learned reaches the authority of {authority:.2g} deg/h: the bias may be further off",
+            next="calibrate it again in the chamber",
+        )
+
+
+def _simplest(knots_c: FloatArray, shift: FloatArray, sigma: FloatArray) -> tuple[Moved, FloatArray]:
+    """The simplest change within 1 sigma of the shift at every knot, and its values there."""
+    steps: tuple[tuple[Moved, int], ...] = (("nothing", -1), ("offset", 0), ("slope", 1))
+    for name, degree in steps:
+        fitted = np.zeros(KNOTS)
+        if degree >= 0:
+            fitted = np.polynomial.Polynomial.fit(knots_c, shift, degree, w=1.0 / sigma)(knots_c)
+        if np.all(np.abs(shift - fitted) <= sigma):
+            return name, fitted
+    return "shape", shift
+
+
+def _with_shift(model: Model, knots_c: FloatArray, change: FloatArray, sigma: FloatArray) -> Model:
+    """The model with a change at the knots in its map, and its uncertainty no less than that of the change.
+
+    A straight part goes into the plane; what is left becomes a Gaussian of T at each knot, as wide as they are apart.
+    """
+    line = np.polynomial.Polynomial.fit(knots_c, change, 1).convert().coef
+    slope = float(line[1]) if len(line) > 1 else 0.0
+    rest, step = change - line[0] - slope * knots_c, float(knots_c[1] - knots_c[0])
+    center, half = model.scale.temperature_c
+    bent = bool(np.max(np.abs(rest)) > _STRAIGHT * np.max(np.abs(change)))
+    weights = np.linalg.solve(np.exp(-(((knots_c[:, None] - knots_c) / step) ** 2)), rest) if bent else np.zeros(0)
+    if model.n_centers + len(weights) * len(model.networks) > MOST_CENTERS:
+        raise InputError("the learned shape", f"{len(weights)} more centers", f"{MOST_CENTERS} at most in a table")
+
+    def changed(one: Network) -> Network:
+        added = knots_c[: len(weights)].tolist()
+        return one.model_copy(
+            update={
+                "w0": one.w0 + float(line[0]) + slope * center,
+                "linear": (one.linear[0] + slope * half, one.linear[1]),
+                "centers": (*one.centers, *((t, 0.0) for t in added)),
+                "widths": (*one.widths, *((step / half, None) for _ in added)),
+                "weights": (*one.weights, *weights.tolist()),
+            }
+        )
+
+    known = model.uncertainty_dph
+    if known is not None:
+        low, high = model.envelope.temperature_c
+        cells = low + (high - low) * (np.arange(known.cells[0]) + 0.5) / known.cells[0]
+        least = np.interp(cells, knots_c, sigma)
+        rows = tuple(tuple(float(max(s, m)) for s, m in zip(row, least, strict=True)) for row in known.rows)
+        known = known.model_copy(update={"rows": rows})
+    return model.model_copy(
+        update={
+            "networks": tuple(changed(one) for one in model.networks),
+            "fallback_dph": model.fallback_dph + float(np.mean(change)),
+            "uncertainty_dph": known,
+            "meta": {**model.meta, "learned_in_service_onto": model.hash},
+        }
+    )

@@ -26,6 +26,7 @@ from ..simulate.profile import corners
 from ..simulate.scenario import Scenario, read
 from .basis import CONSTANT, PRIOR_LOG, LotBasis
 from .prior import MapPosterior
+from .service import parkings
 from .use import LotPrior, prior_of
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
@@ -297,6 +298,7 @@ def next_run(
         price_per_run=price.per_run,
         proposals=proposals,
         best=int(np.argmax(worth)),
+        parkings=parkings(model.learning, model.envelope.temperature_c) if model.learning else (),
     )
 
 

@@ -374,3 +374,32 @@ class Changes(UnitResult):
     def named(self) -> tuple[tuple[str, NameChanges], ...]:
         """What came, went or has other bytes, by what it is."""
         return ("recordings", self.recordings), ("findings", self.findings), ("files", self.files)
+
+
+class LearnedKnot(Part):
+    """What a unit has learned at a knot of temperature."""
+
+    temperature_c: float = Field(description="C")
+    table_dph: float = Field(description="the chamber's table where temperature stands still, deg/h")
+    shift_dph: float = Field(description="what was learned on top, deg/h")
+    sigma_dph: Amount = Field(description="1 sigma of it, deg/h")
+    unlearned_dph: Amount = Field(description="1 sigma of a unit of the same age that learned nothing, deg/h")
+
+
+class InService(UnitResult):
+    """What a unit learned in service (`gyrotc recalibrate --learned`)."""
+
+    schema_: Annotated[Literal["gyrotc.service/1"], Field(alias="schema")] = "gyrotc.service/1"
+    model_hash: str = Field(description="of the model whose table was in service")
+    power_ons: Count = Field(description="how often it was switched on")
+    days: Amount = Field(description="since it was put into service, to within 0.8 %")
+    authority_dph: Amount = Field(description="largest shift, deg/h")
+    drift_limit_dph: Figure = Field(description="the most that the type drifts in this time; null: no limit is stated")
+    knots: tuple[LearnedKnot, ...] = Field(description="temperature ascending")
+    moved: Literal["nothing", "offset", "slope", "shape"] = Field(
+        description="the simplest change of the table that is within 1 sigma of what was learned at every knot"
+    )
+    new_model_hash: str | None = Field(
+        description="of the changed model; null: nothing to change, or a finding forbids"
+    )
+    findings: tuple[Finding, ...] = Field(description="what a person should know; empty: nothing")

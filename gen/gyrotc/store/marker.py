@@ -25,6 +25,7 @@ KINDS = {
     "build": "result",
     "fit": "result",
     "emit": "result",
+    "recalibrate": "result",
     "verify": "result",
     "evaluate": "result",
     "sign": "result",

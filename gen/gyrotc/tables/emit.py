@@ -296,10 +296,12 @@ def runtime_texts(models: Iterable[Model], numerics: Iterable[str]) -> dict[str,
 
 
 def prior_of(model: Model, tables: Mapping[str, Table]) -> ServicePrior | None:
-    """What a table's gyro may learn in service; None: nothing."""
+    """What a table's gyro may learn in service; None: nothing. Its id is of the table's words, not of the gyro alone:
+    what was learned on top of one table must not come on top of the next.
+    """
     if model.learning is None:
         return None
-    return service_prior(model.learning, model.envelope.temperature_c, next(iter(tables.values())).id)
+    return service_prior(model.learning, model.envelope.temperature_c, next(iter(tables.values())).crc)
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:

@@ -12,7 +12,7 @@ from ..model import BiasSpread, Learning
 from ..target.learning import KNOTS, ServicePrior, packed
 from .text import float_text
 
-_MONTH_H = 30.44 * 24.0  # the mean month
+MONTH_H = 30.44 * 24.0  # the mean month
 _COMMENTS = {
     "low_c": "first knot, C",
     "knots_per_c": "1/C",
@@ -32,7 +32,7 @@ def data_sheet_spread(table_dph: float, turn_on_dph: float, ageing_dph_per_sqrt_
     A table's error is mostly one of its level, a fifth of it a slope over 30 C; a fiftieth comes and goes with the
     thermal history, as do 3e-5 deg/h of any gyro.
     """
-    ageing = ageing_dph_per_sqrt_month / float(np.sqrt(_MONTH_H))
+    ageing = ageing_dph_per_sqrt_month / float(np.sqrt(MONTH_H))
     return BiasSpread(
         level=table_dph, slope=0.2 * table_dph / 30.0, shape=0.16 * table_dph, turn_on=turn_on_dph,
         turn_on_slope=0.0, warm_up=0.0, warm_up_s=600.0, memory=float(np.hypot(3e-5, 0.02 * table_dph)),

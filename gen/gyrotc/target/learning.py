@@ -40,8 +40,13 @@ _PAIR[_ROWS, _COLUMNS] = _PAIR[_COLUMNS, _ROWS] = np.arange(_PAIRS)
 
 def packed(matrix: ArrayLike) -> NDArray[np.float64]:
     """Lower triangle of a symmetric matrix, row by row."""
-    full = np.asarray(matrix, dtype=np.float64)
-    return full[np.tril_indices(len(full))]
+    square = np.asarray(matrix, dtype=np.float64)
+    return square[np.tril_indices(len(square))]
+
+
+def full(rows: ArrayLike) -> NDArray[np.float64]:
+    """The symmetric matrix of packed rows of the knots."""
+    return np.asarray(rows, dtype=np.float64)[_PAIR[:KNOTS, :KNOTS]]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,150 @@
+"""Learning in service on the host: a simulated service, what its words say, and the table that is made of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import run_here
+from gyrotc.assess.limits import Limits, Recalibration
+from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.jobs.recalibration import learned_in_service
+from gyrotc.lot.service import learning_in, parkings, words_text
+from gyrotc.model import Learning, Model, Uncertainty, load_model
+from gyrotc.results.evaluation import InService
+from gyrotc.tables.emit import emit
+from gyrotc.tables.learning import data_sheet_spread
+from gyrotc.target.learning import KNOTS, Learner
+
+GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"
+LEARNING = Learning(
+    spread=data_sheet_spread(2e-3, 1e-4, 2e-4), reference_c=20.0, authority_dph=0.03, noise_deg_per_sqrt_h=1e-4
+)
+
+
+@pytest.fixture(scope="module")
+def unit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("unit")
+    known = Uncertainty(cells=(4, 1), rows=((1e-6, 1e-6, 1e-6, 1.0),))
+    model = load_model(GOLDEN).model_copy(update={"learning": LEARNING, "uncertainty_dph": known})
+    model.save(folder / "model.json")
+    emit(model, folder)
+    return folder
+
+
+def kept(unit: Path, where: Path, knots: np.ndarray, less: float = 1e-4) -> Path:
+    """Words of a unit that has learned this, to within `less` of what was not known."""
+    _, _, prior = learning_in(unit)
+    learner = Learner(prior)
+    for _ in range(9):
+        learner.power_on(30 * 86400.0, 20.0)
+    learner.x[:KNOTS, 0] = knots
+    learner.p[: len(prior.map_var)] *= np.float32(less**2)
+    where.write_text(words_text(learner.save()))
+    return where
+
+
+def moved_by(unit: Path, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Temperatures over the envelope, and how far the map moved there, at any rate of T."""
+    before = load_model(unit / "model.json")
+    t = np.linspace(*before.envelope.temperature_c, 50)
+    still, ramp = (model.map_dph(t, r) - before.map_dph(t, r) for r in (0.0, 1.0))
+    assert np.allclose(still, ramp, atol=1e-12)
+    return t, still
+
+
+def knots_of(unit: Path) -> np.ndarray:
+    return np.linspace(*load_model(unit / "model.json").envelope.temperature_c, KNOTS)
+
+
+def test_a_service_is_simulated_and_recalibrated_by_command(unit: Path, tmp_path: Path) -> None:
+    out, again = tmp_path / "service", tmp_path / "again"
+    order = ("simulate", "service", "--base", unit, "--power-ons", "12", "--seed", "4")
+    said = run_here(*order, "--out", out)
+    assert "12 power-ons" in said and "error over sigma" in said
+    run_here(*order, "--out", again)
+    run_here(*order, "--mounted", "6", "--out", tmp_path / "mounted")
+    texts = [(folder / "stops.csv").read_text() for folder in (out, again, tmp_path / "mounted")]
+    assert texts[0] == texts[1] != texts[2]
+    assert [a[:2] for a in (line.split(",") for line in texts[0].splitlines()[1:])][-1][0] == "12"
+    served = tmp_path / "served"
+    said = run_here("recalibrate", unit, "--learned", out / "learned.txt", "--out", served)
+    found = InService.model_validate_json((served / "service.json").read_text())
+    assert found.power_ons == 12 and not found.findings and len(found.knots) == KNOTS
+    assert all(0.0 < k.sigma_dph <= k.unlearned_dph for k in found.knots)
+    assert min(k.sigma_dph / k.unlearned_dph for k in found.knots) < 0.7
+    assert found.new_model_hash == load_model(served / "model.json").hash and "a new table" in said
+    with pytest.raises(InputError, match="of another table"):  # nothing is applied twice
+        learned_in_service(served, out / "learned.txt")
+
+
+def test_an_authority_is_never_left_by_a_simulated_service(unit: Path, tmp_path: Path) -> None:
+    run_here("simulate", "service", "--base", unit, "--power-ons", "6", "--mounted", "2", "--out", tmp_path / "s")
+    rows = np.loadtxt(tmp_path / "s" / "stops.csv", delimiter=",", skiprows=1)
+    assert np.abs(rows[:, 7]).max() <= LEARNING.authority_dph and (rows[:, 8] > 0.0).all()
+
+
+@pytest.mark.parametrize("kind", ["nothing", "offset", "slope", "shape"])
+def test_the_new_table_has_what_was_learned(kind: str, unit: Path, tmp_path: Path) -> None:
+    knots = knots_of(unit)
+    z = (knots - knots.mean()) / np.ptp(knots)
+    shift = {
+        "nothing": 0.0 * z, "offset": 2e-3 + 0.0 * z, "slope": 1e-3 + 4e-3 * z, "shape": 5e-3 * np.sin(9.0 * z)
+    }[kind]  # fmt: skip
+    words = kept(unit, tmp_path / "w.txt", shift, 1e-2)
+    found, model = learned_in_service(unit, words)
+    assert found.moved == kind and found.power_ons == 9
+    assert [k.shift_dph for k in found.knots] == pytest.approx(shift.tolist(), rel=1e-6, abs=1e-12)
+    if model is None:
+        assert kind == "nothing" and found.new_model_hash is None
+        return
+    at_knots = model.map_dph(knots, 0.0) - load_model(unit / "model.json").map_dph(knots, 0.0)
+    assert at_knots == pytest.approx(shift, abs=2e-5)
+    t, moved = moved_by(unit, model)
+    assert np.abs(moved - np.interp(t, knots, shift)).max() < (1e-3 if kind == "shape" else 2e-5)
+    sigma = model.uncertainty_dph
+    assert sigma is not None and min(sigma.rows[0]) > 1e-6 and sigma.rows[0][3] == 1.0
+    emit(model, tmp_path)
+
+
+def test_words_that_are_not_its_own_are_refused(unit: Path, tmp_path: Path) -> None:
+    words = kept(unit, tmp_path / "w.txt", np.zeros(KNOTS))
+    text = words.read_text()
+    for wrong, why in (
+        (text.replace(text[40], "0" if text[40] != "0" else "1", 1), "damaged"),
+        (text[:-10], "47 of 47"),
+        (text[:-3] + "xy\n", "47 of 48"),
+    ):
+        words.write_text(wrong)
+        with pytest.raises(InputError, match=why):
+            learned_in_service(unit, words)
+    plain = load_model(unit / "model.json").model_copy(update={"learning": None})
+    plain.save(tmp_path / "model.json")
+    emit(plain, tmp_path)
+    with pytest.raises(InputError, match="has no learning"):
+        learned_in_service(tmp_path, words)
+
+
+def test_drift_beyond_its_limit_is_a_finding_and_no_table(unit: Path, tmp_path: Path) -> None:
+    words = kept(unit, tmp_path / "w.txt", np.full(KNOTS, 3e-3), 1e-2)
+    years = 9 * 30 / 365.25
+    limits = Limits(schema=1)
+    for per_year, ids in ((2.5e-3 / years, ["drift_beyond_limit"]), (3.5e-3 / years, [])):
+        stated = limits.model_copy(update={"interval": Recalibration(days=365.0, drift_dph_per_year=per_year)})
+        found, model = learned_in_service(unit, words, stated)
+        assert [f.id for f in found.findings] == ids and (model is None) == bool(ids)
+        assert found.drift_limit_dph == pytest.approx(per_year * years, rel=1e-2)
+    far = kept(unit, tmp_path / "far.txt", np.full(KNOTS, LEARNING.authority_dph))
+    found, model = learned_in_service(unit, far)
+    assert [f.id for f in found.findings] == ["at_authority"] and model is None
+    with pytest.raises(CheckFailed, match="authority"):
+        run_here("recalibrate", unit, "--learned", far)
+
+
+def test_a_parking_is_worth_more_the_longer_it_is() -> None:
+    found = parkings(LEARNING, (-40.0, 60.0))
+    after = [one.after_dph for one in found]
+    assert all(one.after_dph < one.before_dph for one in found) and after == sorted(after, reverse=True)
+    for one in found:  # a rest tells at least what its own mean tells
+        assert one.after_dph <= 1.001 * LEARNING.noise_deg_per_sqrt_h / np.sqrt(one.minutes / 60.0)
