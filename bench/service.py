@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.lot.service import Learned, Method, PowerOn, Service, Spoil, fitted_spread, missions, served
+from gyrotc.lot.service import Learned, Corrector, PowerOn, Service, Spoil, fitted_spread, missions, served
 from gyrotc.model import BiasSpread, Learning
 from gyrotc.tables.learning import MONTH_H, data_sheet_spread, service_prior
 from gyrotc.target.learning import ServicePrior
@@ -162,7 +162,7 @@ def laser(axes: int, seeds: Sequence[int], cells: Sequence[tuple[float, float, f
         ratio: list[Floats] = []
         for seed in seeds:
             service = missions(np.random.default_rng(seed), axes, Service(table, turn_on, _AGEING))
-            methods: Mapping[str, Method] = {
+            methods: Mapping[str, Corrector] = {
                 "table": Nothing(axes), "hold": Hold(axes), "re-zero": Rezero(axes, table, turn_on),
                 "Android": Android(axes, 3 * max(table, turn_on, arw)),
                 "learned": Learned(data_sheet_prior(table, turn_on, arw), axes),
@@ -221,7 +221,7 @@ def _read(path: Path) -> _Measured:
 
 def _replayed(
     run: _Measured,
-    method: Method,
+    method: Corrector,
     every_s: float,
     table: Floats,
     clock_s: float = 0.0,

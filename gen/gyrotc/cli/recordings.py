@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import typer
 
 from ..common.errors import InputError
-from ..pages.words import sci
 from .base import (
     AppliedOption,
     AxisOption,
@@ -241,6 +240,7 @@ def simulate(
 def _simulate_service(base: str | None, seed: int, out: Path, power_ons: int, mounted: Sequence[int]) -> None:
     """`gyrotc simulate service`."""
     from ..lot.service import simulate_service
+    from ..pages.words import sci
 
     if base is None:
         raise InputError("--base", "is missing", "a result of gyrotc build with [learning] in its limits file")

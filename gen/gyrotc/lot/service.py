@@ -107,7 +107,7 @@ def fitted_spread(
     return spread, np.sqrt(scales(spread)[0])
 
 
-class Method(Protocol):
+class Corrector(Protocol):
     """What corrects the table, of all axes at once. Times in s: of the clock, since power-on."""
 
     def power_on(self, clock_s: float, temp_c: float) -> None: ...
@@ -231,7 +231,7 @@ Spoil = Callable[[int, FloatArray, float], FloatArray]
 
 def served(
     service: Sequence[Mission],
-    method: Method,
+    method: Corrector,
     draw: np.random.Generator,
     arw: float,
     spoil: Spoil | None = None,
