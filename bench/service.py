@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.lot.service import Learned, Corrector, PowerOn, Service, Spoil, fitted_spread, missions, served
+from gyrotc.lot.service import Corrector, LearningUnit, PowerOn, Service, Spoil, fitted_spread, missions, served
 from gyrotc.model import BiasSpread, Learning
 from gyrotc.tables.learning import MONTH_H, data_sheet_spread, service_prior
 from gyrotc.target.learning import ServicePrior
@@ -165,7 +165,7 @@ def laser(axes: int, seeds: Sequence[int], cells: Sequence[tuple[float, float, f
             methods: Mapping[str, Corrector] = {
                 "table": Nothing(axes), "hold": Hold(axes), "re-zero": Rezero(axes, table, turn_on),
                 "Android": Android(axes, 3 * max(table, turn_on, arw)),
-                "learned": Learned(data_sheet_prior(table, turn_on, arw), axes),
+                "learned": LearningUnit(data_sheet_prior(table, turn_on, arw), axes),
             }  # fmt: skip
             for name, method in methods.items():
                 errors, sigmas = served(service, method, np.random.default_rng(seed + 1), arw)
@@ -247,7 +247,7 @@ class _EachAxis:
     """The unit of each axis with its own scale of the spread."""
 
     def __init__(self, priors: Sequence[ServicePrior]) -> None:
-        self.axes = [Learned(prior, 1) for prior in priors]
+        self.axes = [LearningUnit(prior, 1) for prior in priors]
 
     def power_on(self, clock_s: float, temp_c: float) -> None:
         for axis in self.axes:
@@ -351,7 +351,7 @@ def wrong_rests(axes: int, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-class _Watched(Learned):
+class _Watched(LearningUnit):
     """Keeps the largest |shift|."""
 
     largest = 0.0

@@ -1,135 +1,15 @@
-"""What concerns the user's own machine: completion of a shell, the cache, JSON Schemas of every file and output."""
+"""What concerns the user's own machine: completion of a shell, the cache, forms of the results."""
 
 from __future__ import annotations
 
 import json
-import types
-from collections.abc import Collection, Iterator
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated
 
 import typer
-from pydantic import BaseModel
 
 from ..common.errors import InputError
-from ..model import Model
-from ..results.base import MapOnGrid, Marker
-from ..results.diagnosed import Diagnosed, DiagnosisSeries
-from ..results.evaluation import Changes, Comparison, Evaluation, InService
-from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary
-from ..results.lot import Lot
-from ..results.planned import LotPlan, NextRun, Plan
-from ..results.recordings import Checked, ImportedFiles, SimulatedTruth
-from ..results.release import Budget, HeldLimits, Release
-from ..results.training import Manifest, Training
-from ..results.verification import Emitted, JointVerification, Verification
-from ..tables.record import EmissionRecord
 from .base import app, tell
 from .words import Shell
-
-KINDS: dict[str, type[BaseModel]] = {
-    "budget": Budget,
-    "catalogue": CatalogueAnswer,
-    "changes": Changes,
-    "check": Checked,
-    "compare": Comparison,
-    "diagnose": Diagnosed,
-    "diagnosis-series": DiagnosisSeries,
-    "emission": EmissionRecord,
-    "emit": Emitted,
-    "entry": FleetEntry,
-    "evaluate": Evaluation,
-    "fleet": FleetSummary,
-    "import": ImportedFiles,
-    "limits": HeldLimits,
-    "lot-plan": LotPlan,
-    "lot": Lot,
-    "manifest": Manifest,
-    "map": MapOnGrid,
-    "model": Model,
-    "next-run": NextRun,
-    "plan": Plan,
-    "release": Release,
-    "result": Marker,
-    "service": InService,
-    "training": Training,
-    "truth": SimulatedTruth,
-    "verify-axes": JointVerification,
-    "verify": Verification,
-}
-
-
-_PLAIN = {str: "text", int: "integer", float: "number", bool: "true or false", type(None): "null", Any: "any"}
-
-
-def schema_text(kind: type[BaseModel]) -> str:
-    """JSON Schema of a result, as `gyrotc schema` prints it."""
-    return json.dumps(kind.model_json_schema(by_alias=True), indent=1, ensure_ascii=True) + "\n"
-
-
-def tables(kind: type[BaseModel], shown: Collection[type[BaseModel]] = ()) -> str:
-    """A table of fields for a result, and one for each object inside it, in Markdown.
-
-    Args:
-        shown: Results whose tables stand on the same page: their objects are not reported again.
-    """
-    seen: dict[type[BaseModel], None] = {kind: None}
-    above = {inner for one in shown for inner in _in_order({one: None})}
-    parts = []
-    for one in (one for one in _in_order(seen) if one not in above):
-        text = (one.__doc__ or "").strip().splitlines()[0]
-        head = "" if one is kind else f"`{_name(one)}`: {text[0].lower() + text[1:]}\n\n"
-        rows = []
-        for name, field in one.model_fields.items():
-            absent = "" if field.is_required() or name == "schema_" else "; may be absent"
-            meaning = (field.description or "").replace("|", "\\|")
-            rows.append(f"| `{field.alias or name}` | {_type(field.annotation)}{absent} | {meaning} |")
-        parts.append(head + "\n".join(["| field | type | meaning |", "| --- | --- | --- |", *rows]) + "\n")
-    return "\n".join(parts)
-
-
-def _in_order(seen: dict[type[BaseModel], None]) -> Iterator[type[BaseModel]]:
-    """The classes of `seen`, and then those that their fields hold, each once."""
-    waiting = list(seen)
-    while waiting:
-        one = waiting.pop(0)
-        yield one
-        for field in one.model_fields.values():
-            for inner in _inside(field.annotation):
-                if inner not in seen:
-                    seen[inner] = None
-                    waiting.append(inner)
-
-
-def _inside(kind: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        yield kind
-    for part in get_args(kind) if get_origin(kind) is not Literal else ():
-        yield from _inside(part)
-
-
-def _name(kind: type[BaseModel]) -> str:
-    return kind.__name__.lstrip("_")
-
-
-def _type(kind: Any) -> str:
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        return _type(inner[0])
-    if origin is Literal:
-        return ", ".join(f'`"{v}"`' for v in inner)
-    if origin in (Union, types.UnionType):
-        return " or ".join(dict.fromkeys(_type(part) for part in inner))
-    if origin is dict:
-        return f"object of {_type(inner[1])} by name"
-    if origin is tuple:
-        if inner[-1] is Ellipsis:
-            return f"list of {_type(inner[0])}"
-        return "[" + ", ".join(_type(part) for part in inner) + "]"
-    if origin is list:
-        return f"list of {_type(inner[0])}"
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return f"`{_name(kind)}`"
-    return _PLAIN.get(kind, "any")
 
 
 @app.command()
@@ -143,7 +23,7 @@ def schema(
 
     Example: gyrotc schema limits
     """
-    from .shell import KINDS, schema_text, tables
+    from .schemas import KINDS, schema_text, tables
 
     if name is not None and name not in KINDS:
         raise InputError("schema", repr(name), ", ".join(KINDS))

@@ -119,7 +119,7 @@ class Corrector(Protocol):
     def shift(self, clock_s: float, time_s: float, temp_c: float) -> tuple[FloatArray, FloatArray]: ...
 
 
-class Learned:
+class LearningUnit:
     """The unit of the runtime."""
 
     def __init__(self, prior: ServicePrior, axes: int) -> None:
@@ -261,7 +261,7 @@ def served(
     return np.array(errors), np.array(sigmas)
 
 
-class _Recorded(Learned):
+class _Recorded(LearningUnit):
     """Keeps a row of each stop: power-on, h on the clock, s since power-on, C, s, deg/h, status, shift and sigma."""
 
     def __init__(self, prior: ServicePrior) -> None:

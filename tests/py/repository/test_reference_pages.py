@@ -9,7 +9,7 @@ import pytest
 import reference
 from conftest import ROOT
 from gyrotc.cli.commands import app
-from gyrotc.cli.shell import KINDS, tables
+from gyrotc.cli.schemas import KINDS, tables
 from gyrotc.verify.sizes import PUBLIC
 from typer.main import get_command
 

@@ -14,7 +14,7 @@ import pytest
 from conftest import Command
 from gyrotc import results
 from gyrotc.cli.commands import app
-from gyrotc.cli.shell import KINDS, tables
+from gyrotc.cli.schemas import KINDS, tables
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.results.base import Marker, Numbered, checked_result

@@ -86,7 +86,8 @@ COMMANDS = {
 }
 SLOW = ("report", "sign", "catalogue", "verify", "evaluate", "build", "compare", "diagnose", "plan")
 WRITE_NOTHING = {"completion", "schema", "cache"}  # but to standard output, and in the cache's own folder
-AS_OTHERS = {"lot"}  # a file by `write_atomically`, as check --json; a lot needs units that take minutes
+# A file by `write_atomically`, as check --json, of units that take minutes; a folder by `result_folder`, as fit.
+AS_OTHERS = {"lot", "recalibrate"}
 
 
 @pytest.fixture(params=quick_and_slow([name for name in COMMANDS if name not in SLOW], SLOW))
