@@ -43,12 +43,13 @@ class Part:
     numerics: tuple[str, ...] = ("f32", "q31")
 
 
-_RELATED = {"f32": "gtc_f32_cell", "q31": "gtc_q31_position"}
+_MISSING = {"f32": "gtc_f32_is_missing"}
+_RELATED = {"f32": "gtc_f32_is_missing,gtc_f32_cell", "q31": "gtc_q31_position"}
 _TERMS = {"f32": "gtc_f32_follow,gtc_f32_mean", "q31": "gtc_q31_follow,gtc_q31_mean"}
 _STAND_INS = {**_TERMS, "q31": f"{_TERMS['q31']},gtc_q31_position"}
 PARTS = {
-    "map": Part("map", precision=7, checks=1),
-    "map of a bank": Part("map", "bank", precision=7, checks=1, left=2),
+    "map": Part("map", precision=7, contracts=_MISSING, checks=1),
+    "map of a bank": Part("map", "bank", precision=7, contracts=_MISSING, checks=1, left=2),
     "mean": Part("mean"),
     "slope": Part("slope", options=("-eva-slevel-function", "gtc_{n}_window_slope:4000"), checks=2),
     "step": Part(
@@ -88,14 +89,14 @@ PARTS = {
 
 def _analysed(c: Path, part: Part, numeric: str, machine: str) -> str:
     options = ["-eva-precision", str(part.precision), *(text.format(n=numeric) for text in part.options)]
-    if part.contracts:
+    if numeric in part.contracts:
         options += ["-eva-use-spec", part.contracts[numeric]]
     define = "-DF32" if numeric == "f32" else "-DQ31"
     if part.shape:
         networks, term = part.shape
         define += f" -DANY_TABLE -DSHAPE_NETWORKS={networks}U -DSHAPE_LAST=term_{term}"
         define += f" -DSHAPE_KIND=GTC_TERM_{term.upper()}"
-        define += " -DGTC_WITH_BANK=1 -DGTC_OPEN_TERMS=1"
+        define += " -DGTC_MAX_TERMS=4 -DGTC_WITH_BANK=1 -DGTC_OPEN_TERMS=1"
     command = ["frama-c", *OPTIONS, *options, "-machdep", machine, f"-cpp-extra-args=-I{c} -I{HERE} {define}"]
     files = [str(HERE / f"{part.file}.c"), str(c / "gtc_rlg_0042.c")]
     done = subprocess.run([*command, *files], capture_output=True, text=True, check=False)

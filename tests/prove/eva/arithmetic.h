@@ -18,6 +18,12 @@ typedef float wide_t;
 #define NUMBER(word) ((word).value)
 #define MEMBER_NUMBER(member) ((member).value)
 #define ANY_PLAUSIBLE() Frama_C_float_interval(LOWEST, HIGHEST)
+/* What tests/prove/primitives_f32.c shows for every float32. */
+/*@ assigns \result \from x;
+    behavior number: assumes \is_finite(x); ensures \result == 0;
+    behavior missing: assumes !\is_finite(x); ensures \result == 1;
+    complete behaviors; */
+static inline int gtc_f32_is_missing(float x);
 #else
 #define NAME(x) gtc_q31_##x
 #define THE_TABLE gtc_rlg_0042_q31

@@ -6,12 +6,7 @@
  */
 #include "arithmetic.h"
 
-/* What tests/prove/primitives_f32.c shows of these three for every float32. */
-/*@ assigns \result \from x;
-    behavior number: assumes \is_finite(x); ensures \result == 0;
-    behavior missing: assumes !\is_finite(x); ensures \result == 1;
-    complete behaviors; */
-static inline int gtc_f32_is_missing(float x);
+/* What tests/prove/primitives_f32.c shows of these two for every float32. */
 /*@ requires least <= most;
     assigns \result \from x, least, most;
     assigns *remarks \from *remarks, x, least, most;

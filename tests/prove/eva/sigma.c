@@ -8,11 +8,6 @@
 #if defined(F32)
 /*@ requires n >= 1; assigns \result \from x, range[0 .. 1], n; ensures \result <= n - 1; */
 static inline uint_least32_t gtc_f32_cell(float x, const gtc_word_t *range, uint_least32_t n);
-/*@ assigns \result \from x;
-    behavior number: assumes \is_finite(x); ensures \result == 0;
-    behavior missing: assumes !\is_finite(x); ensures \result == 1;
-    complete behaviors; */
-static inline int gtc_f32_is_missing(float x);
 #define BOUND 1.0F
 #else
 /*@ assigns \result \from x, range[0 .. 1];
@@ -50,6 +45,8 @@ static void any_state(void)
 {
     unsigned i;
     state.table = &THE_TABLE;
+    state.period_us = Frama_C_unsigned_long_interval(1, 0xFFFFFFFFUL);
+    state.samples_per_block = Frama_C_unsigned_long_interval(1, MAX_BLOCK);
     state.status = Frama_C_interval(0, 63);
     state.input[0].held_blocks = Frama_C_unsigned_long_interval(0, 100001);
     state.elapsed = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);

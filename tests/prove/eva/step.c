@@ -21,14 +21,6 @@ static inline num_t NAME(mean)(num_t base, wide_t sum, uint_least32_t n);
     ensures \result == 0 || \result == 1; */
 static int_least32_t NAME(window_slope)(const NAME(state_t) *state, num_t *slope);
 
-#if defined(F32)
-/*@ assigns \result \from x;
-    behavior number: assumes \is_finite(x); ensures \result == 0;
-    behavior missing: assumes !\is_finite(x); ensures \result == 1;
-    complete behaviors; */
-static inline int gtc_f32_is_missing(float x);
-#endif
-
 /* `volatile` stands in libc/ so that compilers make no calls of memset() and memmove() out of loops. Nobody else
  * writes there, but Eva takes every such read for anything. */
 #define volatile
