@@ -45,7 +45,7 @@ class Part:
 
 _MISSING = {"f32": "gtc_f32_is_missing"}
 _RELATED = {"f32": "gtc_f32_is_missing,gtc_f32_cell", "q31": "gtc_q31_position"}
-_TERMS = {"f32": "gtc_f32_follow,gtc_f32_mean", "q31": "gtc_q31_follow,gtc_q31_mean"}
+_TERMS = {"f32": "gtc_f32_follow,gtc_f32_mean,gtc_f32_is_missing", "q31": "gtc_q31_follow,gtc_q31_mean"}
 _STAND_INS = {**_TERMS, "q31": f"{_TERMS['q31']},gtc_q31_position"}
 PARTS = {
     "map": Part("map", precision=7, contracts=_MISSING, checks=1),
