@@ -41,13 +41,7 @@ FLOOR_DPH = 7e-4  # of 100-s means
 RUNS, HOURS, STILL_C_PER_MIN = 4, 8.0, 0.1
 ROWS_S, RESOLUTIONS_C = (1, 10, 60), (0.001, 0.0625, 0.1)
 NEAR_S = 900.0  # of an event that is reported, from the planted one
-WARNINGS = (
-    "sign_reversed",
-    "axes_exchanged",
-    "runs_contradict",
-    "thermometer_changed",
-    "rate_outliers",
-)
+WARNINGS = ("sign_reversed", "axes_exchanged", "runs_contradict", "thermometer_changed", "rate_outliers")
 
 
 @dataclass
@@ -169,11 +163,7 @@ KINDS: dict[str, tuple[Plant | None, str, tuple[str, ...]]] = {
         ("gain_changed", "unit_changed", "unit"),
     ),
     "thermometer +1.5 C": (warmer(1.5), "any", ("jump_in_temperature",)),
-    "lost contact": (
-        lost_contact,
-        "any",
-        ("jump_in_temperature", "stuck_temperature", "thermometer_changed"),
-    ),
+    "lost contact": (lost_contact, "any", ("jump_in_temperature", "stuck_temperature", "thermometer_changed")),
     "stuck": (stuck, "ramp", ("stuck_temperature",)),
     "burst": (burst, "any", ("rate_outliers",)),
     "dropout": (dropout, "any", ("dropout", "restart")),
@@ -186,11 +176,7 @@ def draw_temperatures(rng: np.random.Generator) -> list[tuple[Array, Array]]:
     runs = []
     for k in range(RUNS):
         legs = [
-            (
-                float(rng.uniform(0.7, 4.0)),
-                float(rng.uniform(*((30, 60) if j % 2 else (-40, 0)))),
-                60.0 * m,
-            )
+            (float(rng.uniform(0.7, 4.0)), float(rng.uniform(*((30, 60) if j % 2 else (-40, 0)))), 60.0 * m)
             for j, m in enumerate(rng.uniform(25.0, 150.0, 8))
         ]
         start = float(rng.uniform(-10.0, 30.0))
@@ -225,11 +211,7 @@ def draw_set(kind: str, resolution: float, rng: np.random.Generator) -> tuple[li
 
 def draw_bias(rng: np.random.Generator) -> Callable[[Array], Array]:
     """Offset, a curve over temperature that swings by 10 to 40 floors, and a share of dT/dt."""
-    swing, tilt, middle = (
-        rng.uniform(10.0, 40.0) * FLOOR_DPH,
-        rng.uniform(-1.0, 1.0),
-        rng.uniform(-20.0, 40.0),
-    )
+    swing, tilt, middle = (rng.uniform(10.0, 40.0) * FLOOR_DPH, rng.uniform(-1.0, 1.0), rng.uniform(-20.0, 40.0))
     width, bend = rng.uniform(12.0, 40.0), rng.uniform(-1.0, 1.0)
     offset, share = rng.uniform(-0.05, 0.05), rng.uniform(-3.0, 3.0) * FLOOR_DPH
 
@@ -245,11 +227,7 @@ def draw_place(temperature: Array, where: str, rng: np.random.Generator) -> floa
     """A time well within the run, in a hold or on a ramp."""
     times = np.arange(4200, temperature.size - 4200)
     slope = np.abs(np.gradient(temperature))[times] * 60.0
-    there = {
-        "hold": slope < STILL_C_PER_MIN,
-        "ramp": slope > 5.0 * STILL_C_PER_MIN,
-        "any": slope >= 0.0,
-    }[where]
+    there = {"hold": slope < STILL_C_PER_MIN, "ramp": slope > 5.0 * STILL_C_PER_MIN, "any": slope >= 0.0}[where]
     return float(rng.choice(times[there])) if there.any() else float(rng.choice(times))
 
 
@@ -265,10 +243,7 @@ def write(runs: list[Recording], row_s: int, averaged: bool, folder: Path) -> No
             "temperature_c": np.round(read.mean(axis=1), 4) if averaged else read[:, -1],
             "rate_dph": np.round(run.rate_dph[:n].reshape(-1, row_s).mean(axis=1), 9),
         }
-        pq.write_table(
-            pa.table({name: v[kept] for name, v in columns.items()}),
-            folder / f"{k}.parquet",
-        )
+        pq.write_table(pa.table({name: v[kept] for name, v in columns.items()}), folder / f"{k}.parquet")
         lines += ["", "[[run]]", f'file = "{k}.parquet"']
     (folder / "dataset.toml").write_text("\n".join(lines) + "\n", "utf-8")
 
@@ -306,12 +281,7 @@ def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
     right = [time for id, time in near if id in planted.names]
     at = planted.at_s
     holds = at is not None and any(low <= at <= high for of_event in right for low, high in of_event)
-    return Score(
-        bool(ids),
-        any(id in planted.names for id in ids),
-        holds,
-        tuple(id for id, _ in other),
-    )
+    return Score(bool(ids), any(id in planted.names for id in ids), holds, tuple(id for id, _ in other))
 
 
 def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
@@ -323,11 +293,7 @@ def scores(kind: str, seed: int, each: int) -> Iterator[Score]:
         runs, planted = draw_set(kind, resolution, rng)
         with tempfile.TemporaryDirectory(prefix="events-") as name:
             write(runs, row_s, bool(rng.integers(2)), Path(name))
-            yield judge(
-                Path(name),
-                planted,
-                warnings=planted.at_s is None or kind == "lost contact",
-            )
+            yield judge(Path(name), planted, warnings=planted.at_s is None or kind == "lost contact")
 
 
 def row(job: tuple[str, int, int]) -> dict[str, Any]:
@@ -346,16 +312,7 @@ def row(job: tuple[str, int, int]) -> dict[str, Any]:
 
 
 def section(record: dict[str, Any]) -> str:
-    head = (
-        "event",
-        "sets ",
-        "found ",
-        "named ",
-        "in rows of 1, 10, 60 s ",
-        "limits hold ",
-        "false ",
-        "reported",
-    )
+    head = ("event", "sets ", "found ", "named ", "in rows of 1, 10, 60 s ", "limits hold ", "false ", "reported")
     rows = [
         (
             *(r[k] for k in ("name", "sets", "found", "named")),
@@ -375,11 +332,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=secrets.randbits(31))
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--only", action="append", choices=list(KINDS))
-    parser.add_argument(
-        "--json",
-        type=Path,
-        help="what was found so far: kinds in it are not drawn again",
-    )
+    parser.add_argument("--json", type=Path, help="what was found so far: kinds in it are not drawn again")
     parser.add_argument("--docs", type=Path, help="the folder docs, whose record is written")
     given = parser.parse_args()
     record: dict[str, Any] = {"seed": given.seed, "rows": []}

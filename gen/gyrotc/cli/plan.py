@@ -285,7 +285,8 @@ def _next_run(
     for line in programme_text(best).splitlines():
         tell(line)
     for rest in result.parkings:
-        tell(f"a parking of {plain(rest.minutes)} min: {sci(rest.before_dph)} -> {sci(rest.after_dph)} deg/h (1 sigma)")
+        before, after = sci(rest.before_dph), sci(rest.after_dph)
+        tell(f"a parking of {plain(rest.minutes)} min: {before} -> {after} {rate_unit()} (1 sigma)")
     if out is not None:
         tell(f"{out / 'programme.csv'}: set points over time")
 

@@ -214,12 +214,11 @@ def simulate(
         _simulate_lot(given, base or "paper", seed, out, (row_s, raw_hz, pulses, format), noise)
         return
     if scenario == "service" and not given:
-        _simulate_service(base, seed, out, power_ons or 100, mounted or ())
+        _simulate_service(base, seed, out, 100 if power_ons is None else power_ons, mounted or ())
         return
-    if power_ons or mounted:
-        raise InputError(
-            "--power-ons" if power_ons else "--mounted", "is an option of service", "gyrotc simulate service"
-        )
+    if power_ons is not None or mounted:
+        name = "--mounted" if power_ons is None else "--power-ons"
+        raise InputError(name, "is an option of service", "gyrotc simulate service")
     if given or base:
         raise InputError(f"--{next(iter(given), 'base')}", "is an option of lots", "gyrotc simulate lot")
     with progress() as say:

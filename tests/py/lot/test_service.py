@@ -77,6 +77,8 @@ def test_a_service_is_simulated_and_recalibrated_by_command(unit: Path, tmp_path
     assert found.new_model_hash == load_model(served / "model.json").hash and "a new table" in said
     with pytest.raises(InputError, match="of another table"):  # nothing is applied twice
         learned_in_service(served, out / "learned.txt")
+    with pytest.raises(InputError, match="--power-ons: 0"):
+        run_here(*order[:4], "--power-ons", "0", "--out", tmp_path / "none")
 
 
 def test_an_authority_is_never_left_by_a_simulated_service(unit: Path, tmp_path: Path) -> None:
