@@ -354,9 +354,9 @@ class Cause:
 
     @property
     def unit(self) -> str:
-        """Unit of its size: of its amplitude, or of the parameter that changes the map's input."""
+        """Unit of its size: of its amplitude, or of the parameter that changes the map's input; empty: it has none."""
         shown = self.parameters if self.kind == "input" else [p for p in self.parameters if p.linear]
-        return shown[0].unit
+        return next((parameter.unit for parameter in shown), "")
 
     @property
     def shipped(self) -> bool:

@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..common.errors import InputError
-from ..pages.display import rate_unit, shown
+from ..pages.display import DISPLAYS, NATIVE, rate_unit, shown, with_unit
 from ..pages.words import plain, sci
 from .base import PLAN, DisplayOption, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .words import NoiseLevel
@@ -25,18 +25,25 @@ _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next t
 
 
 def limits_of(texts: Sequence[str]) -> dict[str, float]:
-    """Reads `cause=value` options: required detection limits by cause.
+    """Reads `cause=limit` options: required detection limits by cause, in the unit of its limit as results hold it.
 
     Raises:
-        InputError: One is not of this form.
+        InputError: One is not of this form, or of another quantity.
     """
+    from ..causes import CATALOGUE
+
     found = {}
     for text in texts:
-        name, _, value = text.partition("=")
+        name, _, stated = text.partition("=")
+        value, _, unit = stated.strip().partition(" ")
+        native = CATALOGUE[name.strip()].unit if name.strip() in CATALOGUE else NATIVE
+        factors = {native: 1.0} | {native.replace(NATIVE, shown): factor for shown, factor in DISPLAYS.items()}
         try:
-            found[name.strip()] = float(value)
+            found[name.strip()] = float(value) / factors[unit.strip() or native]
         except ValueError:
             raise InputError("--require", repr(text), "cause=limit, e.g. hysteresis=5e-5") from None
+        except KeyError:
+            raise InputError("--require", repr(text), f"a limit in {' or '.join(factors)}") from None
         if not found[name.strip()] > 0.0:
             raise InputError("--require", repr(text), "a limit above 0")
     return found
@@ -155,13 +162,17 @@ def _accuracy(result: Plan) -> Table:
 
 
 def _shortest(found: Shortest) -> Iterator[str]:
-    wanted = ", ".join(f"{i} {v:g}" for i, v in found.required.items())
+    from ..causes import CATALOGUE
+
+    wanted, reached = (
+        ", ".join(f"{id} {with_unit(value, CATALOGUE[id].unit)}" for id, value in limits.items())
+        for limits in (found.required, found.reached)
+    )
     if found.runs is None:
         yield f"{wanted}: not reached by any number of these runs"
         return
     counted = {name: found.runs.count(name) for name in found.runs}
     runs = ", ".join(f"{n} x {name}" if n > 1 else name for name, n in counted.items())
-    reached = ", ".join(f"{i} {sci(v, 1)}" for i, v in found.reached.items())
     yield f"shortest profile for {wanted}: {found.hours:g} h: {runs} (reaches {reached})"
 
 
@@ -183,7 +194,8 @@ def plan(
         list[str] | None,
         typer.Option(
             "--require",
-            help="A limit to reach, e.g. hysteresis=5e-5; repeatable. Gives the shortest profile.",
+            help="A limit to reach, e.g. warm_up=1e-3 (deg/h) or 'warm_up=3e-4 mdps'; repeatable. "
+            "Gives the shortest profile.",
         ),
     ] = None,
     separate: Annotated[

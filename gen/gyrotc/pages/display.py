@@ -26,7 +26,13 @@ DISPLAYS = {NATIVE: 1.0, "deg/s": 1.0 / 3600.0, "mdps": 1.0 / 3.6, "arcsec/s": 1
 
 _CURRENT: ContextVar[str] = ContextVar("display", default=NATIVE)
 _RATE = re.compile(r"_dph(_per_\w+)?$")
-_NUMBER = r"[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?"
+_DIGITS, _SUPERSCRIPTS = "-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+_TO_SUPERSCRIPTS, _FROM_SUPERSCRIPTS = (
+    str.maketrans(*pair) for pair in ((_DIGITS, _SUPERSCRIPTS), (_SUPERSCRIPTS, _DIGITS))
+)
+_POWER = rf"·10[{_SUPERSCRIPTS}]+"
+_NUMBER = rf"[+−-]?\d[\d,]*\.?\d*(?:e[+-]?\d+|{_POWER})?"
+_TOGETHER = re.compile(rf"\(({_NUMBER}) ± ({_NUMBER})\)({_POWER})")
 _STATED = re.compile(rf"(?<![\w.])({_NUMBER}(?: (?:\.\.\.|…|->|→|±|\+-|and|to) {_NUMBER})*) deg/h(?![/\w√²])")
 _NO_RATES = ("freedom", "degrees_of_freedom", "coverage_factor", "p_value", "sigmas")  # beside a rate
 _OF_LIMIT = (
@@ -79,15 +85,24 @@ def shown(part: T) -> T:
     return made
 
 
+def with_unit(value: float | None, unit: str) -> str:
+    """A figure and its unit as they are shown: of deg/h/C, deg/h is changed."""
+    if value is None:
+        return "never"
+    factor = DISPLAYS[rate_unit()] if unit.startswith(NATIVE) else 1.0
+    return f"{significant(value * factor, 3)} {unit.replace(NATIVE, rate_unit())}"
+
+
 def shown_text(text: str) -> str:
     """A sentence with its rates in the unit and form in which they are shown, with as many digits as they have."""
     if NATIVE not in text:
         return text
-    return _STATED.sub(lambda found: re.sub(_NUMBER, _converted, found[1]) + f" {rate_unit()}", text)
+    apart = text if rate_unit() == NATIVE else _TOGETHER.sub(r"\1\3 ± \2\3", text)
+    return _STATED.sub(lambda found: re.sub(_NUMBER, _converted, found[1]) + f" {rate_unit()}", apart)
 
 
 def _converted(found: re.Match[str]) -> str:
-    number = found[0].replace(",", "")
+    number = found[0].replace(",", "").replace("·10", "e").replace("−", "-").translate(_FROM_SUPERSCRIPTS)
     digits = len(re.sub(r"^[+-]?[0.]*|[.]|e.*$", "", number)) or 1
     sign = "+" if number.startswith("+") else ""
     return sign + significant(float(number) * DISPLAYS[rate_unit()], digits)
@@ -146,7 +161,7 @@ _PLAIN = (-3, 5)  # powers of ten between which numbers are written without one
 
 def power(exponent: int) -> str:
     """A power of ten: 10⁻⁴."""
-    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return "10" + str(exponent).translate(_TO_SUPERSCRIPTS)
 
 
 def is_plain(exponent: int) -> bool:

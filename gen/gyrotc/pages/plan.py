@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
+from ..causes import CATALOGUE
 from ..results.base import read_result
 from ..results.planned import Plan
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
 from .chart import AFTER, BEFORE, Panel, drawing
-from .display import rate_unit, shown
+from .display import rate_unit, shown, with_unit
 from .report import page_environment, page_from, write_page
 
 _FULL = 30.0  # d from which a pair counts as inseparable
@@ -95,6 +96,7 @@ def write_plan_page(folder: Path) -> Path:
             .get_template("plan.html.j2")
             .render(
                 p=result,
+                limit=lambda id, value: with_unit(value, CATALOGUE[id].unit),
                 temperatures=temperatures(result),
                 matrix=separability_matrix(result),
                 accuracy=accuracy_by_hours(result),

@@ -103,6 +103,7 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
     (tmp_path / "report.html").unlink()
     assert gyrotc("report", tmp_path).returncode == 0
     assert (tmp_path / "report.html").read_text("utf-8") == page
+    assert "warm up 3.00·10⁻³ deg/h" in page
     assert gyrotc("report", tmp_path, "--display", "mdps").returncode == 0
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "error of the map, mdps" in page and "error of the map, deg/h" not in page
@@ -113,6 +114,7 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
     [
         (("--require", "hysteresis"), "cause=limit"),
         (("--require", "hysteresis=-1"), "above 0"),
+        (("--require", "cavity_lag=1 mdps"), "a limit in s"),
         (("--require", "sensor_lag=1"), "thermal_gradient"),
         (("--separate", "hysteresis"), "two causes"),
         (("--separate", "hysteresis,sensor_lag"), "thermal_gradient"),
@@ -138,6 +140,8 @@ def test_what_is_printed_is_in_the_unit_that_is_asked_for(planned: dict[str, Any
 
 def test_options_are_read() -> None:
     assert limits_of(["hysteresis=5e-5", " warm_up = 1e-3"]) == {"hysteresis": 5e-5, "warm_up": 1e-3}
+    stated = limits_of(["warm_up=1e-3 mdps", "hysteresis = 1 deg/s/C", "cavity_lag=2 s", "accuracy=3600"])
+    assert stated == {"warm_up": 3.6e-3, "hysteresis": 3600.0, "cavity_lag": 2.0, "accuracy": 3600.0}
     assert pair_of("hysteresis, ageing") == ("hysteresis", "ageing") and pair_of(None) is None
     with pytest.raises(InputError):
         pair_of("ageing,ageing")
