@@ -274,7 +274,7 @@ def measured(folder: Path, spoil: Spoil | None = None) -> list[dict[str, Any]]:
         mean = rate.mean(axis=0)
         cubic = np.stack([np.polynomial.Polynomial.fit(temp_c, r, 3)(run.temp_c) for r in rate.T], axis=1)
         flat = np.tile(mean, (len(run.time_s), 1))
-        spread, scale = fitted_spread(_GUESS, [p.past(mean) for p in past], envelope, center, _NOISE)
+        spread, scale = fitted_spread(_GUESS, [[p.past(mean) for p in past]], envelope, center, _NOISE)
         noise = _NOISE * np.sqrt(10.0) / 60.0  # deg/√h
         known = Learning(
             spread=spread, reference_c=center, authority_dph=1e5, noise_deg_per_sqrt_h=noise, span_c=1e6,

@@ -17,20 +17,18 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Annotated, Any, Literal, get_args
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from scipy.special import stdtrit
 
 from .. import __version__
 from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
-from ..model import BiasSpread, Learning, Model, RuntimePart
+from ..model import Model, RuntimePart
 from ..results.evaluation import Evaluation, FigureUncertainty
 from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict
 from ..results.verification import Verification
-from ..tables.learning import data_sheet_spread
 from ..verify.toolchain import all_targets
-from .product_guards import ProductGuard
+from .product_guards import ProductGuard, ServiceLearning
 
 _NORMAL = NormalDist()
 _UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
@@ -276,42 +274,6 @@ class Recalibration(_Part):
 
     days: Annotated[float, Field(gt=0.0, le=36525.0)]
     drift_dph_per_year: Amount = None  # the most that units of the type do
-
-
-class ServiceLearning(_Part):
-    """What firmware may learn in service: from a data sheet, or `spread` as past power-ons or a lot show it."""
-
-    authority_dph: Annotated[float, Field(gt=0.0, le=1e6)]
-    table_dph: Amount = None  # 1 sigma of the table's error; None: the median of its uncertainty
-    turn_on_dph: Amount = None  # from power-on to power-on; None: as training saw it
-    ageing_dph_per_sqrt_month: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
-    noise_deg_per_sqrt_h: Annotated[float, Field(gt=0.0, le=1e6)] | None = None  # None: as training saw it
-    reference_c: Celsius | None = None  # where the table is known best; None: the middle of its envelope
-    settle_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
-    spread: BiasSpread | None = None
-
-    def of(self, model: Model, where: str) -> Learning:
-        """The same for a model.
-
-        Raises:
-            InputError: The model does not know what the section leaves out.
-        """
-        rules = model.uncertainty_dph.rules if model.uncertainty_dph else None
-        noise = self.noise_deg_per_sqrt_h or (rules.noise_deg_per_sqrt_h if rules else 0.0)
-        known = [sigma for row in model.uncertainty_dph.rows for sigma in row] if model.uncertainty_dph else [0.0]
-        table = float(np.median(known)) if self.table_dph is None else self.table_dph
-        stated = {"noise_deg_per_sqrt_h": noise, "table_dph": 1.0 if self.spread else table}
-        for name, value in stated.items():
-            if not value > 0.0:
-                raise InputError(f"{where}, field learning.{name}", "is missing", "a number: training does not tell it")
-        turn_on = model.between_dph if self.turn_on_dph is None else self.turn_on_dph
-        return Learning(
-            spread=self.spread or data_sheet_spread(table, turn_on, self.ageing_dph_per_sqrt_month),
-            reference_c=sum(model.envelope.temperature_c) / 2.0 if self.reference_c is None else self.reference_c,
-            authority_dph=self.authority_dph,
-            noise_deg_per_sqrt_h=noise,
-            settle_s=self.settle_s,
-        )
 
 
 class Limits(_Part):

@@ -15,9 +15,10 @@ from ..assess.budget import budget_of
 from ..assess.changes import changes_since, load_earlier
 from ..assess.evaluate import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
-from ..assess.product_guards import guarded
+from ..assess.product_guards import Seen, guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
+from ..lot.use import LotPrior
 from ..model import Model, load_model
 from ..pages.display import check_display
 from ..pages.report import write_report
@@ -204,7 +205,9 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
         left_out = order.limits.needs.left_out
         stated = order.limits.learning
-        learning = stated.of(model, order.limits.file) if stated else None
+        lot = options.prior.lot if isinstance(options.prior, LotPrior) else None
+        seen = Seen(lot, fitted.training.known, fitted.means)
+        learning = stated.of(model, seen, order.limits.file) if stated else None
         model = model.model_copy(
             update={
                 "q31_bias_frac_bits": order.limits.q31_bias_frac_bits,

@@ -18,7 +18,7 @@ from ..assess.limits import Limits
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.ranges import MOST_CENTERS
-from ..lot.earlier import EarlierPrior, posterior_of_known, posterior_of_means, stated_sigma_dph, widened
+from ..lot.earlier import EarlierPrior, posterior_of_result, widened
 from ..lot.learn import FALSE_ALARM
 from ..lot.prior import MapPosterior
 from ..lot.service import learning_in, words_in
@@ -55,7 +55,8 @@ def prior_from(
     for run in dataset.runs:
         if run.role == "train" and run.sha256 in seen:
             raise InputError(run.file, f"the model in {folder} was made from it", "recordings of its own")
-    posterior = posterior_in(earlier.folder, earlier.model)
+    where = earlier.folder / "training.json"
+    posterior = posterior_of_result(read_result(where, Training), earlier.model, where)
     aged, stated = _ageing(earlier, dataset, ageing_dph, limits)
     return widened(posterior, aged, stated, earlier.model.hash, earlier.date)
 
@@ -91,23 +92,6 @@ def with_prior(
     return replace(options, prior=prior_from(folder, dataset, ageing_dph=ageing_dph, limits=limits))
 
 
-def posterior_in(folder: Path, model: Model) -> MapPosterior:
-    """What is known of a unit's map by its result.
-
-    Raises:
-        InputError: Its `training.json` does not say enough.
-    """
-    where = folder / "training.json"
-    training = read_result(where, Training)
-    if training.known is not None:
-        return posterior_of_known(training.known, str(where))
-    means = means_of(training.means, where)
-    envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    between, table = model.between_dph, model.uncertainty_dph
-    stated = stated_sigma_dph(np.array(table.rows), envelope, between, means) if table else 0.0
-    return posterior_of_means(means, envelope, between, stated)
-
-
 def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, MapMeans]:
     """A unit's model, what is known of its map, and the means of its own runs.
 
@@ -125,7 +109,7 @@ def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, 
     means = means_of(training.means, where)
     assert training.means is not None
     if lot is None or training.known is not None:
-        return model, posterior_in(folder, model), training.means
+        return model, posterior_of_result(training, model, where), training.means
     if lot.axis != model.axis:
         raise InputError("--lot", f"of axis {lot.axis}", f"a lot of axis {model.axis}, as the unit")
     known = prior_of(lot).with_runs(means)

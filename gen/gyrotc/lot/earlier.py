@@ -10,17 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..model import Model
 from ..results.lot import KnownMap
-from ..results.training import ChangeKind, EarlierUse, TriedChange
+from ..results.training import ChangeKind, EarlierUse, Training, TriedChange
 from ..train.data import Scaling, TrainingData
 from ..train.evidence import Asked
-from ..train.means import UnitMeans
+from ..train.means import UnitMeans, means_of
 from ..train.result import Given
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
@@ -141,6 +143,21 @@ def posterior_of_means(
     known = prior.alone()
     wider = max(1.0, (stated_dph / known.rms_sigma_dph()) ** 2)
     return replace(known, covariance=wider * covariance)
+
+
+def posterior_of_result(training: Training, model: Model, where: Path) -> MapPosterior:
+    """What is known of a unit's map by its result, `training` being read from `where`.
+
+    Raises:
+        InputError: It does not say enough.
+    """
+    if training.known is not None:
+        return posterior_of_known(training.known, str(where))
+    means = means_of(training.means, where)
+    envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
+    between, table = model.between_dph, model.uncertainty_dph
+    stated = stated_sigma_dph(np.array(table.rows), envelope, between, means) if table else 0.0
+    return posterior_of_means(means, envelope, between, stated)
 
 
 def widened(

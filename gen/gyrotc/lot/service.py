@@ -10,26 +10,35 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import read_input
 from ..model import BiasSpread, Learning, Model, load_model
+from ..results.lot import LotAgeing
 from ..results.planned import Parking
 from ..store.files import write_atomically
 from ..store.folder import result_folder
 from ..tables.emit import emitted_tables, prior_of
-from ..tables.learning import MONTH_H, service_prior
-from ..target.learning import KEPT_WORDS, Learner, ServicePrior, Stop, full
+from ..tables.learning import MONTH_H, service_prior, walk
+from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
+from ..train.data import TrainingData, scaling_of
+from ..train.means import unit_means
+from .earlier import posterior_of_means
+from .learn import Envelope
+from .prior import MapPosterior
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 _LOG_SPREAD = 0.5  # standard deviation of a logarithm about its start: an order of magnitude is 4.6 of them
+_FARTHEST = 4.6  # of a logarithm from its start: two orders of magnitude
 _STEPS = 40  # of the search: it ends before
 _STEP_S = 300.0  # of a simulated service: a row
 _MOST_POWER_ONS = 10_000  # of a simulated service: a day each in 27 years
+_LEAST_POWER_ONS = 3  # with two, each tells of the other alone
+_STOPS = 240  # of past power-ons, in all: the likelihood is asked for hundreds of times
 _PARKINGS_MIN = (1.0, 10.0, 60.0, 480.0)  # a stop, a break, an hour, a night
 
 
@@ -44,7 +53,7 @@ class PowerOn:
 
 
 def _innovations(
-    spread: BiasSpread, past: Sequence[PowerOn], envelope_c: tuple[float, float], center_c: float, var: float
+    spread: BiasSpread, past: Sequence[Sequence[PowerOn]], envelope_c: tuple[float, float], center_c: float, var: float
 ) -> tuple[FloatArray, FloatArray]:
     """Innovations of all stops, (n, axes), and their variances for a scale of 1, by the filter in float64."""
     known = Learning(spread=spread, reference_c=center_c, authority_dph=1.0, noise_deg_per_sqrt_h=1.0)
@@ -55,20 +64,21 @@ def _innovations(
         span_c=np.inf,
         gate_square=np.inf,
     )
-    learner = Learner(prior, past[0].rate_dph.shape[1], np.float64)
     found, variances = [], []
-    for run in past:
-        learner.power_on(np.nan, run.temp_c[0])
-        for time_s, temp_c, rate in zip(run.time_s, run.temp_c, run.rate_dph, strict=True):
-            learner.rest(Stop(time_s, temp_c, rate, 1.0))
-            found.append(learner.innovation)
-            variances.append(learner.innovation_var[0])
+    for runs in past:
+        learner = Learner(prior, runs[0].rate_dph.shape[1], np.float64)
+        for run in runs:
+            learner.power_on(np.nan, run.temp_c[0])
+            for time_s, temp_c, rate in zip(run.time_s, run.temp_c, run.rate_dph, strict=True):
+                learner.rest(Stop(time_s, temp_c, rate, 1.0))
+                found.append(learner.innovation)
+                variances.append(learner.innovation_var[0])
     return np.array(found), np.array(variances)
 
 
 def fitted_spread(
     start: BiasSpread,
-    past: Sequence[PowerOn],
+    past: Sequence[Sequence[PowerOn]],
     envelope_c: tuple[float, float],
     center_c: float,
     noise_dph: float,
@@ -79,7 +89,7 @@ def fitted_spread(
 
     Args:
         start: A guess within an order of magnitude.
-        past: Power-ons, two at least.
+        past: Power-ons that have one table, for each table.
         envelope_c: Where the knots lie, C.
         center_c: Where the table was made level, C.
         noise_dph: Of the mean of a stop, deg/h.
@@ -102,9 +112,105 @@ def fitted_spread(
         data = 0.5 * len(square) * np.log(s).sum() + 0.5 * len(s) * np.log(square).sum()
         return float(data + 0.5 * np.sum(((x - begin) / _LOG_SPREAD) ** 2))
 
-    best = minimize(cost, begin, method="L-BFGS-B", options={"maxiter": _STEPS})
+    bounds = [(x - _FARTHEST, x + _FARTHEST) for x in begin]
+    best = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
     spread = spread_at(best.x)
     return spread, np.sqrt(scales(spread)[0])
+
+
+def spread_of_power_ons(
+    start: BiasSpread, means: TrainingData, envelope: Envelope, center_c: float, between_dph: float, where: str
+) -> BiasSpread:
+    """As a unit's own power-ons show it: what the map of the others leaves of each, by maximum likelihood.
+
+    Args:
+        start: A guess within an order of magnitude; what is 0 in it stays so.
+        means: Of training, `run` being the power-on.
+        envelope: Ranges of T (C) and dT/dt (C/min).
+        center_c: Where the table is known best.
+        between_dph: Standard deviation of the constant from power-on to power-on.
+        where: Of the limits file.
+
+    Raises:
+        InputError: There are fewer than three power-ons.
+    """
+    numbers = np.unique(means.run)
+    if len(numbers) < _LEAST_POWER_ONS:
+        raise InputError(where, f"{len(numbers)} training runs", f"{_LEAST_POWER_ONS} at least: each is a power-on")
+    scaling, step, past, noises = scaling_of(means), -(-len(means) // _STOPS), [], []
+    for number in numbers:
+        others = unit_means(means.select(means.run != number), scaling, None)[0]
+        one = means.select(means.run == number)
+        left = one.bias_dph - posterior_of_means(others, envelope, between_dph).mean_dph(
+            one.temperature_c, one.slope_c_per_min
+        )
+        past.append([PowerOn(one.time_s[::step], one.temperature_c[::step], left[::step, None])])
+        noises.append(others.sigma_dph)
+    spread, scale = fitted_spread(start, past, envelope[0], center_c, float(np.median(noises)))
+    return spread.scaled(float(scale[0]))
+
+
+def spread_of_lot(
+    stated: BiasSpread, known: MapPosterior, ageing: LotAgeing | None, envelope_c: tuple[float, float], center_c: float
+) -> BiasSpread:
+    """As lot and own runs leave a unit's map open where temperature stands still, and as units of the lot age.
+
+    Args:
+        stated: All else.
+        known: The unit's map.
+        ageing: None: as stated.
+        envelope_c: Where the knots lie, C.
+        center_c: Where the table is known best, C.
+    """
+    knots = np.linspace(*envelope_c, KNOTS)
+    z = knots - center_c
+    pairs = np.stack([one.ravel() for one in (np.ones((KNOTS, KNOTS)), np.outer(z, z), walk(z))], axis=1)
+    left = covariance_at(known, knots)
+    parts = nnls(pairs, left.ravel())[0]
+    parts *= np.trace(left) / np.trace((pairs @ parts).reshape(KNOTS, KNOTS))  # as much variance as there is
+    found = dict(zip(("level", "slope", "shape"), np.sqrt(parts).tolist(), strict=True))
+    if ageing is not None:
+        hourly = float(np.sqrt(MONTH_H))
+        found["ageing"] = ageing.level_dph_per_sqrt_month / hourly
+        found["ageing_shape"] = ageing.shape_dph_per_sqrt_month_c / hourly
+    return stated.model_copy(update=found)
+
+
+def covariance_at(known: MapPosterior, temperature_c: FloatArray) -> FloatArray:
+    """Covariance of a map where temperature stands still, (deg/h)²."""
+    values = known.prior.basis.values(temperature_c, np.zeros(len(temperature_c))) * known.prior.unit_dph
+    return np.asarray(values @ known.covariance @ values.T)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """How far the map of a unit moved between two calibrations: at temperatures, with covariance, in months."""
+
+    temperature_c: FloatArray
+    moved_dph: FloatArray
+    covariance: FloatArray
+    months: float
+
+
+def fitted_ageing(moves: Sequence[Moved], center_c: float) -> tuple[float, float]:
+    """Ageing of the level and along T by maximum likelihood, deg/h/√month and deg/h/√(month C)."""
+    size = float(np.sqrt(np.mean([np.mean(one.moved_dph**2) / one.months for one in moves]))) or 1e-12
+
+    def cost(x: FloatArray) -> float:
+        level, shape = (size * x) ** 2
+        total = 0.0
+        for one in moves:
+            of_time = level + shape * walk(one.temperature_c - center_c)
+            factor = np.linalg.cholesky(one.covariance + one.months * of_time)
+            total += 0.5 * float(np.sum(np.linalg.solve(factor, one.moved_dph) ** 2))
+            total += float(np.log(np.diag(factor)).sum())
+        return total
+
+    span = float(np.ptp(np.concatenate([one.temperature_c for one in moves])))
+    starts = [(a, b / np.sqrt(span)) for a in (0.03, 0.7) for b in (0.03, 0.7)]
+    found = [minimize(cost, x, method="L-BFGS-B", bounds=[(0.0, None)] * 2) for x in starts]
+    level, shape = size * min(found, key=lambda one: one.fun).x
+    return float(level), float(shape)
 
 
 class Corrector(Protocol):

@@ -40,7 +40,7 @@ def data_sheet_spread(table_dph: float, turn_on_dph: float, ageing_dph_per_sqrt_
     )  # fmt: skip
 
 
-def _walk(knots: FloatArray) -> FloatArray:
+def walk(knots: FloatArray) -> FloatArray:
     """Covariance of a random walk from 0 to either side."""
     same_side = np.outer(knots, knots) > 0
     return np.where(same_side, np.minimum.outer(np.abs(knots), np.abs(knots)), 0.0)
@@ -50,8 +50,8 @@ def service_prior(learning: Learning, envelope_c: tuple[float, float], id: int =
     """The prior of a table with this id; the knots lie over the envelope."""
     spread, (low, high) = learning.spread, envelope_c
     knots = np.linspace(low, high, KNOTS) - learning.reference_c
-    level = spread.level**2 + spread.slope**2 * np.outer(knots, knots) + spread.shape**2 * _walk(knots)
-    ageing = spread.ageing**2 + spread.ageing_shape**2 * _walk(knots)
+    level = spread.level**2 + spread.slope**2 * np.outer(knots, knots) + spread.shape**2 * walk(knots)
+    ageing = spread.ageing**2 + spread.ageing_shape**2 * walk(knots)
     return ServicePrior(
         id=id, low_c=low, knots_per_c=(KNOTS - 1) / (high - low), reference_c=learning.reference_c,
         authority_dph=learning.authority_dph,

@@ -27,8 +27,8 @@ from ..results.findings import Finding
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
 from .cross_validation import Span, training_spans, whole_runs
-from .data import TrainingData, cleaned, joined, scaling_of
-from .evidence import TrainingFailed
+from .data import TrainingData, average, cleaned, joined, scaling_of
+from .evidence import MEAN_S, TrainingFailed
 from .guards import AGREE_S, longest_same_s, stuck_after_s
 from .means import unit_means
 from .methods import fit
@@ -80,10 +80,11 @@ class FitOptions(BuildOptions):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model, and what `training.json` says of it."""
+    """A model, what `training.json` says of it, and means over 50 s that it was fitted to, `run` being the power-on."""
 
     model: Model
     training: Training
+    means: TrainingData | None = None  # None: an extended model
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,8 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
         choice = chosen_channels(dataset, data, read.channels, options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
-    fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
+    power_on = power_ons(stretches)
+    fitted = _fit(data, options, power_on=power_on, serial=dataset.serial)
     spans = training_spans(stretches, data)
     if not spans and not any(run.role == "exam" for run in dataset.runs):
         spans = whole_runs(stretches, data)  # what the correction is judged by
@@ -189,7 +191,8 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     if choice:
         content["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
-    return Fitted(model, training.model_copy(update=content))
+    means = average(cleaned(replace(data, run=power_on[data.run])), MEAN_S)
+    return Fitted(model, training.model_copy(update=content), means)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,25 @@ from conftest import run_here
 from gyrotc.assess.limits import Limits, Recalibration
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.jobs.recalibration import learned_in_service
-from gyrotc.lot.service import learning_in, parkings, words_text
+from gyrotc.lot.earlier import posterior_of_means
+from gyrotc.lot.service import (
+    Moved,
+    covariance_at,
+    fitted_ageing,
+    learning_in,
+    parkings,
+    spread_of_lot,
+    spread_of_power_ons,
+    words_text,
+)  # fmt: skip
 from gyrotc.model import Learning, Model, Uncertainty, load_model
 from gyrotc.results.evaluation import InService
+from gyrotc.results.lot import LotAgeing
 from gyrotc.tables.emit import emit
-from gyrotc.tables.learning import data_sheet_spread
-from gyrotc.target.learning import KNOTS, Learner
+from gyrotc.tables.learning import MONTH_H, data_sheet_spread, service_prior, walk
+from gyrotc.target.learning import KNOTS, Learner, full
+from gyrotc.train.data import TrainingData
+from gyrotc.train.means import UnitMeans
 
 GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"
 LEARNING = Learning(
@@ -150,3 +163,54 @@ def test_a_parking_is_worth_more_the_longer_it_is() -> None:
     assert all(one.after_dph < one.before_dph for one in found) and after == sorted(after, reverse=True)
     for one in found:  # a rest tells at least what its own mean tells
         assert one.after_dph <= 1.001 * LEARNING.noise_deg_per_sqrt_h / np.sqrt(one.minutes / 60.0)
+
+
+@pytest.mark.parametrize(("level", "shape"), [(2e-4, 3e-5), (2e-4, 0.0), (0.0, 0.0)])
+def test_ageing_is_what_units_moved_between_two_calibrations(level: float, shape: float) -> None:
+    draw, t, noise = np.random.default_rng(11), np.linspace(-40.0, 60.0, KNOTS), 5e-5
+    of_month, moves = level**2 + shape**2 * walk(t - 10.0), []
+    for months in draw.uniform(6.0, 24.0, 60):
+        moved = draw.multivariate_normal(np.zeros(KNOTS), months * of_month) + draw.normal(0.0, noise, KNOTS)
+        moves.append(Moved(t, moved, noise**2 * np.eye(KNOTS), float(months)))
+    found = fitted_ageing(moves, 10.0)
+    assert found[0] == pytest.approx(level, rel=0.25, abs=5e-6)  # 60 units: 1 sigma of 9 %
+    assert found[1] == pytest.approx(shape, rel=0.25, abs=2e-6)
+
+
+def test_the_prior_of_a_lot_is_as_wide_as_its_posterior() -> None:
+    draw = np.random.default_rng(3)
+    t, r = draw.uniform(-20.0, 30.0, 200), draw.uniform(-2.0, 2.0, 200)  # nothing above 30 C
+    means = UnitMeans(t, r, 1e-3 * t + 0.01 * np.sin(t / 9.0) + draw.normal(0.0, 1e-3, 200), np.ones(200), 1e-3)
+    known = posterior_of_means(means, ((-20.0, 60.0), (-2.0, 2.0)), 2e-4)
+    ageing = LotAgeing(
+        units=9, months=12.0, level_dph_per_sqrt_month=3e-4, shape_dph_per_sqrt_month_c=1e-5
+    )  # fmt: skip
+    spread = spread_of_lot(data_sheet_spread(1e-3, 2e-4, 0.0), known, ageing, (-20.0, 60.0), 10.0)
+    learning = LEARNING.model_copy(update={"spread": spread, "reference_c": 10.0})
+    prior = np.sqrt(np.diag(full(service_prior(learning, (-20.0, 60.0)).map_var)))
+    left = np.sqrt(np.diag(covariance_at(known, np.linspace(-20.0, 60.0, KNOTS))))
+    assert np.sum(prior**2) == pytest.approx(np.sum(left**2), rel=1e-9)
+    assert left[-1] > 3.0 * left[3] and prior[-1] > 2.0 * prior[3]  # wide where nobody has been
+    assert spread.ageing * np.sqrt(MONTH_H) == pytest.approx(3e-4) and spread.turn_on == 2e-4
+
+
+@pytest.mark.parametrize("turn_on", [2e-3, 2e-2])
+def test_past_power_ons_say_how_far_the_next_one_is(turn_on: float) -> None:
+    """Runs over 40 C of a map that they know well: what is drawn at each is what the map of the others leaves."""
+    draw, n, parts = np.random.default_rng(5), 14, []
+    for run in range(6):
+        time_s = 900.0 * np.arange(n)
+        t = 10.0 + 20.0 * np.sin(time_s / 2000.0 + run)
+        bias = 0.1 * np.cos(t / 15.0) + draw.normal(0.0, turn_on) + draw.normal(0.0, 1e-3, n)
+        slope = np.gradient(t, time_s / 60.0)
+        parts.append((t, slope, bias, np.ones(n), np.full(n, run), time_s, np.full(n, 900.0)))
+    columns = [np.concatenate(x) for x in zip(*parts, strict=True)]
+    means = TrainingData(*columns[:4], columns[4].astype(np.int64), *columns[5:])
+    envelope = (-10.0, 30.0), (-1.0, 1.0)
+    start = data_sheet_spread(5e-3, 5e-3, 0.0).model_copy(update={"warm_up": 5e-3, "turn_on_slope": 1e-4})
+    found = spread_of_power_ons(start, means, envelope, 10.0, turn_on, "limits.toml")
+    drawn = np.std([columns[2][columns[4] == run].mean() for run in range(6)])
+    assert 0.4 < np.hypot(found.level, found.turn_on) / drawn < 2.5  # one constant a run, six runs
+    assert found.ageing == 0.0
+    with pytest.raises(InputError, match=r"limits\.toml: 2 training runs"):
+        spread_of_power_ons(start, means.select(means.run < 2), envelope, 10.0, turn_on, "limits.toml")
