@@ -20,17 +20,18 @@ static float of_bits(uint32_t bits)
     return word.value;
 }
 
-/* What tests/prove/eva/learn.c believes of a range and of the root of anything but plus infinity. */
+/* What tests/prove/eva/arithmetic.h believes of a range, of a square and of the root of anything but plus infinity. */
 static int breaks_contract(float x)
 {
-    const float most[] = {1.0F, 7.0F, 3.6e9F}, root = gtc_f32_root(x);
+    const float most[] = {1.0F, 7.0F, 3.6e9F}, root = gtc_f32_root(x), square = gtc_f32_square_or(x, 4.0F);
     int wrong = !(isinf(x) && (x > 0.0F)) && !(isfinite(root) && (root >= 0.0F));
+    wrong |= !((square >= 0.0F) && (square <= 1.0e38F));
     unsigned k;
     for (k = 0; k < 3U; k++) {
         const float least = (k == 0U) ? -1.0F : 0.0F;
         int_least32_t remarks = 0;
         const float y = gtc_f32_saturate(x, least, most[k], &remarks);
-        wrong |= !((y >= least) && (y <= most[k]));
+        wrong |= !((y >= least) && (y <= most[k])) || ((remarks != 0) && (remarks != GTC_CLAMPED));
     }
     return wrong;
 }

@@ -24,6 +24,22 @@ typedef float wide_t;
     behavior missing: assumes !\is_finite(x); ensures \result == 1;
     complete behaviors; */
 static inline int gtc_f32_is_missing(float x);
+#if defined(RANGES_BY_CONTRACT) /* Eva lets a NaN through `x >= least`; these for every float32, too */
+/*@ assigns \result \from x, least, most;
+    assigns *remarks \from *remarks, x, least, most;
+    ensures \is_finite(\result);
+    ensures least <= most ==> least <= \result <= most;
+    ensures *remarks == \old(*remarks) || *remarks == (\old(*remarks) | GTC_CLAMPED); */
+static inline float gtc_f32_saturate(float x, float least, float most, int_least32_t *remarks);
+/*@ requires !(x > 0x1.fffffep127);
+    assigns \result \from x;
+    ensures \is_finite(\result) && \result >= 0; */
+static inline float gtc_f32_root(float x);
+/*@ requires 0 <= other <= 1.0e38;
+    assigns \result \from square, other;
+    ensures \is_finite(\result) && 0 <= \result <= 1.0e38F; */
+static inline float gtc_f32_square_or(float square, float other);
+#endif
 #else
 #define NAME(x) gtc_q31_##x
 #define THE_TABLE gtc_rlg_0042_q31

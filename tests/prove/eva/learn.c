@@ -4,18 +4,8 @@
  * negative. Each knot lies within the authority where it starts (0) or is put by `restore`, and a rest keeps it there. The prior is the generator's: numbers within
  * the intervals below; its authority is 1 deg/h.
  */
+#define RANGES_BY_CONTRACT
 #include "arithmetic.h"
-
-/* What tests/prove/primitives_f32.c shows of these two for every float32. */
-/*@ requires least <= most;
-    assigns \result \from x, least, most;
-    assigns *remarks \from *remarks, x, least, most;
-    ensures \is_finite(\result) && least <= \result <= most; */
-static inline float gtc_f32_saturate(float x, float least, float most, int_least32_t *remarks);
-/*@ requires !(x > 0x1.fffffep127);
-    assigns \result \from x;
-    ensures \is_finite(\result) && \result >= 0; */
-static inline float gtc_f32_root(float x);
 
 #include "gtc.c"
 

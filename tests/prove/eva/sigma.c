@@ -3,6 +3,7 @@
  * The bound: whatever the state, the rate and the time, the shift stays within the table's `rezero`, here 1 deg/h or
  * 2^20 units, where it starts (`init`: 0) or is put by `restore`.
  */
+#define RANGES_BY_CONTRACT
 #include "arithmetic.h"
 
 #if defined(F32)
