@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from gyrotc.paper.summary import keep, recorded, shortened
+from gyrotc.paper.page import keep, recorded, shortened
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "promises"))
 

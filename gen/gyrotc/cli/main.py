@@ -77,7 +77,7 @@ def main() -> None:
     _single_threaded()
     _returning_columns()
     _without_warnings()
-    from ..store.interrupts import Interrupted, die_of, raise_on_signals
+    from ..store.files import Interrupted, die_of, raise_on_signals
 
     raise_on_signals()
     try:

@@ -24,9 +24,8 @@ from typing import Any
 from ..common.errors import InputError, install_command
 from ..results.fleet import FleetEntry
 from ..store.cache import program_of
-from ..store.files import Lock
+from ..store.files import Lock, deferred
 from ..store.folder import result_folder
-from ..store.interrupts import deferred
 from ..store.marker import KINDS, check_contents, check_separate, final_place
 from .catalogue import enter
 from .manifest import SUMMARY, Fleet, Share, mine, printable

@@ -16,8 +16,7 @@ from ..simulate.campaign import campaign, with_noise
 from ..simulate.scenario import read
 from ..store.files import write_atomically
 from .figures import FIGURES, draw, draw_run
-from .page import SEEDS, departures, filled, measured, parts
-from .summary import keep, recorded
+from .page import SEEDS, departures, filled, keep, measured, parts, recorded
 
 _RUN = "5 C/min"
 

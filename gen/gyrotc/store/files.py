@@ -1,4 +1,7 @@
-"""Single files: opened for writing in one place, replaced whole or not at all; JSON as gyrotc writes it."""
+"""Single files: opened for writing in one place, replaced whole or not at all; JSON as gyrotc writes it.
+
+Signals that end a job are raised where it can clean up, and held back while a result changes places.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,18 @@ import functools
 import hashlib
 import json
 import os
+import signal
 import socket
 import stat
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any, BinaryIO
 
 from ..common.errors import InputError
-from .interrupts import deferred
 
 _NESTED = (dict, list, tuple)
 _SERIES = 32  # numbers; a longer list stands in one line: a third of its bytes were line ends and blanks
@@ -364,3 +371,57 @@ def sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupted(BaseException):
+    """A signal asked the process to end. No `Exception`: nothing but clean-up may catch it."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+class _State:
+    depth = 0
+    waiting: int | None = None
+
+
+def raise_on_signals() -> None:
+    """From now on SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread; those ignored stay so."""
+    for number in _ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _on_signal)
+
+
+def _on_signal(number: int, _frame: FrameType | None) -> None:
+    for other in _ENDING:  # the clean-up that now begins is not interrupted again
+        signal.signal(other, signal.SIG_IGN)
+    if _State.depth:
+        _State.waiting = number
+    else:
+        raise Interrupted(number)
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Inside, a signal waits until the outermost block has ended. Other threads are never interrupted anyway."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _State.depth += 1
+    try:
+        yield
+    finally:
+        _State.depth -= 1
+        if _State.depth == 0 and _State.waiting is not None:
+            number, _State.waiting = _State.waiting, None
+            raise Interrupted(number)
+
+
+def die_of(number: int) -> None:
+    """Ends the process by the signal itself, so that a shell sees 128 + number and stops its loop."""
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
 from ..results.base import Marker
-from .files import Lock, check_replaceable, sync_folder, unfinished, write_atomically, write_own
-from .interrupts import deferred
+from .files import Lock, check_replaceable, deferred, sync_folder, unfinished, write_atomically, write_own
 from .marker import (
     KINDS,
     MARKER,

@@ -15,8 +15,7 @@ from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 from gyrotc.paper.__main__ import page_of, record_of, stale
 from gyrotc.paper.experiment import METHODS
 from gyrotc.paper.figures import FIGURES, Series, checksum, draw
-from gyrotc.paper.page import departures, filled, made_with, measured
-from gyrotc.paper.summary import keep
+from gyrotc.paper.page import departures, filled, keep, made_with, measured
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "paper.md"

@@ -18,7 +18,7 @@ import pytest
 from gyrotc import _core
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
-from gyrotc.paper.summary import recorded
+from gyrotc.paper.page import recorded
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.data import average, scaling_of
 from gyrotc.train.methods import trained

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gyrotc.paper.summary import keep
+from gyrotc.paper.page import keep
 from results import recorded, write
 
 ROOT = Path(__file__).resolve().parents[3]
