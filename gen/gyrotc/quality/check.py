@@ -6,7 +6,7 @@ can be checked: its unfinished last line is left out, and that is a warning.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from ..recordings.load import asked_axes, survey
 from ..recordings.records import Applied, Dataset, Mark, Rows, Run
 from ..results.findings import Finding, MarkedRows
 from ..results.recordings import Checked, CheckedRun, Problem
-from .curves import contradiction_findings, curve_findings
+from .curves import contradiction_findings, curve_findings, open_questions
 from .facts import RunFacts, facts_of
 from .findings import (
     coarse_rate_findings,
@@ -57,6 +57,7 @@ class CheckResult:
         axis: The one that was asked for.
         problems: What `fit` refuses.
         warnings: What a person should look at.
+        not_testable: What the recordings cannot tell.
         facts: Axis and facts of every run that could be read.
         marks: Rows that a problem is about, by its text.
         datasets: Axis and data set of the runs that could be read.
@@ -66,20 +67,22 @@ class CheckResult:
     axis: str | None
     problems: tuple[InputError, ...]
     warnings: tuple[Finding, ...]
+    not_testable: tuple[Finding, ...]
     facts: tuple[tuple[str | None, RunFacts], ...]
     marks: Mapping[str, tuple[Mark, ...]]
     datasets: tuple[tuple[str | None, Dataset], ...]
 
     def lines(self) -> Iterator[str]:
-        """For a person: a line for each problem, warning (and what to do next) and run, and one that sums up."""
+        """For a person: a line for each problem, warning, open question and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
-        for warning in self.warnings:
-            yield f"warning: {warning}"
-            if warning.next:
-                yield f"  next: {warning.next}"
-            if warning.exclude:
-                yield f"  paste: {warning.exclude}"
+        for kind, found in (("warning", self.warnings), ("not testable", self.not_testable)):
+            for one in found:
+                yield f"{kind}: {one}"
+                if one.next:
+                    yield f"  next: {one.next}"
+                if one.exclude:
+                    yield f"  paste: {one.exclude}"
         for axis, f in self.facts:
             yield _run_line(axis, f)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
@@ -96,6 +99,7 @@ class CheckResult:
                 for p in self.problems
             ),
             warnings=self.warnings,
+            not_testable=self.not_testable,
             runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
         )
 
@@ -140,7 +144,8 @@ def check(
     """
     problems: dict[str, InputError] = {}
     marks: dict[str, tuple[Mark, ...]] = {}
-    warnings: dict[tuple[str, str, str], tuple[Finding, list[str | None]]] = {}
+    warnings: _Seen = {}
+    untold: _Seen = {}
     facts: list[tuple[str | None, RunFacts]] = []
     datasets: list[tuple[str | None, Dataset]] = []
     axes = _axes(folder, axis)
@@ -159,12 +164,20 @@ def check(
                 looked.append(_looked_at(run))
             of_axis = [f for f, _ in looked]
             together = _of_all_runs(dataset, of_axis, envelope, earlier)
-            for warning in (*together, *(warning for _, of_run in looked for warning in of_run)):
-                warnings.setdefault((warning.id, warning.where, warning.text), (warning, []))[1].append(one)
+            _see(warnings, (*together, *(warning for _, of_run in looked for warning in of_run)), one)
+            _see(untold, open_questions(dataset, of_axis, earlier), one)
             facts += [(one, f) for f in of_axis]
-    named = (_of_axes(warning, seen, len(axes)) for warning, seen in warnings.values())
+    named, open_ = (tuple(_of_axes(w, of, len(axes)) for w, of in found.values()) for found in (warnings, untold))
     serial = datasets[-1][1].serial if datasets else None
-    return CheckResult(serial, axis, tuple(problems.values()), tuple(named), tuple(facts), marks, tuple(datasets))
+    return CheckResult(serial, axis, tuple(problems.values()), named, open_, tuple(facts), marks, tuple(datasets))
+
+
+_Seen = dict[tuple[str, str, str], tuple[Finding, list[str | None]]]  # and the axes that show it
+
+
+def _see(seen: _Seen, findings: Iterable[Finding], axis: str | None) -> None:
+    for one in findings:
+        seen.setdefault((one.id, one.where, one.text), (one, []))[1].append(axis)
 
 
 def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:

@@ -22,9 +22,9 @@ from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark, Run
 from ..results.findings import Finding
-from ..target.recursions import first_order, play
 from .facts import RunFacts
 from .findings import Limits, finding
+from .fits import evidence_beside_memories
 
 _NEXT = (
     "Look at mounting and wiring; where only the columns are exchanged or mirrored, write them right or name them "
@@ -80,6 +80,61 @@ def curve_findings(
     return list(found.values())
 
 
+def open_questions(
+    dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None = None
+) -> Iterator[Finding]:
+    """What these recordings cannot tell of their curves, each with the reason and what to record.
+
+    The id is that of the finding that stays open.
+    """
+    training = [c for c in dataset.curves if c.role == "train"]
+    series = [_series(c, dataset.axis) for c in training]
+    one_axis = all(len(c.axes) <= 1 for c in dataset.curves)
+    unknown = (
+        ("sign_reversed" if one_axis else "axes_exchanged", [
+            c.file for c in dataset.curves if not _orientation_shows(dataset, c, earlier or {})
+        ]),
+        ("gain_changed", [
+            c.file for k, c in enumerate(training) if _shared_swing(series[k], series[:k] + series[k + 1 :]) is None
+        ]),
+        ("unit_changed", [c.file for c in dataset.curves if _noise_ratio(c.file, facts) is None]),
+    )  # fmt: skip
+    every = {c.file for c in dataset.curves}
+    for id, files in unknown:
+        if files:
+            which = "any run" if set(files) == every else ", ".join(dict.fromkeys(files))
+            question, needs = _OPEN[id]
+            text = f"Whether {question.format(which)}, these recordings cannot tell: that takes two other {needs}."
+            yield finding(id, text, advice=_RECORD)
+
+
+_RECORD = "Record three runs at least, over the same temperatures and with the same rows."
+_INSTEAD = (
+    "runs over the same temperatures, or Earth's rate (earth_rate, latitude_deg), or an earlier result (--previous)"
+)
+_OPEN = {
+    "sign_reversed": ("the sign of {} is reversed", _INSTEAD),
+    "axes_exchanged": ("axes of {} are exchanged or reversed", _INSTEAD),
+    "gain_changed": (
+        "the gain of {} is another",
+        "training runs over the same temperatures, and a bias that changes over them",
+    ),
+    "unit_changed": ("the unit of {} is another", "runs with rows of the same length and noise of the same level"),
+}
+
+
+def _orientation_shows(dataset: Dataset, curve: Curve, earlier: Mapping[str, Model]) -> bool:
+    """Whether a reversed or exchanged axis of the run would show."""
+    others = [c for c in dataset.curves if c is not curve and c.axes == curve.axes]
+    along = _earth(curve)
+    by_earth = len(along) == 3 or (len(along) == 1 and abs(float(along[0])) >= _LEAST_ALONG_DPH)
+    return len(curve.cells) > 0 and (
+        bool(_shared_places(curve, others))
+        or (curve.earth_dph is not None and by_earth)
+        or any(axis in earlier for axis in (curve.axes or ("",)))
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Way:
     """Which column holds each axis, and with which sign."""
@@ -130,20 +185,12 @@ def _orientation(dataset: Dataset, curve: Curve, earlier: Mapping[str, Model]) -
 
 def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] | None:
     """The way that makes the run one of the others, which agree with one another."""
-    if len(others) < _LEAST_OTHERS:
+    shared = _shared_places(curve, others)
+    if not shared:
         return None
-    known: dict[float, list[FloatArray]] = {}
-    for other in others:
-        for t, rates in zip(other.temperature_c.tolist(), other.rates_dph - _earth(other), strict=True):
-            known.setdefault(t, []).append(rates)
-    usable = [k for k, t in enumerate(curve.temperature_c.tolist()) if len(known.get(t, ())) >= _LEAST_OTHERS]
-    if not usable:
-        return None
-    of_others = [np.array(known[t]) for t in curve.temperature_c[usable].tolist()]
-    own, usual = (
-        curve.rates_dph[usable],
-        np.array([rates.mean(axis=0) for rates in of_others]) + _earth(curve),
-    )
+    of_others = list(shared.values())
+    own = curve.rates_dph[list(shared)]
+    usual = np.array([rates.mean(axis=0) for rates in of_others]) + _earth(curve)
     squares = np.sum([np.sum((rates - rates.mean(axis=0)) ** 2, axis=0) for rates in of_others], axis=0)
     variance = squares / sum(len(rates) - 1 for rates in of_others)
     found = _best(own, usual, _AGREES * float(np.sqrt(variance.mean())))
@@ -158,6 +205,16 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     return way, (
         f"the other runs (off by {stated:.4g} deg/h as it stands, by {left:.2g} so; they agree to {scatter:.2g})"
     )
+
+
+def _shared_places(curve: Curve, others: Sequence[Curve]) -> dict[int, FloatArray]:
+    """Rates of the other runs, without Earth's, at each of the run's temperatures that two of them show."""
+    known: dict[float, list[FloatArray]] = {}
+    for other in others:
+        for t, rates in zip(other.temperature_c.tolist(), other.rates_dph - _earth(other), strict=True):
+            known.setdefault(t, []).append(rates)
+    at = {k: known.get(t, []) for k, t in enumerate(curve.temperature_c.tolist())}
+    return {k: np.array(rates) for k, rates in at.items() if len(rates) >= _LEAST_OTHERS}
 
 
 def _earth(curve: Curve) -> FloatArray:
@@ -237,7 +294,7 @@ def _best(rates: FloatArray, usual: FloatArray, tolerance: float = 0.0) -> tuple
 
 def _unit(file: str, facts: Sequence[RunFacts]) -> _Found | None:
     """The unit that a run's noise says."""
-    ratio = _noise_ratio(file, facts)
+    ratio = _noise_ratio(file, facts) or 1.0
     unit = next((f for u in _UNITS for f in (u, 1.0 / u) if 1.0 / _OF_UNIT < ratio / f < _OF_UNIT), None)
     if unit is None:
         return None
@@ -248,18 +305,18 @@ def _unit(file: str, facts: Sequence[RunFacts]) -> _Found | None:
     return "unit_changed", text, (unit, unit, unit)
 
 
-def _noise_ratio(file: str, facts: Sequence[RunFacts]) -> float:
-    """Noise of a run's rows over that of the others; 1 where two others at least do not agree on theirs."""
+def _noise_ratio(file: str, facts: Sequence[RunFacts]) -> float | None:
+    """Noise of a run's rows over that of the others; None where two others at least do not agree on theirs."""
     own = next((f for f in facts if f.file == file), None)
     if own is None:
-        return 1.0
+        return None
     others = [
         f.noise_dph
         for f in facts
         if f.file != file and abs(f.row_period_s / own.row_period_s - 1.0) < 0.01 and f.noise_dph > 0.0
     ]
     if len(others) < _LEAST_OTHERS or max(others) > _NOISE_ALIKE * min(others):
-        return 1.0
+        return None
     return own.noise_dph / float(np.median(others))
 
 
@@ -284,7 +341,7 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
             f"times {factor:.3g} (95 % {limits[1]:.3g} ... {limits[2]:.3g}). {_NEXT}"
         )
         return "sign_reversed", text, limits
-    louder = _noise_ratio(curve.file, facts)
+    louder = _noise_ratio(curve.file, facts) or 1.0
     if abs(louder - 1.0) < _LEAST_CHANGE or abs(factor / louder - 1.0) > _LEAST_CHANGE:
         rest = [others[:k] + others[k + 1 :] for k in range(len(others))]
         among = [one for k, of in enumerate(rest) if (one := _factor(others[k], of)) is not None]
@@ -328,21 +385,34 @@ def _factor(own: Mapping[float, float], others: Sequence[Mapping[float, float]])
 
     None where the runs share too few temperatures, the curve hardly swings, or no factor makes it this one.
     """
-    usual, scatter = _usual_curve(others)
-    common = sorted(own.keys() & usual.keys())
-    if len(common) < _LEAST_PLACES:
+    shared = _shared_swing(own, others)
+    if shared is None:
         return None
-    x, y = np.array([usual[t] for t in common]), np.array([own[t] for t in common])
-    x, y = x - x.mean(), y - y.mean()
+    x, y, scatter = shared
     power = float(x @ x)
-    if power < _LEAST_SWING**2 * len(x) * max(scatter, 1e-300) ** 2:
-        return None
     factor = float(x @ y) / power
     left, stated = float(np.mean((y - factor * x) ** 2)), float(np.mean((y - x) ** 2))
     if abs(factor - 1.0) >= _LEAST_CHANGE and left > max(_LEFT**2 * stated, (_ALIKE * scatter) ** 2):
         return None
     error = float(np.sqrt(left / power * len(x) / (len(x) - 2)))
     return factor, NORMAL_95 * error
+
+
+def _shared_swing(
+    own: Mapping[float, float], others: Sequence[Mapping[float, float]]
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """The others' mean curve and this one where both are known, about their means, and the scatter of the others.
+
+    None where the runs share too few temperatures, or the curve hardly swings.
+    """
+    usual, scatter = _usual_curve(others)
+    common = sorted(own.keys() & usual.keys())
+    if len(common) < _LEAST_PLACES:
+        return None
+    x, y = np.array([usual[t] for t in common]), np.array([own[t] for t in common])
+    x, y = x - x.mean(), y - y.mean()
+    swings = float(x @ x) >= _LEAST_SWING**2 * len(x) * max(scatter, 1e-300) ** 2
+    return (x, y, scatter) if swings else None
 
 
 def _usual_curve(others: Sequence[Mapping[float, float]]) -> tuple[dict[float, float], float]:
@@ -418,49 +488,3 @@ def _contradictions(
                 scatter_dph=scatter,
                 places=len(values),
             )
-
-
-_WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through
-_LAGS_S = (200.0, 600.0, 1800.0, 5400.0)  # over what its lags look through, by factors of three
-_RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play that is never pushed
-
-
-def evidence_beside_memories(
-    means: tuple[FloatArray, FloatArray, FloatArray],
-    used: NDArray[np.bool_],
-    change: FloatArray,
-    known: FloatArray,
-) -> float:
-    """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
-
-    The memories are plays, lags, and both, each beside a level, the temperature's rate and what is `known`, free in all
-    their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am. Stat. Assoc. 90
-    (1995) 773). Means that resemble their neighbours count for less, as of a first-order process.
-
-    Args:
-        means: Time (s), temperature (C) and rate of the run, shape (n,) each, with what came before the means used.
-        used: Means that count, shape (n,).
-        change: Columns that explain the run by a change, shape (n, k); its place counts as one more.
-        known: Columns that the memories stand beside, shape (n, k).
-    """
-    t, x, y = means
-    left, rank, alike = _left(change[used], y[used])
-    independent = float(used.sum()) * (1.0 - alike) / (1.0 + alike)
-    plain = [np.ones_like(t), np.gradient(x, t), *known.T]
-    plays = [play(width, x) - x for width in _WIDTHS_C]
-    lags = [first_order(tau, t, x) - x for tau in _LAGS_S]
-    found = []
-    for memories in (plays, lags, plays + lags):
-        remains, columns, _ = _left(np.column_stack(plain + memories)[used], y[used])
-        better = independent * float(np.log(max(remains, 1e-300) / max(left, 1e-300)))
-        found.append(better - (rank + 1 - columns) * float(np.log(max(independent, 1.0))))
-    return min(found)
-
-
-def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
-    """Squares that a fit leaves, its rank, and the correlation of neighbours in what it leaves, 0 at least."""
-    q, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    q = q[:, size > _RANK * size[0]]
-    rest = y - q @ (q.T @ y)
-    left = float(rest @ rest)
-    return left, q.shape[1], min(max(float(rest[1:] @ rest[:-1]) / max(left, 1e-300), 0.0), 0.95)

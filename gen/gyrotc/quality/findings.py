@@ -89,6 +89,7 @@ def finding(
     size: tuple[Limits, str] | None = None,
     leave_out: Sequence[tuple[float, float]] = (),
     whole_run: bool = False,
+    advice: str | None = None,
     **evidence: Any,
 ) -> Finding:
     """A finding as results hold it; what does not apply is absent.
@@ -97,6 +98,7 @@ def finding(
         run: What it is about: a run, its facts, or a file; None: the data set or the model.
         size: With its unit.
         leave_out: Times to leave out, s; the first ones stand in the line to paste.
+        advice: What to do next; None: what is usual for this id.
     """
     file, from_s = (run, None) if run is None or isinstance(run, str) else (run.file, run.from_s)
     given: dict[str, Any] = {} if from_s is None else {"from_s": from_s}
@@ -112,7 +114,7 @@ def finding(
         id=id,
         where=(file or "data set") + ("" if from_s is None else f" from {from_s:.6g} s"),
         text=text,
-        next=_ADVICE.get(id, ""),
+        next=_ADVICE.get(id, "") if advice is None else advice,
         file=file,
         exclude=exclude_line(leave_out[:_LINES], id) if leave_out else None,
         rows=tuple(MarkedRows(file=m.file, rows=m.rows, span_s=m.span_s) for m in marks[:_LINES]),

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_discrete_are
 from scipy.signal import lfilter
@@ -21,6 +22,7 @@ from scipy.signal import lfilter
 from ..common.arrays import FloatArray
 from ..common.metrics import median_step
 from ..common.statistics import cell_means, orthonormal, running_mean
+from ..target.recursions import first_order, play
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
@@ -239,3 +241,49 @@ def likeliest_noise(
         inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
         best = max(inside, key=likelihood)
     return Noise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]])), known[best]
+
+
+_WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through
+_LAGS_S = (200.0, 600.0, 1800.0, 5400.0)  # over what its lags look through, by factors of three
+_RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play that is never pushed
+
+
+def evidence_beside_memories(
+    means: tuple[FloatArray, FloatArray, FloatArray],
+    used: NDArray[np.bool_],
+    change: FloatArray,
+    known: FloatArray,
+) -> float:
+    """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
+
+    The memories are plays, lags, and both, each beside a level, the temperature's rate and what is `known`, free in all
+    their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am. Stat. Assoc. 90
+    (1995) 773). Means that resemble their neighbours count for less, as of a first-order process.
+
+    Args:
+        means: Time (s), temperature (C) and rate of the run, shape (n,) each, with what came before the means used.
+        used: Means that count, shape (n,).
+        change: Columns that explain the run by a change, shape (n, k); its place counts as one more.
+        known: Columns that the memories stand beside, shape (n, k).
+    """
+    t, x, y = means
+    left, rank, alike = _left(change[used], y[used])
+    independent = float(used.sum()) * (1.0 - alike) / (1.0 + alike)
+    plain = [np.ones_like(t), np.gradient(x, t), *known.T]
+    plays = [play(width, x) - x for width in _WIDTHS_C]
+    lags = [first_order(tau, t, x) - x for tau in _LAGS_S]
+    found = []
+    for memories in (plays, lags, plays + lags):
+        remains, columns, _ = _left(np.column_stack(plain + memories)[used], y[used])
+        better = independent * float(np.log(max(remains, 1e-300) / max(left, 1e-300)))
+        found.append(better - (rank + 1 - columns) * float(np.log(max(independent, 1.0))))
+    return min(found)
+
+
+def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
+    """Squares that a fit leaves, its rank, and the correlation of neighbours in what it leaves, 0 at least."""
+    q, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    q = q[:, size > _RANK * size[0]]
+    rest = y - q @ (q.T @ y)
+    left = float(rest @ rest)
+    return left, q.shape[1], min(max(float(rest[1:] @ rest[:-1]) / max(left, 1e-300), 0.0), 0.95)

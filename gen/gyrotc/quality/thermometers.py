@@ -46,6 +46,8 @@ _OFTEN = 0.5  # of the rows differ from the one before: else repeating is what t
 _LONGER = 4.0  # than what else repeats in the run; holds of one programme, in which a converter waits, differ by less
 _MOST = 5  # stuck stretches of a run at most; a thermometer with more repeats often by nature
 _ONE_STEP = 1.5  # steps of the converter: a temperature that is held between two of them goes on by one
+_REPEATED = 3  # rows alike: averages of different readings seldom are
+_LEAST_STEP_C = 1e-6  # of a converter: less is rounding
 _RELEASE = 3.0  # times the steps that rows make on ramps: the temperature went on meanwhile
 _ON_RAMPS = 0.95  # quantile of the steps
 
@@ -85,7 +87,13 @@ def temperature_findings_of(run: Run, rows: Rows, f: RunFacts) -> Iterator[Findi
     """
     inside = run.in_span(rows.time_s)
     time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
+    stretches = stuck_stretches(temperature, run.row_period_s)
+    spans = [(float(time[k]), float(time[k + n - 1]) + run.row_period_s) for k, n in stretches]
     jumps = jumps_of(time, temperature, f.temperature_step_c)
+    if any(jump.lasting for jump in jumps):  # it settles, so it did not stand still before: it was held
+        spans = [span for span in spans if abs(span[1] - jumps[0].time_s) > _AROUND_S]
+    else:  # one that was stuck shows at once what the temperature did meanwhile
+        jumps = tuple(j for j in jumps if all(abs(j.time_s - end) > run.row_period_s for _, end in spans))
     if jumps:
         first = jumps[0]
         size, at = first.to_c - first.from_c, first.time_s
@@ -110,9 +118,7 @@ def temperature_findings_of(run: Run, rows: Rows, f: RunFacts) -> Iterator[Findi
             size=((size, size, size), "C"),
             leave_out=out,
         )
-    stretches = stuck_stretches(temperature, run.row_period_s)
-    if stretches:
-        spans = [(float(time[k]), float(time[k + n - 1]) + run.row_period_s) for k, n in stretches]
+    if spans:
         start, end = max(spans, key=lambda span: span[1] - span[0])
         text = (
             f"The temperature of {run.file} stands still to the last digit for {end - start:g} s from {start:g} s on, "
@@ -180,32 +186,37 @@ def displaced(time: FloatArray, temperature: FloatArray, resolution: float) -> t
     noise = MAD_TO_SIGMA * median(size[elsewhere])
     if size[k] < max(least, _DISPLACED_SIGMAS * noise, 2.0 * resolution, _LEAST_C):
         return ()
-    at = k + 3
-    near = np.abs(np.arange(len(t)) - at) <= _BESIDE_CELLS
-    if not _jumps_rather_than_bends((t[near] - t[at]) / _CELL_S, x[near]):
-        return ()
-    return (Jump(float(t[at]), float(x[at - 1]), float(x[at + 1]), lasting=True),)
+    for at in (k + 3, k + 2):  # a thermometer that settles in a minute moves most behind the cell in which it came off
+        near = np.abs(np.arange(len(t)) - at) <= _BESIDE_CELLS
+        if _jumps_rather_than_bends((t[near] - t[at]) / _CELL_S, x[near]):
+            return (Jump(float(t[at]), float(x[at - 1]), float(x[at + 1]), lasting=True),)
+    return ()
 
 
 def _jumps_rather_than_bends(u: FloatArray, x: FloatArray) -> bool:
     """Whether temperatures around u = 0 jump there, and go on as they like, far rather than they turn a corner.
 
-    The cell of the jump and the next, in which a thermometer still settles, are left out.
+    The cell of the jump and the next, in which a thermometer still settles, are left out. Where both sides meet within
+    them there is a corner, however little it leaves.
     """
     used = (u < -0.5) | (u > 1.5)
     u, x = u[used], x[used]
 
-    def left(*columns: FloatArray) -> float:
+    def left(*columns: FloatArray) -> tuple[float, FloatArray]:
         all_ = np.column_stack([np.ones_like(u), u, u * u, *columns])
-        rest = x - all_ @ np.linalg.lstsq(all_, x, rcond=None)[0]
-        return float(rest @ rest)
+        found = np.linalg.lstsq(all_, x, rcond=None)[0]
+        rest = x - all_ @ found
+        return float(rest @ rest), np.asarray(found)
+
+    jumps, (*_, size, turn) = left(np.asarray(u > 0.0, dtype=np.float64), np.maximum(u, 0.0))
+    if min(-0.5 * turn, 1.5 * turn) <= -size <= max(-0.5 * turn, 1.5 * turn):
+        return False
 
     def corner_at(at: float) -> FloatArray:
         since = u - at  # a mean over the cell that holds the corner rounds it
         return np.where(np.abs(since) < 0.5, 0.5 * (since + 0.5) ** 2, np.maximum(since, 0.0))
 
-    corner = min(left(corner_at(at)) for at in np.arange(-3.0, 4.0, 0.02).tolist())
-    return corner > _RATHER * left(np.asarray(u > 0.0, dtype=np.float64), np.maximum(u, 0.0))
+    return min(left(corner_at(at))[0] for at in np.arange(-3.0, 4.0, 0.02).tolist()) > _RATHER * jumps
 
 
 def _departures(values: FloatArray) -> Iterator[FloatArray]:
@@ -226,7 +237,8 @@ def stuck_stretches(temperature: FloatArray, period_s: float) -> list[tuple[int,
 
     A coarse converter, or a logger that averages one, repeats a reading for as long as a chamber holds. So a stretch
     counts only where it is far longer than all others of a run that seldom repeats and ends with more than one step of
-    the converter, or where it ends with a step that no ramp of the run makes from row to row.
+    the converter, or where it ends with a step that no ramp of the run makes from row to row. The step of a converter
+    whose readings were averaged lies between the values that repeat: there all readings were one.
     """
     starts = np.flatnonzero(np.r_[True, temperature[1:] != temperature[:-1]])
     lengths = np.diff(np.r_[starts, len(temperature)])
@@ -241,7 +253,9 @@ def stuck_stretches(temperature: FloatArray, period_s: float) -> list[tuple[int,
     steps = np.abs(np.diff(temperature[starts]))
     release = _RELEASE * float(np.quantile(steps, _ON_RAMPS))
     moved = np.r_[steps, np.inf]  # behind each stretch
-    one_step = _ONE_STEP * float(steps.min())
+    apart = np.diff(np.unique(temperature[starts[lengths >= _REPEATED]]))
+    apart = apart[apart > _LEAST_STEP_C]
+    one_step = _ONE_STEP * float(apart.min() if len(apart) else steps.min())
     return [
         (int(starts[k]), int(lengths[k]))
         for k in long

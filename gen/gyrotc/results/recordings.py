@@ -49,6 +49,9 @@ class Checked(Result):
     axis: str | None = Field(description="as asked for: `x`, `y`, `z`, `all`, or null")
     problems: tuple[Problem, ...] = Field(description="what `fit` refuses")
     warnings: tuple[Finding, ...] = Field(description="what it takes, and a person should look at")
+    not_testable: tuple[Finding, ...] = Field(
+        default=(), description="what these recordings cannot tell, by the `id` of the finding that stays open"
+    )
     runs: tuple[CheckedRun, ...] = Field(description="every run that could be read")
 
 

@@ -15,9 +15,11 @@ import pytest
 from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
+from gyrotc.pages.check import write_check_page
 from gyrotc.quality.check import CheckResult, check, envelope_of
 from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.quality.findings import finding
+from gyrotc.quality.pictures import pictures_of
 from gyrotc.recordings.plausibility import earth_rate
 from gyrotc.results.findings import Finding
 from gyrotc.results.fleet import Facts, FleetEntry
@@ -391,9 +393,6 @@ def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
     lines = (folder / "b.csv").read_text().splitlines()
     lines[7] = lines[6]
     (folder / "b.csv").write_text("\n".join(lines))
-    from gyrotc.pages.check import write_check_page
-    from gyrotc.quality.pictures import pictures_of
-
     result = check(folder)
     assert len(result.problems) == 1
     assert {d.id for d in result.warnings} == {
@@ -496,6 +495,30 @@ def test_the_run_with_its_sign_reversed_is_named(reversed_run: int | None, tmp_p
     assert all("Look at mounting and wiring" in d.text for d in reported)
 
 
+@pytest.mark.parametrize("runs", [1, 2, 3])
+def test_questions_that_need_two_other_runs_are_said_not_testable_without_them(runs: int, tmp_path: Path) -> None:
+    for k in range(runs):
+        write_csv(tmp_path / "R" / f"{k}.csv", run(k))
+    result = check(tmp_path / "R")
+    asked = {"sign_reversed", "gain_changed", "unit_changed"} if runs < 3 else set()
+    assert {question["id"] for question in result.result().content()["not_testable"]} == asked
+    lines = [line for line in result.lines() if line.startswith("not testable: ")]
+    assert len(lines) == len(asked)
+    assert all("takes two other" in line for line in lines)
+    page = tmp_path / "check.html"
+    write_check_page(page, result.result(), pictures_of(tmp_path / "R", result), "R")
+    assert page.read_text("utf-8").count("these recordings cannot tell:") == len(asked)
+
+
+def test_earths_rate_or_an_earlier_result_tells_the_axes_of_a_single_run(calibrated: Path, tmp_path: Path) -> None:
+    write_csv(tmp_path / "RLG-0042" / "a.csv", three(5))
+    alone, earlier = (check(tmp_path / "RLG-0042", earlier=e) for e in (None, earlier_models(calibrated)))
+    assert {one.id for one in alone.not_testable} == {"axes_exchanged", "gain_changed", "unit_changed"}
+    assert {one.id for one in earlier.not_testable} == {"gain_changed", "unit_changed"}
+    (tmp_path / "RLG-0042" / "dataset.toml").write_text(toml(f'file = "a.csv"\n{GEOMETRY}', head=COMPUTED), "utf-8")
+    assert {one.id for one in check(tmp_path / "RLG-0042").not_testable} == {"gain_changed", "unit_changed"}
+
+
 def test_axes_that_stand_as_they_should_do_not_hide_one_that_does_not(tmp_path: Path) -> None:
     """Six times the scatter in y; in the mean over three axes it is 3.5 times."""
     for k in range(4):
@@ -527,7 +550,8 @@ def test_a_stuck_thermometer_is_reported_and_the_line_mends_it(tmp_path: Path) -
     table = run(1)
     table["temperature_c"][200:280] = table["temperature_c"][200]
     write_csv(tmp_path / "R" / "a.csv", table)
-    [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "stuck_temperature"]
+    [warning] = [d for d in check(tmp_path / "R").warnings if "temperature" in d.id]  # its release is no jump
+    assert warning.id == "stuck_temperature"
     assert "for 800 s from 2000 s on" in warning.text
     assert warning.exclude == 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "stuck_temperature"}]'
 

@@ -518,6 +518,17 @@ def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged:
         assert [first for first, _ in found] == pytest.approx(expected, abs=1), found
 
 
+def test_a_hold_that_is_entered_and_left_slowly_is_not_stuck_where_readings_were_averaged() -> None:
+    """Averages of a converter of 0.1 C differ by less than its step; of repeated rows they do not."""
+    time = np.arange(8 * 3600.0)
+    settled = np.where(time < 10_000.0, -np.expm1(-time / 1500.0), 1.0)
+    true = 45.0 * settled + 0.3 - 30.0 * np.maximum(time - 18_000.0, 0.0) ** 2 / 10_800.0**2
+    rows = np.round((0.1 * np.round(true / 0.1)).reshape(-1, 60).mean(axis=1), 4)
+    assert stuck_stretches(rows, 60.0) == []
+    rows[40:80] = rows[40]
+    assert stuck_stretches(rows, 60.0) == [(40, 40)]
+
+
 def lagged(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Temperature of a block in a case that follows a programme of ramps within ten minutes."""
     programme = np.interp(time / 3600.0, [0, 1, 1.5, 3, 4, 5, 6, 8], [20, 20, 50, 50, -10, -10, 30, 30])
@@ -526,17 +537,26 @@ def lagged(time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.convolve(past, lag / lag.sum())[lag.size : past.size]
 
 
-@pytest.mark.parametrize(("size", "settles_s"), [(1.5, 0.0), (-4.0, 40.0), (0.0, 0.0)])
+@pytest.mark.parametrize(("size", "settles_s"), [(1.5, 0.0), (-4.0, 40.0), (-4.0, 60.0), (0.0, 0.0)])
 def test_a_thermometer_that_shifts_or_comes_off_is_named_with_what_lies_behind(size: float, settles_s: float) -> None:
-    """A coarse converter, rows of ten seconds: what it does as nowhere else in the run."""
+    """A coarse converter, rows of ten seconds: what it does as nowhere else in the run, wherever cells begin."""
     rng = np.random.default_rng(SEED + 7)
-    time, at = np.arange(0.0, 3600.0 * HOURS, 10.0), 10_000.0
-    since = np.maximum(time - at, 0.0)
-    moved = size * (-np.expm1(-since / settles_s) if settles_s else 1.0 * (since > 0.0))
-    read = 0.0625 * np.round((lagged(time) + moved) / 0.0625 + 0.2 * rng.standard_normal(time.size))
-    found = displaced(time, read, 0.0625)
-    assert len(found) == (size != 0.0), found
-    assert all(abs(jump.time_s - at) <= 120.0 and jump.lasting for jump in found)
+    time = np.arange(0.0, 3600.0 * HOURS, 10.0)
+    for at in (10_000.0, 10_015.0, 10_030.0, 10_045.0):
+        since = np.maximum(time - at, 0.0)
+        moved = size * (-np.expm1(-since / settles_s) if settles_s else 1.0 * (since > 0.0))
+        read = 0.0625 * np.round((lagged(time) + moved) / 0.0625 + 0.2 * rng.standard_normal(time.size))
+        found = displaced(time, read, 0.0625)
+        assert len(found) == (size != 0.0), (at, found)
+        assert all(abs(jump.time_s - at) <= 120.0 and jump.lasting for jump in found)
+
+
+def test_a_sharp_corner_of_a_programme_is_no_jump() -> None:
+    """Its two lines meet within the minutes that are left out: both a jump and a corner then leave noise alone."""
+    time = np.arange(0.0, 6000.0, 10.0)
+    for corner in (500.0, 590.0, 630.0, 2000.0):
+        noise = np.random.default_rng(SEED + 8).normal(0.0, 0.005, time.size)
+        assert displaced(time, 20.0 + 0.1 * np.minimum(time, corner) + noise, 0.001) == ()
 
 
 @pytest.mark.parametrize("factor", [1e-3, 57.29578])

@@ -11,7 +11,7 @@ import pytest
 from conftest import HOST, Command
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build
-from gyrotc.quality.curves import evidence_beside_memories
+from gyrotc.quality.fits import evidence_beside_memories
 from gyrotc.target.recursions import first_order, play
 from gyrotc.train.fitting import FitOptions
 from numpy.typing import NDArray
