@@ -185,7 +185,7 @@ kills: setup
 
 ## copies of runs, faults of timing, holding and pairing, and clean sets: which findings name them (20 minutes)
 evidence: setup
-	@$(PYTHON) -m tests.evidence.run $${SET_SEED:+"--seed=$$SET_SEED"}
+	@$(PYTHON) -m tests.evidence.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## faults planted in gyrotc, and which check or test sees each: docs/results.md
 mutants: setup

@@ -1,7 +1,7 @@
 """What is found of drawn sets: copies in a set and in a fleet, faults of timing, holding and pairing, and clean ones.
 
-`python -m tests.evidence.run --clean 500 --copies 200 --faults 200 --fleets 200 --seed 1` (`make evidence`) prints a
-table. A set is made again by its seed and number.
+`python -m tests.evidence.run --clean 500 --copies 200 --faults 200 --fleets 200 --seed 1 --docs docs` (`make evidence`)
+prints a table and keeps it as a record. A set is made again by its seed and number.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from gyrotc.common.errors import CheckFailed, InputError
@@ -23,6 +24,7 @@ from gyrotc.recordings.noise_copies import noise_of, noise_signs
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 
+from ..events import table, write_record
 from .sets import EXPORTS, FAULTS, Recorded, drawn_set, exported_again, faulty, written
 
 ABOUT = frozenset(
@@ -91,12 +93,21 @@ def tasks(counts: dict[str, int], seed: int) -> list[tuple[str, str, int, int]]:
     return [(k, KINDS[k][n % len(KINDS[k])], seed, n) for k, count in counts.items() for n in range(count)]
 
 
+def section(record: dict[str, Any]) -> str:
+    rows = [
+        (f"{r['kind']}{', ' + r['way'] if r['way'] != r['kind'] else ''}", r["drawn"], r["named"])
+        for r in record["rows"]
+    ]
+    return f"## Evidence that is its own\n\nSeed {record['seed']}.\n\n{table(('sets', 'drawn ', 'named '), rows)}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for kind, count in (("clean", 500), ("copies", 200), ("faults", 200), ("fleets", 200)):
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--docs", type=Path, help="the folder docs, whose record is written")
     given = parser.parse_args()
     every = tasks({kind: getattr(given, kind) for kind in KINDS}, given.seed)
     drawn: Counter[tuple[str, str]] = Counter()
@@ -107,9 +118,11 @@ def main() -> None:
             named[kind, way] += bool(ids & (ABOUT | {"refused"}))
             if bool(ids & (ABOUT | {"refused"})) == (kind == "clean"):
                 print(f"  {kind} {way}, set {number}: {', '.join(sorted(ids)) or 'nothing'}", flush=True)
-    print("| sets | drawn | named |\n| --- | ---: | ---: |")
-    for kind, way in drawn:
-        print(f"| {kind}{f', {way}' if way != kind else ''} | {drawn[kind, way]} | {named[kind, way]} |")
+    rows = [{"kind": k, "way": way, "drawn": n, "named": named[k, way]} for (k, way), n in drawn.items()]
+    record = {"seed": given.seed, "rows": rows}
+    print(section(record))
+    if given.docs:
+        write_record(given.docs, "evidence", record, section)
     totals = {k: sum(n for (kind, _), n in named.items() if kind == k) / max(getattr(given, k), 1) for k in KINDS}
     print(", ".join(f"{'false' if k == 'clean' else k} {share:.1%}" for k, share in totals.items()))
     good = totals["clean"] <= 0.01 and all(totals[k] >= 0.95 for k in KINDS if k != "clean" and getattr(given, k))

@@ -28,6 +28,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "budget": ("gen/gyrotc/assess", *_TRAIN),
     "catalogue": ("gen/gyrotc/fleet/catalogue.py",),
     "events": ("gen/gyrotc/quality",),
+    "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/copies.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
     "faults": (*_RUNTIME, *_TRAIN),
     "fleet": _MANY,
     "growth": _MANY,
