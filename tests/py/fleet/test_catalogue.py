@@ -261,6 +261,16 @@ def test_what_all_gyros_have_stands_once_in_a_fleet(two: Path) -> None:
     assert sum(own) + sum((two / "RLG-1" / n).stat().st_size for n in ("model.json", IMAGE)) <= _MOST_BYTES
 
 
+def test_a_gyro_of_the_papers_size_adds_no_more_than_is_stated(gyrotc: Command, tmp_path: Path) -> None:
+    """Twelve runs of 8 h, rows of 10 s; before a release, which keeps model and image under their hashes, too."""
+    gyrotc("simulate", "paper", "--seed", "1", "--out", tmp_path / "d" / "RLG-1")
+    (entry,) = run_fleet(load_manifest(tmp_path / "d"), tmp_path / "out", jobs=1)
+    assert entry.status == "done", entry.reason
+    files = [p for p in (tmp_path / "out" / "RLG-1").rglob("*") if p.is_file() and p.stat().st_nlink == 1]
+    own = {p.name: p.stat().st_size for p in files}
+    assert 100_000 < sum(own.values()) <= _MOST_BYTES, own
+
+
 @pytest.mark.parametrize("of", ["RLG-2", "no gyro"])
 def test_a_row_with_an_image_that_its_model_does_not_give_is_refused(two: Path, tmp_path: Path, of: str) -> None:
     """Before: another gyro's whole image, under its own hash, was given out for this one."""
