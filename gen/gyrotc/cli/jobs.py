@@ -255,10 +255,14 @@ def build(
 def recalibrate(
     unit: Annotated[Path, typer.Argument(help="The result of gyrotc build whose table was in service.")],
     learned: Annotated[Path, typer.Option("--learned", help="What gtc_learn_save kept: 48 words in hexadecimal.")],
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for service.json and the new table.")] = None,
+    stops: Annotated[
+        Path | None, typer.Option("--stops", help="Its stops as CSV, as simulate service writes them: for the page.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for service.json, page and new table.")] = None,
     limits: Annotated[
         Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if it drifted further.")
     ] = None,
+    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Show what a unit learned in service beside the chamber's table, and make a new table of it.
@@ -267,11 +271,14 @@ def recalibrate(
     """
     from ..assess.limits import load_limits
     from ..jobs.recalibration import learned_in_service
+    from ..pages.service import write_service_page
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
     from ..tables.emit import emit
 
-    result, model = learned_in_service(unit, learned, load_limits(limits) if limits else None)
+    product = load_limits(limits) if limits else None
+    result, model = learned_in_service(unit, learned, product, stops)
+    unit_of_rates = display or (product.display if product else NATIVE)
     if out is not None:
         with result_folder(out, "recalibrate", inputs=[unit]) as stage:
             stage.of(result.serial, result.axis)
@@ -279,9 +286,13 @@ def recalibrate(
             if model is not None:
                 model.save(stage.folder / "model.json")
                 emit(model, stage.folder)
+            write_service_page(stage.folder, unit_of_rates)
     write_json(json_file, result.content())
-    for line in service_lines(result):
-        tell(line)
+    with displayed(unit_of_rates):
+        for line in service_lines(shown(result)):
+            tell(line)
+    if out is not None:
+        tell(f"report: {out / 'report.html'}")
     if out is not None and model is not None:
         tell(f"{out / 'c'}: a new table; firmware with it refuses the words of the old one and learns anew")
     if result.findings:

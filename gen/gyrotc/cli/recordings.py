@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -248,6 +249,10 @@ def _simulate_service(base: str | None, seed: int, out: Path, power_ons: int, mo
     tell(
         f"RMS under way {sci(found.table_dph)} -> {sci(found.learned_dph)} deg/h; "
         f"error over sigma {found.over_sigma:.2f}"
+    )
+    tell(
+        f"next: gyrotc recalibrate {shlex.quote(base)} --learned {shlex.quote(str(out / 'learned.txt'))} "
+        f"--stops {shlex.quote(str(out / 'stops.csv'))} --out served"
     )
 
 

@@ -333,12 +333,12 @@ def service_lines(result: InService) -> Iterator[str]:
     """What a unit learned in service, knot by knot, and what it means for the table."""
     yield (
         f"{result.serial} after {result.power_ons} power-ons in {result.days:.0f} days; authority "
-        f"{sci(result.authority_dph)} deg/h"
+        f"{sci(result.authority_dph)} {rate_unit()}"
     )
     for knot in result.knots:
         yield (
             f"  {knot.temperature_c:6.1f} C: table {sci(knot.table_dph)}, learned {sci(knot.shift_dph)} +- "
-            f"{sci(knot.sigma_dph)} deg/h (1 sigma; {sci(knot.unlearned_dph)} without)"
+            f"{sci(knot.sigma_dph)} {rate_unit()} (1 sigma; {sci(knot.unlearned_dph)} without)"
         )
     if result.moved == "nothing":
         yield "the table holds: what was learned is within 1 sigma of it"

@@ -308,7 +308,7 @@ def evaluate(
 
 @app.command()
 def report(folder: DirArg, display: DisplayOption = None) -> None:
-    """Write DIR/report.html from what build, diagnose or plan left in DIR.
+    """Write DIR/report.html from what build, diagnose, plan or recalibrate left in DIR.
 
     Example: gyrotc report result
     """
@@ -316,11 +316,14 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.plan import is_plan, write_plan_page
     from ..pages.report import axes_page, write_page, write_report
+    from ..pages.service import is_service, write_service_page
 
     with progress() as say:
         say("drawing")
         if is_diagnosis(folder) or is_plan(folder):
             path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
+        elif is_service(folder):
+            path = write_service_page(folder, display)
         elif axes := axes_in(folder):
             path = write_page(folder, axes_page(folder, axes, display))
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,6 +18,7 @@ from ..assess.changes import Earlier, load_earlier, started_on
 from ..assess.limits import Limits
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..common.inputs import checked, read_input
 from ..common.ranges import MOST_CENTERS
 from ..lot.earlier import EarlierPrior, posterior_of_result, widened
 from ..lot.learn import FALSE_ALARM
@@ -26,7 +28,7 @@ from ..lot.use import prior_of
 from ..model import Model, Network, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_result
-from ..results.evaluation import InService, LearnedKnot
+from ..results.evaluation import InService, LearnedKnot, ServedStops
 from ..results.findings import Finding, Size
 from ..results.lot import Lot
 from ..results.training import MapMeans, Training
@@ -149,16 +151,44 @@ Moved = Literal["nothing", "offset", "slope", "shape"]
 _DAY_S = 86400.0  # by definition
 _AT_AUTHORITY = 0.99  # of it: a knot that far was held there
 _STRAIGHT = 1e-6  # of a change: rounding leaves less of one that is straight
+_MOST_STOPS = 100_000  # one each hour in eleven years
+_LATE_POWER_ONS = 10  # of them the stops are asked, ten at least: a gate of 4 sigma refuses none of them by chance
 _COVERAGE = 2.0  # sigmas that a drift must exceed its limit by
 
 
-def learned_in_service(unit: Path, words: Path, limits: Limits | None = None) -> tuple[InService, Model | None]:
+def stops_in(path: Path) -> ServedStops:
+    """Stops in service: CSV with the columns that `gyrotc simulate service` writes.
+
+    Raises:
+        InputError: A column is missing, or a value is none.
+    """
+    text = read_input(path, "text_mib", "stops in service").decode("utf-8", "replace")
+    rows = list(csv.DictReader(text.splitlines()))
+    if not rows or len(rows) > _MOST_STOPS:
+        raise InputError(str(path), f"{len(rows)} stops", f"1 ... {_MOST_STOPS}")
+    columns = {}
+    for name in ServedStops.model_fields:
+        kind = int if name in ("power_on", "status") else float
+        try:
+            columns[name] = tuple(kind(row[name]) for row in rows)
+        except (KeyError, TypeError, ValueError) as error:
+            found = "is missing" if name not in rows[0] else "has a value that is no number"
+            raise InputError(
+                f"{path}, column {name}", found, f"the columns {', '.join(ServedStops.model_fields)}"
+            ) from error
+    return checked(ServedStops, columns, str(path))
+
+
+def learned_in_service(
+    unit: Path, words: Path, limits: Limits | None = None, stops: Path | None = None
+) -> tuple[InService, Model | None]:
     """What a unit learned, beside the chamber's table, and the model that has it in its map.
 
     Args:
         unit: The result whose table was in service.
         words: What `gtc_learn_save` kept of it, as hexadecimal text.
         limits: Limits of the product, for the drift of its type.
+        stops: Where they were learned, for the page.
 
     Raises:
         InputError: The words are damaged, of another table, or the result has no learning.
@@ -179,7 +209,8 @@ def learned_in_service(unit: Path, words: Path, limits: Limits | None = None) ->
     years = age_s / _DAY_S / DAYS_A_YEAR
     drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
     limit = None if drift is None else drift * years
-    findings = tuple(_findings(knots_c, shift, sigma, learning.authority_dph, limit))
+    served = stops_in(stops) if stops else None
+    findings = (*_findings(knots_c, shift, sigma, learning.authority_dph, limit), *_of_stops(served))
     new = None if findings or moved == "nothing" else _with_shift(model, knots_c, change, sigma)
     table = model.map_dph(knots_c, 0.0)
     rows = zip(knots_c.tolist(), table.tolist(), shift.tolist(), sigma.tolist(), unlearned.tolist(), strict=True)
@@ -200,7 +231,7 @@ def learned_in_service(unit: Path, words: Path, limits: Limits | None = None) ->
         new_model_hash=new.hash if new else None,
         findings=findings,
     )
-    return result, new
+    return (result.model_copy(update={"stops": served}) if served else result), new
 
 
 def _findings(
@@ -221,6 +252,21 @@ def _findings(
             id="at_authority",
             text=f"what was learned reaches the authority of {authority:.2g} deg/h: the bias may be further off",
             next="calibrate it again in the chamber",
+        )
+
+
+def _of_stops(stops: ServedStops | None) -> Iterator[Finding]:
+    """Whether the unit still learns."""
+    if stops is None:
+        return
+    late = [s for p, s in zip(stops.power_on, stops.status, strict=True) if p > max(stops.power_on) - _LATE_POWER_ONS]
+    refused = sum(status < 0 for status in late)
+    if len(late) >= _LATE_POWER_ONS and refused > len(late) / 2:
+        yield Finding(
+            id="stops_refused",
+            text=f"{refused} of the last {len(late)} stops were refused: the bias is not where this unit has learned "
+            "it to be, as after mounting anew, and sigma does not say so",
+            next="start its learning anew (gtc_learn_start), or calibrate it again in the chamber",
         )
 
 

@@ -386,6 +386,18 @@ class LearnedKnot(Part):
     unlearned_dph: Amount = Field(description="1 sigma of a unit of the same age that learned nothing, deg/h")
 
 
+class ServedStops(Part):
+    """Stops of a unit in service, a number of each in every list."""
+
+    power_on: tuple[Count, ...] = Field(description="number of the power-on, from 1")
+    clock_h: tuple[float, ...] = Field(description="hours on the unit's clock")
+    temperature_c: tuple[float, ...] = Field(description="C")
+    rate_dph: tuple[float, ...] = Field(description="mean rate less the table's bias, deg/h")
+    status: tuple[int, ...] = Field(description="what `gtc_learn_rest` returned: below 0 refused")
+    shift_dph: tuple[float, ...] = Field(description="shift of the correction after it, deg/h")
+    sigma_dph: tuple[Amount, ...] = Field(description="1 sigma of the shift, deg/h")
+
+
 class InService(UnitResult):
     """What a unit learned in service (`gyrotc recalibrate --learned`)."""
 
@@ -403,3 +415,4 @@ class InService(UnitResult):
         description="of the changed model; null: nothing to change, or a finding forbids"
     )
     findings: tuple[Finding, ...] = Field(description="what a person should know; empty: nothing")
+    stops: ServedStops | None = Field(default=None, description="not there: none were given")

@@ -94,6 +94,49 @@ def test_a_service_is_simulated_and_recalibrated_by_command(unit: Path, tmp_path
         run_here(*order[:4], "--power-ons", "0", "--out", tmp_path / "none")
 
 
+def test_the_page_shows_where_and_when_it_was_learned(unit: Path, tmp_path: Path) -> None:
+    """From service.json alone, again by report; stops that do not end to be refused are a finding."""
+    run_here("simulate", "service", "--base", unit, "--power-ons", "40", "--seed", "4", "--out", tmp_path / "s")
+    order = ("recalibrate", unit, "--learned", tmp_path / "s" / "learned.txt", "--out", tmp_path / "p")
+    run_here(*order)
+    bare = (tmp_path / "p" / "report.html").read_text()
+    run_here(*order, "--stops", tmp_path / "s" / "stops.csv")
+    page = (tmp_path / "p" / "report.html").read_text()
+    assert "What was learned where" in bare and "<h2>Bias and correction" not in bare
+    assert "<h2>Bias and correction" in page and "measured at a stop" in page
+    run_here("report", tmp_path / "p")
+    assert (tmp_path / "p" / "report.html").read_text() == page
+    run_here("report", tmp_path / "p", "--display", "mdps")
+    assert "learned, mdps" in (tmp_path / "p" / "report.html").read_text()
+    stops, rows = tmp_path / "stops.csv", (tmp_path / "s" / "stops.csv").read_text()
+    for text, why in (
+        (rows.replace("shift_dph", "shift"), "column shift_dph: is missing"),
+        (rows.replace("\n1,", "\nx,", 1), "column power_on: has a value that is no number"),
+        (rows.splitlines()[0], "0 stops"),
+    ):
+        stops.write_text(text)
+        with pytest.raises(InputError, match=why):
+            run_here(*order, "--stops", stops)
+    run_here(
+        "simulate",
+        "service",
+        "--base",
+        unit,
+        "--power-ons",
+        "60",
+        "--mounted",
+        "30",
+        "--seed",
+        "4",
+        "--out",
+        tmp_path / "m",
+    )
+    with pytest.raises(CheckFailed, match="stops were refused"):
+        run_here(
+            "recalibrate", unit, "--learned", tmp_path / "m" / "learned.txt", "--stops", tmp_path / "m" / "stops.csv"
+        )
+
+
 def test_an_authority_is_never_left_by_a_simulated_service(unit: Path, tmp_path: Path) -> None:
     run_here("simulate", "service", "--base", unit, "--power-ons", "6", "--mounted", "2", "--out", tmp_path / "s")
     rows = np.loadtxt(tmp_path / "s" / "stops.csv", delimiter=",", skiprows=1)
