@@ -18,6 +18,7 @@ from ..common.errors import InputError
 from ..model import Model
 from ..recordings.description import Problems
 from ..recordings.load import asked_axes, survey
+from ..recordings.plausibility import TRUSTED
 from ..recordings.records import Applied, Dataset, Mark, Rows, Run
 from ..results.findings import Finding, MarkedRows
 from ..results.recordings import Checked, CheckedRun, Problem
@@ -279,7 +280,7 @@ def _of_all_runs(
     """What all runs together raise."""
     for warning in dataset.warnings:
         where, _, text = warning.partition(": ")
-        yield finding("left_out", text, where)
+        yield finding("units_trusted" if text.startswith(TRUSTED) else "left_out", text, where)
     isothermal = list(temperature_findings(facts))
     yield from isothermal
     yield from findings_of_data_set(dataset, facts, earlier)

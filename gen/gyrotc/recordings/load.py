@@ -18,7 +18,7 @@ from ..common.inputs import refuse_above, refused
 from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
 from .noise_copies import noise_signs
 from .overlap import counted_once, shared_axes, shared_rows
-from .plausibility import Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
+from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
 from .shared_rows import sketch
@@ -310,7 +310,7 @@ def survey(
     check_channel_units(description, recordings, problems)
     suspicions = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
     trusted = judge(suspicions, trust_units or description.trust_units, problems)
-    warnings += [f"{name}: units are trusted: {text}" for name, text in trusted]
+    warnings += [f"{name}: {TRUSTED}{text}" for name, text in trusted]
     trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
     if description.temperature_late_s:
         warnings.append(

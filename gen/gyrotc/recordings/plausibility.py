@@ -22,6 +22,8 @@ from .values import Layout
 
 EARTH_RATE_DPH = 15.04106717866910  # 7.2921150e-5 rad/s (WGS 84), deg/h
 
+TRUSTED = "units are trusted: "
+"""Begins what is said of values that contradict their units and were taken all the same."""
 _LARGEST_DPH = 15.05  # of a component of Earth's rate, rounded up
 
 

@@ -22,6 +22,7 @@ import pyarrow.parquet as pq
 import pytest
 import scipy.io
 from conftest import Command, run_gyrotc
+from gyrotc.quality.check import check
 from gyrotc.recordings.importers import names
 from gyrotc.recordings.importers.job import ImportOptions, import_files
 from gyrotc.recordings.importers.map_file import Map, load_map
@@ -299,11 +300,17 @@ def test_a_refusal_names_what_goes_on_and_that_goes_on(case: str, tmp_path: Path
 
 def test_values_that_are_right_as_they_are_come_in_and_it_is_recorded(tmp_path: Path, run: Run) -> None:
     (tmp_path / "log.csv").write_text(REFUSED["deg/s taken for deg/h"][0])
-    status, out, error = run("import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", "--trust-units")
+    status, out, error = run(
+        "import", tmp_path / "log.csv", "--out", tmp_path / "RLG-1", "--trust-units", "--json", tmp_path / "i.json"
+    )
     assert status == 0, error
     assert "units are trusted: rate_dph: white noise" in out
     dataset = load(tmp_path / "RLG-1")
     assert "white noise" in dataset.trusted[0]
+    (of_import,) = read_result(tmp_path / "i.json", ImportedFiles).findings
+    (of_check,) = (one for one in check(tmp_path / "RLG-1").warnings if one.id == "units_trusted")
+    assert (of_import.id, of_import.next) == (of_check.id, of_check.next)
+    assert all("units are trusted: " in one.text and "white noise" in one.text for one in (of_import, of_check))
 
 
 def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_path: Path, run: Run) -> None:
@@ -429,6 +436,12 @@ def test_what_an_import_says_is_a_typed_result(tmp_path: Path, run: Run) -> None
     said = read_result(tmp_path / "i.json", ImportedFiles)
     (one,) = said.runs
     assert (said.serial, one.rows, one.left_out) == ("R-1", 599, {"no number in rate_dph": 1})
+    (finding,) = said.findings
+    assert (finding.id, finding.file, finding.text) == (
+        "left_out",
+        one.file,
+        "1 rows are left out: no number in rate_dph",
+    )
     assert one.source.file == "a.csv" and one.source.bytes == (tmp_path / "a.csv").stat().st_size
 
 

@@ -15,11 +15,12 @@ from pydantic_core import PydanticCustomError
 
 from ... import __version__
 from ...common.errors import InputError
+from ...results.findings import ADVICE, Finding
 from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
 from ...store.files import write_own
 from ...store.folder import result_folder
 from ..description import FILE, check_serial, dataset_toml
-from ..plausibility import Suspicion, suspicions
+from ..plausibility import TRUSTED, Suspicion, suspicions
 from ..tables import LoggerFile
 from ..values import MIN_ROWS
 from .formats import open_logger_file
@@ -163,7 +164,7 @@ def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}{left}"
         )
         for text in entry["trusted"]:
-            yield f"  units are trusted: {text}"
+            yield f"  {TRUSTED}{text}"
     yield f"{out / 'map.toml'}: reads the next file of this logger: gyrotc import FILE --map map.toml --out ..."
 
 
@@ -250,7 +251,21 @@ class Imported:
                 )
                 for entry in self.runs
             ),
+            findings=self.findings(),
         )
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Rows that were left out, and units that were taken against what the values say, as `check` tells them."""
+        said = [
+            (id, entry["file"], text)
+            for entry in self.runs
+            for id, texts in (
+                ("left_out", [f"{rows} rows are left out: {reason}" for reason, rows in entry["left_out"].items()]),
+                ("units_trusted", [TRUSTED + text for text in entry["trusted"]]),
+            )
+            for text in texts
+        ]
+        return tuple(Finding(id=id, where=file, file=file, text=text, next=ADVICE[id]) for id, file, text in said)
 
 
 def import_files(
