@@ -44,6 +44,7 @@ from .base import (
 from .results import (
     change_lines,
     evaluation_table,
+    learning_lines,
     limit_lines,
     not_installed_lines,
     service_lines,
@@ -321,6 +322,7 @@ def _print_built(result: Built) -> None:
         *training_lines(shown(result.training)),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
         *_left_out(result.model),
+        *learning_lines(result.model, [error.numeric for error in result.verification.errors]),
         *(extension_lines(shown(result.diagnosis)) if result.diagnosis else ()),
         *(limit_lines(shown(result.limits)) if result.limits else ()),
         *(change_lines(shown(result.changes)) if result.changes else ()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -13,6 +13,7 @@ from ..pages.display import rate_unit
 from ..pages.words import COVERAGE, bound_words, measured_words, plain, rounded, sci, with_uncertainty
 
 if TYPE_CHECKING:
+    from ..model import Model
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, InService, Pooled
     from ..results.release import HeldLimits
     from ..results.training import Training
@@ -324,6 +325,15 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
     yield f"  as found: RMS {sci(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
+
+
+def learning_lines(model: Model, numerics: Collection[str]) -> Iterator[str]:
+    """What learning in service asks of a processor that was to need no floating point."""
+    if model.learning is not None and "f32" not in numerics:
+        yield (
+            "learning in service is float32 beside a fixed-point table, too: without a floating-point unit the "
+            "compiler's routines compute it (docs/numerics.md, section 9)"
+        )
 
 
 _MOVED = {"offset": "an offset", "slope": "an offset and a slope", "shape": "a new shape"}

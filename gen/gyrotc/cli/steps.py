@@ -42,7 +42,15 @@ from .base import (
     with_build_options,
     write_json,
 )
-from .results import evaluation_table, file_notes, prediction_line, training_lines, verify_notes, verify_table
+from .results import (
+    evaluation_table,
+    file_notes,
+    learning_lines,
+    prediction_line,
+    training_lines,
+    verify_notes,
+    verify_table,
+)
 
 
 @contextmanager
@@ -175,6 +183,8 @@ def emit(
     write_json(json_file, result.content())
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    for line in learning_lines(loaded, emission.tables):
+        tell(line)
     tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
 
 

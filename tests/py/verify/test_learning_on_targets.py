@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import run_here
 from gyrotc.assess.limits import load_limits
 from gyrotc.assess.product_guards import Seen
 from gyrotc.common.errors import InputError
@@ -33,17 +34,25 @@ def learning_model() -> Model:
 
 @pytest.mark.parametrize("numerics", [None, ("q31",)])
 def test_targets_learn_save_and_restore_as_the_mirror_does(numerics: tuple[str, ...] | None, tmp_path: Path) -> None:
-    """Also beside a table in fixed point alone, and where a write was cut off after any number of words."""
+    """Also beside a table in fixed point alone on a processor without floating point; a write is cut off everywhere."""
     model = learning_model()
     model.save(tmp_path / "model.json")
     assert load_model(tmp_path / "model.json").learning == model.learning
     emit(model, tmp_path, numerics=numerics)
-    targets = ("host-gcc-O2",) if numerics else ("host-gcc-O2", FIRMWARE)
+    targets = ("host-gcc-O2", "cortex-m0" if numerics else FIRMWARE)
     found = verify(tmp_path, targets=targets)
     assert found.failed == 0
     learned = [entry.learned for entry in found.targets if entry.learned is not None]
     assert len(learned) == len({entry.name for entry in found.targets if entry.status != "missing"})
     assert all(one.calls > 100 and one.mismatches == 0 for one in learned)
+
+
+def test_a_fixed_point_build_says_that_learning_is_float32(tmp_path: Path) -> None:
+    model = learning_model()
+    model.save(tmp_path / "model.json")
+    for numeric, said in (("q31", True), ("f32", False)):
+        told = run_here("emit", tmp_path / "model.json", "--numeric", numeric, "--out", tmp_path / numeric)
+        assert ("learning in service is float32" in told) == said
 
 
 def test_the_calls_reach_what_they_are_for(tmp_path: Path) -> None:
