@@ -69,6 +69,16 @@ static float within(float x, float least, float most)
     return gtc_f32_saturate(x, least, most, &remarks);
 }
 
+/* to + factor from */
+static void add_products(float *to, const float *from, uint_least32_t n, float factor)
+{
+    uint_least32_t k;
+
+    for (k = 0U; k < n; k++) {
+        to[k] = add_product(to[k], factor, from[k]);
+    }
+}
+
 static void clear(volatile float *x, uint_least32_t n) /* no memset() */
 {
     uint_least32_t k;
@@ -139,11 +149,7 @@ static void step_to(const gtc_learn_state_t *state, const gtc_learn_prior_t *pri
 /* The covariance of the knots, some time later. */
 static void age(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, float time_s)
 {
-    uint_least32_t k;
-
-    for (k = 0U; k < KNOT_PAIRS; k++) {
-        state->p[k] = add_product(state->p[k], prior->ageing_var[k], time_s);
-    }
+    add_products(state->p, prior->ageing_var, KNOT_PAIRS, time_s);
     state->service_s = gtc_f32_add(state->service_s, time_s);
 }
 
@@ -201,6 +207,7 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
                    expected_t *expected)
 {
     const float memory_var = prior->power_on_var[MEMORY - KNOTS];
+    const float *p;
     float *ph;
     float var = 0.0F;
     uint_least32_t i;
@@ -214,16 +221,16 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
         const float h = step->h[i];
 
         k = observed(step, i);
-        for (j = 0U; j < k; j++) {
-            ph[j] = add_product(ph[j], h, state->p[ROW(k) + j]);
-        }
+        expected->rate = add_product(expected->rate, h, state->x[k]);
+        p = &state->p[ROW(k)];
+        add_products(ph, p, k, h);
         for (j = k; j < STATES; j++) {
-            ph[j] = add_product(ph[j], h, state->p[ROW(j) + k]);
+            p = &p[j];
+            ph[j] = add_product(ph[j], h, p[0]);
         }
     }
     for (i = 0U; i < n; i++) {
         k = observed(step, i);
-        expected->rate = add_product(expected->rate, step->h[i], state->x[k]);
         var = add_product(var, step->h[i], ph[k]);
     }
     ph[MEMORY] = gtc_f32_add(ph[MEMORY], memory_var); /* P0 is not in the state */
@@ -356,17 +363,14 @@ static void inflate(gtc_learn_state_t *state, expected_t *expected, float square
 static void update(gtc_learn_state_t *state, const gtc_learn_prior_t *prior, const expected_t *expected,
                    float innovation)
 {
-    uint_least32_t pair = 0U;
+    float *row = state->p;
     uint_least32_t i;
-    uint_least32_t j;
 
     for (i = 0U; i < STATES; i++) {
         const float gain = quotient(expected->ph[i], expected->var);
 
-        for (j = 0U; j <= i; j++) {
-            state->p[pair] = gtc_f32_diff(state->p[pair], product(gain, expected->ph[j]));
-            pair++;
-        }
+        add_products(row, expected->ph, i + 1U, -gain);
+        row = &row[i + 1U];
         state->x[i] = add_product(state->x[i], gain, innovation);
         if (i < KNOTS) {
             state->x[i] = within(state->x[i], -prior->authority_dph, prior->authority_dph);
