@@ -1,9 +1,9 @@
 """The compensation model extended with the named causes: terms, overtones, and whether it is shipped.
 
 States beside a map are one candidate more in model selection (`train.selection`), the richest: every piece of thermal
-history is left out in turn, and they are taken where pieces agree that they are better than what would be emitted
-without them. Causes and their parameters are those of all training runs, as the
-parameters of the evidence process are; the map beside them is fitted anew without each stretch.
+history is left out in turn, and they are taken where pieces agree, at temperatures that the rest has covered, that
+they are better than what would be emitted without them. Causes and their parameters are those of all training runs, as
+the parameters of the evidence process are; the map beside them is fitted anew without each stretch.
 
 The training runs choose, what is shipped, too (`shipping`). Where there are exam runs, they measure. Where there are
 none, runs (or branches of few runs) are left out in turn, and causes and parameters are chosen anew without them.
@@ -209,8 +209,8 @@ class Shipping:
         shipped: Effects of the extended model.
         candidate: What model selection would emit without them.
         left_out: What was left out, in words.
-        before_dph, after_dph: RMS over these stretches without and with the effects, all stretches counting alike;
-            None where nothing can be left out, or nothing was to be added.
+        before_dph, after_dph: RMS over these stretches without and with the effects, all stretches counting alike, at
+            temperatures that the rest has seen; None where nothing can be left out, or nothing was to be added.
     """
 
     shipped: list[Effect]
@@ -236,13 +236,13 @@ def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     best = _comparison(refitting, [])
     candidate = best.chosen()
     shipped: list[Effect] = []
-    before, after = best.rms_of(candidate), None
+    before, after = best.rms_covered(candidate), None
     together = refitting.single_cycle
     for tried in [able] if together and able else [able[: k + 1] for k in range(len(able))]:
         new = tried if together else [*shipped, tried[-1]]
         name = f"{len(new)} states"
         beside = best.with_states(name, _comparison(refitting, new))
-        after = beside.rms_of(name)
+        after = beside.rms_covered(name)
         if beside.chosen() == name:
             shipped, best = new, beside
     return Shipping(shipped, candidate, best.stretches(), before, after)

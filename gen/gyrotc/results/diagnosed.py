@@ -180,8 +180,10 @@ class ShippingTrial(Part):
     ships: bool = Field(description="whether it is")
     beside: str = Field(description="correction that would be emitted without it")
     left_out: tuple[str, ...] = Field(description="what was left out, in words")
-    rms_before_dph: Figure = Field(description="over these stretches without it, deg/h; null: not tried")
-    rms_after_dph: Figure = Field(description="over these stretches with it, deg/h; null: not tried")
+    rms_before_dph: Figure = Field(
+        description="of what the rest has covered of them without it, deg/h; null: not tried"
+    )
+    rms_after_dph: Figure = Field(description="the same with it, deg/h; null: not tried")
 
 
 class Unexplained(Part):

@@ -55,6 +55,7 @@ CANDIDATES = ("nothing", *_SIMPLE, "mrbf")
 """From the simplest to the richest."""
 _OF_NETWORK, _OF_STATES = 0.025, 0.05  # of the t test: states that a verdict names have evidence of their own
 _LEAST = 0.02  # share of RMS by which the network has to be better: what "no worse than trivial" allows (docs/real.md)
+_COVERED = 0.5  # of a piece at temperatures that the rest has seen: of less it is the map's ends that are judged
 _MUCH = 0.10  # share of RMS by which the constant has to be beaten where the t test is silent
 _UNDECIDED = 1.0  # t of the gain over a constant below which it is a coin (docs/training.md, section 2)
 _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ by rounding only
@@ -70,6 +71,8 @@ class CandidateScores:
         noise_dph: Noise of a mean over `average_s`, from all differences of neighbours.
         white_dph: The same without slopes and outliers.
         means: Number of means in each piece, shape (folds,).
+        covered_dph: As `rms_dph`, of means at temperatures that the rest of the history has seen; nan where these are
+            less than half of a piece.
         candidates: Names of the candidates, from the simplest to the richest.
     """
 
@@ -78,6 +81,7 @@ class CandidateScores:
     noise_dph: float
     white_dph: float
     means: FloatArray
+    covered_dph: FloatArray
     candidates: tuple[str, ...] = CANDIDATES
 
     def chosen(self, without: Sequence[str] = ()) -> str:
@@ -94,19 +98,33 @@ class CandidateScores:
             name = "mrbf"
         name = name if self.beats_constant(name) else "constant"
         for states in (n for n in able if n not in CANDIDATES):
-            name = states if self._surely_better(states, name, _OF_STATES) else name
+            name = states if self._states_surely_better(states, name) else name
         return name
 
     def _surely_better(self, name: str, other: str, level: float) -> bool:
-        gains = self._score(other) - self._score(name)
-        return bool(gains.mean() > _LEAST) and surely_above_0(gains, significance=level)
+        return _surely(self._score(other) - self._score(name), level)
+
+    def _states_surely_better(self, name: str, other: str) -> bool:
+        """By the t test, or by a factor of two on every piece: of two pieces a t test asks for 6.3 standard errors.
+
+        On what is covered: at other temperatures an error of the map's ends is larger than what states do.
+        """
+        gains = self._log(self._covered(other)) - self._log(self._covered(name))
+        gains = gains[np.isfinite(gains)]
+        return _surely(gains, _OF_STATES) or (len(gains) > 1 and bool(gains.min() >= np.log(2.0)))
 
     def _rms(self, name: str) -> FloatArray:
         return np.asarray(self.rms_dph[:, self.candidates.index(name)])
 
+    def _covered(self, name: str) -> FloatArray:
+        return np.asarray(self.covered_dph[:, self.candidates.index(name)])
+
     def _score(self, name: str) -> FloatArray:
         """½ log(mean square + s²) of every piece."""
-        return np.asarray(0.5 * np.log(self._rms(name) ** 2 + self.noise_dph**2))
+        return self._log(self._rms(name))
+
+    def _log(self, rms_dph: FloatArray) -> FloatArray:
+        return np.asarray(0.5 * np.log(rms_dph**2 + self.noise_dph**2))
 
     def beats_constant(self, name: str) -> bool:
         """Whether a candidate is better than a constant on unseen pieces: by 10 % with t of at least 1, or surely."""
@@ -120,8 +138,15 @@ class CandidateScores:
 
     def with_states(self, name: str, other: CandidateScores) -> CandidateScores:
         """Besides, the network of another comparison over the same pieces, beside states that a verdict names."""
-        added = other.rms_dph[:, [other.candidates.index("mrbf")]]
-        return replace(self, rms_dph=np.hstack([self.rms_dph, added]), candidates=(*self.candidates, name))
+        at = [other.candidates.index("mrbf")]
+        rms = np.hstack([self.rms_dph, other.rms_dph[:, at]])
+        covered = np.hstack([self.covered_dph, other.covered_dph[:, at]])
+        return replace(self, rms_dph=rms, covered_dph=covered, candidates=(*self.candidates, name))
+
+    def rms_covered(self, name: str) -> float | None:
+        """As `rms_of`, over what is covered."""
+        square = self._covered(name) ** 2
+        return float(np.sqrt(np.nanmean(square))) if np.isfinite(square).any() else None
 
     def rms_of(self, name: str) -> float | None:
         """RMS of a candidate over the pieces, all counting alike; None where it is not known."""
@@ -157,6 +182,11 @@ class CandidateScores:
         ]
 
 
+def _surely(gains: FloatArray, level: float) -> bool:
+    """Whether gains in score over pieces are above the least one by their mean, and above 0 by a t test."""
+    return len(gains) > 1 and bool(gains.mean() > _LEAST) and surely_above_0(gains, significance=level)
+
+
 _COUNTED = {
     "run": ("whole run", "whole runs"),
     "branch": ("branch", "branches"),
@@ -190,9 +220,10 @@ def compare_candidates(
     least = max(_LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
     noise = max(_difference_rms(judged), least)
     rest = Rest(means, kept, scaling, process, _on(means, power_on), rate=rate)
-    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(len(folds), len(CANDIDATES))
+    square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(len(folds), 2, len(CANDIDATES))
     count = np.array([len(average(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
-    return CandidateScores(folds, np.sqrt(square), noise, max(white, least), count)
+    whole, covered = np.sqrt(square).transpose(1, 0, 2)
+    return CandidateScores(folds, whole, noise, max(white, least), count, covered)
 
 
 def _difference_rms(means: TrainingData) -> float:
@@ -219,8 +250,8 @@ def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData
     return means.select(first), kept[first]
 
 
-def _squares(fold: Fold, rest: Rest, average_s: float) -> list[float]:
-    """Mean square on a piece under each candidate that has not seen it, (deg/h)²."""
+def _squares(fold: Fold, rest: Rest, average_s: float) -> list[list[float]]:
+    """Mean square on a piece under each candidate that has not seen it, of all and of what is covered, (deg/h)²."""
     held, (low, high) = rest.means.select(fold.held), rest.ranges(fold.near)
     t, r = rest.scaling.normalise(
         np.clip(held.temperature_c, low[0], high[0]), np.clip(held.slope_c_per_min, low[1], high[1])
@@ -228,12 +259,17 @@ def _squares(fold: Fold, rest: Rest, average_s: float) -> list[float]:
     flat = high[0] - low[0] < LEAST_SPAN_C
     cells = cells_of(held, average_s)
     corrections = rest.corrections(fold.near, t, r, ("constant",) if flat else CANDIDATES[1:])
-    squares = []
+    at = cells.mean(held.temperature_c)
+    seen = (at >= low[0]) & (at <= high[0])
+    enough = seen.mean() >= _COVERED
+    squares, covered = [], []
     for name in CANDIDATES:
         correction = 0.0 * t if name == "nothing" else corrections["constant" if flat else name]
         left = None if correction is None else cells.mean(held.bias_dph - correction)
         squares.append(np.nan if left is None else weighted_mean(left**2, cells.weight))
-    return squares
+        judged = None if left is None or not enough else left[seen]
+        covered.append(np.nan if judged is None else weighted_mean(judged**2, cells.weight[seen]))
+    return [squares, covered]
 
 
 class Rest:
