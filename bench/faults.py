@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
@@ -32,13 +33,14 @@ FIRST_SEED = 300_000  # of gyros that nothing was tuned on
 _GYROS = 60
 _PERIOD_S = 1.0
 _BLOCK = 10  # samples
-_FROM, _HEALTHY_S = 3600, 1800  # of the exam: the first ramps; then the fault begins
+_FROM, HEALTHY_S = 3600, 1800  # of the exam: the first ramps; then the fault begins
 _LENGTH_S = 3 * 3600
+PART = slice(_FROM, _FROM + _LENGTH_S)
 _EVERY = 10  # samples from one that is looked at to the next
 _WRONG = (
     2.0  # of the largest error of the same run without a fault: a correction beyond it is wrong by the fault
 )
-_PLAN = """
+PLAN = """
 extends = "supply-voltage"
 [[cause]]
 id = "auxiliary"
@@ -63,6 +65,7 @@ profiles = ["fast full range"]
 class Unit:
     """A gyro's table and one exam run, a row a second: readings (temperature, supply), true bias and rate, deg/h."""
 
+    model: Model
     table: Table
     between_dph: float
     readings: Floats
@@ -74,19 +77,19 @@ def unit(seed: int, numeric: Numeric = "f32") -> Unit:
     """The gyro that a seed draws, with its table in an arithmetic."""
     with tempfile.TemporaryDirectory() as place:
         plan = Path(place) / "plan.toml"
-        plan.write_text(_PLAN, "utf-8")
+        plan.write_text(PLAN, "utf-8")
         simulate(plan, seed=seed, out=Path(place) / "data", format="parquet", row_s=_PERIOD_S)
         model = fit_dataset(load(Path(place) / "data"), FitOptions(channels=True)).model
         record = list(campaign(with_noise(read(plan)[1], "paper"), seed))[-1]
-    part = slice(_FROM, _FROM + _LENGTH_S)
     assert model.uncertainty_dph is not None
     names = [term.channel for term in model.terms if term.channel]
     return Unit(
+        model=model,
         table=quantise(model, numeric),
         between_dph=model.uncertainty_dph.rules.between_dph,
-        readings=np.column_stack([record.reading_c, *(record.channels[name] for name in names)])[part],
-        truth_dph=np.diff(record.true_arcsec)[part],
-        rate_dph=np.diff(record.angle_arcsec)[part],
+        readings=np.column_stack([record.reading_c, *(record.channels[name] for name in names)])[PART],
+        truth_dph=np.diff(record.true_arcsec)[PART],
+        rate_dph=np.diff(record.angle_arcsec)[PART],
     )
 
 
@@ -268,9 +271,9 @@ class Outcome:
 
 def outcome(unit: Unit, fault: Fault, seed: int, usual_dph: float) -> Outcome:
     """Drives the compiled runtime through a fault; `usual_dph`: largest error without one."""
-    calls = fault(unit, np.random.default_rng(seed), _HEALTHY_S)
-    error, sigma, status = _driven(unit, calls)
-    after = np.flatnonzero((calls.row >= _HEALTHY_S) & (calls.kind <= MISSED))
+    calls = fault(unit, np.random.default_rng(seed), HEALTHY_S)
+    error, sigma, status = driven(unit, calls)
+    after = np.flatnonzero((calls.row >= HEALTHY_S) & (calls.kind <= MISSED))
     wrong = after[np.abs(error[after]) > _WRONG * usual_dph]
     silent = 0.0
     if wrong.size:
@@ -279,7 +282,7 @@ def outcome(unit: Unit, fault: Fault, seed: int, usual_dph: float) -> Outcome:
     return Outcome((error[after] / sigma[after])[::_EVERY], silent)
 
 
-def _driven(unit: Unit, calls: Calls) -> tuple[Floats, Floats, NDArray[np.int32]]:
+def driven(unit: Unit, calls: Calls) -> tuple[Floats, Floats, NDArray[np.int32]]:
     """Error and sigma of every call, deg/h, and its status with that of the correction."""
     table = unit.table
     values = table.encode_inputs(calls.values)
@@ -299,8 +302,8 @@ def outcomes(seed: int, numeric: Numeric = "f32") -> list[Outcome]:
     own = unit(seed, numeric)
     if own.readings.shape[1] < 2:
         return []
-    healthy, _, _ = _driven(own, Calls.of(own.readings))
-    usual = float(np.abs(healthy[_HEALTHY_S:]).max())
+    healthy, _, _ = driven(own, Calls.of(own.readings))
+    usual = float(np.abs(healthy[HEALTHY_S:]).max())
     return [outcome(own, fault, seed, usual) for fault in CLASSES.values()]
 
 

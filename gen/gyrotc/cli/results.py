@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..pages.display import rate_unit
+from ..pages.display import in_unit, rate_unit
 from ..pages.words import COVERAGE, bound_words, measured_words, plain, rounded, sci, with_uncertainty
 
 if TYPE_CHECKING:
@@ -328,8 +328,20 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
 
 
 def learning_lines(model: Model, numerics: Collection[str]) -> Iterator[str]:
-    """What learning in service asks of a processor that was to need no floating point."""
-    if model.learning is not None and "f32" not in numerics:
+    """What firmware may learn, and what that asks of a processor that was to need no floating point."""
+    learning = model.learning
+    if learning is None:
+        return
+    from ..tables.learning import MONTH_H
+
+    spread = learning.spread
+    amounts = learning.authority_dph, spread.level, spread.turn_on, spread.ageing * MONTH_H**0.5
+    authority, level, turn_on, ageing = (sci(float(x)) for x in in_unit(amounts))
+    yield (
+        f"learns in service up to {authority} {rate_unit()}; 1 sigma of the table's level {level}, of a power-on "
+        f"{turn_on}, of ageing in a month {ageing}; main.c has the calls"
+    )
+    if "f32" not in numerics:
         yield (
             "learning in service is float32 beside a fixed-point table, too: without a floating-point unit the "
             "compiler's routines compute it (docs/numerics.md, section 9)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,22 @@ def test_targets_learn_save_and_restore_as_the_mirror_does(numerics: tuple[str, 
     learned = [entry.learned for entry in found.targets if entry.learned is not None]
     assert len(learned) == len({entry.name for entry in found.targets if entry.status != "missing"})
     assert all(one.calls > 100 and one.mismatches == 0 for one in learned)
+
+
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+def test_the_emitted_example_learns_and_its_words_come_back(numeric: str, tmp_path: Path) -> None:
+    """main.c as it stands: a rest, the shift, the kept words, which recalibrate reads."""
+    learning_model().save(tmp_path / "model.json")
+    run_here("emit", tmp_path / "model.json", "--numeric", numeric, "--out", tmp_path)
+    c = tmp_path / "c"
+    sources = [c / "main.c", c / "gtc.c", c / f"gtc_{learning_model().id}.c"]
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+    subprocess.run(["gcc", *strict, f"-I{c}", *sources, "-o", tmp_path / "main"], check=True)
+    lines = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.splitlines()
+    assert lines[0].startswith("bias") and lines[1].startswith("shift: 0.000000 +- 0.000")
+    (tmp_path / "words.txt").write_text("\n".join(lines[2:]))
+    told = run_here("recalibrate", tmp_path, "--learned", tmp_path / "words.txt")
+    assert "after 1 power-ons" in told and "the table holds" in told
 
 
 def test_a_fixed_point_build_says_that_learning_is_float32(tmp_path: Path) -> None:
