@@ -19,15 +19,15 @@ from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.cross_validation import training_spans
 from ..train.data import TrainingData
-from ..train.fitting import HOLD_S, FitOptions, fit_dataset, front_end, map_method, model_of, training_of
-from ..train.guards import channel_guard, longest_same_s, stuck_after_s
+from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_of, training_of
+from ..train.guards import channel_guard, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import Records, records_of
-from .extension import Extension, extend, refittable, stand_ins_of
+from .extension import Extension, Refitting, extend, stand_ins_of
 from .gain import emitted_means, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
-from .refit import Effect, added_range, play_runs, terms_of
+from .refit import Effect, added_range, terms_of
 from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .static_map import fits_exactly
 from .summary import holds, not_testable, result_of
@@ -102,13 +102,15 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
     undecidable = _undecidable(records)
     if undecidable:
         return Diagnosis(not_testable(dataset, chosen, undecidable), None, None, None)
+    # Before the search: the rows of a whole recording and what the search remembers need not fit into memory together.
+    refitting = Refitting(dataset, records, chosen, single_cycle=is_single_cycle(records))
     analysis = analyse(records, declared_noise(dataset), say)
-    cycle = cycle_of(records) if is_single_cycle(records) else None
-    if not refittable(dataset, analysis.attribution.causes, chosen):
+    cycle = cycle_of(records) if refitting.single_cycle else None
+    if not refitting.takes(analysis.attribution.causes):
         analysis = replace(analysis, attribution=analysis.attribution.without_causes(), separations=())
     named = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = named if cycle is None else cycle.able
-    extension = extend(dataset, records, states, chosen, say, single_cycle=cycle is not None)
+    extension = extend(refitting, states, say)
     if cycle is not None:
         cycle = replace(cycle, preferred=bool(extension.shipped))
         analysis = replace(
@@ -118,7 +120,7 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
             extended=None,
         )
     causes = named if cycle is None else cycle.causes
-    extended, training = _extended_model(dataset, extension, chosen)
+    extended, training = _extended_model(dataset, refitting, extension, chosen)
     extension = _as_emitted(dataset, extension, extended, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
@@ -143,16 +145,13 @@ def _options_of(model: Model | None) -> FitOptions:
 
 
 def _extended_model(
-    dataset: Dataset, extension: Extension, options: FitOptions
+    dataset: Dataset, refitting: Refitting, extension: Extension, options: FitOptions
 ) -> tuple[Model, Training] | tuple[None, None]:
     """The model file of the extension, and what training says of it."""
     if extension.extended is None:
         return None, None
-    runs = [r for r in dataset.runs if r.role == "train"]
-    front = front_end(runs, options.block_s)
-    played = play_runs(dataset, runs, front)
-    longest_s = max(longest_same_s(run.rows().temperature_c, run.row_period_s) for run in runs)
-    front = replace(front, stuck_s=stuck_after_s(longest_s))
+    runs, played = refitting.runs, refitting.train
+    front = replace(refitting.front, stuck_s=stuck_after_s(max(run.longest_same_s for run in played)))
     bumps = extension.bumps
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps)
     stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
@@ -163,7 +162,7 @@ def _extended_model(
     training = _of_whole_map(training, plain)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
-    low, high = added_range(play_runs(dataset, runs, front), extension.shipped)
+    low, high = added_range(played, extension.shipped)
     own = [e for e in extension.shipped if e.channel is None]
     lost = added_range(played, own, sum(s.added for s in stand_ins.values()))
     reported = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}

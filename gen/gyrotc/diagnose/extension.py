@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, Progress
+from ..common.arrays import BoolArray, Progress, give_back
 from ..common.metrics import Averages
 from ..model import Model
 from ..recordings.records import Dataset
@@ -100,6 +100,7 @@ class Refitting:
         self.front = front_end(self.runs, options.block_s)
         self.train = play_runs(dataset, self.runs, self.front)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
+        give_back()  # what the rows of whole recordings took
         self.average_s = options.average_s
         self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
         self.arguments: dict[str, Any] = {
@@ -130,6 +131,11 @@ class Refitting:
         if whole:
             self._fits.append((list(effects), rate, with_map, fitted))
         return fitted
+
+    def takes(self, causes: Sequence[Refined]) -> bool:
+        """Whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
+        effects = [effect for effect in map(Effect.of, causes) if effect.term.mended]
+        return all(any(known(run, [effect]).any() for run in self.train) for effect in effects)
 
     def everything(self) -> list[BoolArray]:
         """All training samples, per run."""
@@ -177,16 +183,6 @@ class Refitting:
             masks.append(run.usable & ~hidden)
         rest = self.records.without_rows(masks)
         return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
-
-
-def refittable(dataset: Dataset, causes: Sequence[Refined], options: FitOptions) -> bool:
-    """Whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
-    effects = [effect for effect in map(Effect.of, causes) if effect.term.mended]
-    if not effects:
-        return True
-    runs = [run for run in dataset.runs if run.role == "train"]
-    played = play_runs(dataset, runs, front_end(runs, options.block_s))
-    return all(any(known(run, [effect]).any() for run in played) for effect in effects)
 
 
 def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
@@ -314,18 +310,10 @@ class Extension:
         return next((e.bumps for e in self.shipped if e.bumps is not None), None)
 
 
-def extend(
-    dataset: Dataset,
-    records: Records,
-    causes: Sequence[Refined],
-    options: FitOptions,
-    say: Progress,
-    *,
-    single_cycle: bool = False,
-) -> Extension:
+def extend(refitting: Refitting, causes: Sequence[Refined], say: Progress) -> Extension:
     """Refits the model with the causes and measures the gain."""
     say("measuring the gain")
-    refitting = Refitting(dataset, records, options, single_cycle=single_cycle)
+    single_cycle, average_s = refitting.single_cycle, refitting.average_s
     effects = completed(refitting.train, [Effect.of(c) for c in causes])
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
@@ -333,7 +321,7 @@ def extend(
         chain = [chain[0], *(chain[-1] for _ in effects)]
     floor = floor_of([*chain[-1], *refitting.on_training(effects)])
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
-    steps = [gain_of(a, b, floor, options.average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
+    steps = [gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
     crossed = shipping(refitting, effects)
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     return Extension(

@@ -24,6 +24,7 @@ from ..train.channels import channel_shown
 from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
+from ..train.guards import longest_same_s
 from ..train.methods import fit
 from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps
 from ..train.result import Fit, predict
@@ -118,6 +119,7 @@ class Played:
         channels: The channels at every correction.
         block_s: Length of a block, s.
         environment: Environment as the data set names it.
+        longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
     """
 
     data: TrainingData
@@ -130,6 +132,7 @@ class Played:
     channels: Mapping[str, CourseChannel]
     block_s: float
     environment: str
+    longest_same_s: float
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
     def outcome(self, effect: Effect) -> TermOutcome:
@@ -177,6 +180,7 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
         channels={name: channel_shown(blocks, rows.channels[name]) for name in dataset.channels},
         block_s=front.block_s,
         environment=run.environment,
+        longest_same_s=longest_same_s(rows.temperature_c, run.row_period_s),
     )
 
 

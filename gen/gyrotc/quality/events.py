@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray, those
+from ..common.arrays import FloatArray, steps_are, those
 from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
 from ..results.findings import Finding
 from .changes import Change, changes_of
@@ -201,7 +201,8 @@ def _hours(from_s: float, to_s: float) -> str:
 def _dropouts(run: Run, rows: Rows) -> Iterator[Finding]:
     """Times without rows."""
     time = those(rows.time_s, run.in_span(rows.time_s))
-    for k in np.flatnonzero(np.diff(time) > max(_LOST_S, 10.0 * run.row_period_s)):
+    lost_s = max(_LOST_S, 10.0 * run.row_period_s)
+    for k in np.flatnonzero(steps_are(time, lambda step: step > lost_s)):
         start, length = float(time[k]), float(time[k + 1] - time[k])
         if not _excluded(run, (start, start + length)):
             text = f"{run.file} has no rows for {length:g} s from {start:g} s on."

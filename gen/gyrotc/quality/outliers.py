@@ -123,9 +123,10 @@ def departing_rows(rows: Rows, run: Run, rows_per_block: int | None = None) -> N
     """Rows of a run's file (0 is the first) that are spikes or parts of bursts."""
     rows_per_block = rows_per_block or samples_per_block(BLOCK_S, run.row_period_s)
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
-    if counted.all():
+    at = None if counted.all() else np.flatnonzero(counted)
+    del counted  # of a long recording as large as what follows
+    if at is None:
         return np.flatnonzero(departing(rows.rate_dph, rows_per_block))
-    at = np.flatnonzero(counted)
     return np.asarray(at[departing(rows.rate_dph[at], rows_per_block)])
 
 

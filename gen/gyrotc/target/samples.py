@@ -105,7 +105,7 @@ def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -
     """Readings that are there, in their range or taken as its edge, and not stuck."""
     there = ~arithmetic.is_missing(x)
     with np.errstate(invalid="ignore"):
-        sound = there.copy()
+        sound = there.copy() if guard.stuck_us else there
         if not guard.takes_edge:
             sound &= x >= guard.low
             sound &= x <= guard.high

@@ -199,16 +199,16 @@ def _mean_rate(
     Args:
         first_row: Of each block, and that behind the last block's; shape (blocks + 1,).
     """
-    counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
     left_out = departing_rows(rows, run, rows_per_block)
-    counted[left_out] = False
     n_blocks, together = len(first_row) - 1, max(1, _PART // rows_per_block)
     count, total = np.zeros(n_blocks), np.zeros(n_blocks)
     for start in range(0, n_blocks, together):
         of_blocks = first_row[start : start + together + 1]
         part = slice(of_blocks[0], of_blocks[-1])
         block = np.repeat(np.arange(len(of_blocks) - 1), np.diff(of_blocks))
-        here, blocks = counted[part], slice(start, start + len(of_blocks) - 1)
+        here, blocks = run.in_span(rows.time_s[part]), slice(start, start + len(of_blocks) - 1)
+        here &= np.isfinite(rows.rate_dph[part])
+        here[left_out[slice(*np.searchsorted(left_out, of_blocks[[0, -1]]))] - part.start] = False
         rate = np.where(here, rows.rate_dph[part], 0.0)
         count[blocks] = np.bincount(block, weights=here, minlength=len(of_blocks) - 1)
         total[blocks] = np.bincount(block, weights=rate, minlength=len(of_blocks) - 1)
