@@ -16,7 +16,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray, those
+from ..common.arrays import BoolArray, FloatArray, IntArray, those
 from ..common.metrics import median
 from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
@@ -129,7 +129,7 @@ def _orientation_shows(dataset: Dataset, curve: Curve, earlier: Mapping[str, Mod
     along = _earth(curve)
     by_earth = len(along) == 3 or (len(along) == 1 and abs(float(along[0])) >= _LEAST_ALONG_DPH)
     return len(curve.cells) > 0 and (
-        bool(_shared_places(curve, others))
+        len(_shared_places(curve, others)[0]) > 0
         or (curve.earth_dph is not None and by_earth)
         or any(axis in earlier for axis in (curve.axes or ("",)))
     )
@@ -185,14 +185,13 @@ def _orientation(dataset: Dataset, curve: Curve, earlier: Mapping[str, Model]) -
 
 def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] | None:
     """The way that makes the run one of the others, which agree with one another."""
-    shared = _shared_places(curve, others)
-    if not shared:
+    mine, rates, there = _shared_places(curve, others)
+    if not len(mine):
         return None
-    of_others = list(shared.values())
-    own = curve.rates_dph[list(shared)]
-    usual = np.array([rates.mean(axis=0) for rates in of_others]) + _earth(curve)
-    squares = np.sum([np.sum((rates - rates.mean(axis=0)) ** 2, axis=0) for rates in of_others], axis=0)
-    variance = squares / sum(len(rates) - 1 for rates in of_others)
+    count = np.count_nonzero(there, axis=0)[:, None]
+    mean = rates.sum(axis=0) / count
+    own, usual = curve.rates_dph[mine], mean + _earth(curve)
+    variance = np.sum(np.where(there[..., None], rates - mean, 0.0) ** 2, axis=(0, 1)) / np.sum(count - 1)
     found = _best(own, usual, _AGREES * float(np.sqrt(variance.mean())))
     if found is None:
         return None
@@ -207,14 +206,23 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     )
 
 
-def _shared_places(curve: Curve, others: Sequence[Curve]) -> dict[int, FloatArray]:
-    """Rates of the other runs, without Earth's, at each of the run's temperatures that two of them show."""
-    known: dict[float, list[FloatArray]] = {}
-    for other in others:
-        for t, rates in zip(other.temperature_c.tolist(), other.rates_dph - _earth(other), strict=True):
-            known.setdefault(t, []).append(rates)
-    at = {k: known.get(t, []) for k, t in enumerate(curve.temperature_c.tolist())}
-    return {k: np.array(rates) for k, rates in at.items() if len(rates) >= _LEAST_OTHERS}
+def _shared_places(curve: Curve, others: Sequence[Curve]) -> tuple[IntArray, FloatArray, BoolArray]:
+    """Which of the run's temperatures two other runs show, their rates there without Earth's, and which of them do."""
+    grid, rates, there = _on_grid([(other.temperature_c, other.rates_dph - _earth(other)) for other in others])
+    shared = np.flatnonzero(np.count_nonzero(there, axis=0) >= _LEAST_OTHERS)
+    _, mine, among = np.intersect1d(curve.temperature_c, grid[shared], return_indices=True)
+    return mine, rates[:, shared[among]], there[:, shared[among]]
+
+
+def _on_grid(curves: Sequence[_Series]) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Every temperature of some curves, their values at each (0 where one has none), and which of them have one."""
+    grid = np.unique(np.concatenate([np.zeros(0), *(t for t, _ in curves)]))
+    shape = len(curves), len(grid)
+    values, there = np.zeros((*shape, *(curves[0][1].shape[1:] if curves else ()))), np.zeros(shape, dtype=bool)
+    for k, (t, of_curve) in enumerate(curves):
+        at = np.searchsorted(grid, t)
+        values[k, at], there[k, at] = of_curve, True
+    return grid, values, there
 
 
 def _earth(curve: Curve) -> FloatArray:
@@ -358,29 +366,30 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
     return "gain_changed", text, limits
 
 
-def _gain_throughout(run: Run, others: Sequence[Mapping[float, float]]) -> bool:
+def _gain_throughout(run: Run, others: Sequence[_Series]) -> bool:
     """Whether a factor on the other runs' curve explains a run better than that curve with any memory."""
-    usual, _ = _usual_curve(others)
+    known, usual, _ = _usual_curve(others)
     rows = run.rows()
     good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
     if not good.any():
         return False
     columns = (those(column, good) for column in (rows.time_s, rows.temperature_c, rows.rate_dph))
     t, x, y = cell_means(_BLOCK_S, *columns)
-    known = np.array(sorted(usual))
-    curve = np.interp(x, known, [usual[c] for c in known.tolist()])
+    curve = np.interp(x, known, usual)
     used = (x >= known[0]) & (x <= known[-1])
     side = np.column_stack([np.ones_like(t), curve, np.gradient(x, t)])
     return evidence_beside_memories((t, x, y - curve), used, side, side[:, :0]) > _EVIDENCE
 
 
-def _series(curve: Curve, axis: str | None) -> dict[float, float]:
+_Series = tuple[FloatArray, FloatArray]  # temperatures, each once; rates there, shape (p,) or (p, axes)
+
+
+def _series(curve: Curve, axis: str | None) -> _Series:
     """Mean rate of the chosen axis at each temperature."""
-    column = curve.axes.index(axis) if axis in curve.axes else 0
-    return dict(zip(curve.temperature_c.tolist(), curve.rates_dph[:, column].tolist(), strict=True))
+    return curve.temperature_c, curve.rates_dph[:, curve.axes.index(axis) if axis in curve.axes else 0]
 
 
-def _factor(own: Mapping[float, float], others: Sequence[Mapping[float, float]]) -> tuple[float, float] | None:
+def _factor(own: _Series, others: Sequence[_Series]) -> tuple[float, float] | None:
     """The factor on the others' mean curve that makes this one, beside a constant, and half its 95 % interval.
 
     None where the runs share too few temperatures, the curve hardly swings, or no factor makes it this one.
@@ -398,33 +407,32 @@ def _factor(own: Mapping[float, float], others: Sequence[Mapping[float, float]])
     return factor, NORMAL_95 * error
 
 
-def _shared_swing(
-    own: Mapping[float, float], others: Sequence[Mapping[float, float]]
-) -> tuple[FloatArray, FloatArray, float] | None:
+def _shared_swing(own: _Series, others: Sequence[_Series]) -> tuple[FloatArray, FloatArray, float] | None:
     """The others' mean curve and this one where both are known, about their means, and the scatter of the others.
 
     None where the runs share too few temperatures, or the curve hardly swings.
     """
-    usual, scatter = _usual_curve(others)
-    common = sorted(own.keys() & usual.keys())
+    grid, usual, scatter = _usual_curve(others)
+    common, mine, at = np.intersect1d(own[0], grid, return_indices=True)
     if len(common) < _LEAST_PLACES:
         return None
-    x, y = np.array([usual[t] for t in common]), np.array([own[t] for t in common])
-    x, y = x - x.mean(), y - y.mean()
+    x, y = usual[at] - usual[at].mean(), own[1][mine] - own[1][mine].mean()
     swings = float(x @ x) >= _LEAST_SWING**2 * len(x) * max(scatter, 1e-300) ** 2
     return (x, y, scatter) if swings else None
 
 
-def _usual_curve(others: Sequence[Mapping[float, float]]) -> tuple[dict[float, float], float]:
-    """The mean curve where at least two runs have it, each without its own mean there, and their scatter."""
-    temperatures = sorted({t for o in others for t in o})
-    shared = [t for t in temperatures if sum(t in o for o in others) >= _LEAST_OTHERS]
-    levels = [float(np.mean([o[t] for t in shared if t in o] or [0.0])) for o in others]
-    values = [[o[t] - m for o, m in zip(others, levels, strict=True) if t in o] for t in shared]
-    if not values:
-        return {}, 0.0
-    scatter = float(np.sqrt(np.mean([np.var(v, ddof=1) for v in values])))
-    return {t: float(np.mean(v)) for t, v in zip(shared, values, strict=True)}, scatter
+def _usual_curve(others: Sequence[_Series]) -> tuple[FloatArray, FloatArray, float]:
+    """Temperatures that two runs have at least, the mean curve there of each without its own mean, their scatter."""
+    grid, rates, there = _on_grid(others)
+    shared = np.count_nonzero(there, axis=0) >= _LEAST_OTHERS
+    grid, rates, there = grid[shared], rates[:, shared], there[:, shared]
+    if not len(grid):
+        return grid, grid, 0.0
+    level = rates.sum(axis=1, keepdims=True) / np.maximum(np.count_nonzero(there, axis=1, keepdims=True), 1)
+    count, left = np.count_nonzero(there, axis=0), np.where(there, rates - level, 0.0)
+    usual = left.sum(axis=0) / count
+    variance = np.sum(np.where(there, left - usual, 0.0) ** 2, axis=0) / (count - 1)
+    return grid, usual, float(np.sqrt(variance.mean()))
 
 
 def contradiction_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
