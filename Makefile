@@ -177,7 +177,8 @@ fleet: setup
 
 ## a thousand gyros on a Dask cluster whose workers are killed three times: every table as without
 fleet-kills: setup
-	@GYROTC_SERIALS=$${GYROTC_SERIALS:-1000} $(PYTHON) -m pytest -q tests/py/fleet/test_fleet_dask.py -k three_workers_killed
+	@GYROTC_SERIALS=$${GYROTC_SERIALS:-1000} GYROTC_DOCS=docs \
+	  $(PYTHON) -m pytest -q tests/py/fleet/test_fleet_dask.py -k three_workers_killed
 
 ## jobs killed, signalled and let down by the disk at every call that changes a file: docs/results.md
 kills: setup

@@ -131,6 +131,15 @@ def write_fleet(docs: Path) -> None:
     write(docs, "fleet", figures, section)
 
 
+def kills_section(record: dict[str, Any]) -> str:
+    """The section `fleet-kills`, whose record a test leaves."""
+    return (
+        "## A fleet on Dask whose workers are killed (`make fleet-kills`)\n\n"
+        "{serials} gyros on two workers, of which {killed} processes were killed while they worked. Of {files} files "
+        "(models and everything emitted) {differ} differ from those that processes of one machine make.\n"
+    ).format(**record)
+
+
 _UNITS, _DRAWS, _SEED, _LOT_JOBS = 20, 8, 1, 2  # three axes each
 _MANIFEST = 'schema = 1\ndatasets = ["IMU-*"]\naxis = "all"\nnumeric = ["f32"]\n'
 _LOT = """## Faults planted in a lot (`make lot`)

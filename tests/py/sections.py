@@ -63,6 +63,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "lot": fleet.lot_section,
     "lot-prior": lot_prior.section,
     "fleet": fleet.section,
+    "fleet-kills": fleet.kills_section,
     "catalogue": fleet.catalogue_section,
     "growth": growth.section,
     "formats": formats.section,

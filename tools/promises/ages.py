@@ -31,6 +31,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/copies.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
     "faults": (*_RUNTIME, *_TRAIN),
     "fleet": _MANY,
+    "fleet-kills": ("gen/gyrotc/fleet",),
     "growth": _MANY,
     "formats": ("gen/gyrotc/recordings/importers",),
     "import": ("gen/gyrotc/recordings",),

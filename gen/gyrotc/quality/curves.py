@@ -196,9 +196,9 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
     if found is None:
         return None
     way = found[0]
-    at = way.changed  # axes that stand as they should say nothing of one that does not
-    scatter = float(np.sqrt(variance[at].mean()))
-    left, stated = (float(np.sqrt(np.mean((r - usual)[:, at] ** 2))) for r in (way.of(own), own))
+    changed = way.changed  # axes that stand as they should say nothing of one that does not
+    scatter = float(np.sqrt(variance[changed].mean()))
+    left, stated = (float(np.sqrt(np.mean((r - usual)[:, changed] ** 2))) for r in (way.of(own), own))
     if left > _AGREES * scatter or stated < _BETTER * max(left, scatter):
         return None
     return way, (

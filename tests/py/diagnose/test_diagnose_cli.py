@@ -16,6 +16,8 @@ import pytest
 from campaigns import GRADIENT, simulated
 from conftest import HOST, Command
 from gyrotc.causes import CATALOGUE
+from gyrotc.diagnose import diagnosis as stages
+from gyrotc.diagnose import extension
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
@@ -463,6 +465,26 @@ def test_without_causes_there_is_no_extension(case: Case) -> None:
     found = extend(case.refitting, (), lambda _: None)
     assert found.extended is None and found.steps == () and found.measured_on == "exam"
     assert found.baseline_rms > 2.0 * LEVEL, "the plain map leaves the gradient"
+
+
+def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rows of a long recording and what the search remembers were in memory together: 612 MB of 1e8 rows."""
+    order = []
+    played, searched = extension.play_runs, stages.analyse
+
+    def playing(dataset: Any, runs: Any, front: Any) -> Any:
+        order.extend(run.file for run in runs)
+        return played(dataset, runs, front)
+
+    def searching(*arguments: Any) -> Any:
+        order.append("search")
+        return searched(*arguments)
+
+    monkeypatch.setattr(extension, "play_runs", playing)
+    monkeypatch.setattr(stages, "analyse", searching)
+    found = diagnose(case.dataset, options=OPTIONS)
+    assert found.extension is not None
+    assert order == ["0.csv", "1.csv", "2.csv", "3.csv", "search"]
 
 
 def test_recordings_at_one_temperature_cannot_decide(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from gyrotc.fleet.run import Cluster, run_fleet
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.store.marker import MARKER
 from recordings import columns, toml, write_csv
+from results import write
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed")
 
@@ -286,7 +287,7 @@ def test_what_is_done_is_not_done_again_when_its_worker_is_killed(world: Path, a
 def test_with_three_workers_killed_every_table_is_the_one_made_here(
     world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
 ) -> None:
-    """GYROTC_SERIALS gyros (40); `make fleet-kills` does a thousand."""
+    """GYROTC_SERIALS gyros (40); `make fleet-kills` does a thousand, and leaves its record in GYROTC_DOCS."""
     names = [f"RLG-{k:04d}" for k in range(MANY)]
     for seed, name in enumerate(names, 100):
         gyro(tmp_path / "lab" / name, name, seed=seed)
@@ -303,9 +304,15 @@ def test_with_three_workers_killed_every_table_is_the_one_made_here(
     assert len(set(held.begun())) >= len(WORKERS) + 2  # processes: those killed, and those that came for them
     done = gyrotc("fleet", held.lab, "--out", tmp_path / "here")
     assert done.returncode == 0, done.stdout + done.stderr
-    for name in names:
-        made, here = (_tables(place / name) for place in (held.out, tmp_path / "here"))
+    tables = [[_tables(place / name) for place in (held.out, tmp_path / "here")] for name in names]
+    for name, (made, here) in zip(names, tables, strict=True):
         assert len(here) > 5 and made == here, name
+    if docs := os.environ.get("GYROTC_DOCS"):
+        from sections import SECTIONS
+
+        files = sum(len(here) for _, here in tables)
+        record = {"serials": len(names), "killed": kill, "files": files, "differ": 0}
+        write(Path(docs), "fleet-kills", record, SECTIONS["fleet-kills"])
 
 
 def _tables(unit: Path) -> dict[str, bytes]:
