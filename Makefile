@@ -69,7 +69,7 @@ targets:
 ## every input of a table, no run-time error, rounding bounds (Frama-C, Gappa, Z3; minutes): docs/results.md
 prove:
 	@tools/setup.sh prove
-	@$(PYTHON) -m pytest -q -rs tests/prove --results docs
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/prove --results docs
 
 ## style and promises: ruff, mypy; of the C library words, warnings, symbols, fused operations, MISRA, analysers
 check:

@@ -1,6 +1,7 @@
 """The tests of `make prove`: Frama-C, Gappa, Z3 and some minutes. What needs a tool that is not there is skipped.
 
-`--results docs` writes what they found into the documentation.
+`--results docs` writes what they found into the documentation. What a test found goes with its report, so that tests
+may run in several processes (`-n 2`).
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,17 +19,28 @@ sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/
 from prove_page import section  # noqa: E402
 from results import Results, machine, write  # noqa: E402
 
-_FOUND = Results()
-_SKIPPED: set[str] = set()  # tools that are not here
+_FOUND: list[tuple[str, Any]] = []  # of a test: name of a list, its place, a record
+_SKIPPED: set[str] = set()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--results", type=Path, help="folder whose results/summary.json and results.md are written")
 
 
-@pytest.fixture(scope="session")
-def results() -> Results:
-    return _FOUND
+class _OfATest(Results):
+    """What one test finds; its place among all tests is that of its rows in the tables."""
+
+    def __init__(self, item: pytest.Item) -> None:
+        super().__init__()
+        self.place, self.item = item.session.items.index(item), item
+
+    def add(self, name: str, record: dict[str, Any]) -> None:
+        self.item.user_properties.append((name, (self.place, record)))
+
+
+@pytest.fixture
+def results(request: pytest.FixtureRequest) -> Results:
+    return _OfATest(request.node)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -37,12 +50,22 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     for mark in item.iter_markers("tool"):
         if shutil.which(mark.args[0]) is None:
-            _SKIPPED.add(mark.args[0])
             pytest.skip(f"{mark.args[0]} is not installed")
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.skipped:
+        _SKIPPED.add(report.nodeid)
+    elif report.when == "call":
+        _FOUND.extend(report.user_properties)
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """Only a session in which everything passed, and nothing was skipped, leaves results."""
     docs = session.config.getoption("--results")
-    if docs is not None and exitstatus == 0 and not _SKIPPED:
-        write(docs, "prove", {"schema": "gyrotc.prove/1", "machine": machine(), **_FOUND.lists}, section)
+    if docs is None or exitstatus != 0 or _SKIPPED or hasattr(session.config, "workerinput"):
+        return
+    found = Results()
+    for name, (_, record) in sorted(_FOUND, key=lambda one: one[1][0]):
+        found.add(name, record)
+    write(docs, "prove", {"schema": "gyrotc.prove/1", "machine": machine(), **found.lists}, section)
