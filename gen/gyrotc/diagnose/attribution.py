@@ -97,12 +97,15 @@ class _Stage:
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = detect(search, "map and beside")
+    nothing = Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
     if first[0].p_value > LEVEL:
-        return Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
+        return nothing
     gains = Gains(search)
     singles = list(gains.single())
     weigher = MarginalLikelihood(gains)
     stage = _stage(search, gains, _single(gains, singles, weigher).members)
+    if stage is None:
+        return nothing
     pairs: list[Point] = []
     if stage.remains:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
@@ -184,8 +187,12 @@ def _contest(
     return contest(gains, causes, others, wide)
 
 
-def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage:
+def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage | None:
+    """None where the causes and the map have a column for every block, so that nothing can be said of either."""
     refined = refine(search, gains, chosen)
+    columns = gains.map.shape[1] + gains.beside.shape[1] + model_columns(refined).shape[1]
+    if columns >= search.y.size:
+        return None
     current, held = _with(search, refined)
     gain = explained(current, current.likeliest, held)
     return _Stage(chosen, refined, detect(current, held), gain, misfit(current, held, refined))
@@ -224,10 +231,13 @@ def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:
 def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
     """The pair, or three causes, where these leave nothing; else the single cause with its remainder."""
     two = _stage(search, gains, pair)
+    if two is None:
+        return one
     third = _third(two.found, pair) if two.remains else None
     if third is not None:
         three = _stage(search, gains, (*pair, third))
-        if three.left.p_value >= _WELL > two.left.p_value and _plausible(gains, three.refined):
+        well = three is not None and three.left.p_value >= _WELL > two.left.p_value
+        if three is not None and well and _plausible(gains, three.refined):
             return three
     return two if two.well else one
 

@@ -393,6 +393,12 @@ def test_more_functions_than_means_are_no_fault(tmp_path: Path) -> None:
     assert all(c.p_value is None or np.isfinite(c.p_value) for c in result.considered)
 
 
+def test_causes_with_a_column_for_every_block_are_no_fault(tmp_path: Path) -> None:
+    """144 blocks: a late record hides some of them, and beside a finer map no degree of freedom is left."""
+    dataset = without("branch 1", tmp_path, "y", 0.0)
+    assert diagnose(dataset, options=FitOptions(average_s=100.0, block_s=20.0)).result.verdict != "not_testable"
+
+
 @pytest.mark.slow
 def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
     """Every second five minutes: a record that is late by more leaves no sample whose input is known."""
