@@ -259,9 +259,7 @@ class Score:
 
 
 def intervals(event: Finding) -> list[tuple[float, float]]:
-    """Times of an event: the limits of its own, and of spikes of every stretch."""
-    if event.id == "rate_outliers":
-        return list(event.leave_out_s)
+    """Limits of an event's time; spikes have one for all."""
     return [] if event.time_s is None else [(event.time_s.low or 0.0, event.time_s.high or 0.0)]
 
 

@@ -39,17 +39,8 @@ FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
 _MOST_CELLS = 150_000  # of all runs: longer ones have longer cells
 _STEP_S = 30.0  # what takes no longer is a step
-_DURATIONS_S = (
-    0.0,
-    30.0,
-    60.0,
-    90.0,
-    120.0,
-    180.0,
-    300.0,
-    450.0,
-    600.0,
-)  # from a step to ten minutes, where a drift begins
+# From a step to ten minutes, where a drift begins
+_DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
 _BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a departure comes back: octaves
 _MARGIN = 1.25  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
@@ -295,6 +286,7 @@ class _Search:
             before = list(own)
             for k, at in enumerate(before):
                 own[k] = self._best(at, fit, own[:k] + own[k + 1 :])
+            own = self._at_steps(fit, own)
             if before == own:
                 break
         while own:
@@ -309,6 +301,17 @@ class _Search:
             del own[int(np.argmin(over))]
         return others + own
 
+    def _at_steps(self, fit: SmoothFit, own: list[_At]) -> list[_At]:
+        """With each gain at the step that it may be the cause of: then one step fewer has to be clear."""
+        for gain in [at for at in own if at.kind == "gain"]:
+            for step in [at for at in own if at.kind == "step"]:
+                rest = [at for at in own if at not in (gain, step)]
+                moved = replace(gain, begin_s=step.middle_s)
+                both = self._gains(fit, [step], rest)[0] + self._gains(fit, [gain], [*rest, step])[0]
+                if both - self._gains(fit, [moved], rest)[0] < self._limit**2:
+                    return self._at_steps(fit, [*rest, moved])
+        return own
+
     def _best(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> _At:
         """The likeliest place and duration.
 
@@ -320,7 +323,11 @@ class _Search:
         near = cells.time_s[np.abs(cells.time_s - at.middle_s) <= reach]
         near = near[:: max(len(near) // _PLACES, 1)] - 0.5 * cells.cell_s
         if at.kind == "gain":
-            tried = [replace(at, begin_s=float(t)) for t in near[:: max(len(near) // _GAIN_PLACES, 1)]]
+            every = max(len(near) // _GAIN_PLACES, 1)
+            tried = [at, *(replace(at, begin_s=float(t)) for t in near[::every])]
+            best = tried[int(np.argmax(self._gains(fit, tried, others)))]
+            near = cells.time_s[np.abs(cells.time_s - best.begin_s) <= every * cells.cell_s]
+            tried = [best, *(replace(at, begin_s=float(t)) for t in near)]
             return tried[int(np.argmax(self._gains(fit, tried, others)))]
         durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
         shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
@@ -414,12 +421,15 @@ class _Search:
         return next((gap for end, gap in gaps if end - gap - cell_s < at.middle_s <= end + cell_s), 0.0)
 
     def _begins(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> Limits:
-        """The beginning of a drift with the times that are nearly as likely."""
-        t = self._cells[at.run].time_s
+        """The beginning of a drift, or the place of a change of gain, with the times that are nearly as likely.
+
+        A cell more on either side: it may be in the midst of one, and rows bear the time of their end or their start.
+        """
+        t, cell_s = self._cells[at.run].time_s, self._cells[at.run].cell_s
         near = t[np.abs(t - at.begin_s) < _HOUR_S]
         gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near], others)
-        likely = near[gains >= gains.max() - CHI2_95_ONE]
-        return float(near[int(np.argmax(gains))]), float(likely[0]), float(likely[-1])
+        likely = near[gains >= gains.max() - (_PLACED_95 if at.kind == "gain" else CHI2_95_ONE)]
+        return float(near[int(np.argmax(gains))]), float(likely[0]) - 2.0 * cell_s, float(likely[-1]) + cell_s
 
 
 def _across_gap(at: _At, rows: Rows, around_s: float) -> Limits:

@@ -206,4 +206,6 @@ def _dropouts(run: Run, rows: Rows) -> Iterator[Finding]:
         start, length = float(time[k]), float(time[k + 1] - time[k])
         if not _excluded(run, (start, start + length)):
             text = f"{run.file} has no rows for {length:g} s from {start:g} s on."
-            yield finding("dropout", text, run, time_s=(start,) * 3, size=((length,) * 3, "s"))
+            yield finding(
+                "dropout", text, run, time_s=(start, start, start + run.row_period_s), size=((length,) * 3, "s")
+            )

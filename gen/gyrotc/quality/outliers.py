@@ -98,7 +98,7 @@ def spike_findings(run: Run, rows: Rows, wild: NDArray[np.int64]) -> Iterator[Fi
         text,
         run,
         marks=[mark_of(run.file, rows, *span) for span in spans],
-        time_s=(at, spans[0][0], spans[-1][1]),
+        time_s=(at, spans[0][0] - run.row_period_s, spans[-1][1]),  # a row may be a mean over the time before it
         size=((size, size, size), "deg/h"),
         leave_out=spans,
         stretches=len(spans),
