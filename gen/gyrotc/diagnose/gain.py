@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..assess.evaluate import replay_run
-from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA, Averages, average, time_statistics
+from ..common.arrays import FloatArray, those
+from ..common.metrics import MAD_TO_SIGMA, Averager, Averages, time_statistics
 from ..model import Model
 from ..recordings.records import Run
 from ..results.diagnosed import GainOnUnseen
@@ -94,14 +94,16 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
     for run in runs:
         rows = run.rows()
         inside = run.in_span(rows.time_s)
-        replayed = [
-            list(replay_run(rows, run, model, table, None)) for model, table in zip(models, tables, strict=True)
-        ]
-        scored = np.all([np.concatenate([part.scored for part in parts]) for parts in replayed], axis=0)
-        for means, parts in zip(found, replayed, strict=True):
-            left = rows.rate_dph - np.concatenate([part.bias_dph for part in parts])
-            columns = (rows.time_s, rows.temperature_c, rows.rate_dph, left)
-            means.append(average(*(c[inside] for c in columns), scored=scored[inside], average_s=average_s))
+        averagers = [Averager(those(rows.time_s, inside), average_s) for _ in models]
+        replayed = (replay_run(rows, run, model, table, None) for model, table in zip(models, tables, strict=True))
+        for parts in zip(*replayed, strict=True):
+            at, span = parts[0].rows, inside[parts[0].rows]
+            scored = np.all([part.scored[span] for part in parts], axis=0)
+            time, temperature, rate = (c[at][span] for c in (rows.time_s, rows.temperature_c, rows.rate_dph))
+            for averager, part in zip(averagers, parts, strict=True):
+                averager.add(time, temperature, rate, rate - part.bias_dph[span], scored)
+        for means, averager in zip(found, averagers, strict=True):
+            means.append(averager.averages())
     return found
 
 

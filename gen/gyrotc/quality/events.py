@@ -99,11 +99,11 @@ class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
             good &= np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
             good[self._departing[number]] = False
             good &= self._runs[number].file not in self._without
-            part = (
-                those(rows.time_s, good),
-                those(rows.temperature_c, good),
-                those(rows.rate_dph, good),
-            )
+            columns = [rows.time_s, rows.temperature_c, rows.rate_dph]
+            del rows  # each column goes as its own rows are chosen: a long recording is not held twice
+            for k in range(3):
+                columns[k] = those(columns[k], good)
+            part = (columns[0], columns[1], columns[2])
             self._read = number, part if len(part[0]) > 1 else (np.zeros(2),) * 3
         return self._read[1]
 

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter
 
-from ..common.arrays import BoolArray, FloatArray
+from ..common.arrays import BoolArray, FloatArray, those
 from ..common.metrics import MAD_TO_SIGMA, median_of_parts, middle_of_five, quantile_of_parts
 from ..recordings.records import Run
 from ..results.findings import Finding
@@ -123,11 +123,8 @@ def departing_rows(rows: Rows, run: Run, rows_per_block: int | None = None) -> N
     """Rows of a run's file (0 is the first) that are spikes or parts of bursts."""
     rows_per_block = rows_per_block or samples_per_block(BLOCK_S, run.row_period_s)
     counted = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
-    at = None if counted.all() else np.flatnonzero(counted)
-    del counted  # of a long recording as large as what follows
-    if at is None:
-        return np.flatnonzero(departing(rows.rate_dph, rows_per_block))
-    return np.asarray(at[departing(rows.rate_dph[at], rows_per_block)])
+    wild = np.flatnonzero(departing(those(rows.rate_dph, counted), rows_per_block))
+    return wild if counted.all() else np.flatnonzero(counted)[wild]
 
 
 def departing(rate: FloatArray, rows_per_block: int) -> BoolArray:
