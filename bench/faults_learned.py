@@ -1,8 +1,8 @@
-"""The same faults where firmware has learned in service: is sigma after learning true, and no larger than before?
+"""The same faults where firmware has learned in service: is sigma after learning true?
 
 Thirty power-ons teach each gyro, with stops at temperatures of its exam run; then every class of `bench.faults` begins.
 A re-zero of a class is a stop that the learning unit is offered. Firmware keeps three rules: with a status of the table
-other than 0 it offers no stop, keeps the shift, and takes the table's sigma; else the smaller of the two sigmas holds.
+other than 0 it offers no stop, keeps the shift, and takes the table's sigma; else that of the learning unit.
 `python -m bench docs --only faults-learned`.
 """
 
@@ -34,14 +34,16 @@ _POWER_ONS, _STOPS = 30, 3  # that have taught: stops of each
 _LONGEST_S, _SPAN_C = 600, 1.5  # of a stop; the gate of the learning unit
 _EVERY = 10  # samples from one that is looked at to the next
 _AUTHORITY_DPH = 0.03
+_TURN_ON_DPH = 3e-4  # of these gyros, as their data sheet would state it
 
 
 @dataclass(frozen=True, slots=True)
 class Learned:
-    """Errors over sigma without and with what was learned, of every tenth second after the fault began."""
+    """Errors over sigma without what was learned, with it, and where the prior knows the turn-on as training saw it."""
 
     before: Floats
     after: Floats
+    seen: Floats
 
 
 def _parked(temp_c: Floats, end: int, longest: int = _LONGEST_S) -> int:
@@ -62,17 +64,17 @@ def turn_on_dph(own: Unit, seed: int) -> float:
     return float(apart.mean())
 
 
-def _taught(own: Unit, seed: int) -> Learner:
-    """A unit of firmware that has been through power-ons at this gyro's temperatures."""
+def _taught(own: Unit, seed: int, stated_dph: float | None) -> Learner:
+    """A unit of firmware that has been through power-ons at this gyro's temperatures, its turn-on stated or not."""
     rng = np.random.default_rng([seed, 27])
-    learning = ServiceLearning(authority_dph=_AUTHORITY_DPH).of(own.model, Seen(), "bench")
+    learning = ServiceLearning(authority_dph=_AUTHORITY_DPH, turn_on_dph=stated_dph).of(own.model, Seen(), "bench")
     learner = Learner(service_prior(learning, own.model.envelope.temperature_c))
     left, _, status = driven(own, Calls.of(own.readings))
     left = left - turn_on_dph(own, seed)
     temp_c, noise = own.readings[:, 0], learning.noise_deg_per_sqrt_h
     for _ in range(_POWER_ONS):
         learner.power_on(86400.0, float(temp_c[0]))
-        offset = own.between_dph * rng.standard_normal()
+        offset = _TURN_ON_DPH * rng.standard_normal()
         for number, end in enumerate(sorted(rng.integers(_LONGEST_S, len(temp_c), _STOPS).tolist())):
             at = slice(_parked(temp_c, end), end)
             if np.any(status[at]):
@@ -83,8 +85,8 @@ def _taught(own: Unit, seed: int) -> Learner:
     return learner
 
 
-def learned(own: Unit, fault: Fault, seed: int, words: list[int], learner: Learner) -> Learned:
-    """Drives runtime and learning unit through a fault; `words` is what the unit kept before."""
+def learned(own: Unit, fault: Fault, seed: int, words: list[int], learner: Learner) -> tuple[Floats, Floats]:
+    """Error over sigma without and with what was learned, of every tenth second; `words`: what the unit kept before."""
     calls = fault(own, np.random.default_rng(seed), HEALTHY_S)
     rest = calls.kind == REZERO
     plain = Calls(*(part[~rest] for part in (calls.kind, calls.number, calls.values, calls.row, calls.offset_dph)))
@@ -114,10 +116,10 @@ def learned(own: Unit, fault: Fault, seed: int, words: list[int], learner: Learn
         if known:
             y, s = learner.shift(float(row - begun), temp_c)
             shift, own_sigma = float(y[0]), float(s[0])
-        both = min(float(sigma[k]), own_sigma) if known else float(sigma[k])
+        both = own_sigma if known else float(sigma[k])
         before.append(error[k] / sigma[k])
         after.append((error[k] - shift) / both)
-    return Learned(np.array(before), np.array(after))
+    return np.array(before), np.array(after)
 
 
 def _offered(
@@ -143,9 +145,13 @@ def outcomes(seed: int) -> list[Learned]:
     own = unit_of(seed)
     if own.readings.shape[1] < 2:
         return []
-    learner = _taught(own, seed)
-    words = learner.save()
-    return [learned(own, fault, seed, words, learner) for fault in CLASSES.values()]
+    taught = [_taught(own, seed, stated) for stated in (_TURN_ON_DPH, None)]
+    words = [learner.save() for learner in taught]
+    found = []
+    for fault in CLASSES.values():
+        stated, seen = (learned(own, fault, seed, kept, unit) for kept, unit in zip(words, taught, strict=True))
+        found.append(Learned(*stated, seen[1]))
+    return found
 
 
 def faults_learned(say: Say, gyros: int = _GYROS, workers: int | None = 1) -> dict[str, Any]:
@@ -171,14 +177,21 @@ def _figures(name: str, own: list[Learned]) -> dict[str, Any]:
         "rms": rms([one.after for one in own]),
         "p95": float(np.quantile(np.abs(np.concatenate([one.after for one in own])), 0.95)),
         "worst_gyro": max(rms([one.after]) for one in own),
+        "seen": rms([one.seen for one in own]),
     }
 
 
 def section(result: dict[str, Any]) -> str:
     """Section of docs/results.md."""
     rows = [
-        (row["name"], *(f"{row[key]:.2f}" for key in ("before", "rms", "p95", "worst_gyro")))
+        (row["name"], *(f"{row[key]:.2f}" for key in ("before", "rms", "p95", "worst_gyro", "seen")))
         for row in result["classes"]
     ]
     head = f"## Faults with learned states\n\nError over sigma of {result['gyros']} gyros.\n"
-    return head + "\n" + markdown(("fault", "RMS without ", "RMS with ", "95 % ", "RMS, worst gyro "), rows)
+    return (
+        head
+        + "\n"
+        + markdown(
+            ("fault", "RMS without ", "RMS with ", "95 % ", "RMS, worst gyro ", "turn-on as five runs showed it "), rows
+        )
+    )

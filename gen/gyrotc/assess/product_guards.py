@@ -143,7 +143,7 @@ class ServiceLearning(BaseModel):
     authority_dph: Annotated[float, Field(gt=0.0, le=1e6)]
     prior: Literal["data_sheet", "lot", "power_ons"] = "data_sheet"
     table_dph: _Sigma = None  # 1 sigma of the table's error; None: the median of its uncertainty
-    turn_on_dph: _Sigma = None  # from power-on to power-on; None: as training saw it
+    turn_on_dph: _Sigma = None  # from power-on to power-on; None: as training saw it, at least the table's
     ageing_dph_per_sqrt_month: _Sigma = None  # None: none, with a lot the lot's
     noise_deg_per_sqrt_h: Annotated[float, Field(gt=0.0, le=1e6)] | None = None  # None: as training saw it
     reference_c: Celsius | None = None  # where the table is known best; None: the middle of its envelope
@@ -186,7 +186,8 @@ class ServiceLearning(BaseModel):
         table = float(np.median(known)) if self.table_dph is None else self.table_dph
         if not table > 0.0:
             raise InputError(f"{at}.table_dph", "is missing", "a number: training does not tell it")
-        turn_on = model.between_dph if self.turn_on_dph is None else self.turn_on_dph
+        # Few runs that agree do not show that power-ons do: no less than the table is known to.
+        turn_on = max(model.between_dph, table) if self.turn_on_dph is None else self.turn_on_dph
         return data_sheet_spread(table, turn_on, self.ageing_dph_per_sqrt_month or 0.0)
 
     def _of_power_ons(self, model: Model, seen: Seen, center_c: float, at: str) -> BiasSpread:
@@ -196,7 +197,7 @@ class ServiceLearning(BaseModel):
         if not self.spread:  # nobody has said that there is no warm-up, nor that a slope is not drawn
             size = float(np.hypot(guess.level, guess.turn_on))
             span = float(np.ptp(model.envelope.temperature_c)) or 1.0
-            more = {"turn_on": max(guess.turn_on, 0.5 * size), "turn_on_slope": size / span, "warm_up": size}
+            more = {"turn_on_slope": size / span, "warm_up": size}
             guess = guess.model_copy(update=more)
         envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
         return spread_of_power_ons(guess, seen.means, envelope, center_c, model.between_dph, f"{at}.prior")
