@@ -324,10 +324,10 @@ class _Search:
         near = near[:: max(len(near) // _PLACES, 1)] - 0.5 * cells.cell_s
         if at.kind == "gain":
             every = max(len(near) // _GAIN_PLACES, 1)
-            tried = [at, *(replace(at, begin_s=float(t)) for t in near[::every])]
-            best = tried[int(np.argmax(self._gains(fit, tried, others)))]
-            near = cells.time_s[np.abs(cells.time_s - best.begin_s) <= every * cells.cell_s]
-            tried = [best, *(replace(at, begin_s=float(t)) for t in near)]
+            tried = [at] + [replace(at, begin_s=float(t)) for t in near[::every]]
+            place = tried[int(np.argmax(self._gains(fit, tried, others)))]
+            near = cells.time_s[np.abs(cells.time_s - place.begin_s) <= every * cells.cell_s]
+            tried = [place] + [replace(at, begin_s=float(t)) for t in near]
             return tried[int(np.argmax(self._gains(fit, tried, others)))]
         durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
         shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
