@@ -135,7 +135,7 @@ def test_a_limits_file_says_what_may_be_learned(tmp_path: Path) -> None:
     assert bare is not None
     with pytest.raises(InputError, match=r"limits.toml, field learning.noise_deg_per_sqrt_h: is missing"):
         bare.of(model.model_copy(update={"uncertainty_dph": None}), Seen(), str(path))
-    path.write_text("schema = 1\n[learning]\nauthority_dph = 0.03\ntable_dph = 2e-4\nnoise_deg_per_sqrt_h = 1e-4\n")
+    path.write_text("schema = 1\n[learning]\nauthority_dph = 9.0\ntable_dph = 3.0\nnoise_deg_per_sqrt_h = 1e-4\n")
     few = load_limits(path).learning
     assert few is not None and model.between_dph == 0.0
     assert (
