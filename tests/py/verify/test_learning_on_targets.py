@@ -137,10 +137,9 @@ def test_a_limits_file_says_what_may_be_learned(tmp_path: Path) -> None:
         bare.of(model.model_copy(update={"uncertainty_dph": None}), Seen(), str(path))
     path.write_text("schema = 1\n[learning]\nauthority_dph = 9.0\ntable_dph = 3.0\nnoise_deg_per_sqrt_h = 1e-4\n")
     few = load_limits(path).learning
-    assert few is not None and model.between_dph == 0.0
-    assert (
-        few.of(model, Seen(), str(path)).spread.turn_on == 2e-4
-    )  # runs that agree show no less than the table's sigma
+    assert few is not None and model.between_dph < 3.0
+    agreeing = few.of(model, Seen(), str(path)).spread
+    assert agreeing.turn_on == 3.0  # runs that agree show no less than the table's sigma
     path.write_text("schema = 1\n[learning]\ntable_dph = 1e-4\n")
     with pytest.raises(InputError, match="authority_dph"):
         load_limits(path)
