@@ -199,8 +199,8 @@ class ServiceLearning(BaseModel):
             span = float(np.ptp(model.envelope.temperature_c)) or 1.0
             more = {"turn_on_slope": size / span, "warm_up": size}
             guess = guess.model_copy(update=more)
-        envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
-        return spread_of_power_ons(guess, seen.means, envelope, center_c, model.between_dph, f"{at}.prior")
+        envelope = model.envelope.temperature_c
+        return spread_of_power_ons(guess, seen.means, model.method, envelope, center_c, f"{at}.prior")
 
     def _of_lot(self, model: Model, seen: Seen, center_c: float, at: str) -> BiasSpread:
         if self.spread or self.table_dph is not None:

@@ -24,9 +24,10 @@ from ..tables.emit import emitted_tables, prior_of
 from ..tables.learning import MONTH_H, service_prior, walk
 from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
 from ..train.data import TrainingData, scaling_of
+from ..train.evidence import TrainingFailed
 from ..train.means import unit_means
-from .earlier import posterior_of_means
-from .learn import Envelope
+from ..train.methods import fit
+from ..train.result import predict
 from .prior import MapPosterior
 
 if TYPE_CHECKING:
@@ -119,34 +120,37 @@ def fitted_spread(
 
 
 def spread_of_power_ons(
-    start: BiasSpread, means: TrainingData, envelope: Envelope, center_c: float, between_dph: float, where: str
+    start: BiasSpread, means: TrainingData, method: str, envelope_c: tuple[float, float], center_c: float, where: str
 ) -> BiasSpread:
     """As a unit's own power-ons show it: what the map of the others leaves of each, by maximum likelihood.
 
     Args:
         start: A guess within an order of magnitude; what is 0 in it stays so.
         means: Of training, `run` being the power-on.
-        envelope: Ranges of T (C) and dT/dt (C/min).
+        method: By which the map is made.
+        envelope_c: Where the knots lie, C.
         center_c: Where the table is known best.
-        between_dph: Standard deviation of the constant from power-on to power-on.
         where: Of the limits file.
 
     Raises:
-        InputError: There are fewer than three power-ons.
+        InputError: There are fewer than three power-ons, or no map without one of them.
     """
     numbers = np.unique(means.run)
     if len(numbers) < _LEAST_POWER_ONS:
         raise InputError(where, f"{len(numbers)} training runs", f"{_LEAST_POWER_ONS} at least: each is a power-on")
-    scaling, step, past, noises = scaling_of(means), -(-len(means) // _STOPS), [], []
+    step, past = -(-len(means) // _STOPS), []
     for number in numbers:
-        others = unit_means(means.select(means.run != number), scaling, None)[0]
         one = means.select(means.run == number)
-        left = one.bias_dph - posterior_of_means(others, envelope, between_dph).mean_dph(
-            one.temperature_c, one.slope_c_per_min
-        )
+        try:
+            others = fit(means.select(means.run != number), method=method)
+        except TrainingFailed as failure:
+            raise InputError(
+                where, f"no map of the others without run {number + 1}: {failure}", "another prior"
+            ) from failure
+        left = one.bias_dph - predict(others, one.temperature_c, one.slope_c_per_min)
         past.append([PowerOn(one.time_s[::step], one.temperature_c[::step], left[::step, None])])
-        noises.append(others.sigma_dph)
-    spread, scale = fitted_spread(start, past, envelope[0], center_c, float(np.median(noises)))
+    noise = unit_means(means, scaling_of(means), None)[0].sigma_dph
+    spread, scale = fitted_spread(start, past, envelope_c, center_c, noise)
     return spread.scaled(float(scale[0]))
 
 

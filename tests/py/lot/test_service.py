@@ -237,23 +237,34 @@ def test_the_prior_of_a_lot_is_as_wide_as_its_posterior() -> None:
     assert spread.ageing * np.sqrt(MONTH_H) == pytest.approx(3e-4) and spread.turn_on == 2e-4
 
 
-@pytest.mark.parametrize("turn_on", [2e-3, 2e-2])
-def test_past_power_ons_say_how_far_the_next_one_is(turn_on: float) -> None:
-    """Runs over 40 C of a map that they know well: what is drawn at each is what the map of the others leaves."""
+def power_ons_of(turn_on: float, farther: float = 1.0) -> TrainingData:
+    """Six runs over 40 C of one map, a constant drawn at each; the last goes so many times as far and as fast."""
     draw, n, parts = np.random.default_rng(5), 14, []
     for run in range(6):
         time_s = 900.0 * np.arange(n)
-        t = 10.0 + 20.0 * np.sin(time_s / 2000.0 + run)
+        t = 10.0 + (20.0 if run < 5 else 20.0 * farther) * np.sin(time_s / 2000.0 + run)
         bias = 0.1 * np.cos(t / 15.0) + draw.normal(0.0, turn_on) + draw.normal(0.0, 1e-3, n)
         slope = np.gradient(t, time_s / 60.0)
         parts.append((t, slope, bias, np.ones(n), np.full(n, run), time_s, np.full(n, 900.0)))
     columns = [np.concatenate(x) for x in zip(*parts, strict=True)]
-    means = TrainingData(*columns[:4], columns[4].astype(np.int64), *columns[5:])
-    envelope = (-10.0, 30.0), (-1.0, 1.0)
+    return TrainingData(*columns[:4], columns[4].astype(np.int64), *columns[5:])
+
+
+@pytest.mark.parametrize("turn_on", [2e-3, 2e-2])
+def test_past_power_ons_say_how_far_the_next_one_is(turn_on: float) -> None:
+    """They know the map well: what is drawn at each is what the map of the others leaves."""
+    means = power_ons_of(turn_on)
     start = data_sheet_spread(5e-3, 5e-3, 0.0).model_copy(update={"warm_up": 5e-3, "turn_on_slope": 1e-4})
-    found = spread_of_power_ons(start, means, envelope, 10.0, turn_on, "limits.toml")
-    drawn = np.std([columns[2][columns[4] == run].mean() for run in range(6)])
+    found = spread_of_power_ons(start, means, "mrbf", (-10.0, 30.0), 10.0, "limits.toml")
+    drawn = np.std([means.bias_dph[means.run == run].mean() for run in range(6)])
     assert 0.4 < np.hypot(found.level, found.turn_on) / drawn < 2.5  # one constant a run, six runs
     assert found.ageing == 0.0
     with pytest.raises(InputError, match=r"limits\.toml: 2 training runs"):
-        spread_of_power_ons(start, means.select(means.run < 2), envelope, 10.0, turn_on, "limits.toml")
+        spread_of_power_ons(start, means.select(means.run < 2), "mrbf", (-10.0, 30.0), 10.0, "limits.toml")
+
+
+def test_a_run_beyond_the_others_is_held_against_their_map_at_its_edge() -> None:
+    """A smooth prior alone said biases of 1e7 deg/h there, on the recordings of a consumer's MEMS."""
+    start = data_sheet_spread(5e-3, 5e-3, 0.0).model_copy(update={"warm_up": 5e-3, "turn_on_slope": 1e-4})
+    found = spread_of_power_ons(start, power_ons_of(2e-3, 3.0), "mrbf", (-50.0, 70.0), 10.0, "limits.toml")
+    assert np.hypot(found.level, found.turn_on) < 0.5  # the map spans 0.2
