@@ -244,14 +244,16 @@ class _Search:
 
     def _differ(self, one: _At, other: _At) -> bool:
         """Whether two changes of a run are two."""
-        return abs(one.middle_s - other.middle_s) > self._separation_s(one.run) or {one.kind, other.kind} == {
-            "gain",
-            "drift",
-        }
+        apart = abs(one.middle_s - other.middle_s) > self._separation_s(one.run)
+        return apart or {one.kind, other.kind} == {"gain", "drift"}
 
     def _separation_s(self, run: int) -> float:
         """Least separation of two changes, s: nearer ones are one."""
         return max(2.0 * _STEP_S, 3.0 * self._cells[run].cell_s)
+
+    def _shows_gain(self, run: int, time_s: float) -> bool:
+        t = self._cells[run].time_s
+        return bool(t[0] + _GAIN_S <= time_s <= t[-1] - _GAIN_S)
 
     def _gain(self, fit: SmoothFit, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
         """The likeliest change of gain of a run and what it gains with its step; None where none is clear.
@@ -265,6 +267,7 @@ class _Search:
         every = max(round(0.25 * _GAIN_S / cells.cell_s), (len(cells) - 2 * edge) // _GAIN_PLACES, 1)
         places = cells.time_s[edge : len(cells) - edge : every].tolist()
         steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
+        steps = [at for at in steps if self._shows_gain(run, at)]
         tried = [_At(run, "gain", float(t)) for t in [*places, *steps]]
         if not places:
             return None
@@ -292,10 +295,7 @@ class _Search:
         while own:
             own = [at for k, at in enumerate(own) if all(self._differ(at, o) for o in own[:k])]
             gains = [self._alone(fit, at, own[:k] + own[k + 1 :]) for k, at in enumerate(own)]
-            over = [
-                gain - (_AT_STEP if at.kind == "gain" else self._limit) ** 2
-                for gain, at in zip(gains, own, strict=True)
-            ]
+            over = [g - (_AT_STEP if at.kind == "gain" else self._limit) ** 2 for g, at in zip(gains, own, strict=True)]
             if min(over) > 0.0:
                 break
             del own[int(np.argmin(over))]
@@ -304,7 +304,7 @@ class _Search:
     def _at_steps(self, fit: SmoothFit, own: list[_At]) -> list[_At]:
         """With each gain at the step that it may be the cause of: then one step fewer has to be clear."""
         for gain in [at for at in own if at.kind == "gain"]:
-            for step in [at for at in own if at.kind == "step"]:
+            for step in [at for at in own if at.kind == "step" and self._shows_gain(at.run, at.middle_s)]:
                 rest = [at for at in own if at not in (gain, step)]
                 moved = replace(gain, begin_s=step.middle_s)
                 both = self._gains(fit, [step], rest)[0] + self._gains(fit, [gain], [*rest, step])[0]
@@ -324,10 +324,10 @@ class _Search:
         near = near[:: max(len(near) // _PLACES, 1)] - 0.5 * cells.cell_s
         if at.kind == "gain":
             every = max(len(near) // _GAIN_PLACES, 1)
-            tried = [at] + [replace(at, begin_s=float(t)) for t in near[::every]]
+            tried = [at] + [replace(at, begin_s=float(t)) for t in near[::every] if self._shows_gain(at.run, t)]
             place = tried[int(np.argmax(self._gains(fit, tried, others)))]
             near = cells.time_s[np.abs(cells.time_s - place.begin_s) <= every * cells.cell_s]
-            tried = [place] + [replace(at, begin_s=float(t)) for t in near]
+            tried = [place] + [replace(at, begin_s=float(t)) for t in near if self._shows_gain(at.run, t)]
             return tried[int(np.argmax(self._gains(fit, tried, others)))]
         durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
         shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
@@ -427,6 +427,8 @@ class _Search:
         """
         t, cell_s = self._cells[at.run].time_s, self._cells[at.run].cell_s
         near = t[np.abs(t - at.begin_s) < _HOUR_S]
+        if at.kind == "gain":
+            near = np.array([s for s in near if self._shows_gain(at.run, s)] or [at.begin_s])
         gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near], others)
         likely = near[gains >= gains.max() - (_PLACED_95 if at.kind == "gain" else CHI2_95_ONE)]
         return float(near[int(np.argmax(gains))]), float(likely[0]) - 2.0 * cell_s, float(likely[-1]) + cell_s
