@@ -154,6 +154,7 @@ uncertainty: setup
 ## is sigma true, and does the status say so, when a sensor, the clock or a re-zero fails: docs/results.md
 faults: setup
 	@$(PYTHON) -m bench docs --only faults
+	@$(PYTHON) -m bench docs --only faults-learned
 
 ## every result of the generator as in tests/oracle/reference.json? minutes (GYROTC_REAL_DATA names measured recordings)
 oracle: setup

@@ -30,6 +30,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "events": ("gen/gyrotc/quality",),
     "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/copies.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
     "faults": (*_RUNTIME, *_TRAIN),
+    "faults-learned": ("gen/gyrotc/target/learning.py", "gen/gyrotc/assess/product_guards.py"),
     "fleet": _MANY,
     "fleet-kills": ("gen/gyrotc/fleet",),
     "growth": _MANY,
