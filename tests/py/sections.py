@@ -40,6 +40,7 @@ from bench import page as bench_page  # noqa: E402
 from tests import events, invariance  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
+from tests.evidence import run as evidence  # noqa: E402
 from tests.kills import page as kills  # noqa: E402
 from tests.mutants import page as mutants  # noqa: E402
 
@@ -59,6 +60,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "blind": blind.section,
     "blind-other": other.section,
     "events": events.section,
+    "evidence": evidence.section,
     "invariance": invariance.section,
     "lot": fleet.lot_section,
     "lot-prior": lot_prior.section,

@@ -267,8 +267,7 @@ class _Search:
         every = max(round(0.25 * _GAIN_S / cells.cell_s), (len(cells) - 2 * edge) // _GAIN_PLACES, 1)
         places = cells.time_s[edge : len(cells) - edge : every].tolist()
         steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
-        steps = [at for at in steps if self._shows_gain(run, at)]
-        tried = [_At(run, "gain", float(t)) for t in [*places, *steps]]
+        tried = [_At(run, "gain", float(t)) for t in (*places, *(s for s in steps if self._shows_gain(run, s)))]
         if not places:
             return None
         gains = self._gains(fit, tried, [])

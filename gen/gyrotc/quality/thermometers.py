@@ -32,7 +32,6 @@ from .findings import finding, mark_of
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
 _CELL_S = 60.0  # of a mean: below it the lags of thermometers themselves show
 _SETTLED_S = 3600.0  # self-heating has set in by then; a third of a shorter run
-_LEAST_CELLS = 20  # for three numbers
 _LEAST_RANGE_C = 5.0  # over less neither share nor lag of a run is known
 _SIGMAS = 5.0  # of what the other runs differ by among themselves
 _LEAST_S = 60.0  # a cell
@@ -55,7 +54,7 @@ _JUMP_SIGMAS = 10.0  # no normal deviation reaches it
 _WAVERING = 0.9  # of departures: more are no jumps
 _WAVERING_SIGMAS = NormalDist().inv_cdf(0.5 + _WAVERING / 2.0)
 _JUMP_C_PER_MIN = 10.0  # beyond the change around it; a sensor in a housing does not follow air faster
-_LEAST_CELLS = 60  # of a run: fewer do not show what is unusual in it
+_LEAST_CELLS = 60  # of a run: fewer do not show what is unusual in it, nor three numbers well
 _ELSEWHERE_S = 900.0  # from a place: beyond it the temperature has forgotten it
 _AS_NOWHERE = 2.0  # times what the temperature does anywhere else in the run
 _DISPLACED_SIGMAS = 6.0  # of the same: once in 5e8 places

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from recordings import Columns, toml, write_csv
 
 from tests.blind.other.record import draw_recording, write
+from tests.events import scores
 
 SEED, ROW_S, HOURS = 20261122, 10.0, 8
 NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means
@@ -294,6 +295,12 @@ def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path
     assert (event.exclude or "").startswith("exclude = [{from_s = ")
     assert found_events(load(ramps(tmp_path / "none"))) == []
     assert [e.id for e in found_events(load(ramps(tmp_path / "level", higher)))] == ["step"]
+
+
+def test_a_gain_is_placed_at_the_step_that_it_makes() -> None:
+    """Before: a step at its place, and a gain more than half an hour from it."""
+    (score,) = scores("gain within 1.5", 20261126, 1)
+    assert score.named and score.holds and score.other == ()
 
 
 def test_a_run_with_its_sign_reversed_is_reported(tmp_path: Path) -> None:
