@@ -159,12 +159,15 @@ def _peak(
     n_other: int,
 ) -> tuple[int, float] | None:
     """Lag (by how many cells the other's values come earlier, each from its own start) and height of a copy's peak."""
-    like = scipy.fft.irfft(one * np.conj(other), n) / (1.0 - 2.0 * SLOWEST)
-    lags = np.r_[0:n_one, n - n_other + 1 : n]
-    there = np.abs(like[lags])
-    best = int(np.argmax(there))
-    height = float(there[best])
-    if height < _LEAST_PEAK or height < _SIGMAS * MAD_TO_SIGMA * median(there):
+    like = scipy.fft.irfft(one * np.conj(other), n)
+    np.abs(like, out=like)
+    like /= 1.0 - 2.0 * SLOWEST
+    like[n_one : n - n_other + 1] = 0.0  # lags at which nothing of the two overlaps
+    best = int(np.argmax(like))
+    height = float(like[best])
+    if height < _LEAST_PEAK:
         return None
-    lag = int(lags[best])
-    return (lag if lag < n_one else lag - n), height
+    there = np.concatenate([like[:n_one], like[n - n_other + 1 :]])
+    if height < _SIGMAS * MAD_TO_SIGMA * median(there):
+        return None
+    return (best if best < n_one else best - n), height

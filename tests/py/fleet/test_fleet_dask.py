@@ -233,9 +233,13 @@ class Held:
         with self._log.open("wb") as log:
             self.client = subprocess.Popen(program, stdout=log, stderr=log)
 
+    def said(self) -> str:
+        """What the client has told so far: what a worker is done with may be on its way still."""
+        return self._log.read_text()
+
     def wait_until(self, true: Callable[[], object]) -> None:
-        wait_until(lambda: true() or self.client.poll() is not None, self._log.read_text)
-        assert true(), self._log.read_text()
+        wait_until(lambda: true() or self.client.poll() is not None, self.said)
+        assert true(), self.said()
 
     def let_go(self, *names: str) -> None:
         for name in names or SERIALS:
@@ -244,7 +248,7 @@ class Held:
     def end(self) -> tuple[int, list[str], str]:
         """Exit status, what the summary says of the gyros, and output, in which no program tells of itself."""
         status = self.client.wait(LIMIT_S)
-        said = self._log.read_text()
+        said = self.said()
         assert "Traceback" not in said and "distributed" not in said, said
         units = json.loads((self.out / "fleet.json").read_text())["serials"]
         return status, [unit["status"] for unit in units], said
@@ -341,7 +345,7 @@ def test_what_a_lost_scheduler_leaves_is_unfinished_and_done_by_the_next_call(
     held = Held(world, tmp_path, held=SERIALS[1:])
     alone.worker("anna", "--no-nanny", preload=held.preload)
     held.start(alone.address)
-    held.wait_until(lambda: held.begun("RLG-2"))
+    held.wait_until(lambda: held.begun("RLG-2") and "RLG-1: done" in held.said())
     alone.kill("scheduler")
     status, states, said = held.end()
     assert status == 1 and states == ["done", "unfinished", "unfinished"], said
@@ -357,7 +361,7 @@ def test_what_is_left_when_all_workers_are_lost_is_unfinished(world: Path, alone
     held = Held(world, tmp_path, held=SERIALS[1:])
     alone.worker("anna", "--no-nanny", preload=held.preload)
     held.start(alone.address, "--wait", "1")
-    held.wait_until(lambda: held.begun("RLG-2"))
+    held.wait_until(lambda: held.begun("RLG-2") and "RLG-1: done" in held.said())
     alone.kill("anna")
     status, states, said = held.end()
     assert status == 1 and states == ["done", "unfinished", "unfinished"], said
