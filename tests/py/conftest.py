@@ -80,6 +80,13 @@ def run_here(*args: str | Path) -> str:
     return done.output
 
 
+def packed(name: str, content: bytes) -> bytes:
+    """A file of what is kept, as gyrotc writes it under a name."""
+    from gyrotc.store.cache import _head
+
+    return _head(name, content) + content
+
+
 def quick_and_slow(quick: Sequence[Any], slow: Sequence[Any]) -> list[Any]:
     """Cases of a parametrised test, of which `make test` runs the quick ones and `make test-all` all."""
     marked = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in slow)

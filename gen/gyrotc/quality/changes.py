@@ -126,7 +126,7 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     Args:
         runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
     """
-    long = [k for k, rows in enumerate(runs) if len(rows[0]) > 4 * _EDGE and np.ptp(rows[2]) > 0.0]
+    long = [k for k in range(len(runs)) if _is_long(runs[k])]  # by number: no run is held while the next one is read
     span = sum(float(np.ptp(runs[k][0])) for k in long)
     cell_s = max(_CELL_S, span / _MOST_CELLS)
     fine = [cells_of(runs[k], cell_s) for k in long]
@@ -148,6 +148,11 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     gains = [one for one in known if one.kind == "gain"]
     kept = [one for one in known if one in gains or not any(_within(one, gain) for gain in gains)]
     return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
+
+
+def _is_long(rows: Rows) -> bool:
+    """Whether a run is long enough for a change, and its rate moves at all."""
+    return len(rows[0]) > 4 * _EDGE and bool(np.ptp(rows[2]) > 0.0)
 
 
 def _within(one: Change, gain: Change) -> bool:

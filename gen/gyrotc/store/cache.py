@@ -104,8 +104,9 @@ def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
 def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
     try:
         data = read_input(path, "recording_mib", "what was kept")
-        content = data[_HEAD_BYTES:]
-        if data == _packed(path.name, content):
+        head, content = data[:_HEAD_BYTES], data[_HEAD_BYTES:]
+        del data  # a bank of signatures has the size of what a search remembers
+        if head == _head(path.name, content):
             found = content_of(content)
             if found is not None:
                 os.utime(path, follow_symlinks=False)
@@ -123,12 +124,15 @@ def keep(name: str, content: bytes) -> None:
     """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
     with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
         if _is_own():
-            write_atomically(folder() / name, _packed(name, content))
+            write_atomically(folder() / name, _head(name, content), content)
             _trim()
 
 
-def _packed(name: str, content: bytes) -> bytes:
-    return _MAGIC + hashlib.sha256(name.encode() + b"\n" + content).digest() + content
+def _head(name: str, content: bytes) -> bytes:
+    """What stands before a content in its file."""
+    digest = hashlib.sha256(name.encode() + b"\n")
+    digest.update(content)
+    return _MAGIC + digest.digest()
 
 
 def _is_own() -> bool:

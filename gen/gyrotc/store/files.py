@@ -275,8 +275,10 @@ unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""
 
 
-def write_atomically(path: Path, data: str | bytes) -> None:
+def write_atomically(path: Path, data: str | bytes, more: bytes = b"") -> None:
     """Writes a file under a temporary name beside it and renames it into place, on disk when this returns.
+
+    `more` comes behind `data`.
 
     A device or a pipe is written as it is; a link is replaced, and where it led stays as it was.
 
@@ -288,20 +290,20 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     try:
         if _is_stream(path):
             with open_stream(path) as stream:
-                stream.write(content)
+                stream.write(content + more)
             return
         path = path.parent.resolve() / path.name
         path.parent.mkdir(parents=True, exist_ok=True)
         if any(folder in path.parents for folder in unfinished):
-            write_own(path, content)
+            write_own(path, content + more)
         else:
-            _replace(path, content)
+            _replace(path, content, more)
     except OSError as error:
         error.filename = error.filename or str(path)
         raise
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, *content: bytes) -> None:
     with deferred():
         lock = Lock(path, "output", wait=True)
         part = path.with_name(f".{path.name}.gyrotc-part")
@@ -315,7 +317,7 @@ def _replace(path: Path, content: bytes) -> None:
                 raise InputError(str(part), found, "nothing of that name; move it away") from None
             try:
                 with stream:
-                    stream.write(content)
+                    stream.writelines(content)
                     stream.flush()
                     os.fsync(stream.fileno())
                 part.replace(path)

@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import Command
+from conftest import Command, packed
 from gyrotc.assess.limits import load_limits
 from gyrotc.common import inputs
 from gyrotc.common.errors import InputError
@@ -310,7 +310,7 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         b"x",
         whole[:-1],
         content,
-        kept._packed(path.name, content),
+        packed(path.name, content),
     ):
         path.write_bytes(foreign)
         assert kept.kept(path.name, signature_bank._bank) is None

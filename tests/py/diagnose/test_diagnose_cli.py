@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from campaigns import GRADIENT, simulated
-from conftest import HOST, Command
+from conftest import HOST, Command, packed
 from gyrotc.causes import CATALOGUE
 from gyrotc.diagnose import diagnosis as stages
 from gyrotc.diagnose import extension
@@ -314,16 +314,16 @@ def test_what_is_damaged_or_holds_foreign_files_is_computed_again(data: Path, co
     diagnosis.diagnosed(recordings)
     [path] = cache.folder().glob("*.diagnosis")
     whole = path.read_bytes()
-    content = json.loads(whole[len(cache._packed("", b"")) :])
+    content = json.loads(whole[len(cache._head("", b"")) :])
     for damaged in (
         b"",
         whole[:-1],
         whole[:100] + b"0" + whole[101:],
-        cache._packed("0" * 64 + ".diagnosis", whole[len(cache._packed("", b"")) :]),  # of another name
-        cache._packed(path.name, b"[]"),
-        cache._packed(path.name, json.dumps(content | {"files": {"../report.html": ""}}).encode()),
-        cache._packed(path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
-        cache._packed(path.name, json.dumps(content | {"result": {}}).encode()),
+        packed("0" * 64 + ".diagnosis", whole[len(cache._head("", b"")) :]),  # of another name
+        packed(path.name, b"[]"),
+        packed(path.name, json.dumps(content | {"files": {"../report.html": ""}}).encode()),
+        packed(path.name, json.dumps(content | {"files": {"diagnose.json": "", "report.html": 1}}).encode()),
+        packed(path.name, json.dumps(content | {"result": {}}).encode()),
     ):
         path.write_bytes(damaged)
         before = counted.count

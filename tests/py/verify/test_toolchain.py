@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from conftest import packed
 from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.store import cache
@@ -205,15 +206,15 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
     _asked(source, tmp_path)
     [other] = set(cache.folder().glob("*.object")) - {path}
     (source.parent / "size.h").write_text("#define SIZE 3\n")
-    head = len(cache._packed("", b""))
+    head = len(cache._head("", b""))
     spoiled = (
         b"",
         whole[:-1],
         whole[:-9] + bytes([whole[-9] ^ 1]) + whole[-8:],
         other.read_bytes(),  # of another text, sound in itself
         whole[:head] + whole[head:].replace(b"one", b"two", 1),
-        cache._packed(path.name, b"{}\n" + sound.code),
-        cache._packed(path.name, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
+        packed(path.name, b"{}\n" + sound.code),
+        packed(path.name, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
     )
     for k, content in enumerate(spoiled, 3):
         path.write_bytes(content)
