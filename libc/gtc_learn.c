@@ -207,7 +207,6 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
                    expected_t *expected)
 {
     const float memory_var = prior->power_on_var[MEMORY - KNOTS];
-    const float *p;
     float *ph;
     float var = 0.0F;
     uint_least32_t i;
@@ -222,11 +221,9 @@ static void expect(const gtc_learn_state_t *state, const gtc_learn_prior_t *prio
 
         k = observed(step, i);
         expected->rate = add_product(expected->rate, h, state->x[k]);
-        p = &state->p[ROW(k)];
-        add_products(ph, p, k, h);
+        add_products(ph, &state->p[ROW(k)], k, h);
         for (j = k; j < STATES; j++) {
-            p = &p[j];
-            ph[j] = add_product(ph[j], h, p[0]);
+            ph[j] = add_product(ph[j], h, state->p[ROW(j) + k]);
         }
     }
     for (i = 0U; i < n; i++) {
