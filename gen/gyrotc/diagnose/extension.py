@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, Progress, give_back
+from ..common.arrays import BoolArray, Progress
 from ..common.metrics import Averages
 from ..model import Model
 from ..recordings.records import Dataset
@@ -100,7 +100,6 @@ class Refitting:
         self.front = front_end(self.runs, options.block_s)
         self.train = play_runs(dataset, self.runs, self.front)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
-        give_back()  # what the rows of whole recordings took
         self.average_s = options.average_s
         self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
         self.arguments: dict[str, Any] = {

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..causes.base import Cause, History, Scene, Values
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
 from ..target.recursions import Course, CourseChannel, TermOutcome
@@ -157,7 +157,11 @@ _KEPT = 8  # outcomes of terms for each run: those of two full tables
 def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
     """Front end over all runs."""
     first = min((r.started for r in dataset.runs if r.started is not None), default=None)
-    return [_played(dataset, run, k, front, first) for k, run in enumerate(runs)]
+    played = []
+    for k, run in enumerate(runs):
+        played.append(_played(dataset, run, k, front, first))
+        give_back()  # what the rows of a whole recording took
+    return played
 
 
 def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
