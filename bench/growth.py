@@ -1,9 +1,11 @@
-"""How the cost of whole commands grows with rows, runs, centers and units: CPU seconds, peak memory, slopes."""
+"""How the cost of whole commands grows with rows, runs, centers and units, and what the stages of a build cost."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -15,19 +17,34 @@ from typing import Any
 
 from results import machine, table
 
-from .fleet import under_serial
-
 _RAW_HZ = (1, 10, 100)  # rows a second of the paper's twelve runs of 8 h
-_SETS = (1, 4, 16)  # of the six runs of the paper, and one set to be judged by
+_SETS = (1, 4, 17)  # of the six runs of the paper, and one set to be judged by
 _CENTERS = (4, 16, 64)
 _SERIALS = (4, 16, 64)
-_GYROS = 4  # whose recordings stand for all serials in turn
 _HEAD = """## How cost grows (`make bench`)
 
 {machine}. Whole commands, interpreter and imports included. Rows: twelve runs of 8 h (Parquet), of which a `fit` takes
 every row through the front end. Runs: of 8 h, rows of 10 s. Centers: as many as are asked for, twelve runs. Units:
-serials of the paper's size through one process. Slope: of the logarithm of the cost over that of the size, between the
-two largest sizes; 1 is in proportion.
+serials of the paper's size through one process, and their lot. Slope: of the logarithm of the cost over that of the
+size, between the two largest sizes; 1 is in proportion.
+"""
+_STAGES = """
+## Stages of a build (`python -m bench docs --only growth`)
+
+CPU seconds of `gyrotc build` of the paper's recordings on all targets found, compilers and emulators included: the
+first, with an empty cache, and a later one of another gyro. Load before it: {load:.1f}.
+
+"""
+_BUILD = """import json, resource, sys
+from pathlib import Path
+def used():
+    both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in both)
+marks = [("starting", 0.0)]
+from gyrotc.jobs.build import build
+from gyrotc.train.fitting import FitOptions
+build(Path(sys.argv[1]), Path(sys.argv[2]), FitOptions(), progress=lambda text: marks.append((text.split()[0], used())))
+print(json.dumps([*marks, ("", used())]))
 """
 _STARTER = """import os, sys
 null = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, os.O_WRONLY, 0) for fd in (1, 2)]
@@ -49,7 +66,29 @@ def growth(say: Say) -> dict[str, Any]:
         for what, jobs in _PARTS.items():
             for command, found in _measured(jobs(Path(place) / what), what, say).items():
                 rows.append({"what": what, "command": command, "sizes": found})
-    return {"machine": machine(), "rows": rows}
+        say("stages of a build")
+        stages = _stages(Path(place) / "stages")
+    slopes = {row["what"]: _slope(row["sizes"], "seconds") for row in rows if row["what"] in ("runs", "centers")}
+    return {"machine": machine(), "rows": rows, "slopes": slopes, **stages}
+
+
+def _stages(folder: Path) -> dict[str, Any]:
+    """CPU seconds by what `build` says that it is doing: the first with an empty cache, and one of another gyro."""
+    load, costs = os.getloadavg()[0], []
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+    for seed in (1, 2):
+        data = folder / str(seed)
+        gyrotc(["simulate", "paper", "--seed", str(seed), "--out", str(data)])
+        command = [sys.executable, "-c", _BUILD, str(data), f"{data}-out"]
+        marks = json.loads(subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True).stdout)
+        cost: dict[str, float] = {}
+        for (name, began), (_, ended) in itertools.pairwise(marks):
+            cost[name] = cost.get(name, 0.0) + ended - began
+        costs.append(cost)
+    first, later = costs
+    stages = [{"stage": name, "first_s": first[name], "later_s": later.get(name, 0.0)} for name in first]
+    whole = {"first_s": sum(first.values()), "later_s": sum(later.values())}
+    return {"load": load, "stages": [*stages, {"stage": "all", **whole}]}
 
 
 def _measured(jobs: Iterator[_Job], what: str, say: Say) -> dict[str, list[dict[str, float]]]:
@@ -57,12 +96,12 @@ def _measured(jobs: Iterator[_Job], what: str, say: Say) -> dict[str, list[dict[
     found: dict[str, list[dict[str, float]]] = {}
     for size, words in jobs:
         say(f"{what}: {size}, gyrotc {words[0]}")
-        cost = _gyrotc(words)
+        cost = gyrotc(words)
         found.setdefault(words[0], []).append({"size": size, **cost})
     return found
 
 
-def _gyrotc(words: Sequence[str]) -> dict[str, float]:
+def gyrotc(words: Sequence[str]) -> dict[str, float]:
     """CPU seconds and peak memory of a command, started by a process that has next to none itself.
 
     A process begins with the peak of the one that started it.
@@ -77,7 +116,7 @@ def _rows(folder: Path) -> Iterator[_Job]:
     for hz in _RAW_HZ:
         data = folder / str(hz)
         raw = ["--raw-hz", str(hz), "--format", "parquet"]
-        _gyrotc(["simulate", "paper", *raw, "--out", str(data)])
+        gyrotc(["simulate", "paper", *raw, "--out", str(data)])
         size = 12 * 8 * 3600 * hz
         yield size, ["check", str(data)]
         yield size, ["fit", str(data), "--out", f"{data}-out"]
@@ -91,25 +130,25 @@ def _runs(folder: Path) -> Iterator[_Job]:
         scenario, data = folder / f"{sets}.toml", folder / str(sets)
         again = [train.replace("2026-03-02", f"{2000 + k}-03-02") for k in range(sets)]
         scenario.write_text("".join([profiles, *again, judged]), "utf-8")
-        _gyrotc(["simulate", str(scenario), "--out", str(data)])
+        gyrotc(["simulate", str(scenario), "--out", str(data)])
         yield 6 * sets, ["fit", str(data), "--out", f"{data}-out"]
 
 
 def _centers(folder: Path) -> Iterator[_Job]:
-    _gyrotc(["simulate", "paper-ripple-strong", "--out", str(folder)])
+    gyrotc(["simulate", "paper-ripple-strong", "--out", str(folder)])
     for n in _CENTERS:
         chosen = ["--method", "mrbf", "--centers", str(n)]
         yield n, ["fit", str(folder), *chosen, "--out", f"{folder}-{n}"]
 
 
 def _units(folder: Path) -> Iterator[_Job]:
-    for k in range(_GYROS):
-        _gyrotc(["simulate", "paper", "--seed", str(k + 1), "--out", str(folder / "gyros" / str(k))])
+    gyrotc(["simulate", "lot", "--units", str(max(_SERIALS)), "--out", str(folder)])
     for serials in _SERIALS:
-        data = folder / str(serials)
-        for k in range(serials):
-            under_serial(folder / "gyros" / str(k % _GYROS), data / f"RLG-{k:04d}")
-        yield serials, ["fleet", str(data), "--jobs", "1", "--out", f"{data}-out"]
+        manifest, out = folder / f"{serials}.toml", folder / f"out-{serials}"
+        names = sorted(path.parent.name for path in folder.glob("*/dataset.toml"))[:serials]
+        manifest.write_text(f"schema = 1\ndatasets = {json.dumps(names)}\n", "utf-8")
+        yield serials, ["fleet", str(manifest), "--jobs", "1", "--out", str(out)]
+        yield serials, ["lot", str(out), "--out", f"{out}.json"]
 
 
 _PARTS: dict[str, Callable[[Path], Iterator[_Job]]] = {
@@ -122,7 +161,15 @@ _PARTS: dict[str, Callable[[Path], Iterator[_Job]]] = {
 
 def section(result: dict[str, Any]) -> str:
     """The section of docs/results.md."""
-    return "\n".join([_HEAD.format(**result), table(_COLUMNS, [_row(row) for row in result["rows"]])])
+    stages = [[one["stage"], f"{one['first_s']:.2f}", f"{one['later_s']:.2f}"] for one in result["stages"]]
+    return "\n".join(
+        [
+            _HEAD.format(**result),
+            table(_COLUMNS, [_row(row) for row in result["rows"]])
+            + _STAGES.format(**result)
+            + table(("stage", "first ", "later "), stages),
+        ]
+    )
 
 
 def _row(row: dict[str, Any]) -> list[str]:
@@ -132,15 +179,14 @@ def _row(row: dict[str, Any]) -> list[str]:
         row["what"],
         f"`gyrotc {row['command']}`",
         *cells,
-        _slope(sizes, "seconds"),
-        _slope(sizes, "peak_mib"),
+        *(f"{_slope(sizes, key):.2f}" for key in ("seconds", "peak_mib")),
     ]
 
 
 _FORMS = {"size": ",", "seconds": ".2f", "peak_mib": ".0f"}
 
 
-def _slope(sizes: Sequence[dict[str, float]], key: str) -> str:
+def _slope(sizes: Sequence[dict[str, float]], key: str) -> float:
     """Between the two largest sizes."""
     small, large = sizes[-2:]
-    return f"{math.log(large[key] / small[key]) / math.log(large['size'] / small['size']):.2f}"
+    return math.log(large[key] / small[key]) / math.log(large["size"] / small["size"])

@@ -6,17 +6,16 @@ lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no
 knows from what distribution unrelated units are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the foreign units of all other draws), and one that knows each such unit's map.
 
-Cost: the units are simulated from physics, each for itself: copies of a few with noise of their own would be as many
-clusters, and what was measured were the search for these. Each number of units has a process of its own, so that its
-memory is what it needs.
+Cost of `gyrotc lot`, whole: the units are simulated from physics, each for itself: copies of a few with noise of their
+own would be as many clusters, and what was measured were the search for these.
 """
 
 from __future__ import annotations
 
 import multiprocessing
-import resource
+import os
 import secrets
-import time
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,13 +23,19 @@ from typing import Any
 import numpy as np
 from gyrotc.lot.learn import FALSE_ALARM, UnitSums, sums_of
 from gyrotc.lot.use import LotPrior
+from gyrotc.model import load_model
+from gyrotc.results.base import read_result
+from gyrotc.results.lot import Lot as LearnedLot
+from gyrotc.results.training import MapMeans, Training
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
+from gyrotc.store.files import json_text
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.means import UnitMeans, unit_means
 from numpy.typing import NDArray
 
+from .growth import gyrotc
 from .lot_peers import best_power, seen
 from .lot_prior import CASES, learnt, ordered, programmes, recordings_of, write_page
 
@@ -58,9 +63,7 @@ def drawn(seed: int) -> Draw:
     units = draw_lot(with_noise(read("paper")[1], "paper"), ordered(case), seed)
     own = [u for u in units if u.lot and not u.lot.unrelated]
     strange = [u for u in units if u.lot and u.lot.unrelated]
-    taught = [
-        unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(own[:_TAUGHT], exam=False)
-    ]
+    taught = [unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(own[:_TAUGHT], exam=False)]
     found = Draw(seed, learnt(taught), _held(own[_TAUGHT:]), _held(strange))
     print(f"seed {seed}: drawn", flush=True)
     return found
@@ -70,9 +73,7 @@ def _held(units: list[SimulatedGyro]) -> list[tuple[UnitMeans, UnitMeans]]:
     return [(seen(programmes(data)[0][1]), seen(data)) for data, _ in recordings_of(units, exam=False)]
 
 
-def ratio_test(
-    prior: LotPrior, own: list[UnitMeans], strange: list[UnitMeans], known: list[UnitMeans]
-) -> Any:
+def ratio_test(prior: LotPrior, own: list[UnitMeans], strange: list[UnitMeans], known: list[UnitMeans]) -> Any:
     """Shares of own and of unrelated units refused by the likelihood ratio of the latter's distribution to the lot's.
 
     Args:
@@ -145,31 +146,50 @@ def write_unrelated(docs: Path) -> None:
     write_page(docs, {"unrelated": [figures(draw, draws) for draw in draws]})
 
 
-_UNITS = (50, 100, 200, 400)
+_UNITS = (100, 300, 1000)
 _SEED, _FAMILY = 4711, 0.73
+_DIGITS = 6  # of a mean, as a fit leaves it
 
 
-def _measured(units: list[UnitMeans]) -> dict[str, float]:
-    before, began = time.process_time(), time.perf_counter()
-    prior = learnt(units)
-    return {
-        "units": len(units),
-        "cpu_s": time.process_time() - before,
-        "wall_s": time.perf_counter() - began,
-        "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
-        "clusters": len(prior.means),
-        "directions": len(prior.lot.directions),
-    }
+def _taught(folder: Path) -> None:
+    """Units of a lot as `gyrotc fleet` leaves them: the files of one fit, with the means of each unit."""
+    gyros = draw_lot(with_noise(read("paper")[1], "paper"), LotOrder(max(_UNITS), _FAMILY, 1, 0), _SEED)
+    gyrotc(["simulate", "paper", "--out", str(folder / "one")])
+    gyrotc(["fit", str(folder / "one"), "--out", str(folder / "fitted")])
+    model, training = load_model(folder / "fitted/model.json"), read_result(folder / "fitted/training.json", Training)
+    for k, (samples, _) in enumerate(recordings_of(gyros, exam=False)):
+        data = cleaned(samples)
+        found, mean_s = unit_means(data, scaling_of(data), None)
+        lists = {
+            name: tuple(float(f"{v:.{_DIGITS}g}") for v in getattr(found, name))
+            for name in ("temperature_c", "slope_c_per_min", "bias_dph", "count")
+        }
+        means = MapMeans(**lists, sigma_dph=found.sigma_dph, mean_s=mean_s)
+        unit = folder / "units" / f"LOT-{k:04d}"
+        unit.mkdir(parents=True)
+        model.model_copy(update={"serial": unit.name}).save(unit / "model.json")
+        own = training.model_copy(update={"serial": unit.name, "means": means})
+        (unit / "training.json").write_text(json_text(own.content()), "utf-8")
 
 
 def write_speed(docs: Path) -> None:
-    """Learning from 50 to 400 units."""
-    order = LotOrder(max(_UNITS), _FAMILY, 1, 0)
-    gyros = draw_lot(with_noise(read("paper")[1], "paper"), order, _SEED)
-    units = [unit_means(cleaned(d), scaling_of(d), None)[0] for d, _ in recordings_of(gyros, exam=False)]
+    """`gyrotc lot` of 100 to 1,000 units."""
     found = []
-    for n in _UNITS:
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            found.append(pool.map(_measured, [units[:n]])[0])
-        print(found[-1], flush=True)
+    with tempfile.TemporaryDirectory(prefix="gyrotc-lot-") as work:
+        folder = Path(work)
+        _taught(folder)
+        for n in _UNITS:
+            some, file = folder / str(n), folder / f"{n}.json"
+            some.mkdir()
+            for unit in sorted((folder / "units").iterdir())[:n]:
+                (some / unit.name).symlink_to(unit)
+            load, cost = os.getloadavg()[0], gyrotc(["lot", str(some), "--out", str(file)])
+            lot = read_result(file, LearnedLot)
+            found.append(
+                {
+                    "units": n, "cpu_s": cost["seconds"], "memory_mib": cost["peak_mib"], "load": load,
+                    "clusters": len(lot.clusters), "directions": len(lot.directions),
+                }
+            )  # fmt: skip
+            print(found[-1], flush=True)
     write_page(docs, {"speed": found})

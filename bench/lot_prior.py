@@ -338,15 +338,14 @@ def _coverage(draws: dict[str, list[dict[str, Any]]]) -> str:
 
 
 def _speed(rows: Sequence[dict[str, Any]]) -> str:
-    lines = ["### Learning from 50 to 400 units (`python -m bench docs --only lot-speed`)", ""]
+    lines = ["### `gyrotc lot` of 100 to 1,000 units (`python -m bench docs --only lot-speed`)", ""]
     lines += [
-        "| units | processor time, s | memory, MiB | clusters, directions |",
-        "| --- | --- | --- | --- |",
+        "| units | processor time, s | memory, MiB | clusters, directions | load of the machine |",
+        "| --- | --- | --- | --- | --- |",
     ]
     for row in rows:
-        lines.append(
-            f"| {row['units']} | {row['cpu_s']:.1f} | {row['memory_mib']:.0f} | {row['clusters']}, {row['directions']} |"
-        )
+        found = f"{row['clusters']}, {row['directions']}"
+        lines.append(f"| {row['units']} | {row['cpu_s']:.1f} | {row['memory_mib']:.0f} | {found} | {row['load']:.1f} |")
     return "\n".join(lines) + "\n"
 
 
