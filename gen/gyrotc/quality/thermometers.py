@@ -129,7 +129,7 @@ def temperature_findings_of(run: Run, rows: Rows, f: RunFacts) -> Iterator[Findi
             text,
             run,
             marks=[mark_of(run.file, rows, *span) for span in spans],
-            time_s=(start, start, start),
+            time_s=(start, start - 2.0 * run.row_period_s, start),  # the row before may be a mean that holds it
             size=((end - start,) * 3, "s"),
             leave_out=spans,
         )

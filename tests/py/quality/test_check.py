@@ -553,6 +553,7 @@ def test_a_stuck_thermometer_is_reported_and_the_line_mends_it(tmp_path: Path) -
     [warning] = [d for d in check(tmp_path / "R").warnings if "temperature" in d.id]  # its release is no jump
     assert warning.id == "stuck_temperature"
     assert "for 800 s from 2000 s on" in warning.text
+    assert warning.time_s is not None and (warning.time_s.low, warning.time_s.high) == (1980.0, 2000.0)
     assert warning.exclude == 'exclude = [{from_s = 2000.0, to_s = 2800.0, reason = "stuck_temperature"}]'
 
 
