@@ -58,7 +58,7 @@ test:
 ## everything: `make test` with the slow tests, then `make check`, `make cov`, `make targets`; an hour on two cores
 test-all:
 	$(c-tests)
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py -k "not one_of_eighty"
 	@$(MAKE) --no-print-directory check cov targets
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
@@ -71,7 +71,7 @@ prove:
 	@tools/setup.sh prove
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/prove --results docs
 
-## style and promises: ruff, mypy; of the C library words, warnings, symbols, fused operations, MISRA, analysers
+## style and promises: ruff, mypy; of the C library words, warnings, symbols, fused operations, MISRA, analysers; 80 diagnoses
 check:
 	@tools/setup.sh check
 	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools
@@ -81,6 +81,7 @@ check:
 	@$(PYTHON) -m pytest -q tests/py/repository/test_examples.py -k notebook
 	@$(PYTHON) -m gyrotc.paper docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/paper/test_paper_reference.py
+	@$(PYTHON) -m pytest -q -n 2 tests/py/diagnose/test_diagnose_fixed.py -k "eighty or fresh"
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:
