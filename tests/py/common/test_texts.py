@@ -503,7 +503,7 @@ def test_the_page_of_a_plan(tmp_path: Path) -> None:
 
     def draw(text: Callable[[], str]) -> str:
         template = report.page_environment().get_template("plan.html.j2")
-        return template.render(p=_with(plan, text), temperatures="", matrix="", accuracy="")
+        return template.render(p=_with(plan, text), limit=lambda _, v: v, temperatures="", matrix="", accuracy="")
 
     _same_page(draw)
 
