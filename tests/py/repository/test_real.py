@@ -51,8 +51,9 @@ def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(tmp_pat
 
 
 def test_nothing_can_be_learnt_from_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
+    """What the bias does at this temperature may be more than noise; that is all that is found besides."""
     for result in built("mpu6050-isothermal", tmp_path / "out", gyrotc).values():
-        assert found(result) == {"no_temperature_information"}
+        assert found(result) - {"residual_above_noise"} == {"no_temperature_information"}
         assert "nothing can be learnt about temperature" in result["evaluate"]["findings"][0]["text"]
         network = result["model"]["networks"][0]
         assert (network["centers"], network["linear"]) == ([], [0.0, 0.0])
@@ -66,14 +67,14 @@ def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Co
     if name in ABSENT:
         pytest.skip(SKIPPED)
     rows = (REAL / name / "data.csv").read_text().splitlines()
-    scaled = [",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) / 1000.0!r}"]) for line in rows[1:]]
-    folder = tmp_path / SETS[1]
-    folder.mkdir()
-    (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")
-    assert gyrotc("build", folder, "--out", tmp_path / "out", *HOST).returncode == 0
-    result = {"evaluate": json.loads((tmp_path / "out" / "evaluate.json").read_text())}
-    assert {"does_not_generalise", "jump_in_temperature", "earth_rate_not_stated"} <= found(result)
-    assert "no_temperature_information" not in found(result)
+    results = []
+    for folder, scale in ((tmp_path / name, 1.0), (tmp_path / SETS[1], 1e-3)):
+        scaled = [",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) * scale!r}"]) for line in rows[1:]]
+        folder.mkdir()
+        (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")
+        assert gyrotc("build", folder, "--out", tmp_path / f"out{scale}", *HOST).returncode == 0
+        results.append(found({"evaluate": json.loads((tmp_path / f"out{scale}" / "evaluate.json").read_text())}))
+    assert "jump_in_temperature" in results[0] and results[1] == results[0] | {"earth_rate_not_stated"}
 
 
 def test_simulated_data_under_a_real_name_have_no_findings(tmp_path: Path, gyrotc: Command) -> None:
