@@ -123,7 +123,7 @@ def _merged(base: Guard, guard: ProductGuard, where: str) -> Guard:
 
 
 @dataclass(frozen=True)
-class Seen:
+class BuiltUnit:
     """What a build saw of a unit: the lot that its map was made with and what is known of the map, means of training
     (`run` is the power-on)."""
 
@@ -150,7 +150,7 @@ class ServiceLearning(BaseModel):
     settle_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
     spread: BiasSpread | None = None  # in place of what a data sheet says
 
-    def of(self, model: Model, seen: Seen, where: str) -> Learning:
+    def of(self, model: Model, seen: BuiltUnit, where: str) -> Learning:
         """The same for a model.
 
         Args:
@@ -190,7 +190,7 @@ class ServiceLearning(BaseModel):
         turn_on = max(model.between_dph, table) if self.turn_on_dph is None else self.turn_on_dph
         return data_sheet_spread(table, turn_on, self.ageing_dph_per_sqrt_month or 0.0)
 
-    def _of_power_ons(self, model: Model, seen: Seen, center_c: float, at: str) -> BiasSpread:
+    def _of_power_ons(self, model: Model, seen: BuiltUnit, center_c: float, at: str) -> BiasSpread:
         if seen.means is None:
             raise InputError(f"{at}.prior", "'power_ons' for an extended model", "another prior")
         guess = self._of_data_sheet(model, at)
@@ -202,7 +202,7 @@ class ServiceLearning(BaseModel):
         envelope = model.envelope.temperature_c
         return spread_of_power_ons(guess, seen.means, model.method, envelope, center_c, f"{at}.prior")
 
-    def _of_lot(self, model: Model, seen: Seen, center_c: float, at: str) -> BiasSpread:
+    def _of_lot(self, model: Model, seen: BuiltUnit, center_c: float, at: str) -> BiasSpread:
         if self.spread or self.table_dph is not None:
             raise InputError(at, "'lot' beside table_dph or spread", "one of them: the lot says what a table leaves")
         if seen.lot is None or seen.known is None:

@@ -15,7 +15,7 @@ from ..assess.budget import budget_of
 from ..assess.changes import changes_since, load_earlier
 from ..assess.evaluate import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
-from ..assess.product_guards import Seen, guarded
+from ..assess.product_guards import BuiltUnit, guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..lot.use import LotPrior
@@ -206,7 +206,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         left_out = order.limits.needs.left_out
         stated = order.limits.learning
         lot = options.prior.lot if isinstance(options.prior, LotPrior) else None
-        seen = Seen(lot, fitted.training.known, fitted.means)
+        seen = BuiltUnit(lot, fitted.training.known, fitted.means)
         learning = stated.of(model, seen, order.limits.file) if stated else None
         model = model.model_copy(
             update={

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import run_here
 from gyrotc.assess.limits import load_limits
-from gyrotc.assess.product_guards import Seen
+from gyrotc.assess.product_guards import BuiltUnit
 from gyrotc.common.errors import InputError
 from gyrotc.model import BiasSpread, Learning, Model, load_model
 from gyrotc.tables.emit import emit, prior_of
@@ -122,23 +122,23 @@ def test_a_limits_file_says_what_may_be_learned(tmp_path: Path) -> None:
     limits = load_limits(path)
     model = load_model(GOLDEN)
     assert limits.learning is not None
-    assert limits.learning.of(model, Seen(), str(path)) == learning_model().learning
+    assert limits.learning.of(model, BuiltUnit(), str(path)) == learning_model().learning
     spread = data_sheet_spread(1.0, 2.0, 3.0)
     numbers = "\n".join(f"{name} = {value!r}" for name, value in json.loads(spread.model_dump_json()).items())
     path.write_text(
         f"schema = 1\n[learning]\nauthority_dph = 9.0\nnoise_deg_per_sqrt_h = 0.1\n[learning.spread]\n{numbers}\n"
     )
     stated = load_limits(path).learning
-    assert stated is not None and stated.of(model, Seen(), str(path)).spread == BiasSpread(**dict(spread))
+    assert stated is not None and stated.of(model, BuiltUnit(), str(path)).spread == BiasSpread(**dict(spread))
     path.write_text("schema = 1\n[learning]\nauthority_dph = 0.03\n")
     bare = load_limits(path).learning
     assert bare is not None
     with pytest.raises(InputError, match=r"limits.toml, field learning.noise_deg_per_sqrt_h: is missing"):
-        bare.of(model.model_copy(update={"uncertainty_dph": None}), Seen(), str(path))
+        bare.of(model.model_copy(update={"uncertainty_dph": None}), BuiltUnit(), str(path))
     path.write_text("schema = 1\n[learning]\nauthority_dph = 9.0\ntable_dph = 3.0\nnoise_deg_per_sqrt_h = 1e-4\n")
     few = load_limits(path).learning
     assert few is not None and model.between_dph < 3.0
-    agreeing = few.of(model, Seen(), str(path)).spread
+    agreeing = few.of(model, BuiltUnit(), str(path)).spread
     assert agreeing.turn_on == 3.0  # runs that agree show no less than the table's sigma
     path.write_text("schema = 1\n[learning]\ntable_dph = 1e-4\n")
     with pytest.raises(InputError, match="authority_dph"):
