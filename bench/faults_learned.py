@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.assess.product_guards import Seen, ServiceLearning
+from gyrotc.assess.product_guards import BuiltUnit, ServiceLearning
 from gyrotc.simulate.campaign import campaign, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.learning import service_prior
@@ -24,8 +24,21 @@ from numpy.typing import NDArray
 from results import table as markdown
 
 from .faults import (
-    CLASSES, FIRST_SEED, HEALTHY_S, INIT, MISSED, PART, PLAN, POWER_CYCLE, REZERO,
-    Calls, Fault, Floats, Say, Unit, driven,
+    CLASSES,
+    FIRST_SEED,
+    HEALTHY_S,
+    INIT,
+    MISSED,
+    PART,
+    PLAN,
+    POWER_CYCLE,
+    REZERO,
+    Calls,
+    Fault,
+    Floats,
+    Say,
+    Unit,
+    driven,
 )  # fmt: skip
 from .faults import unit as unit_of
 
@@ -67,7 +80,7 @@ def turn_on_dph(own: Unit, seed: int) -> float:
 def _taught(own: Unit, seed: int, stated_dph: float | None) -> Learner:
     """A unit of firmware that has been through power-ons at this gyro's temperatures, its turn-on stated or not."""
     rng = np.random.default_rng([seed, 27])
-    learning = ServiceLearning(authority_dph=_AUTHORITY_DPH, turn_on_dph=stated_dph).of(own.model, Seen(), "bench")
+    learning = ServiceLearning(authority_dph=_AUTHORITY_DPH, turn_on_dph=stated_dph).of(own.model, BuiltUnit(), "bench")
     learner = Learner(service_prior(learning, own.model.envelope.temperature_c))
     left, _, status = driven(own, Calls.of(own.readings))
     left = left - turn_on_dph(own, seed)
