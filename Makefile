@@ -58,7 +58,7 @@ test:
 ## everything: `make test` with the slow tests, then `make check`, `make cov`, `make targets`; an hour on two cores
 test-all:
 	$(c-tests)
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py -k "not one_of_eighty"
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile tests/py -k "not of_eighty"
 	@$(MAKE) --no-print-directory check cov targets
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md

@@ -37,7 +37,7 @@ def limits_of(texts: Sequence[str]) -> dict[str, float]:
         name, _, stated = text.partition("=")
         value, _, unit = stated.strip().partition(" ")
         native = CATALOGUE[name.strip()].unit if name.strip() in CATALOGUE else NATIVE
-        factors = {native: 1.0} | {native.replace(NATIVE, shown): factor for shown, factor in DISPLAYS.items()}
+        factors = {native: 1.0} | {native.replace(NATIVE, rate): factor for rate, factor in DISPLAYS.items()}
         try:
             found[name.strip()] = float(value) / factors[unit.strip() or native]
         except ValueError:

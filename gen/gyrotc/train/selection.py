@@ -56,6 +56,7 @@ CANDIDATES = ("nothing", *_SIMPLE, "mrbf")
 _OF_NETWORK, _OF_STATES = 0.025, 0.05  # of the t test: states that a verdict names have evidence of their own
 _LEAST = 0.02  # share of RMS by which the network has to be better: what "no worse than trivial" allows (docs/real.md)
 _COVERED = 0.5  # of a piece at temperatures that the rest has seen: of less it is the map's ends that are judged
+_TWOFOLD = 2.0  # gain of states on every piece that needs no test: two pieces are too few for one
 _MUCH = 0.10  # share of RMS by which the constant has to be beaten where the t test is silent
 _UNDECIDED = 1.0  # t of the gain over a constant below which it is a coin (docs/training.md, section 2)
 _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ by rounding only
@@ -111,7 +112,7 @@ class CandidateScores:
         """
         gains = self._log(self._covered(other)) - self._log(self._covered(name))
         gains = gains[np.isfinite(gains)]
-        return _surely(gains, _OF_STATES) or (len(gains) > 1 and bool(gains.min() >= np.log(2.0)))
+        return _surely(gains, _OF_STATES) or (len(gains) > 1 and bool(gains.min() >= np.log(_TWOFOLD)))
 
     def _rms(self, name: str) -> FloatArray:
         return np.asarray(self.rms_dph[:, self.candidates.index(name)])

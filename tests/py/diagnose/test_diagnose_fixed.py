@@ -57,7 +57,7 @@ def mistakes(drawn: Iterable[Drawn]) -> Counter[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("numbers", [(fixed.OWN_NUMBERS, ()), ((), fixed.OTHER_NUMBERS)], ids=["own", "other"])
-def test_at_most_one_of_eighty_is_wrong_in_each_class(
+def test_of_eighty_no_more_are_wrong_than_each_class_allows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, numbers: tuple[Sequence[int], Sequence[int]]
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
