@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import COSTS, needs_of
-from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables.emit import COSTS, emit_texts, needs_of, quantise_all
 from gyrotc.verify.sizes import parse_graph
 
 from .sizes import COMPILER, CORES, LEVELS, LINKED, MODEL

@@ -25,8 +25,7 @@ from gyrotc.tables.quantise import quantise
 from gyrotc.target.arithmetic import FLOAT64
 from gyrotc.target.history import replay
 from gyrotc.target.recursions import TermOutcome, recursion_of
-from gyrotc.target.status import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING
-from gyrotc.target.table import Table
+from gyrotc.target.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
 from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
 from gyrotc.train.methods import fit

@@ -23,8 +23,7 @@ from gyrotc.recordings.records import Dataset, Rows, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import read_truth
-from gyrotc.tables.applied import applied_of
-from gyrotc.tables.quantise import quantise
+from gyrotc.tables.quantise import applied_of, quantise
 from gyrotc.train.channels import seen_by_target
 from gyrotc.train.data import TrainingData, average, joined
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, samples_of

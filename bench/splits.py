@@ -21,8 +21,7 @@ from gyrotc.common.errors import GyrotcError
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.recordings.records import Dataset
-from gyrotc.train.cross_validation import turning_points
-from gyrotc.train.data import TrainingData, average, joined, scaling_of
+from gyrotc.train.data import TrainingData, average, joined, scaling_of, turning_points
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.simple import design, solve
 from numpy.typing import NDArray

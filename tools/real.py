@@ -24,7 +24,7 @@ from gyrotc.paper.figures import AFTER, BEFORE, png
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.tables.emit import emit
-from gyrotc.train.cross_validation import training_spans
+from gyrotc.train.data import training_spans
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from matplotlib.figure import Figure
 from real_peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others

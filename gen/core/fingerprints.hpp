@@ -1,6 +1,6 @@
 // fingerprints.hpp - hashes of windows of rows by which a copied stretch of a recording is known again.
 //
-// What they mean, and why chance cannot have made them, stands in gyrotc/recordings/shared_rows.py.
+// What they mean, and why chance cannot have made them, stands in gyrotc/recordings/copies.py.
 #pragma once
 
 #include <cstddef>

@@ -35,8 +35,7 @@ from pydantic import (
 from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
 from .common.errors import InputError
-from .common.inputs import read_json
-from .common.ranges import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength
+from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, read_json
 from .store.files import digest_of, json_text, write_atomically
 
 __all__ = [

@@ -19,8 +19,8 @@ import numpy as np
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.fleet.copies import copies
 from gyrotc.jobs.build import build_into
+from gyrotc.recordings.copies import noise_of, noise_signs
 from gyrotc.recordings.load import load
-from gyrotc.recordings.noise_copies import noise_of, noise_signs
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 

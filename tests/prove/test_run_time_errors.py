@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from emitted import GOLDEN, emitted, spoil
 from gyrotc.model import Learning, Model, load_model
-from gyrotc.tables.learning import data_sheet_spread
+from gyrotc.tables.emit import data_sheet_spread
 from models import bank_with_channels, with_memories
 from results import Results
 

@@ -81,7 +81,7 @@ def first_lines(text: str) -> str:
 def amalgamated(root: Path, folder: Path) -> Path:
     """gtc.h and gtc.c, as they are emitted."""
     script = (
-        "import sys; from pathlib import Path; from gyrotc.tables.amalgamate import amalgamate\n"
+        "import sys; from pathlib import Path; from gyrotc.tables.text import amalgamate\n"
         "root, out = map(Path, sys.argv[1:])\n"
         "for name, text in zip(('gtc.h', 'gtc.c'), amalgamate(root / 'include', root / 'libc')):\n"
         "    (out / name).write_text(text, encoding='ascii')\n"

@@ -25,7 +25,7 @@ from ..common.metrics import Averager, Averages, statistics, time_statistics
 from ..common.texts import file_stem
 from ..model import Model, load_model
 from ..quality.check import findings_of_run
-from ..quality.facts import RunFacts, facts_of
+from ..quality.findings import RunFacts, facts_of
 from ..quality.outliers import departing_rows
 from ..recordings.records import Dataset, Rows, Run
 from ..results.base import read_result

@@ -21,14 +21,13 @@ from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages
 from ..model import Model
 from ..quality.check import findings_of_data_set
-from ..quality.facts import RunFacts
-from ..quality.findings import finding, temperature_findings
+from ..quality.findings import RunFacts, finding, temperature_findings
 from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Run
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.findings import Finding
 from ..results.training import Training
-from ..train.noise import robust_sigma
+from ..train.evidence import robust_sigma
 
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
 _SIGMAS = 4.0  # of each figure's distribution: one clean residual in ten thousand

@@ -19,7 +19,7 @@ from ..lot.earlier import posterior_of_known
 from ..lot.service import spread_of_lot, spread_of_power_ons
 from ..model import BiasSpread, Celsius, Guard, Learning, Model
 from ..results.lot import KnownMap, Lot
-from ..tables.learning import data_sheet_spread
+from ..tables.emit import data_sheet_spread
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
 from ..target.samples import PLAUSIBLE_C
 from ..train.data import TrainingData

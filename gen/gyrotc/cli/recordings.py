@@ -325,7 +325,7 @@ def check(
         )
         if plots is not None:
             from ..pages.check import write_check_page
-            from ..quality.pictures import pictures_of
+            from ..quality.check import pictures_of
 
             say("drawing")
             write_check_page(plots, result.result(), pictures_of(dataset, result), str(dataset))

@@ -332,7 +332,7 @@ def learning_lines(model: Model, numerics: Collection[str]) -> Iterator[str]:
     learning = model.learning
     if learning is None:
         return
-    from ..tables.learning import MONTH_H
+    from ..tables.emit import MONTH_H
 
     spread = learning.spread
     amounts = learning.authority_dph, spread.level, spread.turn_on, spread.ageing * MONTH_H**0.5

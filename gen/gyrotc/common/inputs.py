@@ -1,7 +1,7 @@
 """Files that somebody else may have written: opened as regular files, within limits, refused in one clear message.
 
-A user moves one by `gyrotc --max NAME=VALUE` or by the environment: `GYROTC_MAX="NAME=VALUE NAME=VALUE"`. The option
-writes the environment, so that the processes of a fleet see it too.
+A user moves one of the limits by `gyrotc --max NAME=VALUE` or by the environment: `GYROTC_MAX="NAME=VALUE NAME=VALUE"`.
+The option writes the environment, so that the processes of a fleet see it too.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, TypeVar, cast
+
+from annotated_types import Interval
 
 from .errors import InputError
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter, ValidationError
+
 
 ENVIRONMENT = "GYROTC_MAX"
 
@@ -337,3 +340,26 @@ def _look_at(value: Any, where: str) -> None:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+
+
+MOST_CENTERS = 512
+"""What a table holds: docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl."""
+MOST_HELD = 100_000
+"""Blocks for which a temperature is held."""
+BlockLength = Annotated[float, Interval(gt=0.0, le=3600.0)]
+"""Of a block, s."""
+AverageLength = Annotated[float, Interval(gt=0.0, le=1e6)]
+"""Of the means of which RMS figures are taken, s."""
+
+
+def runtime_folders() -> tuple[Path, Path]:
+    """Folders `include` and `libc` of the runtime: in the installed package, else in the source tree.
+
+    Raises:
+        InputError: They are in neither place.
+    """
+    here = Path(__file__).resolve().parents[1]
+    for root in (here / "runtime", here.parents[1]):
+        if (root / "include" / "gtc.h").is_file():
+            return root / "include", root / "libc"
+    raise InputError(str(here), "the C runtime is missing", "folders include and libc")

@@ -31,9 +31,8 @@ from ..pages.unit import UnitResults
 from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
 from ..results.release import Limit
 from ..store.files import write_atomically, write_own
-from ..store.folder import result_folder
+from ..store.folder import result_folder, scratch_folder
 from ..store.marker import read_marker, sha256
-from ..store.scratch import scratch_folder
 
 _CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
 _UNITS = (

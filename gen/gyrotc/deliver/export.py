@@ -29,8 +29,8 @@ from ..common.texts import c_code, c_environment, toml_comment
 from ..jobs.axes import axes_in, check_emitted
 from ..model import Model, load_model, table_id
 from ..store.files import check_replaceable, json_text, write_atomically, write_own
+from ..store.folder import scratch_folder
 from ..store.marker import check_intact
-from ..store.scratch import scratch_folder
 from ..tables.record import RECORD, read_options
 from ..tables.rounding import channel_names, guard_of, sigma_cells
 from ..tables.text import example_period_us

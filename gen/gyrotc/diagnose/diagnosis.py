@@ -17,10 +17,9 @@ from ..results.diagnosed import Diagnosed
 from ..results.findings import Finding
 from ..results.training import Training
 from ..train.channels import StandIn
-from ..train.cross_validation import training_spans
-from ..train.data import TrainingData
+from ..train.data import TrainingData, training_spans
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_of, training_of
-from ..train.guards import channel_guard, stuck_after_s
+from ..train.result import channel_guard, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import Records, records_of
 from .extension import Extension, Refitting, extend, stand_ins_of

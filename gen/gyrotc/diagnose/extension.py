@@ -26,8 +26,7 @@ from ..recordings.records import Dataset
 from ..results.diagnosed import ShippingTrial
 from ..results.lot import LotUse
 from ..train.channels import StandIn, stand_in_of
-from ..train.cross_validation import training_spans
-from ..train.data import TrainingData, cleaned, joined, scaling_of
+from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, front_end, map_method, power_ons
 from ..train.mrbf import Bumps

@@ -24,10 +24,9 @@ from ..train.channels import channel_shown
 from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
-from ..train.guards import longest_same_s
 from ..train.methods import fit
 from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps
-from ..train.result import Fit, predict
+from ..train.result import Fit, longest_same_s, predict
 from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
 from .refine import Refined

@@ -26,7 +26,7 @@ from .. import causes
 from ..causes.base import Reach, SingleCycle
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
-from ..train.cross_validation import turning_points
+from ..train.data import turning_points
 from .attribution import Attribution
 from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched, shape_parameter

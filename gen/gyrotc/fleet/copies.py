@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..recordings.noise_copies import FASTEST_SIGNS, SLOWEST
+from ..recordings.copies import FASTEST_SIGNS, SLOWEST
 from ..results.fleet import Copy, FleetEntry, NoiseSigns
 
 _DIGITS = 16  # of a hash

@@ -12,11 +12,10 @@ from ..model import Model, load_model
 from ..pages.report import axes_page
 from ..results.verification import JointVerification, Verification
 from ..store.files import write_atomically, write_own
-from ..store.scratch import scratch_folder
-from ..tables.amalgamate import ARITHMETICS
+from ..store.folder import scratch_folder
 from ..tables.emit import config_text, emitted_tables, runtime_texts
 from ..tables.record import RECORD, joint_record_text
-from ..tables.text import example_period_us, example_samples
+from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.job import verify
 from ..verify.signatures import check_signature, load_public_key

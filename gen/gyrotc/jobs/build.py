@@ -33,8 +33,8 @@ from ..results.verification import Verification
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
 from ..store.marker import MARKER, sha256
-from ..tables.applied import applied_of
 from ..tables.emit import emit
+from ..tables.quantise import applied_of
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify.job import chosen_targets, verify
 from .axes import join_axes

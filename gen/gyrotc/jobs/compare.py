@@ -20,8 +20,7 @@ from ..common.errors import InputError
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
 from ..results.evaluation import Comparison, Group, Method, Pooled
-from ..train.cross_validation import training_spans
-from ..train.data import TrainingData, joined
+from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import front_end, samples_of
 from ..train.methods import fit
 from ..train.options import DEFAULTS, METHODS, BuildOptions

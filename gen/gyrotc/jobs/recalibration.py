@@ -18,8 +18,7 @@ from ..assess.changes import Earlier, load_earlier, started_on
 from ..assess.limits import Limits
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.inputs import checked, read_input
-from ..common.ranges import MOST_CENTERS
+from ..common.inputs import MOST_CENTERS, checked, read_input
 from ..lot.earlier import EarlierPrior, posterior_of_result, widened
 from ..lot.learn import FALSE_ALARM
 from ..lot.prior import MapPosterior

@@ -19,7 +19,7 @@ from ..results.lot import AtRest, CrossValidation, Lot, LotAgeing, LotCluster, L
 from ..results.training import Training
 from ..store.files import digest_of
 from ..store.marker import check_intact
-from ..tables.learning import MONTH_H
+from ..tables.emit import MONTH_H
 from ..target.learning import KNOTS
 from ..train.evidence import MEAN_S
 from ..train.means import UnitMeans, means_of

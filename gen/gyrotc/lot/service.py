@@ -20,8 +20,7 @@ from ..results.lot import LotAgeing
 from ..results.planned import Parking
 from ..store.files import write_atomically
 from ..store.folder import result_folder
-from ..tables.emit import emitted_tables, prior_of
-from ..tables.learning import MONTH_H, service_prior, walk
+from ..tables.emit import MONTH_H, emitted_tables, prior_of, service_prior, walk
 from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
 from ..train.data import TrainingData, scaling_of
 from ..train.evidence import TrainingFailed

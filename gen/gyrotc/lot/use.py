@@ -16,10 +16,9 @@ from ..common.errors import InputError
 from ..results.lot import KnownMap, Lot, LotUse, UnitCurve
 from ..train.data import Bins, Scaling, TrainingData, average
 from ..train.evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
-from ..train.guards import objection
 from ..train.means import UnitMeans, unit_means
 from ..train.mrbf import fit_mrbf
-from ..train.result import Given, Outcome
+from ..train.result import Given, Outcome, objection
 from .basis import LotBasis
 from .learn import FALSE_ALARM, freedom_of, of_few
 from .prior import MapPosterior, MapPrior, check_positive, process_result, processed, rounded, triangle

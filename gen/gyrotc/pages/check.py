@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from ..quality.pictures import Columned, Compared, Covered, Picture, Seen, Strip
+from ..quality.check import Columned, Compared, Covered, Picture, Seen, Strip
 from ..recordings.records import Curve
 from ..results.recordings import Checked
 from ..store.folder import write_result

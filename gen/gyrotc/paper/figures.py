@@ -19,8 +19,8 @@ from PIL.PngImagePlugin import PngInfo
 
 from ..pages.chart import COLOURS
 from ..pages.comparison import ENVIRONMENTS
+from ..simulate.gyro import CELL_S
 from ..simulate.instrument import SimulatedRecord
-from ..simulate.noise import CELL_S
 from ..store.files import write_atomically
 from .experiment import AVERAGE_S
 

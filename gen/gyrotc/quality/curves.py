@@ -22,8 +22,7 @@ from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark, Run
 from ..results.findings import Finding
-from .facts import RunFacts
-from .findings import Limits, finding
+from .findings import Limits, RunFacts, finding
 from .fits import evidence_beside_memories
 
 _NEXT = (

@@ -18,8 +18,7 @@ from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
 from ..results.findings import Finding
 from .changes import Change, changes_of
 from .curves import curve_findings
-from .facts import RunFacts, facts_of
-from .findings import finding
+from .findings import RunFacts, facts_of, finding
 from .outliers import departing_rows, spike_findings
 from .thermometers import temperature_findings_of
 

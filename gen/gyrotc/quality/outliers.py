@@ -23,8 +23,7 @@ from ..recordings.records import Run
 from ..results.findings import Finding
 from ..results.training import LeftOutRows, Outliers
 from ..target.front_end import samples_per_block
-from .facts import SPIKE_SIGMAS
-from .findings import finding, mark_of
+from .findings import SPIKE_SIGMAS, finding, mark_of
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows

@@ -26,8 +26,7 @@ from ..common.statistics import cell_means
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.findings import Finding
-from .facts import RunFacts, changes_in
-from .findings import finding, mark_of
+from .findings import RunFacts, changes_in, finding, mark_of
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd
 _CELL_S = 60.0  # of a mean: below it the lags of thermometers themselves show

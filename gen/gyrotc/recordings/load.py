@@ -15,13 +15,12 @@ from pydantic_core import PydanticCustomError, ValidationError
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
+from .copies import noise_signs, sketch
 from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
-from .noise_copies import noise_signs
 from .overlap import counted_once, shared_axes, shared_rows
 from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
-from .shared_rows import sketch
 from .units import NATIVE
 from .values import arrange
 

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from .copies import AXES_ALIKE, noise_copies, windows_in_common
 from .description import FILE, Problems, exclude_line
-from .noise_copies import AXES_ALIKE, noise_copies
 from .reading import Reader, Recording
 from .records import Exclusion, Run, SharedAxes, SharedRows
-from .shared_rows import windows_in_common
 from .values import MIN_ROWS
 
 _PART = 2**20  # rows that are compared at once

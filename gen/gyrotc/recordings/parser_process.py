@@ -35,7 +35,7 @@ import pyarrow as pa
 from ..common.arrays import numpy_of
 from ..common.errors import InputError
 from ..common.inputs import ENVIRONMENT, ceiling, refuse_above
-from ..store.scratch import scratch_folder
+from ..store.folder import scratch_folder
 from .sandbox import confine
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 

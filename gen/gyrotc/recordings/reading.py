@@ -13,13 +13,11 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import median_step
-from .csv_file import CsvFile
+from .copies import Fingerprints, NoisePrint, fingerprints_of, noise_of
 from .description import Columns, Problems
-from .files import Source
-from .noise_copies import NoisePrint, noise_of
+from .files import CsvFile, Source
 from .parser_process import Parser, open_confined
 from .records import Applied, EarthRate, Mark, Rows
-from .shared_rows import Fingerprints, fingerprints_of
 from .tables import LoggerTable
 from .units import Conversion, declared
 from .values import MIN_ROWS, Fault, Layout, arrange, faults, rate_faults

@@ -318,7 +318,7 @@ class Dataset:
         shared: Rows that runs of one role have in common, or that a run has twice; they count once.
         shared_axes: Axes that hold the same noise.
         sketch: Hashes of rows by which gyros of a fleet are compared (`shared_rows.sketch`).
-        noise_signs: What their noise is compared by (`noise_copies.noise_signs`).
+        noise_signs: What their noise is compared by (`copies.noise_signs`).
         curves: Mean rates over temperature, of every axis of every run.
     """
 

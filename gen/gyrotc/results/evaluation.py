@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics
-from ..common.ranges import AverageLength
 from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
 from .findings import Finding
 from .release import HeldLimits

@@ -25,9 +25,8 @@ from ..recordings.description import dataset_toml
 from ..results.recordings import SimulatedTruth, TrueLot, TrueRun
 from ..store.files import create, json_text, write_own
 from ..store.folder import result_folder
-from .gyro import BiasMap, draw
+from .gyro import CELL_S, BiasMap, bridge_arcsec, draw, quantised
 from .instrument import SimulatedRecord, record
-from .noise import CELL_S, bridge_arcsec, quantised
 from .scenario import NoiseLevels, Scenario, read
 from .truth import FILE as TRUTH_FILE
 

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -37,8 +37,11 @@ from scipy.signal import lfilter
 from ..causes.base import Scene
 from ..common.arrays import FloatArray
 from ..target.recursions import first_order
-from .noise import CELL_S
 from .scenario import Channel, Laser, Scenario, Thermometer
+
+if TYPE_CHECKING:
+    from .scenario import NoiseLevels
+
 
 T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
 R_LIMIT_C_PER_MIN = 2.5  # half of the fastest ramp of a chamber: the cavity follows slowly
@@ -312,3 +315,91 @@ def internal_readings(
     if scenario.laser and internal.laser:
         readings |= laser_readings(scenario.laser, internal.laser, np.random.default_rng(of_laser))
     return readings
+
+
+CELL_S = 1.0  # s: noise is drawn once a second and bridged between (docs/simulation.md)
+_SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
+_REFERENCE_C = 20.0  # room temperature, at which data sheets state a noise
+
+
+@dataclass(frozen=True, slots=True)
+class CellNoise:
+    """Noise of one run, without quantisation.
+
+    Attributes:
+        angle_arcsec: Angle gathered in each cell, shape (cells,).
+        white_arcsec: Standard deviation of its white part, shape (cells,).
+    """
+
+    angle_arcsec: FloatArray
+    white_arcsec: FloatArray
+
+
+def white_sigma_arcsec(levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
+    """Standard deviation of the angle that the random walk gathers in a cell, arcsec, one for each cell.
+
+    Grows by a share for each C below or above 20 C (by its sign) and for each C/min of heating or cooling.
+    """
+    growth = (
+        1.0
+        + levels.arw_growth_per_c * (temperature_c - _REFERENCE_C)
+        + levels.arw_growth_per_c_per_min * np.abs(slope_c_per_min)
+    )
+    return np.asarray(levels.arw_deg_per_sqrt_h * 3600.0 * np.sqrt(CELL_S / 3600.0) * np.maximum(growth, 0.1))
+
+
+def cell_noise(
+    seeds: np.random.SeedSequence, levels: NoiseLevels, temperature_c: FloatArray, slope_c_per_min: FloatArray
+) -> CellNoise:
+    """Noise of a run whose gyro has these temperatures (C) and rates (C/min), one for each cell."""
+    cells = len(temperature_c)
+    white, flicker, walk, kicks = (np.random.default_rng(child) for child in seeds.spawn(4))
+    sigma = white_sigma_arcsec(levels, temperature_c, slope_c_per_min)
+    angle = sigma * white.standard_normal(cells)
+    if levels.bias_instability_dph:
+        angle += CELL_S * _flicker_dph(flicker, cells, levels.bias_instability_dph)
+    if levels.rate_random_walk_dph_per_sqrt_h:
+        step = levels.rate_random_walk_dph_per_sqrt_h * np.sqrt(CELL_S / 3600.0)
+        angle += CELL_S * np.cumsum(walk.normal(0.0, step, cells))
+    if levels.outliers_per_h:
+        hit = kicks.random(cells) < levels.outliers_per_h * CELL_S / 3600.0
+        size = kicks.uniform(0.5, 1.5, cells) * kicks.choice([-1.0, 1.0], cells)
+        angle += np.where(hit, levels.outlier_arcsec * size, 0.0)
+    return CellNoise(angle, sigma)
+
+
+def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: float) -> FloatArray:
+    """Flicker noise with spectral density B²/(2π f) (two-sided), a sum of Markov processes, shape (cells,).
+
+    Correlation times from a cell to ten times the record, evenly in their logarithm; the variance of each is
+    B² ln(ratio)/π, so that the Allan deviation stands at √(2 ln 2/π) B between both ends.
+    """
+    count = int(np.ceil(np.log(10.0 * cells) / np.log(_SPREAD))) + 1
+    sigma = bias_instability_dph * np.sqrt(np.log(_SPREAD) / np.pi)
+    total = np.zeros(cells)
+    for index in range(count):
+        decay = float(np.exp(-(_SPREAD**-index)))
+        start = rng.normal(0.0, sigma)
+        steps = rng.normal(0.0, sigma * np.sqrt(1.0 - decay**2), cells)
+        total += lfilter([1.0], [1.0, -decay], steps, zi=[decay * start])[0]
+    return total
+
+
+def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: FloatArray) -> FloatArray:
+    """How the white angle departs, at a cell's inner edges, from growing evenly, shape (cells, parts − 1).
+
+    A Brownian bridge: with the even growth added it is a random walk with `white_arcsec` for a whole cell.
+    """
+    steps = rng.standard_normal((len(white_arcsec), parts), dtype=np.float32)
+    steps -= steps.mean(axis=1, keepdims=True)
+    walk = np.cumsum(steps[:, :-1], axis=1, dtype=np.float64)
+    return np.asarray(walk * (white_arcsec[:, None] / np.sqrt(parts)))
+
+
+def quantised(angle_arcsec: FloatArray, quantum_arcsec: float, phase: FloatArray) -> FloatArray:
+    """Angle as read in steps of the quantum while dither moves it; the known dither is taken off again.
+
+    `phase`: dither at the readings, quanta, uniform over 0 ... 1. The error is uniform over one quantum and
+    independent from reading to reading: IEEE's Q = quantum/√12.
+    """
+    return np.asarray(quantum_arcsec * (np.floor(angle_arcsec / quantum_arcsec + phase) - phase + 0.5))

@@ -23,9 +23,18 @@ from ..causes.base import Scene
 from ..common.arrays import FloatArray
 from ..common.inputs import need_memory
 from ..target.recursions import first_order
-from . import noise, profile
-from .gyro import BiasMap, channel_readings, channel_values, internal_of, internal_readings, quantised_c
-from .noise import CELL_S
+from . import profile
+from .gyro import (
+    CELL_S,
+    BiasMap,
+    cell_noise,
+    channel_readings,
+    channel_values,
+    internal_of,
+    internal_readings,
+    quantised,
+    quantised_c,
+)
 from .scenario import Chamber, Gyro, Profile, Scenario
 
 
@@ -173,7 +182,7 @@ def record(
         for channel, child in zip(scenario.channel, channel_seeds.spawn(len(scenario.channel)), strict=True)
     }
     cavity = scene.cavity_c[inside]
-    rough = noise.cell_noise(noisy, scenario.noise, cavity[:-1], 60.0 * np.diff(cavity) / CELL_S)
+    rough = cell_noise(noisy, scenario.noise, cavity[:-1], 60.0 * np.diff(cavity) / CELL_S)
     there = bias[inside]
     true = np.concatenate(([0.0], np.cumsum(0.5 * CELL_S * (there[1:] + there[:-1]))))
     gathered = true + np.concatenate(([0.0], np.cumsum(rough.angle_arcsec)))
@@ -225,7 +234,7 @@ def _read_angle(angle: FloatArray, quantum_arcsec: float, seeds: np.random.SeedS
     if not quantum_arcsec:
         return angle
     phase = np.random.default_rng(seeds.spawn(1)[0]).random(len(angle))
-    return noise.quantised(angle, quantum_arcsec, phase)
+    return quantised(angle, quantum_arcsec, phase)
 
 
 def _scene(

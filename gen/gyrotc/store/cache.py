@@ -23,8 +23,7 @@ from platformdirs import user_cache_path
 
 from .. import __version__, _core
 from ..common.errors import InputError
-from ..common.inputs import read_input
-from ..common.runtime import runtime_folders
+from ..common.inputs import read_input, runtime_folders
 from .files import digest_of, write_atomically
 from .marker import sha256
 

@@ -15,7 +15,7 @@ from ..common.inputs import need_memory
 from .arithmetic import Arithmetic, Numbers
 from .recursions import Course
 from .samples import HELD, RESTART, Guarded, judge_readings
-from .status import WARMING
+from .table import WARMING
 
 MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed

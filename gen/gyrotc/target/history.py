@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import f32, q31
-from . import status as status_bits
+from . import table as status_bits
 from .arithmetic import F32, Q31, Arithmetic, Bells, Numbers, Operations
 from .front_end import FALLBACK, KEEP, MAP, Settings, Steps, Stream, follow, period_us, with_missing
 from .maps import evaluate_map, governed, stand_in
 from .recursions import CourseChannel, Recursion, TableKind, TermOutcome, recursion_of
 from .samples import Guarded
 from .sigma import evidence_of, sigma_bits
-from .status import CHANNEL_LOST, CLAMPED, HELD
-from .table import Table, Words
+from .table import CHANNEL_LOST, CLAMPED, HELD, Table, Words
 
 _SINE_F32 = tuple(
     np.float32(float.fromhex(c))

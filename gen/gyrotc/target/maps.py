@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import f32, q31
-from .status import CLAMPED, E_ARG, UNCOVERED
-from .table import MISSING_Q31, Table, Words
+from .table import CLAMPED, E_ARG, MISSING_Q31, UNCOVERED, Table, Words
 
 __all__ = ["evaluate_map", "governed", "stand_in"]
 

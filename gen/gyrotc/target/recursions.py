@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from .arithmetic import Numbers, Operations
-from .status import CLAMPED
+from .table import CLAMPED
 
 Number = TypeVar("Number", bound=np.generic)
 

@@ -20,8 +20,7 @@ from .arithmetic import Numbers
 from .front_end import FALLBACK as FALLEN
 from .front_end import MAP, Steps
 from .recursions import Course, TableKind, TermOutcome
-from .status import FALLBACK, UNCOVERED, WARMING
-from .table import Table, Words
+from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
 RULES = 11

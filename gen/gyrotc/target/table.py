@@ -1,7 +1,8 @@
 """Table layout 2 as Python data: the words of one table, in the order of its binary image.
 
 Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
-every word; this package computes with a `Table`, `tables` makes one and prints it.
+every word; this package computes with a `Table`, `tables` makes one and prints it. The status bits are those of
+`include/gtc.h`; tests/py/target/test_reference.py compares the two.
 """
 
 from __future__ import annotations
@@ -198,3 +199,21 @@ class Table:
         """The other way."""
         kept = numbers.astype(np.float32 if self.numeric == "f32" else np.int32)
         return np.ascontiguousarray(kept).view(np.uint32)
+
+
+# Results of the functions of the runtime, GTC_OK and so on; the bits of one that is 0 or more may be set together:
+OK = 0
+WARMING = 1
+CLAMPED = 2
+UNCOVERED = 4
+HELD = 8
+FALLBACK = 16
+CHANNEL_LOST = 32
+E_ARG = -1
+E_LAYOUT = -2
+E_SELF_TEST = -3
+E_IMAGE = -4
+E_ID = -5
+E_PERIOD = -6
+E_ABSENT = -7
+E_REST = -8

@@ -40,10 +40,9 @@ from ..target.recursions import CourseChannel, TableKind
 from ..target.samples import Guarded
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, TrainingFailed, conditioned, fit_process
-from .guards import channel_guard
 from .methods import fit
 from .parts import Parts, PartsTrial, bent_parts, chosen_parts
-from .result import predict, rescaled, snapped
+from .result import channel_guard, predict, rescaled, snapped
 from .samples import Blocks
 from .uncertainty import of_few
 

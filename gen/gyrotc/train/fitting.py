@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
+from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
-from ..common.ranges import MOST_HELD
 from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
@@ -26,16 +26,13 @@ from ..results.evaluation import Pooled
 from ..results.findings import Finding
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
-from .cross_validation import Span, training_spans, whole_runs
-from .data import TrainingData, average, cleaned, joined, scaling_of
-from .evidence import MEAN_S, TrainingFailed
-from .guards import AGREE_S, longest_same_s, stuck_after_s
+from .data import Span, TrainingData, average, cleaned, joined, scaling_of, training_spans, whole_runs
+from .evidence import MEAN_S, TrainingFailed, noise_terms, sensitivities, stretches
 from .means import unit_means
 from .methods import fit
 from .mrbf import Bumps
-from .noise import noise_terms, sensitivities, stretches
 from .options import AUTO, SIMPLE, BuildOptions
-from .result import Fit, Prior, predict, snapped
+from .result import AGREE_S, Fit, Prior, longest_same_s, predict, snapped, stuck_after_s
 from .samples import Blocks, run_blocks
 from .uncertainty import coverage, rezero_dph, uncertainty
 

@@ -11,8 +11,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.training import MapMeans
 from .data import Scaling, TrainingData, average, gather
-from .evidence import MEAN_S, Process
-from .noise import difference_sigma
+from .evidence import MEAN_S, Process, difference_sigma
 
 _GRID = 2.0**30  # of a spread: as many digits as a file holds
 

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from ..common.errors import InputError
 from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, cleaned, scaling_of
-from .evidence import TrainingFailed
-from .guards import objection
+from .evidence import TrainingFailed, floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .noise import floor_dph
 from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOptions
 from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
-from .result import Fit, Outcome, Prior, network, predict
+from .result import Fit, Outcome, Prior, network, objection, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .uncertainty import coverage, uncertainty

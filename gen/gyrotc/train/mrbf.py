@@ -26,8 +26,7 @@ from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from .data import Bins, Scaling, TrainingData, scaling_of
-from .evidence import Process, fit_process
-from .noise import not_white
+from .evidence import Process, fit_process, not_white
 from .result import Outcome, network
 from .simple import FLAT, without_rate
 

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 from annotated_types import Interval
 
 from ..common.errors import InputError
-from ..common.inputs import refused
-from ..common.ranges import MOST_CENTERS, AverageLength, BlockLength
+from ..common.inputs import MOST_CENTERS, AverageLength, BlockLength, refused
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

@@ -27,8 +27,8 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData, average
+from .evidence import floor_dph
 from .mrbf import fit_mrbf
-from .noise import floor_dph
 from .result import Outcome, network
 
 _HOLD = 0.1  # |dT/dt| of a hold, share of the half range; the hold's region reaches to twice that

@@ -19,17 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from .cross_validation import (
+from .data import (
     LIKELIER,
     Fold,
+    Scaling,
+    TrainingData,
+    average,
     more_than_its_error,
     pieces,
     surely_above_0,
     unseen_log_likelihood,
 )
-from .data import Scaling, TrainingData, average
-from .evidence import MEAN_S, Process, conditioned, fit_process
-from .noise import difference_sigma
+from .evidence import MEAN_S, Process, conditioned, difference_sigma, fit_process
 
 _ROUNDS = 2  # of process and weights in turn: a third moves the weights of simulated gyros by less than 1 %
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import steps_are
 from ..quality.outliers import departing_rows
-from ..target import status as status_bits
+from ..target import table as status_bits
 from ..target.arithmetic import F32
 from ..target.front_end import (
     FALLBACK,

@@ -32,21 +32,24 @@ from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import LEAST_SPAN_C, median
-from .cross_validation import (
+from .data import (
     LIKELIER,
     Fold,
+    Scaling,
+    TrainingData,
+    average,
+    cells_of,
     edges_of,
+    gather,
     pieces,
     surely_above_0,
     t_statistic,
     unseen_log_likelihood,
+    weighted_mean,
 )
-from .data import Scaling, TrainingData, average, cells_of, gather, weighted_mean
-from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, fit_process
-from .guards import objection
+from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, difference_sigma, fit_process
 from .mrbf import fit_mrbf
-from .noise import difference_sigma
-from .result import Outcome
+from .result import Outcome, objection
 from .simple import Mixed, all_solved, fit_mixed_model, fit_simple, outcome_of, powers_of, triangle_of
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")

@@ -23,10 +23,8 @@ from numpy.typing import NDArray
 from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import median
-from .cross_validation import edges_of, turning_points
-from .data import Scaling, TrainingData, average, cells_of
-from .evidence import GRID, MEAN_S, TrainingFailed
-from .noise import floor_dph
+from .data import Scaling, TrainingData, average, cells_of, edges_of, turning_points
+from .evidence import GRID, MEAN_S, TrainingFailed, floor_dph
 from .options import SIMPLE
 from .result import Network, Outcome, network
 

@@ -34,8 +34,7 @@ from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
 from ..target.recursions import play
-from .cross_validation import edges_of
-from .data import TrainingData, average, cleaned
+from .data import TrainingData, average, cleaned, edges_of
 from .evidence import MEAN_S, Process, fit_process
 from .result import Fit, predict
 

@@ -21,7 +21,7 @@ from ..common.errors import CheckFailed
 from ..common.inputs import read_input
 from ..model import Model
 from ..results.verification import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
-from ..store.scratch import scratch_folder
+from ..store.folder import scratch_folder
 from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
 from ..target.history import answers

@@ -19,15 +19,15 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ..common.errors import CheckFailed, InputError
-from ..common.runtime import runtime_folders
+from ..common.inputs import runtime_folders
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..model import SERIAL, Model
 from ..results.verification import VerifiedFile
 from ..store.files import write_own
 from ..store.marker import read_marker
-from ..tables.amalgamate import ARITHMETICS, LEARNING, amalgamate
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
+from ..tables.text import ARITHMETICS, LEARNING, amalgamate
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})

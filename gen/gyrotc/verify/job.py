@@ -36,8 +36,8 @@ from ..results.verification import (
     VerifiedTarget,
     WorstError,
 )
+from ..store.folder import scratch_folder
 from ..store.marker import check_intact
-from ..store.scratch import scratch_folder
 from ..tables.emit import expected_answers
 from ..tables.vectors import Vectors, make_vectors
 from ..target.q31 import exp2_table

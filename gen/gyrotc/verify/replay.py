@@ -24,8 +24,8 @@ from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..results.verification import ReplayedRows, VerifiedTarget
 from ..store.files import write_own
-from ..store.scratch import scratch_folder
-from ..tables.applied import channels_of
+from ..store.folder import scratch_folder
+from ..tables.quantise import channels_of
 from ..target.front_end import period_us, samples_per_block
 from ..target.history import FollowedHistory, Replay, followed
 from ..target.table import Table, Words

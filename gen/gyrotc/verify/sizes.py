@@ -17,7 +17,7 @@ from ..common.texts import c_environment
 from ..model import Model
 from ..results.verification import FunctionCost
 from ..store.files import write_own
-from ..store.scratch import scratch_folder
+from ..store.folder import scratch_folder
 from ..tables.text import example_period_us
 from ..target.table import Table
 from .emitted import checked_sources, table_files

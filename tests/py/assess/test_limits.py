@@ -26,7 +26,7 @@ from gyrotc.results.verification import MapError, Verification, VerifiedTarget, 
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay
-from gyrotc.target.status import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
+from gyrotc.target.table import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
 from models import random_model
 from recordings import columns, described, write_csv
 

@@ -10,7 +10,7 @@ import pytest
 from conftest import HOST, run_here
 from gyrotc.assess.findings import residual_test
 from gyrotc.results.evaluation import RMS_OVER_FLOOR, ResidualTest
-from gyrotc.train.noise import robust_sigma
+from gyrotc.train.evidence import robust_sigma
 from numpy.typing import NDArray
 from recordings import write_csv
 

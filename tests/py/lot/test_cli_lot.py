@@ -18,7 +18,7 @@ from gyrotc.model import BiasSpread, load_model
 from gyrotc.recordings.load import load
 from gyrotc.results.planned import LotPlan, NextRun
 from gyrotc.store.files import json_text
-from gyrotc.tables.learning import MONTH_H
+from gyrotc.tables.emit import MONTH_H
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from gyrotc.train.result import predict

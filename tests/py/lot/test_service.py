@@ -24,8 +24,7 @@ from gyrotc.lot.service import (
 from gyrotc.model import Learning, Model, Uncertainty, load_model
 from gyrotc.results.evaluation import InService
 from gyrotc.results.lot import LotAgeing
-from gyrotc.tables.emit import emit
-from gyrotc.tables.learning import MONTH_H, data_sheet_spread, service_prior, walk
+from gyrotc.tables.emit import MONTH_H, data_sheet_spread, emit, service_prior, walk
 from gyrotc.target.learning import KNOTS, Learner, full
 from gyrotc.train.data import TrainingData
 from gyrotc.train.means import UnitMeans

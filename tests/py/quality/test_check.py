@@ -16,10 +16,9 @@ from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
 from gyrotc.pages.check import write_check_page
-from gyrotc.quality.check import CheckResult, check, envelope_of
+from gyrotc.quality.check import CheckResult, check, envelope_of, pictures_of
 from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.quality.findings import finding
-from gyrotc.quality.pictures import pictures_of
 from gyrotc.recordings.plausibility import earth_rate
 from gyrotc.results.findings import Finding
 from gyrotc.results.fleet import Facts, FleetEntry

@@ -16,7 +16,7 @@ from gyrotc.quality.changes import Change, changes_of
 from gyrotc.quality.check import check
 from gyrotc.quality.curves import curve_findings
 from gyrotc.quality.events import _Judged, accepted, found_events
-from gyrotc.quality.facts import facts_of
+from gyrotc.quality.findings import facts_of
 from gyrotc.quality.outliers import departing
 from gyrotc.quality.thermometers import displaced, stuck_stretches, thermometer_findings
 from gyrotc.recordings.load import load

@@ -15,7 +15,7 @@ import pytest
 from gyrotc.assess.findings import findings_of
 from gyrotc.model import Model
 from gyrotc.quality.check import findings_of_run
-from gyrotc.quality.facts import facts_of
+from gyrotc.quality.findings import facts_of
 from gyrotc.quality.outliers import departing_rows
 from gyrotc.quality.thermometers import jumps_of
 from gyrotc.recordings.load import load

@@ -20,8 +20,8 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.quality.check import check
 from gyrotc.recordings import files
-from gyrotc.recordings.csv_file import CsvFile
 from gyrotc.recordings.description import Problems
+from gyrotc.recordings.files import CsvFile
 from gyrotc.recordings.load import axes_of, load, survey
 from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.records import Applied

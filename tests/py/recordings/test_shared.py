@@ -10,9 +10,8 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.fleet.copies import copies
 from gyrotc.quality.check import check
+from gyrotc.recordings.copies import fingerprints_of, noise_copies, noise_of, windows_in_common
 from gyrotc.recordings.load import load
-from gyrotc.recordings.noise_copies import noise_copies, noise_of
-from gyrotc.recordings.shared_rows import fingerprints_of, windows_in_common
 from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv

@@ -170,7 +170,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
     assert "git tag -a v0.2.0" in reported
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
-    emitter = clone / "gen" / "gyrotc" / "tables" / "amalgamate.py"
+    emitter = clone / "gen" / "gyrotc" / "tables" / "text.py"
     emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
     command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
     command.write_text(command.read_text("utf-8").replace("in a shell, on", "in a shell of the tag, on"), "utf-8")

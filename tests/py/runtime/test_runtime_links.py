@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.common.runtime import runtime_folders
+from gyrotc.common.inputs import runtime_folders
 from gyrotc.model import Model, Term
-from gyrotc.tables.amalgamate import amalgamate
 from gyrotc.tables.emit import emit, emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS
-from gyrotc.target.status import E_ID, E_IMAGE, E_LAYOUT
-from gyrotc.target.table import SERIAL_WORDS, Table, Words
+from gyrotc.tables.text import amalgamate
+from gyrotc.target.table import E_ID, E_IMAGE, E_LAYOUT, SERIAL_WORDS, Table, Words
 from gyrotc.verify.sizes import PUBLIC
 from gyrotc.verify.toolchain import all_targets, compile_c, compile_objects, run_program
 from libc_build import Runtime, runtime

@@ -17,8 +17,7 @@ from conftest import ROOT
 from gyrotc.common.errors import CheckFailed
 from gyrotc.model import Model, Term, load_model
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.status import E_ID, E_IMAGE
-from gyrotc.target.table import Words
+from gyrotc.target.table import E_ID, E_IMAGE, Words
 from gyrotc.train.uncertainty import rezero_dph
 from libc_build import Runtime, runtime
 from libc_device import SAVE_WORDS, Device, history, variant

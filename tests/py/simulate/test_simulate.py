@@ -14,10 +14,9 @@ import pytest
 from gyrotc.causes import CATALOGUE
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
-from gyrotc.simulate import noise
 from gyrotc.simulate.campaign import NOISE, RowLength, campaign, gyro_map, rows, simulate
+from gyrotc.simulate.gyro import CELL_S, cell_noise, quantised, white_sigma_arcsec
 from gyrotc.simulate.instrument import SimulatedRecord
-from gyrotc.simulate.noise import CELL_S, cell_noise
 from gyrotc.simulate.scenario import NoiseLevels, names, read
 from gyrotc.simulate.truth import read_truth, simulated_floor
 from numpy.typing import NDArray
@@ -488,7 +487,7 @@ def test_a_quantum_falls_as_one_over_tau(seed: int) -> None:
     quantum = 0.5
     rng = np.random.default_rng(seed)
     angle = np.cumsum(rng.normal(0.0, 1e-3, 200_001))
-    read = noise.quantised(angle, quantum, rng.random(200_001))
+    read = quantised(angle, quantum, rng.random(200_001))
     assert np.abs(read - angle).max() <= 0.5 * quantum * (1.0 + 1e-12)
     taus = [1.0, 4.0, 16.0]
     _, low, high = allan(np.diff(read) / CELL_S, taus)
@@ -499,7 +498,7 @@ def test_a_quantum_falls_as_one_over_tau(seed: int) -> None:
 
 def test_noise_grows_with_temperature_and_ramp_as_declared() -> None:
     levels = NoiseLevels(arw_deg_per_sqrt_h=1e-3, arw_growth_per_c=-0.01, arw_growth_per_c_per_min=0.3)
-    at = noise.white_sigma_arcsec(levels, np.array([20.0, -30.0, 20.0]), np.array([0.0, 0.0, -2.0]))
+    at = white_sigma_arcsec(levels, np.array([20.0, -30.0, 20.0]), np.array([0.0, 0.0, -2.0]))
     assert at / at[0] == pytest.approx([1.0, 1.5, 1.6])
     assert at[0] == pytest.approx(1e-3 * 60.0)
 

@@ -8,17 +8,17 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from gyrotc.store.scratch import scratch_folder
+from gyrotc.store.folder import scratch_folder
 
 JOB = """
 import time
-from gyrotc.store.scratch import scratch_folder
+from gyrotc.store.folder import scratch_folder
 with scratch_folder() as folder:
     print(folder, flush=True)
     time.sleep(600)
 """
 MANY = """
-from gyrotc.store.scratch import scratch_folder
+from gyrotc.store.folder import scratch_folder
 for _ in range(300):
     with scratch_folder() as folder:
         (folder / "x").write_text("1")

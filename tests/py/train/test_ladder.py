@@ -14,14 +14,23 @@ from conftest import ROOT
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Run
-from gyrotc.train.cross_validation import Fold, Span, pieces, training_spans
-from gyrotc.train.data import TrainingData, average, cleaned, gather, scaling_of, weighted_mean
+from gyrotc.train.data import (
+    Fold,
+    Span,
+    TrainingData,
+    average,
+    cleaned,
+    gather,
+    pieces,
+    scaling_of,
+    training_spans,
+    weighted_mean,
+)
 from gyrotc.train.evidence import conditioned, fit_process
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.guards import objection
 from gyrotc.train.methods import METHODS, NETWORK_METHODS, fit
 from gyrotc.train.options import SIMPLE
-from gyrotc.train.result import Fit, predict
+from gyrotc.train.result import Fit, objection, predict
 from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
 from gyrotc.train.simple import all_solved, design, fit_mixed_model, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gyrotc.common.arrays import FloatArray
 from gyrotc.train.data import TrainingData
+from gyrotc.train.evidence import allan_variance, noise_terms, sensitivities, stretches
 from gyrotc.train.methods import fit
-from gyrotc.train.noise import allan_variance, noise_terms, sensitivities, stretches
 from gyrotc.train.result import predict
 from gyrotc.train.uncertainty import _likeliest, coverage, of_few, uncertainty
 from numpy.typing import NDArray

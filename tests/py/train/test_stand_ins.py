@@ -15,12 +15,10 @@ from gyrotc.model import Model, Network, Scale, Term
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Rows
 from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.applied import channels_of
-from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.tables.quantise import NUMERICS, channels_of, quantise
 from gyrotc.target.history import Replay, replay
 from gyrotc.target.maps import stand_in
-from gyrotc.target.status import CHANNEL_LOST
-from gyrotc.target.table import Table
+from gyrotc.target.table import CHANNEL_LOST, Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.result import rescaled
 from libc_build import runtime

@@ -13,8 +13,7 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.assess.product_guards import BuiltUnit
 from gyrotc.common.errors import InputError
 from gyrotc.model import BiasSpread, Learning, Model, load_model
-from gyrotc.tables.emit import emit, prior_of
-from gyrotc.tables.learning import data_sheet_spread
+from gyrotc.tables.emit import data_sheet_spread, emit, prior_of
 from gyrotc.target.learning import E_ID, E_IMAGE, KEPT_WORDS, OK, REFUSED, Learner
 from gyrotc.verify.job import verify
 from gyrotc.verify.learning import drawn_calls, expected_words

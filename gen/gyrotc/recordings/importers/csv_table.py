@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from ...common.errors import InputError
-from ..csv_file import blocks_of_lines, parsed
+from ..files import blocks_of_lines, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .csv_dialect import (
     HEXADECIMAL,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ...common.errors import InputError
 from ...common.inputs import open_input, refuse_above
-from ...store.scratch import scratch_folder
+from ...store.folder import scratch_folder
 from ..parser_process import Parser, open_confined
 from ..tables import LoggerFile
 from .csv_table import open_csv
