@@ -79,7 +79,7 @@ check:
 	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/promises
 	@$(PYTHON) -m pytest -q tests/py/repository/test_examples.py -k notebook
-	@$(PYTHON) -m gyrotc.paper docs --check
+	@$(PYTHON) -m gyrotc.paper.page docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/paper/test_paper_reference.py
 	@$(PYTHON) -m pytest -q -n 2 tests/py/diagnose/test_diagnose_fixed.py -k "eighty or fresh"
 
@@ -117,7 +117,7 @@ picture: demo
 ## the paper's table and figures again: docs/paper.md
 paper:
 	@tools/setup.sh test
-	@$(PYTHON) -m gyrotc.paper docs
+	@$(PYTHON) -m gyrotc.paper.page docs
 
 ## measured recordings with runs or spans left out: docs/real.md (DATA=folder of the sets)
 real: setup

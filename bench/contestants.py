@@ -18,7 +18,7 @@ from gyrotc import _core
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import read_truth
-from gyrotc.train.data import TrainingData, average, joined
+from gyrotc.train.data import TrainingData, average
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict

@@ -24,8 +24,21 @@ from numpy.typing import NDArray
 from results import table as markdown
 
 from .faults import (
-    CLASSES, FIRST_SEED, HEALTHY_S, INIT, MISSED, PART, PLAN, POWER_CYCLE, REZERO,
-    Calls, Fault, Floats, Say, Unit, driven,
+    CLASSES,
+    FIRST_SEED,
+    HEALTHY_S,
+    INIT,
+    MISSED,
+    PART,
+    PLAN,
+    POWER_CYCLE,
+    REZERO,
+    Calls,
+    Fault,
+    Floats,
+    Say,
+    Unit,
+    driven,
 )  # fmt: skip
 from .faults import unit as unit_of
 

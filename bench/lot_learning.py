@@ -25,7 +25,7 @@ from gyrotc.lot.learn import FALSE_ALARM, UnitSums, sums_of
 from gyrotc.lot.use import LotPrior
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
-from gyrotc.results.lot import Lot as LearnedLot
+from gyrotc.results.fleet import Lot as LearnedLot
 from gyrotc.results.training import MapMeans, Training
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot

@@ -23,7 +23,7 @@ import numpy as np
 from gyrotc.lot.learn import learn
 from gyrotc.lot.use import LotPrior
 from gyrotc.recordings.load import load
-from gyrotc.results.lot import Lot
+from gyrotc.results.fleet import Lot
 from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import SWITCHES
-from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables.emit import SWITCHES, emit_texts, quantise_all
 from results import table as markdown
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -199,7 +198,7 @@ def _before(folder: Path) -> Iterator[dict[str, Any]]:
     ]
     folders = ("-Iinclude", "-Iexamples/nav_loop")
     for program in PROGRAMS:
-        if program.text is _MAIN and program.calls != () or program == PROGRAMS[0]:
+        if (program.text is _MAIN and program.calls != ()) or program == PROGRAMS[0]:
             text = _text(program).replace(
                 "gtc_f32_sample(&state, 1000000UL, &c)", "gtc_f32_sample(&state, &c)"
             )

@@ -28,7 +28,7 @@ import pyarrow.parquet as pq
 from gyrotc.quality.check import check
 from gyrotc.quality.events import found_events
 from gyrotc.recordings.load import load
-from gyrotc.results.findings import Finding
+from gyrotc.results.base import Finding
 
 from .blind.chamber import Array, draw_unit, expose, steps
 from .blind.noise import Noise, draw

@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.metrics import average
-from gyrotc.paper.figures import AFTER, BEFORE, png
+from gyrotc.paper.experiment import AFTER, BEFORE, png
 from gyrotc.paper.page import filled
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.tables.emit import emit

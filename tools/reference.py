@@ -56,14 +56,14 @@ def c_page() -> str:
 
 def cli_page() -> str:
     """Every command with its arguments and options."""
-    from gyrotc.cli.commands import app
+    from gyrotc.cli.main import application
     from typer.main import get_command
 
     parts = [
         "# Command line reference\n",
         "Made from the commands by `tools/reference.py`; `gyrotc COMMAND --help` says the same.\n",
     ]
-    commands: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
+    commands: dict[str, Any] = get_command(application()).commands  # type: ignore[attr-defined]
     for name, command in sorted(commands.items()):
         text = inspect.cleandoc(command.help or "")
         parts += [
@@ -93,14 +93,14 @@ def _cell(text: str) -> str:
 
 def schemas_page() -> str:
     """Every JSON Schema with its first fields; FORMAT.md has those within objects."""
-    from gyrotc.cli.schemas import KINDS
+    from gyrotc.cli.shell import kinds
 
     parts = [
         "# JSON reference\n",
         "Made from the schemas by `tools/reference.py`. `gyrotc schema NAME` prints one; fields within objects",
         "and what they mean: [FORMAT.md](FORMAT.md).\n",
     ]
-    for kind, described in KINDS.items():
+    for kind, described in kinds().items():
         schema = described.model_json_schema(by_alias=True)
         required = set(schema.get("required", []))
         parts += [f"## {kind}\n", _cell(schema.get("description", "")) + "\n"]
@@ -138,11 +138,11 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
 
 def format_page() -> str:
     """docs/FORMAT.md with the tables of fields."""
-    from gyrotc.cli.schemas import KINDS, tables
+    from gyrotc.cli.shell import kinds, tables
 
     def table(place: re.Match[str]) -> str:
         other = REPORTED_BY.get(place[1])
-        return tables(KINDS[place[1]], [KINDS[other]] if other else []).rstrip()
+        return tables(kinds()[place[1]], [kinds()[other]] if other else []).rstrip()
 
     return PLACE.sub(table, (ROOT / "docs" / "FORMAT.md").read_text("utf-8"))
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.fleet.copies import copies
+from gyrotc.fleet.outliers import copies
 from gyrotc.jobs.build import build_into
 from gyrotc.recordings.copies import noise_of, noise_signs
 from gyrotc.recordings.load import load

@@ -65,10 +65,10 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
 
 def invoked(*args: object) -> Result:
     """The command in this process, which has all modules already."""
-    from gyrotc.cli.commands import app
+    from gyrotc.cli.main import application
     from typer.testing import CliRunner
 
-    return CliRunner().invoke(app, [str(a) for a in args])
+    return CliRunner().invoke(application(), [str(a) for a in args])
 
 
 def run_here(*args: str | Path) -> str:

@@ -25,13 +25,13 @@ from gyrotc.diagnose.signature_bank import build
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages.diagnosis import write_diagnosis_page
-from gyrotc.pages.plan import write_plan_page
+from gyrotc.pages.short import write_plan_page
 from gyrotc.plan.plan import plan
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.planned import Plan
+from gyrotc.results.recordings import Plan
 from gyrotc.results.training import DeclaredUnits, Manifest
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read as read_scenario

@@ -28,7 +28,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "budget": ("gen/gyrotc/assess", *_TRAIN),
     "catalogue": ("gen/gyrotc/fleet/catalogue.py",),
     "events": ("gen/gyrotc/quality",),
-    "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/copies.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
+    "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/outliers.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
     "faults": (*_RUNTIME, *_TRAIN),
     "faults-learned": ("gen/gyrotc/target/learning.py", "gen/gyrotc/assess/product_guards.py"),
     "fleet": _MANY,

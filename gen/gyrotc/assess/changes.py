@@ -30,8 +30,8 @@ from ..results.evaluation import (
     NameChanges,
     TextChange,
 )
+from ..results.release import Verification
 from ..results.training import Manifest, Training
-from ..results.verification import Verification
 from .evaluate import evaluate
 from .limits import Limits, held_against
 

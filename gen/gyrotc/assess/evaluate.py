@@ -28,7 +28,7 @@ from ..quality.check import findings_of_run
 from ..quality.findings import RunFacts, facts_of
 from ..quality.outliers import departing_rows
 from ..recordings.records import Dataset, Rows, Run
-from ..results.base import read_result
+from ..results.base import Finding, read_result
 from ..results.evaluation import (
     EvaluatedRun,
     Evaluation,
@@ -39,7 +39,6 @@ from ..results.evaluation import (
     RunStatistics,
     Statistics,
 )
-from ..results.findings import Finding
 from ..results.training import Training
 from ..simulate.truth import simulated_floor
 from ..store.files import create
@@ -49,8 +48,8 @@ from ..target.table import Table, Words
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
+from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
 from .findings import findings_of, residual_findings, residual_test
-from .uncertainties import figure_uncertainties, root_mean, squares_in_all, squares_of
 
 __all__ = [
     "AnsweredRows",

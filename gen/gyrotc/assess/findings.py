@@ -24,8 +24,8 @@ from ..quality.check import findings_of_data_set
 from ..quality.findings import RunFacts, finding, temperature_findings
 from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Run
+from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
-from ..results.findings import Finding
 from ..results.training import Training
 from ..train.evidence import robust_sigma
 

@@ -25,8 +25,7 @@ from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
 from ..model import Model, RuntimePart
 from ..results.evaluation import Evaluation, FigureUncertainty
-from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict
-from ..results.verification import Verification
+from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict, Verification
 from ..verify.toolchain import all_targets
 from .product_guards import ProductGuard, ServiceLearning
 

@@ -18,7 +18,7 @@ from ..common.errors import InputError
 from ..lot.earlier import posterior_of_known
 from ..lot.service import spread_of_lot, spread_of_power_ons
 from ..model import BiasSpread, Celsius, Guard, Learning, Model
-from ..results.lot import KnownMap, Lot
+from ..results.fleet import KnownMap, Lot
 from ..tables.emit import data_sheet_spread
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
 from ..target.samples import PLAUSIBLE_C

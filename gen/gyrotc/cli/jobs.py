@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..pages.display import NATIVE, displayed, rate_unit, shown
-from ..pages.words import sci, words
+from ..pages.display import NATIVE, displayed, rate_unit, sci, shown, words
 from ..train.options import BuildOptions
 from .base import (
     BUILD,
@@ -272,7 +271,7 @@ def recalibrate(
     """
     from ..assess.limits import load_limits
     from ..jobs.recalibration import learned_in_service
-    from ..pages.service import write_service_page
+    from ..pages.short import write_service_page
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
     from ..tables.emit import emit
@@ -349,7 +348,7 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
-    from ..jobs.compare import compare as run
+    from ..jobs.build import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.load import load
     from ..store.files import json_text, write_atomically

@@ -14,10 +14,14 @@ import tempfile
 import traceback
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..common.texts import terminal_line, terminal_text
+
+if TYPE_CHECKING:
+    from typer import Typer
 
 EXIT_STATUS = 70
 """EX_SOFTWARE of sysexits.h: an internal fault, not one of the input."""
@@ -177,14 +181,21 @@ def _hoisted(arguments: list[str]) -> list[str]:
     return [*front, *(a for a in arguments[:end] if a not in _ANYWHERE), *arguments[end:]]
 
 
+def application() -> Typer:
+    """The application with all its subcommands: importing a module of them registers its own."""
+    from . import fleet, jobs, plan, recordings, shell, steps  # noqa: F401
+    from .base import app
+
+    return app
+
+
 def run(arguments: list[str]) -> int:
     """Runs one command in this process and returns its exit status; errors become one message on stderr.
 
     Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
     """
     try:
-        from .commands import app
-
+        app = application()
         if _COMPLETE in os.environ:  # a shell asks what could follow
             from typer._completion_classes import completion_init
 

@@ -12,13 +12,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..common.errors import InputError
-from ..pages.display import DISPLAYS, NATIVE, rate_unit, shown, with_unit
-from ..pages.words import plain, sci
+from ..pages.display import DISPLAYS, NATIVE, plain, rate_unit, sci, shown, with_unit
 from .base import PLAN, DisplayOption, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
 from .words import NoiseLevel
 
 if TYPE_CHECKING:
-    from ..results.planned import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
+    from ..results.recordings import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace
 
 _NEVER = 90.0  # where two causes overlap wholly d is 100 (`plan.sensitivity`: √(10 / 1e-3))
 _ALONE = 3.4  # d at which nothing but detection counts: the rival mimics next to nothing
@@ -238,7 +237,7 @@ def plan(
     if lot is not None:
         _plan_with_lot(profile, lot, require or (), out, json_file)
         return
-    from ..pages.plan import write_plan
+    from ..pages.short import write_plan
     from ..plan.plan import plan as run
 
     with result_folder(out, "plan") if out else nullcontext() as stage, progress(PLAN) as say:

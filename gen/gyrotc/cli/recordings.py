@@ -240,7 +240,7 @@ def simulate(
 def _simulate_service(base: str | None, seed: int, out: Path, power_ons: int, mounted: Sequence[int]) -> None:
     """`gyrotc simulate service`."""
     from ..lot.service import simulate_service
-    from ..pages.words import sci
+    from ..pages.display import sci
 
     if base is None:
         raise InputError("--base", "is missing", "a result of gyrotc build with [learning] in its limits file")
@@ -324,7 +324,7 @@ def check(
             progress=say,
         )
         if plots is not None:
-            from ..pages.check import write_check_page
+            from ..pages.short import write_check_page
             from ..quality.check import pictures_of
 
             say("drawing")

@@ -9,15 +9,23 @@ from typing import TYPE_CHECKING
 from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
-from ..pages.display import in_unit, rate_unit
-from ..pages.words import COVERAGE, bound_words, measured_words, plain, rounded, sci, with_uncertainty
+from ..pages.display import (
+    COVERAGE,
+    bound_words,
+    in_unit,
+    measured_words,
+    plain,
+    rate_unit,
+    rounded,
+    sci,
+    with_uncertainty,
+)
 
 if TYPE_CHECKING:
     from ..model import Model
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, InService, Pooled
-    from ..results.release import HeldLimits
+    from ..results.release import HeldLimits, JointVerification, ReadLog, Verification, VerifiedFile
     from ..results.training import Training
-    from ..results.verification import JointVerification, ReadLog, Verification, VerifiedFile
 
 
 def evaluation_table(result: Evaluation) -> RichTable:
@@ -177,7 +185,7 @@ def _log_notes(log: ReadLog) -> Iterator[str]:
 
 def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
-    from ..results.verification import Verification
+    from ..results.release import Verification
 
     for file in result.emitted:
         if file.verdict == "foreign":

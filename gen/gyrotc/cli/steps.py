@@ -152,7 +152,7 @@ def emit(
     Example: gyrotc emit result/model.json --out result
     """
     from ..model import load_model
-    from ..results.verification import Emitted, EmittedTable
+    from ..results.release import Emitted, EmittedTable
     from ..store.folder import result_folder
     from ..tables.emit import emit as run
 
@@ -221,10 +221,10 @@ def verify(
 
     Example: gyrotc verify result --target all
     """
-    from ..jobs.axes import axes_in, verify_axes
+    from ..jobs.release import axes_in, verify_axes
     from ..model import load_model
     from ..recordings.load import load
-    from ..results.verification import JointVerification, Verification
+    from ..results.release import JointVerification, Verification
     from ..store.files import json_text, write_atomically
     from ..store.folder import result_folder
     from ..verify.job import verify as run
@@ -322,11 +322,10 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
 
     Example: gyrotc report result
     """
-    from ..jobs.axes import axes_in
+    from ..jobs.release import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
-    from ..pages.plan import is_plan, write_plan_page
     from ..pages.report import axes_page, write_page, write_report
-    from ..pages.service import is_service, write_service_page
+    from ..pages.short import is_plan, is_service, write_plan_page, write_service_page
 
     with progress() as say:
         say("drawing")

@@ -24,11 +24,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..common.errors import InputError
 from ..common.inputs import checked, read_toml
 from ..common.texts import html_environment
-from ..jobs.axes import axes_in
-from ..jobs.release import accepted, unit_of
+from ..jobs.release import accepted, axes_in, unit_of
+from ..pages.display import bound_words, digits_of, limit_words, measured_words, rounded
 from ..pages.report import page_environment, thermal_picture
 from ..pages.unit import UnitResults
-from ..pages.words import bound_words, digits_of, limit_words, measured_words, rounded
 from ..results.release import Limit
 from ..store.files import write_atomically, write_own
 from ..store.folder import result_folder, scratch_folder

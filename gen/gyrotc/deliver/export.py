@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_code, c_environment, toml_comment
-from ..jobs.axes import axes_in, check_emitted
+from ..jobs.release import axes_in, check_emitted
 from ..model import Model, load_model, table_id
 from ..store.files import check_replaceable, json_text, write_atomically, write_own
 from ..store.folder import scratch_folder

@@ -13,8 +13,8 @@ from ..common.metrics import LEAST_SPAN_C
 from ..model import Model
 from ..quality.events import accepted, found_events
 from ..recordings.records import Dataset, Run, joined_runs
+from ..results.base import Finding
 from ..results.diagnosed import Diagnosed
-from ..results.findings import Finding
 from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.data import TrainingData, training_spans

@@ -24,7 +24,7 @@ from ..common.metrics import Averages
 from ..model import Model
 from ..recordings.records import Dataset
 from ..results.diagnosed import ShippingTrial
-from ..results.lot import LotUse
+from ..results.fleet import LotUse
 from ..train.channels import StandIn, stand_in_of
 from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process

@@ -17,8 +17,8 @@ from ..common.arrays import FloatArray, those
 from ..common.metrics import MAD_TO_SIGMA, Averager, Averages, time_statistics
 from ..model import Model
 from ..recordings.records import Run
+from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
-from ..results.findings import Estimate
 from ..tables.emit import quantise_all
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike

@@ -9,6 +9,7 @@ import numpy as np
 from .. import __version__
 from ..causes import CATALOGUE, separate_by
 from ..recordings.records import Dataset
+from ..results.base import Estimate
 from ..results.diagnosed import (
     Baseline,
     ComparedStatistic,
@@ -25,8 +26,7 @@ from ..results.diagnosed import (
     Unexplained,
     WithoutRate,
 )
-from ..results.findings import Estimate
-from ..results.planned import DetectionLimit
+from ..results.recordings import DetectionLimit
 from ..train.fitting import FitOptions, front_end
 from .attribution import Attribution
 from .candidates import diagnosed, searched, shape_parameter

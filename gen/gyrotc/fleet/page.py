@@ -21,9 +21,8 @@ from ..pages.report import page_environment
 from ..results.fleet import Facts, FleetEntry, FleetSummary, FleetUnit, Reason, ResidualSeries
 from ..store.files import json_text, write_atomically
 from ..store.folder import result_folder
-from .copies import copies, with_copies
 from .manifest import SUMMARY
-from .outliers import FIGURES, outliers, spread
+from .outliers import FIGURES, copies, outliers, spread, with_copies
 from .reasons import reasons, with_reasons
 
 _IN_TIME = (

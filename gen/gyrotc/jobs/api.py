@@ -27,9 +27,9 @@ import pyarrow.feather
 from ..common.errors import InputError, install_command
 from ..common.texts import file_stem
 from ..model import Model
+from ..pages.display import sci
 from ..pages.report import thermal_picture
 from ..pages.unit import UnitResults, unit_in
-from ..pages.words import sci
 from ..recordings import records
 from ..recordings.importers.job import ImportOptions, import_files
 from ..recordings.importers.map_file import Map

@@ -21,15 +21,13 @@ from ..common.errors import InputError
 from ..common.inputs import MOST_CENTERS, checked, read_input
 from ..lot.earlier import EarlierPrior, posterior_of_result, widened
 from ..lot.learn import FALSE_ALARM
-from ..lot.prior import MapPosterior
 from ..lot.service import learning_in, words_in
-from ..lot.use import prior_of
+from ..lot.use import MapPosterior, prior_of
 from ..model import Model, Network, load_model
 from ..recordings.records import Dataset
-from ..results.base import read_result
+from ..results.base import Finding, Size, read_result
 from ..results.evaluation import InService, LearnedKnot, ServedStops
-from ..results.findings import Finding, Size
-from ..results.lot import Lot
+from ..results.fleet import Lot
 from ..results.training import MapMeans, Training
 from ..target.learning import E_ID, KNOTS, OK, Learner, full
 from ..train.fitting import FitOptions

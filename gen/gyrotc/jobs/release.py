@@ -3,13 +3,15 @@
 What can be computed again of the results in a folder is, and compared. This finds a decision or an uncertainty that was
 edited, also where hashes were made again. It cannot find figures of recordings that were edited together with all that
 follows from them: only a signature does.
+
+Of a unit with three axes: its one image, with the runtime once, a table for each axis, one page for all.
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +20,35 @@ from pydantic import ValidationError
 from .. import __version__
 from ..assess.budget import AGEING, budget_of
 from ..assess.limits import Limits, held_against, worst_of
-from ..common.errors import InputError
+from ..common.errors import CheckFailed, InputError
+from ..common.texts import c_environment
 from ..model import Model, load_model
+from ..pages.report import axes_page
 from ..pages.unit import UnitResults, unit_in
 from ..results.evaluation import Changes, Evaluation, Pooled
-from ..results.release import NEED_REASON, RELEASED, STATED, Budget, HeldLimits, Release, ReleasedUnit
+from ..results.release import (
+    NEED_REASON,
+    RELEASED,
+    STATED,
+    Budget,
+    HeldLimits,
+    JointVerification,
+    Release,
+    ReleasedUnit,
+    Verification,
+    VerifiedTarget,
+)
 from ..results.training import Training
-from ..results.verification import Verification, VerifiedTarget
+from ..store.files import write_atomically, write_own
+from ..store.folder import scratch_folder
 from ..store.marker import check_intact, sha256
-from ..tables.record import RECORD
-from .axes import axes_in
+from ..tables.emit import config_text, emitted_tables, runtime_texts
+from ..tables.record import RECORD, joint_record_text
+from ..tables.text import ARITHMETICS, example_period_us, example_samples
+from ..verify.emitted import file_entries
+from ..verify.job import verify
+from ..verify.signatures import check_signature, load_public_key
+from ..verify.toolchain import all_targets, compile_c, run_program
 
 _EXPECTED = "what gyrotc build wrote; build it again"
 _ROUNDING = 1e-9  # relative: of sums in another order, far below any digit that is reported
@@ -271,3 +292,140 @@ def _unit(model: Model, unit: UnitResults | None) -> ReleasedUnit:
 def _day_of(model: Model) -> str | None:
     stated = model.meta.get("calibrated_on")
     return None if stated is None else str(stated)
+
+
+AXES = ("x", "y", "z")
+
+_HOST = "host-gcc-O2"
+
+
+def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> None:
+    """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
+
+    `display`: as of `build`. Proves that all tables link and pass their self-tests in one image.
+
+    Raises:
+        CheckFailed: The image does not link, or a table does not pass its self-test in it.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in axes}
+    numerics = list(emitted_tables(folder / axes[0] / "c", models[axes[0]]))
+    c = folder / "c"
+    c.mkdir()
+    for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
+        write_own(c / name, data)
+    _run_together(c, [m.id for m in models.values()])
+    write_atomically(folder / "report.html", axes_page(folder, axes, display))
+
+
+def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Files of every axis's own `c/` by name."""
+    return {
+        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()} for axis in axes
+    }
+
+
+def joint_texts(
+    models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]], numeric: str
+) -> dict[str, bytes]:
+    """All files of the `c/` of a unit by name.
+
+    Args:
+        models: Models by axis.
+        sources: Files of each axis's own `c/` by name.
+        numeric: The arithmetic that `main.c` uses.
+    """
+    headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
+    held = [n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers]  # of all axes
+    texts = runtime_texts(models.values(), held)
+    texts["gtc_config.h"] = config_text(list(models.values()))
+    for axis, model in models.items():
+        own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
+        texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
+    listed = list(models.values())
+    main = (
+        c_environment()
+        .get_template("main_axes.c.j2")
+        .render(
+            models=listed,
+            n=numeric,
+            period_us=example_period_us(listed[0]),
+            samples=example_samples(listed[0]),
+        )
+    )
+    texts["main.c"] = main.encode("ascii")
+    texts[RECORD] = joint_record_text(models, texts)
+    return texts
+
+
+def axes_in(folder: Path) -> tuple[str, ...]:
+    """Axes of a result that `--axis all` made; none where the folder has a model of its own."""
+    if (folder / "model.json").is_file():
+        return ()
+    return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())
+
+
+def verify_axes(
+    folder: Path,
+    results: Mapping[str, Verification],
+    edited: Sequence[str] = (),
+    signature: Path | None = None,
+    replaces: Path | None = None,
+) -> JointVerification:
+    """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
+
+    These must be those of the axes' own folders, which `results` judges.
+
+    Raises:
+        InputError: There is no emitted folder, or a model cannot be read.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in results}
+    if not (folder / "c").is_dir():
+        raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
+    numeric = next(iter(results.values())).errors[0].numeric
+    texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
+    emitted = tuple(file_entries(folder / "c", texts, edited))
+    signed = check_signature(folder / "c", load_public_key(signature), replaces) if signature else None
+    wrong = sum(file.status == "fail" for file in emitted)
+    return JointVerification(
+        gyrotc_version=__version__,
+        serial=next(iter(results.values())).serial,
+        axis=None,
+        passed=sum(one.passed for one in results.values()),
+        failed=sum(one.failed for one in results.values()) + wrong + (signed is not None and signed.status == "fail"),
+        missing=sum(one.missing for one in results.values()),
+        emitted=emitted,
+        signature=signed,
+        axes=dict(results),
+    )
+
+
+def check_emitted(folder: Path, refused: str, progress: Callable[[str], None] = lambda _: None) -> None:
+    """Is what `folder/c` holds (with several axes: of every axis, too) what gyrotc makes of the models?
+
+    Args:
+        refused: What is not done with it otherwise, in words.
+
+    Raises:
+        InputError: There is no emitted code, or a model cannot be read.
+        CheckFailed: It is not.
+    """
+    axes = axes_in(folder)
+    parts = [folder / axis for axis in axes] or [folder]
+    results = {}
+    for k, part in enumerate(parts, 1):
+        progress(f"comparing files, {k} of {len(parts)}")
+        results[part.name] = verify(part, compiled=False)
+    judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
+    wrong = [name for result in judged for name in result.wrong_files]
+    if wrong or any(result.failed for result in judged):
+        raise CheckFailed(f"{refused}: {wrong[0] if wrong else 'a check'} fails; see gyrotc verify {folder}")
+
+
+def _run_together(c: Path, ids: Sequence[str]) -> None:
+    target = all_targets()[_HOST]
+    with scratch_folder() as work:
+        program = work / "main"
+        compile_c(target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c)
+        done = run_program(target, program)
+    if done.returncode != 0:
+        raise CheckFailed(f"the image of all axes ended with status {done.returncode}")

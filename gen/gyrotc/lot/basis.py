@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..results.lot import LotFunctions
+from ..results.fleet import LotFunctions
 
 PARAMETERS = (
     "constant",

@@ -25,7 +25,7 @@ from ..results.training import ChangeKind, CheckedCell, MapChange
 from ..train.means import UnitMeans
 from .basis import PRIOR_LOG
 from .learn import FALSE_ALARM
-from .prior import MapPosterior, MapPrior
+from .use import MapPosterior, MapPrior
 
 Span = tuple[float, float]
 

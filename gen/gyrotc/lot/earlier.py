@@ -18,7 +18,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..model import Model
-from ..results.lot import KnownMap
+from ..results.fleet import KnownMap
 from ..results.training import ChangeKind, EarlierUse, Training, TriedChange
 from ..train.data import Scaling, TrainingData
 from ..train.evidence import Asked
@@ -27,8 +27,7 @@ from ..train.result import Given
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
 from .learn import Envelope, sums_of, that_count
-from .prior import MapPosterior, MapPrior, check_positive, processed, triangle
-from .use import curve_of, followed, known_map, seen_alone
+from .use import MapPosterior, MapPrior, check_positive, curve_of, followed, known_map, processed, seen_alone, triangle
 
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
 _SHAPE = 0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape

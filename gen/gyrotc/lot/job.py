@@ -14,8 +14,7 @@ from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
-from ..results.fleet import FleetSummary
-from ..results.lot import AtRest, CrossValidation, Lot, LotAgeing, LotCluster, LotUnit
+from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotAgeing, LotCluster, LotUnit
 from ..results.training import Training
 from ..store.files import digest_of
 from ..store.marker import check_intact
@@ -25,9 +24,8 @@ from ..train.evidence import MEAN_S
 from ..train.means import UnitMeans, means_of
 from .earlier import posterior_of_result
 from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, freedom_of, learn, of_few
-from .prior import process_result, rounded
 from .service import Moved, covariance_at, fitted_ageing
-from .use import prior_of
+from .use import prior_of, process_result, rounded
 
 _CELLS = (
     33,

@@ -19,15 +19,14 @@ from .. import __version__
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..model import Model
-from ..results.lot import Lot
-from ..results.planned import ChamberStep, LotPlan, LotProgramme, NextRun, ProposedRun
+from ..results.fleet import Lot
+from ..results.recordings import ChamberStep, LotPlan, LotProgramme, NextRun, ProposedRun
 from ..simulate.instrument import chamber_air, thermal_network
 from ..simulate.profile import corners
 from ..simulate.scenario import Scenario, read
 from .basis import CONSTANT, PRIOR_LOG, LotBasis
-from .prior import MapPosterior
 from .service import parkings
-from .use import LotPrior, prior_of
+from .use import LotPrior, MapPosterior, prior_of
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end

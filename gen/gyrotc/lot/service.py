@@ -16,8 +16,8 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import read_input
 from ..model import BiasSpread, Learning, Model, load_model
-from ..results.lot import LotAgeing
-from ..results.planned import Parking
+from ..results.fleet import LotAgeing
+from ..results.recordings import Parking
 from ..store.files import write_atomically
 from ..store.folder import result_folder
 from ..tables.emit import MONTH_H, emitted_tables, prior_of, service_prior, walk
@@ -27,7 +27,7 @@ from ..train.evidence import TrainingFailed
 from ..train.means import unit_means
 from ..train.methods import fit
 from ..train.result import predict
-from .prior import MapPosterior
+from .use import MapPosterior
 
 if TYPE_CHECKING:
     from typing_extensions import Self

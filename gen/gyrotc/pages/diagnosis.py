@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, running_mean
-from ..results.base import read_optional, read_result
+from ..results.base import Finding, read_optional, read_result
 from ..results.diagnosed import (
     ComparedStatistic,
     Diagnosed,
@@ -27,12 +27,10 @@ from ..results.diagnosed import (
     Statistic,
     Values,
 )
-from ..results.findings import Finding
 from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
-from .display import rate_unit, shown
+from .display import rate_unit, shown, words
 from .report import page_environment, page_from, write_page
 from .thermal import sorted_by_rate
-from .words import words
 
 PICTURES, SERIES = "pictures", "series.json"
 

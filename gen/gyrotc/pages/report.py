@@ -29,20 +29,22 @@ from ..results.training import LeftOutRows, Training
 from ..store.files import write_atomically
 from ..store.folder import result_folder
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
-from .display import displayed, in_unit, rate_unit
-from .thermal import allan_deviation, bias_against_temperature
-from .unit import UnitResults, unit_in
-from .words import (
+from .display import (
     bound_words,
+    displayed,
+    in_unit,
     limit_words,
     measured_words,
     plain,
+    rate_unit,
     rounded,
     sci,
     with_uncertainty,
     words,
     words_of_candidate,
 )
+from .thermal import allan_deviation, bias_against_temperature
+from .unit import UnitResults, unit_in
 
 _CURVES = (
     ("unexplained", "1 − Σ error-reduction ratio"),

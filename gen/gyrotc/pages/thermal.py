@@ -12,8 +12,7 @@ from ..common.metrics import Averages
 from ..model import Model
 from ..results.training import NoiseTerms
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
-from .display import in_unit, rate_unit
-from .words import COVERAGE, sci
+from .display import COVERAGE, in_unit, rate_unit, sci
 
 MOVING_C_PER_MIN = 0.1
 """Slower than that temperature stands still: no chamber's programme asks for less, and a hold drifts by less."""

@@ -10,11 +10,9 @@ from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation, Pooled
-from ..results.release import Budget, HeldLimits, Limit, Verdict
+from ..results.release import Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.training import CandidateModel, Manifest, Training
-from ..results.verification import Verification
-from .display import NATIVE, shown
-from .words import COVERAGE, limit_words, plain, words
+from .display import COVERAGE, NATIVE, limit_words, plain, shown, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {

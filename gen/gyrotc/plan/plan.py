@@ -22,7 +22,7 @@ from ..diagnose.blocks import Record
 from ..diagnose.candidates import searched
 from ..diagnose.detection import CauseLimit
 from ..diagnose.gains import Gains
-from ..results.planned import (
+from ..results.recordings import (
     Accuracy,
     Additions,
     AssumedNoise,

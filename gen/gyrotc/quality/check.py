@@ -22,7 +22,7 @@ from ..recordings.load import asked_axes, survey
 from ..recordings.plausibility import TRUSTED
 from ..recordings.reading import open_file
 from ..recordings.records import Applied, Curve, Dataset, Mark, Rows, Run
-from ..results.findings import Finding, MarkedRows
+from ..results.base import Finding, MarkedRows
 from ..results.recordings import Checked, CheckedRun, Problem
 from .curves import contradiction_findings, curve_findings, open_questions
 from .findings import (

@@ -21,7 +21,7 @@ from ..common.metrics import median
 from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark, Run
-from ..results.findings import Finding
+from ..results.base import Finding
 from .findings import Limits, RunFacts, finding
 from .fits import evidence_beside_memories
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray, steps_are, those
 from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
-from ..results.findings import Finding
+from ..results.base import Finding
 from .changes import Change, changes_of
 from .curves import curve_findings
 from .findings import RunFacts, facts_of, finding

@@ -17,7 +17,7 @@ from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median, median_of_parts
 from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, EarthRate, Mark, Rows, Run
-from ..results.findings import ADVICE, Estimate, Finding, MarkedRows, Size
+from ..results.base import ADVICE, Estimate, Finding, MarkedRows, Size
 
 Limits = tuple[float, float, float]
 """A figure and its 95 % limits."""

@@ -25,7 +25,7 @@ from ..common.metrics import (
 from ..common.statistics import cell_means
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..recordings.units import channel_kind
-from ..results.findings import Finding
+from ..results.base import Finding
 from .findings import RunFacts, changes_in, finding, mark_of
 
 _LEAST_RUNS = 3  # of two runs nobody knows which one is odd

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray, steps_are, those
 from ..recordings.records import Mark, Rows, Run
-from ..results.findings import Finding
+from ..results.base import Finding
 from .findings import finding
 
 _GAP = 1.5  # row periods

@@ -7,9 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Count, Figure, Part, Result, UnitResult
-from .findings import Estimate, Finding
-from .planned import DetectionLimit
+from .base import Count, Estimate, Figure, Finding, Part, Result, UnitResult
+from .recordings import DetectionLimit
 
 DiagnosisVerdict = Literal[
     "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"

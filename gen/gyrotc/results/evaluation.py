@@ -10,8 +10,7 @@ from pydantic import Field
 
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics
-from .base import Amount, Arithmetic, Count, Figure, Part, UnitResult
-from .findings import Finding
+from .base import Amount, Arithmetic, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits
 
 

@@ -1,4 +1,4 @@
-"""`limits.json`, `budget.json` and `c/release.json`: what is decided about a unit, and what a laboratory signs."""
+"""What was emitted and verified of a unit, what is decided (`limits.json`, `budget.json`), what a laboratory signs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Amount, Axis, Figure, Part, Positive, Result, UnitResult
+from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Positive, Result, UnitResult
 
 
 class Instrument(Part):
@@ -200,3 +200,233 @@ class Release(Result):
     units: tuple[ReleasedUnit, ...] = Field(description="every axis")
     emission: str = Field(description="SHA-256 of `c/emission.json`, which has that of every emitted file")
     files: dict[str, str] = Field(description="SHA-256 of the files behind this, by path in the result")
+
+
+class EmittedTable(Part):
+    """Size and error bound of one table."""
+
+    numeric: Arithmetic = Field(description="its arithmetic")
+    table_bytes: Count = Field(description="size of the table, bytes (section 3)")
+    error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
+
+
+class Emitted(UnitResult):
+    """Tables that were written."""
+
+    schema_: Annotated[Literal["gyrotc.emit/1"], Field(alias="schema")] = "gyrotc.emit/1"
+    id: str = Field(description="id of the table, part of every emitted name")
+    tables: tuple[EmittedTable, ...] = Field(description="one for each arithmetic")
+    refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
+
+
+PassOrFail = Literal["pass", "fail"]
+
+
+class CallCost(Part):
+    """Cost of a call, less an empty one."""
+
+    min: int = Field(description="of all calls")
+    mean: float = Field(description="of all calls")
+    max: int = Field(description="of all calls")
+
+
+class FunctionCost(Part):
+    """What a public function takes."""
+
+    code_bytes: Count = Field(description="of it and of what it calls")
+    stack_bytes: Count = Field(description="at the deepest of its calls")
+    helpers: tuple[str, ...] = Field(
+        description="functions of the compiler's library that it calls; their stack is not counted"
+    )
+    instructions: Count | None = Field(
+        default=None, description="that no call with this table exceeds, from the object code; Thumb-2 alone"
+    )
+
+
+class ReplayedRows(Part):
+    """Recordings that were replayed."""
+
+    runs: Count = Field(description="runs that were replayed")
+    rows: Count = Field(description="rows in them")
+    mismatches: Count = Field(description="rows that differ from the reference in any bit")
+    first_mismatches: tuple[str, ...] = Field(description="the first of them with all bits")
+    error: str | None = Field(default=None, description="why it could not be replayed to the end")
+
+
+class LearnedCalls(Part):
+    """Calls of the learning unit, through power-ons, saves and writes that were cut off."""
+
+    calls: Count = Field(description="that were made")
+    words: Count = Field(description="of their answers and of the state after each, which were compared")
+    mismatches: Count = Field(description="calls after which any bit differs from the reference")
+    first_mismatches: tuple[str, ...] = Field(description="the first of them")
+
+
+class VerifiedTarget(Part):
+    """The board test on one target, in one arithmetic."""
+
+    name: str = Field(description="of the target, or what a board calls itself")
+    status: Literal["pass", "fail", "missing"] = Field(description="`missing`: its compiler or emulator is not here")
+    numeric: str = Field(description="arithmetic")
+    package: str | None = Field(default=None, description="packages that are missing")
+    compiler: str | None = Field(default=None, description="name and version")
+    flags: str | None = Field(default=None, description="options of the compiler")
+    log: str | None = Field(default=None, description="file with the output of a board test that ran elsewhere")
+    parts: Count | None = Field(default=None, description="board tests of this arithmetic in that file")
+    table_bytes: Count | None = Field(default=None, description="size of the table, bytes (section 3)")
+    vectors: Count | None = Field(default=None, description="results that were compared")
+    mismatches: Count | None = Field(default=None, description="results that differ from the reference")
+    first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
+    instructions: CallCost | None = Field(default=None, description="of a call of the map")
+    cycles: CallCost | None = Field(default=None, description="of a call of the map")
+    ticks: CallCost | None = Field(default=None, description="of a call of the map, in units of the board's counter")
+    stack_bytes: Count | None = Field(default=None, description="of a call of the map")
+    step_instructions: CallCost | None = Field(default=None, description="of a sample")
+    step_cycles: CallCost | None = Field(default=None, description="of a sample")
+    step_ticks: CallCost | None = Field(default=None, description="of a sample, in units of the board's counter")
+    step_stack_bytes: Count | None = Field(default=None, description="of a sample")
+    code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked")
+    read_only_bytes: Count | None = Field(default=None, description="constants of them that are linked")
+    ram_bytes: Count | None = Field(default=None, description="their writable static data")
+    functions: dict[str, FunctionCost] | None = Field(default=None, description="public functions by name")
+    error: str | None = Field(default=None, description="why there is no result")
+    replayed: ReplayedRows | None = Field(default=None, description="recordings, where some were given")
+    learned: LearnedCalls | None = Field(
+        default=None, description="learning in service, where the model has it; with the first arithmetic"
+    )
+
+    @property
+    def map_cost(self) -> tuple[str, CallCost] | None:
+        """What the counter of the target counts, and the cost of a call of the map in it."""
+        found = {"instructions": self.instructions, "cycles": self.cycles, "ticks": self.ticks}
+        return next(((unit, cost) for unit, cost in found.items() if cost), None)
+
+
+class VerifiedFile(Part):
+    """An emitted file, compared with what the model gives."""
+
+    file: str = Field(description="its name in `c/`")
+    verdict: Literal["equal", "differs", "missing", "foreign", "edited", "left_out"] = Field(
+        description="`foreign`: gyrotc does not make it; `edited`: it differs, which `--allow-edited` allows; "
+        "`left_out`: a fleet did not keep it, and what the model gives has the hash that it had"
+    )
+    status: PassOrFail = Field(description="whether it is as it has to be")
+    mismatches: Count = Field(description="lines or words that differ; 1 for what has none")
+    line: Count | None = Field(default=None, description="first line that differs, from 1 on")
+    word: Count | None = Field(default=None, description="first word of an image that differs, from 1 on")
+    found: str | None = Field(default=None, description="what stands there")
+    expected: str | None = Field(default=None, description="what the model gives")
+
+
+class SignatureCheck(Part):
+    """The signature of the emitted files."""
+
+    file: str = Field(description="its name in `c/`")
+    status: PassOrFail = Field(description="whether the record of the files was signed with this key")
+    key: str = Field(description="SHA-256 of the public key")
+    reason: str | None = Field(description="why it is not good; null where it is")
+    verdict: Verdict | None = Field(
+        default=None, description="that was signed; null without limits, and where the signature is not good"
+    )
+    accepted_fail: str | None = Field(
+        default=None,
+        description="why it was released although the verdict is FAIL or CONDITIONAL PASS, as it was signed",
+    )
+    valid_until: str | None = Field(default=None, description="first day on which an axis ends, as it was signed")
+
+
+class MapError(Part):
+    """Departure of the emitted map from the model, in one arithmetic."""
+
+    numeric: str = Field(description="arithmetic")
+    status: PassOrFail = Field(description="whether the largest departure keeps to the bound")
+    bound_dph: float = Field(description="proven for every input, deg/h")
+    worst_dph: float = Field(description="largest found, deg/h")
+    arithmetic_dph: float | None = Field(
+        default=None, description="largest in the middle of a cell of inputs, deg/h; only of `--exhaustive`"
+    )
+    mean_dph: float | None = Field(default=None, description="mean there, deg/h; only of `--exhaustive`")
+    inputs_visited: Count = Field(description="inputs that were tried")
+    mismatches: Count | None = Field(
+        default=None,
+        description="inputs that differ from integers computed separately; only of `--exhaustive`",
+    )
+    first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
+
+
+class LogPart(Part):
+    """A board test in a log."""
+
+    line: Count = Field(description="at which it begins")
+    numeric: str = Field(description="arithmetic")
+    vectors: Count = Field(description="results that were compared")
+    mismatches: Count = Field(description="results that differ from the reference")
+
+
+class ReadLog(Part):
+    """A log that was read: every line of it is accounted for."""
+
+    file: str = Field(description="its name")
+    lines: Count = Field(description="in all")
+    parts: tuple[LogPart, ...] = Field(description="board tests in it")
+    absent: tuple[str, ...] = Field(description="arithmetics that the board did not test")
+    outside: Count = Field(description="lines that belong to no board test")
+    first_outside: tuple[str, ...] = Field(description="the first of them")
+
+
+class EmittedWith(Part):
+    """Options of `emit` with which `c/` was made."""
+
+    numeric: tuple[str, ...] | None = Field(description="arithmetics asked for by `--numeric`, or null")
+    zero_at_c: float | None = Field(description="`--zero-at`, C, or null")
+
+
+class WorstError(Part):
+    """Largest departure of all arithmetics."""
+
+    value: float = Field(description="deg/h")
+    inputs_visited: Count = Field(description="inputs that were tried")
+
+
+class _Counted(Result):
+    """What of a verification is there for one axis and for a unit of several."""
+
+    schema_: Annotated[Literal["gyrotc.verify/1"], Field(alias="schema")] = "gyrotc.verify/1"
+    serial: str = Field(description="gyro serial")
+    axis: Axis = Field(description="null where the recordings have one axis, and of several in one folder")
+    passed: Count = Field(description="targets that passed")
+    failed: Count = Field(description="targets, files and other checks that failed")
+    missing: Count = Field(description="targets whose compiler or emulator is not here")
+    emitted: tuple[VerifiedFile, ...] = Field(description="every file that is or should be in `c/`")
+    signature: SignatureCheck | None = Field(default=None, description="null where none was asked for")
+
+    @property
+    def wrong_files(self) -> list[str]:
+        """Names of files that are not what gyrotc makes."""
+        return [file.file for file in self.emitted if file.status == "fail"]
+
+
+class Verification(_Counted):
+    """What of the emitted code was proven (`gyrotc verify`)."""
+
+    model_hash: str = Field(description="hash of the model")
+    c_hash: str = Field(description="SHA-256 over names and contents of the emitted files")
+    targets: tuple[VerifiedTarget, ...] = Field(description="every target that was tried, and boards")
+    log: ReadLog | None = Field(default=None, description="of a board test that ran elsewhere")
+    options: EmittedWith | None = Field(default=None, description="of `emit`")
+    errors: tuple[MapError, ...] = Field(description="one for each arithmetic")
+    error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")
+    worst_error_dph: WorstError = Field(description="largest departure that was found")
+
+    @property
+    def not_installed(self) -> tuple[list[str], list[str]]:
+        """Targets whose tools are not installed, and the packages that bring them."""
+        missing = [entry for entry in self.targets if entry.status == "missing"]
+        packages = {word for entry in missing for word in (entry.package or "").split()}
+        return list(dict.fromkeys(entry.name for entry in missing)), sorted(packages)
+
+
+class JointVerification(_Counted):
+    """The same for a folder with several axes."""
+
+    axes: dict[str, Verification] = Field(description="what was proven of each axis")

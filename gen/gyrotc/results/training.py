@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from .base import Amount, Count, Figure, Part, UnitResult
+from .base import Amount, Count, Figure, Finding, Part, UnitResult
 from .evaluation import MapDifference, Pooled
-from .findings import Finding
-from .lot import KnownMap, LotUse, UnitCurve
+from .fleet import KnownMap, LotUse, UnitCurve
 
 
 class CheckedCell(Part):

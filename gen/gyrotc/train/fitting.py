@@ -22,8 +22,8 @@ from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Rows, Run, joined_runs
+from ..results.base import Finding
 from ..results.evaluation import Pooled
-from ..results.findings import Finding
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, seen_by_target, with_channels
 from .data import Span, TrainingData, average, cleaned, joined, scaling_of, training_spans, whole_runs

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..common.arrays import FloatArray
 from ..quality.findings import longest_stretch
 from ..recordings.records import Run
-from ..results.lot import KnownMap, LotUse
+from ..results.fleet import KnownMap, LotUse
 from ..results.training import EarlierUse
 from .data import Scaling, TrainingData, average
 from .evidence import Process

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..common.inputs import read_input
 from ..model import Model
-from ..results.verification import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
+from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
 from ..store.folder import scratch_folder
 from ..tables.emit import prior_of
 from ..tables.vectors import Vectors

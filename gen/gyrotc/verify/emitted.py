@@ -22,7 +22,7 @@ from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..model import SERIAL, Model
-from ..results.verification import VerifiedFile
+from ..results.release import VerifiedFile
 from ..store.files import write_own
 from ..store.marker import read_marker
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all

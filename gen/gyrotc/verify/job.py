@@ -26,8 +26,8 @@ from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
-from ..results.release import STATED
-from ..results.verification import (
+from ..results.release import (
+    STATED,
     EmittedWith,
     MapError,
     SignatureCheck,

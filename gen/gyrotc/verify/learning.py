@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..common.texts import c_environment
 from ..model import Model
-from ..results.verification import LearnedCalls
+from ..results.release import LearnedCalls
 from ..store.files import write_own
 from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop
 from .toolchain import Target, compile_objects, link, run_program

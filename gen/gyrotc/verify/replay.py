@@ -22,7 +22,7 @@ from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
-from ..results.verification import ReplayedRows, VerifiedTarget
+from ..results.release import ReplayedRows, VerifiedTarget
 from ..store.files import write_own
 from ..store.folder import scratch_folder
 from ..tables.quantise import channels_of

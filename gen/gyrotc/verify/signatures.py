@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ..common.errors import InputError, install_command
 from ..common.inputs import parse_json
 from ..results.base import checked_result
-from ..results.release import RELEASED, Release
-from ..results.verification import SignatureCheck
+from ..results.release import RELEASED, Release, SignatureCheck
 from ..store.files import write_atomically
 from ..store.marker import sha256
 from ..tables.record import RECORD, RELEASE, SIGNATURE

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..common.errors import CheckFailed
 from ..common.texts import c_environment
 from ..model import Model
-from ..results.verification import FunctionCost
+from ..results.release import FunctionCost
 from ..store.files import write_own
 from ..store.folder import scratch_folder
 from ..tables.text import example_period_us

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.assess.budget import budget_of, combined
+from gyrotc.assess.budget import budget_of, combined, figure_uncertainties
 from gyrotc.assess.limits import (
     Limits,
     coverage_factor,
@@ -18,13 +18,12 @@ from gyrotc.assess.limits import (
     load_limits,
     worst_of,
 )
-from gyrotc.assess.uncertainties import figure_uncertainties
 from gyrotc.common.errors import InputError
 from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.jobs.build import build_into
 from gyrotc.model import load_model
+from gyrotc.pages.display import rounded
 from gyrotc.pages.report import write_report
-from gyrotc.pages.words import rounded
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_optional, read_result
 from gyrotc.results.evaluation import (
@@ -35,9 +34,8 @@ from gyrotc.results.evaluation import (
     RunStatistics,
     Statistics,
 )
-from gyrotc.results.release import Budget
+from gyrotc.results.release import Budget, Verification
 from gyrotc.results.training import Training
-from gyrotc.results.verification import Verification
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.fitting import FitOptions
 

@@ -13,6 +13,7 @@ from gyrotc.assess.limits import AtLeast, AtMost, held_against, load_limits
 from gyrotc.assess.product_guards import guarded
 from gyrotc.common.errors import InputError
 from gyrotc.model import Guard, Model, Term
+from gyrotc.results.base import Finding
 from gyrotc.results.evaluation import (
     EvaluatedRun,
     Evaluation,
@@ -21,8 +22,7 @@ from gyrotc.results.evaluation import (
     RunStatistics,
     Statistics,
 )
-from gyrotc.results.findings import Finding
-from gyrotc.results.verification import MapError, Verification, VerifiedTarget, WorstError
+from gyrotc.results.release import MapError, Verification, VerifiedTarget, WorstError
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.history import replay

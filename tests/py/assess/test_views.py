@@ -23,8 +23,8 @@ from gyrotc.model import Model
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
 from gyrotc.recordings.records import Dataset
+from gyrotc.results.base import Finding
 from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, ResidualTest, Statistics
-from gyrotc.results.findings import Finding
 from gyrotc.results.release import HeldLimits
 from gyrotc.results.training import Training
 from test_limits import EVALUATION, VERIFICATION

@@ -15,7 +15,7 @@ from gyrotc.causes.base import Cause, History, Parameter, Reach, Scene
 from gyrotc.cli.plan import plan_parts
 from gyrotc.jobs.build import build
 from gyrotc.model import load_model
-from gyrotc.pages.plan import write_plan
+from gyrotc.pages.short import write_plan
 from gyrotc.plan.plan import plan
 from gyrotc.simulate.campaign import simulate
 from gyrotc.target.recursions import Course, CourseChannel, TermOutcome

@@ -14,14 +14,14 @@ import pytest
 import typer
 from conftest import quick_and_slow, run_gyrotc
 from emitted import emitted
-from gyrotc.cli.commands import app
+from gyrotc.cli.main import application
 from hostile import hostile_strings
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from recordings import columns, toml, write_csv
 
 SEED = 26
-COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS: dict[str, Any] = typer.main.get_command(application()).commands  # type: ignore[attr-defined]
 LEFT_OUT = {"scheduler", "help", "install_completion", "show_completion", "wait"}  # a host, a shell, a minute
 SLOW = {
     "build",

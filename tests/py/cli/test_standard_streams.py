@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import Command
 from gyrotc.cli import base
-from gyrotc.cli.commands import app
+from gyrotc.cli.main import application
 from recordings import described
 
 
@@ -47,7 +47,7 @@ def test_json_on_standard_output_is_alone_there(tmp_path: Path, gyrotc: Command)
 
 
 def test_every_command_writes_its_json_by_the_same_function() -> None:
-    commands = [c.callback for c in app.registered_commands if c.callback]
+    commands = [c.callback for c in application().registered_commands if c.callback]
     found = {c.__name__ for c in commands if "json_file" in inspect.signature(c).parameters}
     assert {"build", "check", "compare", "diagnose", "emit", "fit", "fleet", "plan", "verify"} <= found
     for command in commands:
@@ -60,6 +60,6 @@ def test_help_of_the_package_begins_with_commands_that_there_are() -> None:
 
     lines = re.findall(r"^    gyrotc (\S+) ", str(gyrotc.__doc__), re.MULTILINE)
     assert len(lines) >= 5 and str(gyrotc.__doc__).index("    gyrotc ") < 300
-    commands = {str(info.name or getattr(info.callback, "__name__", "")) for info in app.registered_commands}
+    commands = {str(info.name or getattr(info.callback, "__name__", "")) for info in application().registered_commands}
     commands |= {name.replace("_", "-") for name in commands}
     assert set(lines) <= commands

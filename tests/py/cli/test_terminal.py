@@ -20,8 +20,7 @@ from conftest import Command, invoked, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
 from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, StageLine, folded, time_left
-from gyrotc.cli.commands import app
-from gyrotc.cli.main import _hoisted, run
+from gyrotc.cli.main import _hoisted, application, run
 from gyrotc.cli.words import ExportFormat, GyroAxis, NoiseLevel, RunFormat, Shell
 from gyrotc.deliver import export
 from gyrotc.model import Model
@@ -174,7 +173,7 @@ def test_ctrl_c_before_anything_is_begun_is_silent() -> None:
 
 def test_help_loads_none_of_the_libraries_that_compute() -> None:
     heavy = {"numpy", "pyarrow", "pydantic", "scipy", "jinja2"}
-    code = f"import sys, gyrotc.cli.commands; sys.exit(' '.join({heavy} & set(sys.modules)) or 0)"
+    code = f"import sys, gyrotc.cli.main as c; c.application(); sys.exit(' '.join({heavy} & set(sys.modules)) or 0)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -235,7 +234,7 @@ def test_a_terminal_of_80_columns_gets_lines_of_80_columns(tmp_path: Path) -> No
 
 def test_help_has_every_command_once_in_a_group_of_the_work(gyrotc: Command) -> None:
     named = [name for names in GROUPS.values() for name in names]
-    callbacks = [c for c in app.registered_commands if c.callback]
+    callbacks = [c for c in application().registered_commands if c.callback]
     assert sorted(named) == sorted(c.name or c.callback.__name__ for c in callbacks if c.callback)
     shown = gyrotc("--help").stdout
     places = [shown.index(f"\n{title}:") for title in GROUPS]

@@ -27,7 +27,7 @@ from gyrotc.pages import report
 from gyrotc.recordings.load import load
 from gyrotc.results.base import checked_result, read_result
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation
-from gyrotc.results.verification import Verification
+from gyrotc.results.release import Verification
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import simulated_floor

@@ -50,7 +50,7 @@ from gyrotc.recordings.load import load
 from gyrotc.results.base import checked_result
 from gyrotc.results.diagnosed import Diagnosed, Estimate
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.verification import VerifiedTarget
+from gyrotc.results.release import VerifiedTarget
 from gyrotc.simulate import scenario
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.verify.emitted import checked_sources, table_files

@@ -13,8 +13,8 @@ from gyrotc.common.errors import InputError
 from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate, facts_of
 from gyrotc.jobs.build import build_into
+from gyrotc.pages.display import digits_of
 from gyrotc.pages.unit import unit_in
-from gyrotc.pages.words import digits_of
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.training import Manifest

@@ -19,7 +19,7 @@ from conftest import ROOT, Command, quick_and_slow
 from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.deliver.export import export
-from gyrotc.jobs.axes import joint_texts
+from gyrotc.jobs.release import joint_texts
 from gyrotc.model import Model, load_model
 from gyrotc.store.marker import MARKER
 from gyrotc.tables.quantise import quantise

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import ROOT, Command
-from gyrotc.cli.deliver import address_of, points_of
+from gyrotc.cli.fleet import address_of, points_of
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.deliver.export import Autopilot, Cubic, Exporting, Format, best_cubic, export
 from gyrotc.deliver.grid import csv_text, grid_of

@@ -50,7 +50,7 @@ from gyrotc.results.diagnosed import (
     NamedCause,
     Unexplained,
 )
-from gyrotc.results.planned import DetectionLimit
+from gyrotc.results.recordings import DetectionLimit
 from gyrotc.target.recursions import first_order
 from gyrotc.train.data import TrainingData, cleaned
 from gyrotc.train.fitting import FitOptions

@@ -190,9 +190,9 @@ def test_a_broken_result_is_reported(tmp_path: Path, gyrotc: Command) -> None:
 
 _LOADED = """
 import json, sys
-from gyrotc.cli.commands import app
+from gyrotc.cli.main import application
 try:
-    app(sys.argv[1:], standalone_mode=False)
+    application()(sys.argv[1:], standalone_mode=False)
 finally:
     print(json.dumps(sorted(sys.modules)), file=sys.stderr)
 """

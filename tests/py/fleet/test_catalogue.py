@@ -17,8 +17,8 @@ from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.results.base import read_result
 from gyrotc.results.fleet import FleetEntry
+from gyrotc.results.release import Verification
 from gyrotc.results.training import Manifest
-from gyrotc.results.verification import Verification
 from gyrotc.store.files import json_text, write_atomically
 from gyrotc.store.folder import result_folder, share_by_hash
 from gyrotc.store.marker import MARKER, faults, read_marker, sha256

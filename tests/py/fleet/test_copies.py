@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from gyrotc.fleet.copies import copies
+from gyrotc.fleet.outliers import copies
 from gyrotc.recordings.copies import noise_of, noise_signs
 from gyrotc.results.fleet import FleetEntry
 from numpy.typing import NDArray

@@ -23,7 +23,7 @@ from gyrotc.model import load_model
 from gyrotc.pages.report import write_report
 from gyrotc.pages.unit import failed_checks
 from gyrotc.recordings.load import load
-from gyrotc.results.verification import MapError
+from gyrotc.results.release import MapError
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.emit import emit
 from gyrotc.train.fitting import FitOptions, fit_dataset

@@ -11,7 +11,7 @@ import pytest
 from conftest import Command
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.errors import InputError
-from gyrotc.jobs.compare import compare
+from gyrotc.jobs.build import compare
 from gyrotc.pages.comparison import comparison_tables
 from gyrotc.pages.display import displayed, shown
 from gyrotc.recordings.load import load

@@ -24,8 +24,8 @@ from gyrotc.lot.earlier import (
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
+from gyrotc.results.release import Verification
 from gyrotc.results.training import Training
-from gyrotc.results.verification import Verification
 from gyrotc.tables.emit import emitted_tables
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.means import UnitMeans, unit_means

@@ -16,7 +16,7 @@ from gyrotc.lot.planning import plan_with_lot
 from gyrotc.lot.use import prior_of
 from gyrotc.model import BiasSpread, load_model
 from gyrotc.recordings.load import load
-from gyrotc.results.planned import LotPlan, NextRun
+from gyrotc.results.recordings import LotPlan, NextRun
 from gyrotc.store.files import json_text
 from gyrotc.tables.emit import MONTH_H
 from gyrotc.train.data import joined

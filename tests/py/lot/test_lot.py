@@ -17,10 +17,9 @@ from gyrotc.lot.earlier import widened
 from gyrotc.lot.job import checksum_of, lot_from
 from gyrotc.lot.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
 from gyrotc.lot.planning import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
-from gyrotc.lot.prior import MapPosterior, MapPrior
-from gyrotc.lot.use import LotPrior, prior_of
-from gyrotc.results.lot import Lot, LotCluster
-from gyrotc.results.planned import ChamberStep
+from gyrotc.lot.use import LotPrior, MapPosterior, MapPrior, prior_of
+from gyrotc.results.fleet import Lot, LotCluster
+from gyrotc.results.recordings import ChamberStep
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import TrainingData
 from gyrotc.train.evidence import Asked

@@ -23,7 +23,7 @@ from gyrotc.lot.service import (
 )  # fmt: skip
 from gyrotc.model import Learning, Model, Uncertainty, load_model
 from gyrotc.results.evaluation import InService
-from gyrotc.results.lot import LotAgeing
+from gyrotc.results.fleet import LotAgeing
 from gyrotc.tables.emit import MONTH_H, data_sheet_spread, emit, service_prior, walk
 from gyrotc.target.learning import KNOTS, Learner, full
 from gyrotc.train.data import TrainingData

@@ -6,14 +6,24 @@ import re
 
 import numpy as np
 import pytest
-from gyrotc.cli.commands import app
+from gyrotc.cli.main import application
 from gyrotc.common.errors import InputError
-from gyrotc.pages.display import DISPLAYS, displayed, in_unit, rate_unit, shown, shown_text, significant
+from gyrotc.pages.display import (
+    DISPLAYS,
+    displayed,
+    in_unit,
+    rate_unit,
+    sci,
+    shown,
+    shown_text,
+    significant,
+    with_uncertainty,
+    words,
+)
 from gyrotc.pages.marks import AxisScale, scale_of
-from gyrotc.pages.words import sci, with_uncertainty, words
+from gyrotc.results.base import Size
 from gyrotc.results.diagnosed import ComparedStatistic, ParameterLikelihood
-from gyrotc.results.findings import Size
-from gyrotc.results.planned import DetectionLimit
+from gyrotc.results.recordings import DetectionLimit
 from gyrotc.results.release import Contribution, Instrument, Limit
 from gyrotc.results.training import AllanPoint, NoiseTerms
 from typer.main import get_command
@@ -151,12 +161,12 @@ def test_ticks_are_round_and_lie_on_the_axis() -> None:
 
 
 def test_every_command_that_states_rates_takes_the_unit_and_refuses_another() -> None:
-    commands = get_command(app).commands  # type: ignore[attr-defined]
+    commands = get_command(application()).commands  # type: ignore[attr-defined]
     takes = {name for name, one in commands.items() if any(p.name == "display" for p in one.params)}
     assert takes >= {
         "fit", "evaluate", "check", "build", "diagnose", "compare", "plan", "fleet", "catalogue", "lot", "report",
     }  # fmt: skip
     for name in sorted(takes):
-        done = CliRunner().invoke(app, [name, "--display", "knots", *["nowhere"] * 3])
+        done = CliRunner().invoke(application(), [name, "--display", "knots", *["nowhere"] * 3])
         assert isinstance(done.exception, InputError) and "knots" in str(done.exception), name
     assert rate_unit() == "deg/h"

@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
-from gyrotc.paper.__main__ import page_of, record_of, stale
-from gyrotc.paper.experiment import METHODS
-from gyrotc.paper.figures import FIGURES, Series, checksum, draw
-from gyrotc.paper.page import departures, filled, keep, made_with, measured
+from gyrotc.paper.experiment import FIGURES, METHODS, Series, checksum, draw
+from gyrotc.paper.page import departures, filled, keep, made_with, measured, page_of, record_of, stale
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "paper.md"

@@ -12,11 +12,10 @@ from campaigns import scenario, simulated
 from conftest import Command, invoked
 from gyrotc.cli.plan import limits_of, pair_of, plan_parts
 from gyrotc.common.errors import InputError
-from gyrotc.pages.display import displayed, shown
-from gyrotc.pages.words import sci
+from gyrotc.pages.display import displayed, sci, shown
 from gyrotc.plan.plan import plan, shortest
 from gyrotc.plan.sensitivity import Sensitivity, programme_of
-from gyrotc.results.planned import Plan
+from gyrotc.results.recordings import Plan
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,12 @@ import pytest
 from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
-from gyrotc.pages.check import write_check_page
+from gyrotc.pages.short import write_check_page
 from gyrotc.quality.check import CheckResult, check, envelope_of, pictures_of
 from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.quality.findings import finding
 from gyrotc.recordings.plausibility import earth_rate
-from gyrotc.results.findings import Finding
+from gyrotc.results.base import Finding
 from gyrotc.results.fleet import Facts, FleetEntry
 from numpy.typing import NDArray
 from recordings import ROWS, RUN, Columns, columns, described, toml, write_csv

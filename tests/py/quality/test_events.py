@@ -21,7 +21,7 @@ from gyrotc.quality.outliers import departing
 from gyrotc.quality.thermometers import displaced, stuck_stretches, thermometer_findings
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows
-from gyrotc.results.findings import Finding
+from gyrotc.results.base import Finding
 from gyrotc.simulate.campaign import simulate
 from gyrotc.target.recursions import first_order
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset

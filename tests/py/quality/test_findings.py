@@ -20,8 +20,8 @@ from gyrotc.quality.outliers import departing_rows
 from gyrotc.quality.thermometers import jumps_of
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
+from gyrotc.results.base import Finding
 from gyrotc.results.evaluation import Pooled
-from gyrotc.results.findings import Finding
 from recordings import Columns, columns, toml, write_csv
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
-from gyrotc.fleet.copies import copies
+from gyrotc.fleet.outliers import copies
 from gyrotc.quality.check import check
 from gyrotc.recordings.copies import fingerprints_of, noise_copies, noise_of, windows_in_common
 from gyrotc.recordings.load import load

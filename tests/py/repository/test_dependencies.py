@@ -23,7 +23,7 @@ PROJECT = tomllib.loads((ROOT / "gen" / "pyproject.toml").read_text("utf-8"))["p
 #: Distributions by the name of what is imported; a part of pydantic with a name of its own comes with it.
 DISTRIBUTIONS = packages_distributions() | {"pydantic_core": ["pydantic"]}
 #: Modules that are one extra's, and are loaded where it is asked for.
-OF_EXTRA = {"train/estimator.py": "sklearn", "paper/figures.py": "paper"}
+OF_EXTRA = {"train/estimator.py": "sklearn", "paper/experiment.py": "paper"}
 
 
 def _named(requirements: list[str]) -> set[str]:
@@ -77,7 +77,7 @@ def test_the_main_job_loads_no_extra() -> None:
         "rosbags",
     }
     program = (
-        "import sys, gyrotc.jobs.build, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.check\n"
+        "import sys, gyrotc.jobs.build, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.short\n"
         f"sys.exit(' '.join({extras} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

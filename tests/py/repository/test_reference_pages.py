@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import reference
 from conftest import ROOT
-from gyrotc.cli.commands import app
-from gyrotc.cli.schemas import KINDS, tables
+from gyrotc.cli.main import application
+from gyrotc.cli.shell import kinds, tables
 from gyrotc.verify.sizes import PUBLIC
 from typer.main import get_command
 
@@ -38,15 +38,15 @@ def test_every_public_function_of_c_has_its_heading(made: Path) -> None:
 
 
 def test_every_command_has_its_heading(made: Path) -> None:
-    commands = get_command(app).commands  # type: ignore[attr-defined]
+    commands = get_command(application()).commands  # type: ignore[attr-defined]
     assert _headings(made / "reference-cli.md") == [f"gyrotc {name}" for name in sorted(commands)]
 
 
 def test_every_result_has_its_heading_and_its_table(made: Path) -> None:
-    assert _headings(made / "reference-schemas.md") == list(KINDS)
+    assert _headings(made / "reference-schemas.md") == list(kinds())
     text = (made / "FORMAT.md").read_text("utf-8")
     assert not reference.PLACE.search(text)
-    for name, kind in KINDS.items():
+    for name, kind in kinds().items():
         first = tables(kind).split("\n\n")[0].strip()
         assert name == "model" or first in text, f"FORMAT.md has no place for the fields of {name}"
 
@@ -61,7 +61,7 @@ def test_every_public_name_of_python_has_its_heading(made: Path) -> None:
 def test_every_place_of_a_table_names_a_command_that_prints_it() -> None:
     text = (ROOT / "docs" / "FORMAT.md").read_text("utf-8")
     places = reference.PLACE.findall(text)
-    assert sorted(places) == sorted(set(KINDS) - {"model"})
+    assert sorted(places) == sorted(set(kinds()) - {"model"})
 
 
 def test_the_site_has_every_page() -> None:

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from conftest import Command
 from gyrotc import results
-from gyrotc.cli.commands import app
-from gyrotc.cli.schemas import KINDS, tables
+from gyrotc.cli.main import application
+from gyrotc.cli.shell import kinds, tables
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.results.base import Marker, Numbered, checked_result
@@ -164,7 +164,7 @@ def test_diagnose(tmp_path: Path, gyrotc: Command) -> None:
 
 
 def test_every_command_has_an_example_in_its_help() -> None:
-    for command in app.registered_commands:
+    for command in application().registered_commands:
         assert command.callback is not None
         name = command.name or command.callback.__name__
         assert f"Example: gyrotc {name}" in (command.callback.__doc__ or ""), name
@@ -196,12 +196,12 @@ def test_every_class_with_a_schema_has_a_name() -> None:
         if one.__module__.startswith("gyrotc.") and not one.__name__.startswith("_")
         and one.model_fields["schema_"].default is not PydanticUndefined
     }  # fmt: skip
-    assert len(named) > 20 and named <= set(KINDS.values())
+    assert len(named) > 20 and named <= set(kinds().values())
 
 
-@pytest.mark.parametrize("name", sorted(set(KINDS) - {"model"}))
+@pytest.mark.parametrize("name", sorted(set(kinds()) - {"model"}))
 def test_every_field_says_what_it_means(name: str) -> None:
-    rows = [line for line in tables(KINDS[name]).splitlines() if line.startswith("| `")]
+    rows = [line for line in tables(kinds()[name]).splitlines() if line.startswith("| `")]
     assert rows and all(not row.endswith("|  |") for row in rows if "`schema`" not in row)
 
 
@@ -261,7 +261,7 @@ def test_a_result_that_is_no_number_cannot_be_made() -> None:
 def test_the_command_prints_a_schema_or_all(gyrotc: Command) -> None:
     done = gyrotc("schema", "limits")
     assert done.returncode == 0 and json.loads(done.stdout) == HeldLimits.model_json_schema()
-    assert json.loads(gyrotc("schema").stdout) == {name: json.loads(gyrotc("schema", name).stdout) for name in KINDS}
+    assert json.loads(gyrotc("schema").stdout) == {name: json.loads(gyrotc("schema", name).stdout) for name in kinds()}
     done = gyrotc("schema", "limit")
     assert done.returncode == 2 and "changes, check" in done.stderr
 
@@ -271,4 +271,4 @@ def test_the_command_prints_tables_of_one_or_all(gyrotc: Command) -> None:
     assert done.returncode == 0 and done.stdout == tables(HeldLimits)
     assert "| `met` | true or false | whether all are met;" in done.stdout and "\n`Limit`: " in done.stdout
     whole = gyrotc("schema", "--table").stdout
-    assert re.findall(r"^## (.+)$", whole, re.MULTILINE) == list(KINDS) and done.stdout in whole
+    assert re.findall(r"^## (.+)$", whole, re.MULTILINE) == list(kinds()) and done.stdout in whole

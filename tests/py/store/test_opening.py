@@ -97,9 +97,9 @@ def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
 
 
 def test_every_command_is_tried() -> None:
-    from gyrotc.cli.commands import app
+    from gyrotc.cli.main import application
 
-    every = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+    every = set(typer.main.get_command(application()).commands)  # type: ignore[attr-defined]
     assert every == {*COMMANDS} | WRITE_NOTHING | AS_OTHERS
 
 
@@ -226,7 +226,7 @@ _DOOR = {
     "store/files.py",
     "store/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
     "store/update.py copy2",  # into a folder that the job has just made
-    "cli/deliver.py copytree",  # likewise
+    "cli/fleet.py copytree",  # likewise
     "recordings/importers/formats.py open",  # into a scratch folder that the job has just made
     "recordings/importers/spreadsheet.py open",  # likewise
 }

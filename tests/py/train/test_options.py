@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Command
-from gyrotc.cli.commands import app
+from gyrotc.cli.main import application
 from gyrotc.common.errors import InputError
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.recordings.load import load
@@ -71,7 +71,7 @@ def test_a_manifest_refuses_what_the_commands_refuse_and_names_the_field(name: s
 
 @pytest.mark.parametrize("command", [name for name in TAKEN if name != "evaluate"])
 def test_a_command_offers_these_options_with_the_defaults_of_the_class(command: str) -> None:
-    parameters = {p.name: p for p in get_command(app).commands[command].params}  # type: ignore[attr-defined]
+    parameters = {p.name: p for p in get_command(application()).commands[command].params}  # type: ignore[attr-defined]
     offered = {name for name in DEFAULTS.__dataclass_fields__ if name in parameters}
     assert offered == TAKEN[command]
     for name in offered:

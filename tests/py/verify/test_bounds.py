@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from emitted import measured
 from gyrotc.common.errors import CheckFailed
-from gyrotc.results.verification import FunctionCost
+from gyrotc.results.release import FunctionCost
 from gyrotc.verify import board
 from gyrotc.verify.bounds import Paths, Program
 from gyrotc.verify.flow import Counts, LoopText, parse_flows

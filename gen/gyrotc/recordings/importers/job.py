@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from ... import __version__
 from ...common.errors import InputError
-from ...results.findings import ADVICE, Finding
+from ...results.base import ADVICE, Finding
 from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
 from ...store.files import write_own
 from ...store.folder import result_folder
