@@ -104,12 +104,7 @@ def reference(model: Model, instruments: Sequence[Instrument]) -> Contribution |
         )
     u, freedom, names, certificates = found
     return part(
-        "reference",
-        "rate that the recordings are referred to",
-        u,
-        names,
-        freedom=freedom,
-        certificate=certificates,
+        "reference", "rate that the recordings are referred to", u, names, freedom=freedom, certificate=certificates
     )
 
 

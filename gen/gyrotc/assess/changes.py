@@ -75,11 +75,7 @@ def history_of(
 
 
 def _calibration(
-    model: Model,
-    evaluation: Evaluation | None,
-    found: AsFound | None,
-    moved: MapDifference | None,
-    date: str | None,
+    model: Model, evaluation: Evaluation | None, found: AsFound | None, moved: MapDifference | None, date: str | None
 ) -> Calibration:
     judged = evaluation.judged() if evaluation else None
     return Calibration(
@@ -213,9 +209,7 @@ def _changed_hashes(before: dict[str, str], after: dict[str, str]) -> FileChange
     """Of files by name, with their hashes: which came, went, or have other bytes."""
     other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
     return FileChanges(
-        new=_only(after.keys(), before.keys()),
-        gone=_only(before.keys(), after.keys()),
-        other_bytes=tuple(other),
+        new=_only(after.keys(), before.keys()), gone=_only(before.keys(), after.keys()), other_bytes=tuple(other)
     )
 
 

@@ -51,11 +51,7 @@ from ..verify.toolchain import Target, all_targets
 from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
 from .findings import findings_of, residual_findings, residual_test
 
-__all__ = [
-    "AnsweredRows",
-    "Watch",
-    "evaluate",
-]
+__all__ = ["AnsweredRows", "Watch", "evaluate"]
 
 Watch = Callable[[Run, Averages], None]
 _HOST = "host-gcc-O2"
@@ -331,13 +327,7 @@ def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
 
 
 def _result(
-    model: Model,
-    dataset: Dataset,
-    table: Table,
-    parts: list[_Part],
-    sizes: Footprint | None,
-    *,
-    average_s: float,
+    model: Model, dataset: Dataset, table: Table, parts: list[_Part], sizes: Footprint | None, *, average_s: float
 ) -> Evaluation:
     exam = [p.averages for p in parts if p.run.role == "exam"]
     train = [p.averages for p in parts if p.run.role == "train"]

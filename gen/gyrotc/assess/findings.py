@@ -144,13 +144,7 @@ _LEAST_COVERAGE = 0.25  # below it three quarters of the envelope are interpolat
 _OUTLIER_SIGMAS = 6.0  # once in 5e8 normal runs
 _OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not reported
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
-_OF_TRAINING = (
-    "does_not_generalise",
-    "map_refused",
-    "map_beyond_data",
-    "not_of_its_lot",
-    "prior_does_not_hold",
-)
+_OF_TRAINING = ("does_not_generalise", "map_refused", "map_beyond_data", "not_of_its_lot", "prior_does_not_hold")
 _POLYNOMIALS = ("cubic", "cubic_slope", "mixed")
 
 

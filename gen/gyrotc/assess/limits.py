@@ -121,12 +121,7 @@ def _by_rule(
 def _bare(name: str, measured: float | None, bound: float, sign: float, why: str) -> Limit:
     met = measured is not None and sign * (bound - measured) >= 0.0
     return Limit(
-        limit=name,
-        measured=measured,
-        bound=bound,
-        met=met,
-        verdict="PASS" if met else "FAIL",
-        uncertainty_from=why,
+        limit=name, measured=measured, bound=bound, met=met, verdict="PASS" if met else "FAIL", uncertainty_from=why
     )
 
 

@@ -91,9 +91,7 @@ def _of_temperature(model: Model, guard: ProductGuard, where: str) -> Guard:
     trained = model.envelope.temperature_c
     if not low <= trained[0] <= trained[1] <= high:
         raise InputError(
-            f"{where}.range",
-            f"{low:g} to {high:g} C",
-            "all of the recordings, {:.4g} to {:.4g} C".format(*trained),
+            f"{where}.range", f"{low:g} to {high:g} C", "all of the recordings, {:.4g} to {:.4g} C".format(*trained)
         )
     base = guard_of(model, None).model_copy(update={"fallback": min(max(0.0, low), high)})
     return _merged(base, guard, where)

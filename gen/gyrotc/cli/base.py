@@ -268,16 +268,14 @@ TargetOption = Annotated[
     ),
 ]
 LotOption = Annotated[
-    Path | None,
-    typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs."),
+    Path | None, typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs.")
 ]
 PriorOption = Annotated[
     Path | None,
     typer.Option("--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."),
 ]
 AgeingOption = Annotated[
-    float | None,
-    typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h."),
+    float | None, typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h.")
 ]
 AppliedOption = Annotated[
     Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
@@ -295,9 +293,7 @@ TrustUnitsOption = Annotated[
 AcceptOption = Annotated[
     str | None,
     typer.Option(
-        "--accept-fail",
-        metavar="REASON",
-        help="Release a unit whose verdict is FAIL or CONDITIONAL PASS; says why.",
+        "--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL or CONDITIONAL PASS; says why."
     ),
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
@@ -448,8 +444,7 @@ def _main(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")] = False,
     verbose: Annotated[
-        bool,
-        typer.Option("--verbose", "-v", help="Print every stage with its time on stderr; also after it."),
+        bool, typer.Option("--verbose", "-v", help="Print every stage with its time on stderr; also after it.")
     ] = False,
 ) -> None:
     _Loudness.quiet, _Loudness.verbose = quiet, verbose

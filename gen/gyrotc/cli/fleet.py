@@ -51,21 +51,18 @@ def fleet(
         str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
     ] = None,
     wait: Annotated[
-        int,
-        typer.Option("--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits."),
+        int, typer.Option("--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits.")
     ] = 60,
     full: Annotated[
         bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
     ] = False,
     tag: Annotated[str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")] = "",
     shard: Annotated[
-        str | None,
-        typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs."),
+        str | None, typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs.")
     ] = None,
     gathered: Annotated[bool, typer.Option("--gather", help="Only the summary of what shares have done.")] = False,
     release: Annotated[
-        list[str] | None,
-        typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it."),
+        list[str] | None, typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it.")
     ] = None,
     why: Annotated[str, typer.Option("--reason", help="Why, for --release.")] = "",
     lot: LotOption = None,
@@ -128,13 +125,11 @@ def catalogue(
     serial: Annotated[str | None, typer.Argument(help="Which table may this gyro carry?")] = None,
     day: Annotated[str | None, typer.Option("--on", help="On this day, ISO 8601; default today.")] = None,
     exported: Annotated[
-        str | None,
-        typer.Option("--export", metavar="SERIAL", help="Write the complete result of this gyro to --out."),
+        str | None, typer.Option("--export", metavar="SERIAL", help="Write the complete result of this gyro to --out.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for --export.")] = None,
     withdrawn: Annotated[
-        str | None,
-        typer.Option("--withdraw", metavar="HASH", help="Mark the model of this hash as withdrawn."),
+        str | None, typer.Option("--withdraw", metavar="HASH", help="Mark the model of this hash as withdrawn.")
     ] = None,
     display: DisplayOption = None,
     json_file: JsonOption = None,
@@ -251,8 +246,7 @@ def lot(
     fleet: Annotated[Path, typer.Argument(help="The folder that gyrotc fleet wrote: fully calibrated units.")],
     out: Annotated[Path, typer.Option("--out", callback=written_place, help="File for the lot.")],
     axis: Annotated[
-        str | None,
-        typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own."),
+        str | None, typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own.")
     ] = None,
     earlier: Annotated[
         Path | None,
@@ -322,8 +316,7 @@ def certificate(
 def export(
     folder: DirArg,
     format: Annotated[
-        ExportFormat,
-        typer.Option("--format", help="px4, ardupilot; csv, json, a2l, cdf: the map as a table; fmu."),
+        ExportFormat, typer.Option("--format", help="px4, ardupilot; csv, json, a2l, cdf: the map as a table; fmu.")
     ],
     out: Annotated[Path, typer.Option("--out", callback=written_place, help="The file.")],
     axis_as: Annotated[
@@ -383,8 +376,7 @@ def sign(
         typer.Option("--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."),
     ] = None,
     passphrase_file: Annotated[
-        Path | None,
-        typer.Option("--key-passphrase-file", help="Its first line is the passphrase of an encrypted key."),
+        Path | None, typer.Option("--key-passphrase-file", help="Its first line is the passphrase of an encrypted key.")
     ] = None,
     accept_fail: AcceptOption = None,
 ) -> None:

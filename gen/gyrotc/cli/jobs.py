@@ -355,10 +355,7 @@ def compare(
     from ..store.folder import result_folder
 
     trained = BuildOptions(**options)
-    with (
-        result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage,
-        progress(COMPARE) as say,
-    ):
+    with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
         subtracted = applied_in(applied)
         recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
         if stage:
@@ -393,8 +390,7 @@ def diagnose(
         bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
     ] = False,
     fresh: Annotated[
-        bool,
-        typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings."),
+        bool, typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings.")
     ] = False,
     display: DisplayOption = None,
     json_file: JsonOption = None,

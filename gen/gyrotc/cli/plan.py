@@ -214,8 +214,7 @@ def plan(
         float, typer.Option("--price-per-hour", help="With --unit: of the chamber, in any currency.")
     ] = 1.0,
     price_per_run: Annotated[
-        float,
-        typer.Option("--price-per-run", help="With --unit: of mounting and settling once, in the same."),
+        float, typer.Option("--price-per-run", help="With --unit: of mounting and settling once, in the same.")
     ] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
     display: DisplayOption = None,

@@ -57,21 +57,18 @@ def import_(
         str | None, typer.Option("--table", help="Which of several tables (topics, groups) of a file.")
     ] = None,
     rate_hz: Annotated[
-        float | None,
-        typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times."),
+        float | None, typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times.")
     ] = None,
     time_format: Annotated[
         str | None, typer.Option("--time-format", help='Form of stamps, e.g. "%d/%m/%Y %H:%M:%S.%f".')
     ] = None,
     time_zone: Annotated[
-        str | None,
-        typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00."),
+        str | None, typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00.")
     ] = None,
     csv: Annotated[
         list[str] | None,
         typer.Option(
-            "--csv",
-            help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
+            "--csv", help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated."
         ),
     ] = None,
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the runs.")] = RunFormat.parquet,
@@ -82,8 +79,7 @@ def import_(
     exam: Annotated[
         bool | None,
         typer.Option(
-            "--exam/--no-exam",
-            help="The last file judges the correction and is not trained on; default: ask.",
+            "--exam/--no-exam", help="The last file judges the correction and is not trained on; default: ask."
         ),
     ] = None,
     trust_units: TrustUnitsOption = False,
@@ -176,8 +172,7 @@ def simulate(
     ] = NoiseLevel.paper,
     units: Annotated[int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")] = None,
     family: Annotated[
-        float | None,
-        typer.Option("--family", help="Of a lot: how much units share, 0 (nothing) ... 1; default 0.9."),
+        float | None, typer.Option("--family", help="Of a lot: how much units share, 0 (nothing) ... 1; default 0.9.")
     ] = None,
     clusters: Annotated[
         int | None, typer.Option("--clusters", help="Of a lot: groups with a center each; default 1.")
@@ -289,14 +284,12 @@ def check(
     dataset: DatasetArg,
     axis: AxisOption = None,
     envelope: Annotated[
-        str | None,
-        typer.Option("--envelope", help="What training should cover, C and C/min, e.g. -40:60,-5:5."),
+        str | None, typer.Option("--envelope", help="What training should cover, C and C/min, e.g. -40:60,-5:5.")
     ] = None,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     previous: Annotated[
-        Path | None,
-        typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?"),
+        Path | None, typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?")
     ] = None,
     plots: Annotated[
         Path | None,

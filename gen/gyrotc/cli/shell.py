@@ -78,7 +78,7 @@ def cache(
 
 @functools.cache
 def kinds() -> dict[str, type[BaseModel]]:
-    """Every file and output by the name that `gyrotc schema` knows; imported where it is asked for, as help needs none."""
+    """Every file and output by the name that `gyrotc schema` knows; imported when asked for, as help needs none."""
     from ..model import Model
     from ..results.base import MapOnGrid, Marker
     from ..results.diagnosed import Diagnosed, DiagnosisSeries

@@ -142,8 +142,7 @@ def emit(
     out: OutOption,
     numeric: NumericOption = None,
     zero_at: Annotated[
-        float | None,
-        typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C."),
+        float | None, typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C.")
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -159,10 +158,7 @@ def emit(
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
     elsewhere = target.resolve() != source.resolve()
-    with (
-        progress(EMIT) as say,
-        result_folder(out, "emit", entries=("c", "model.json")[: 1 + elsewhere]) as stage,
-    ):
+    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")[: 1 + elsewhere]) as stage:
         stage.of(loaded.serial, loaded.axis)
         if elsewhere and target.is_file() and target.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
@@ -202,15 +198,13 @@ def verify(
         bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
     ] = False,
     allow_edited: Annotated[
-        list[str] | None,
-        typer.Option("--allow-edited", help="main.c: the example is yours now and may differ."),
+        list[str] | None, typer.Option("--allow-edited", help="main.c: the example is yours now and may differ.")
     ] = None,
     signature: Annotated[
         Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
     ] = None,
     replaces: Annotated[
-        Path | None,
-        typer.Option("--replaces", help="Signed result that the gyro carries now: DIR may not be older."),
+        Path | None, typer.Option("--replaces", help="Signed result that the gyro carries now: DIR may not be older.")
     ] = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,
@@ -301,13 +295,7 @@ def evaluate(
     recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
         result = run(
-            folder,
-            recordings,
-            numeric=numeric,
-            average_s=average_s,
-            trace=traces,
-            trust_code=trust_code,
-            progress=say,
+            folder, recordings, numeric=numeric, average_s=average_s, trace=traces, trust_code=trust_code, progress=say
         )
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())

@@ -119,10 +119,7 @@ def parameters(
     """The text of a parameter file; axes that are not there get zeros."""
     first = next(iter(cubics.values()))
     rows = _of_px4(first, cubics, device) if autopilot == "px4" else _of_ardupilot(first, cubics)
-    lines = [
-        f"# gyrotc: gyro {serial}, best cubic over temperature in float32",
-        *(f"# {note}" for note in notes),
-    ]
+    lines = [f"# gyrotc: gyro {serial}, best cubic over temperature in float32", *(f"# {note}" for note in notes)]
     if autopilot == "px4":
         lines.append("# TC_G0_ID has to be CAL_GYRO0_ID of the vehicle (--device)" if not device else "#")
         body = (f"1\t1\t{name}\t{text}\t{kind}" for name, text, kind in rows)
@@ -335,11 +332,7 @@ def _description(models: Sequence[Model], name: str, inputs: Sequence[str], toke
     )  # fmt: skip
     units = SubElement(root, "UnitDefinitions")
     SubElement(SubElement(units, "Unit", {"name": "degC"}), "BaseUnit", {"K": "1", "offset": "273.15"})
-    SubElement(
-        SubElement(units, "Unit", {"name": "deg/h"}),
-        "BaseUnit",
-        {"rad": "1", "s": "-1", "factor": _RAD_PER_S},
-    )
+    SubElement(SubElement(units, "Unit", {"name": "deg/h"}), "BaseUnit", {"rad": "1", "s": "-1", "factor": _RAD_PER_S})
     SubElement(SubElement(root, "LogCategories"), "Category", {"name": "logStatusError"})
     SubElement(root, "DefaultExperiment", {"startTime": "0", "stepSize": period_s})
     outputs = _variables(root, models, inputs)
@@ -367,10 +360,7 @@ def _variables(root: Element, models: Sequence[Model], inputs: Sequence[str]) ->
 
 
 def _clock(period_us: int) -> Iterator[tuple[str, dict[str, str]]]:
-    yield (
-        "Float64",
-        {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"},
-    )
+    yield ("Float64", {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"})
     yield (
         "UInt32",
         {
@@ -386,12 +376,7 @@ def _outputs(models: Sequence[Model], n_inputs: int) -> Iterator[tuple[str, dict
     for k, model in enumerate(models):
         of = f"_{model.axis}" if len(models) > 1 else ""
         rows = [
-            (
-                "Float32",
-                f"bias{of}_dph",
-                "Correction in force: compensated = measured - bias",
-                {"unit": "deg/h"},
-            ),
+            ("Float32", f"bias{of}_dph", "Correction in force: compensated = measured - bias", {"unit": "deg/h"}),
             ("Int32", f"status{of}", "Bits of gtc.h: 0 is done", {}),
             ("Float32", f"sigma{of}_dph", "1 sigma of the compensated bias", {"unit": "deg/h"}),
         ]

@@ -252,10 +252,7 @@ def cdf_text(grids: Sequence[MapGrid], notes: Sequence[str]) -> str:
 
 def _instances(tree: Element, grid: MapGrid) -> None:
     names = names_of(grid)
-    for what, unit, points in (
-        ("temperature", "C", grid.temperature_c),
-        ("slope", "C/min", grid.slope_c_per_min),
-    ):
+    for what, unit, points in (("temperature", "C", grid.temperature_c), ("slope", "C/min", grid.slope_c_per_min)):
         _numbers(_content(_instance(tree, names[what], "COM_AXIS"), unit), points)
     rest = _instance(tree, names["rest"], "CURVE")
     _numbers(_content(rest, "deg/h"), grid.rest_dph)

@@ -38,10 +38,7 @@ NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is wh
 _LEAST_IN_BIN = 3  # means, for a mean of them
 _LEAST_MEANS = 16  # a shorter run does not show a step
 _EDGE = 0.1  # of a run, on either side of which a step is not sought
-_WARM_UP_S, _FADES = (
-    900.0,
-    4.0,
-)  # a quarter of an hour, as of discharges and electronics; and it is over in an hour
+_WARM_UP_S, _FADES = (900.0, 4.0)  # a quarter of an hour, as of discharges and electronics; and it is over in an hour
 PROFILE_S = 600.0  # s between two temperatures of a run that are compared
 _POINTS = 160  # of the residual that a picture shows
 
@@ -254,10 +251,7 @@ _GAPS = (2, 4)  # between signs of a window: nearer ones are not independent, fo
 _NARROWEST, _WIDEST = 12, 26  # signs that are compared; the widest lie in two words
 _LAG_BITS = 14  # of a lag, in signs
 _WORD = 56  # signs that are compared at once: what eight bytes hold from any bit of the first on
-_FIRST_LOOK, _LEAST_EXCESS = (
-    4 * _WORD,
-    0.3,
-)  # signs about a window; by how much more of them agree than differ
+_FIRST_LOOK, _LEAST_EXCESS = (4 * _WORD, 0.3)  # signs about a window; by how much more of them agree than differ
 _COPY_SIGMAS = 7.0  # of the signs that agree by chance: once in 4e11, and a fleet of a thousand looks at 1e7 lags
 _COPY_ALIKE = 0.5  # correlation: at periods of minutes nothing shakes two gyros by as much as their own noise
 

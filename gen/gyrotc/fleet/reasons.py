@@ -38,15 +38,7 @@ _OF_RUN = (
     "unit_changed",
     "gain_changed",
 )  # what a run is as a whole comes before what happened in it
-_IN_RUN = (
-    "restart",
-    "step",
-    "step_and_recover",
-    "ramp",
-    "transition",
-    "jump_in_temperature",
-    "stuck_temperature",
-)
+_IN_RUN = ("restart", "step", "step_and_recover", "ramp", "transition", "jump_in_temperature", "stuck_temperature")
 _PER_H = 3600.0  # s in an hour
 
 

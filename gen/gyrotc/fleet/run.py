@@ -429,12 +429,7 @@ def _summed(
 
 def _unfinished(task: Task, reason: str = _STOPPED) -> FleetEntry:
     """The entry of a unit that nobody has done."""
-    return FleetEntry(
-        name=task.unit.name,
-        axis=task.unit.axis,
-        status="unfinished",
-        reason=reason,
-    )
+    return FleetEntry(name=task.unit.name, axis=task.unit.axis, status="unfinished", reason=reason)
 
 
 def _one_of_each_serial(entries: Sequence[FleetEntry]) -> Iterator[FleetEntry]:

@@ -177,11 +177,7 @@ def _identified(entry: FleetEntry, task: Task) -> FleetEntry:
     if description is None or not task.key:
         return entry
     days = [one.started.date().isoformat() for one in description.run if one.started is not None]
-    known = {
-        "serial": description.serial,
-        "date": _day_of(description.meta, days),
-        "key": task.key,
-    }
+    known = {"serial": description.serial, "date": _day_of(description.meta, days), "key": task.key}
     return entry.model_copy(update=known)
 
 
@@ -201,11 +197,7 @@ def failed(task: Task, reason: str) -> FleetEntry:
     except OSError:
         stays = ""
     return FleetEntry(
-        name=task.unit.name,
-        dataset=task.shown,
-        axis=task.unit.axis,
-        status="failed",
-        reason=printable(reason) + stays,
+        name=task.unit.name, dataset=task.shown, axis=task.unit.axis, status="failed", reason=printable(reason) + stays
     )
 
 
@@ -271,8 +263,7 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
         limits_held=len(held.limits) if held and held.limits else None,
         expanded_uncertainty_dph=_expanded(built.evaluation),
         date=_day_of(
-            built.model.meta,
-            [run.started.date().isoformat() for run in dataset.runs if run.started is not None],
+            built.model.meta, [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
         ),
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),

@@ -223,11 +223,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         seen = BuiltUnit(lot, fitted.training.known, fitted.means)
         learning = stated.of(model, seen, order.limits.file) if stated else None
         model = model.model_copy(
-            update={
-                "q31_bias_frac_bits": order.limits.q31_bias_frac_bits,
-                "left_out": left_out,
-                "learning": learning,
-            }
+            update={"q31_bias_frac_bits": order.limits.q31_bias_frac_bits, "left_out": left_out, "learning": learning}
         )
         fitted = replace(fitted, model=model)
     fitted.model.save(work / "model.json")
@@ -258,13 +254,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     changes = None
     if earlier:
         changes = changes_since(
-            earlier,
-            fitted.model,
-            evaluation,
-            manifest,
-            training=fitted.training,
-            dataset=dataset,
-            limits=order.limits,
+            earlier, fitted.model, evaluation, manifest, training=fitted.training, dataset=dataset, limits=order.limits
         )
         _write(work / "changes.json", changes.content())
     budget = budget_of(fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes)
@@ -272,16 +262,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     if order.compiled:
         say("drawing the report")
         write_report(work, order.display)
-    return Built(
-        fitted.model,
-        fitted.training,
-        evaluation,
-        verification,
-        emission.refused,
-        diagnosis,
-        held,
-        changes,
-    )
+    return Built(fitted.model, fitted.training, evaluation, verification, emission.refused, diagnosis, held, changes)
 
 
 def _extended(dataset: Dataset, work: Path, options: FitOptions, say: Progress) -> tuple[Fitted | None, Diagnosed]:

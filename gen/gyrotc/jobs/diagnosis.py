@@ -85,11 +85,7 @@ def extended_scenario(result: Diagnosed) -> str | None:
     ]
     noise = result.estimated_noise
     if noise:
-        lines += [
-            "",
-            "[noise]",
-            *(f"{toml_key(name)} = {toml_value(value)}" for name, value in noise.items()),
-        ]
+        lines += ["", "[noise]", *(f"{toml_key(name)} = {toml_value(value)}" for name, value in noise.items())]
     for cause in causes:
         lines += _cause(cause)
     return "\n".join(lines) + "\n"

@@ -74,11 +74,7 @@ def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float |
 
 
 def with_prior(
-    options: FitOptions,
-    dataset: Dataset,
-    folder: Path | None,
-    ageing_dph: float | None,
-    limits: Limits | None = None,
+    options: FitOptions, dataset: Dataset, folder: Path | None, ageing_dph: float | None, limits: Limits | None = None
 ) -> FitOptions:
     """Options of a fit with what an earlier result says; as they are where none is named.
 

@@ -74,11 +74,7 @@ def _check_figures(evaluation: Evaluation, where: str) -> None:
             _same(stated.mean_dph, mean, f"{where}, field {role}.{side}.mean_dph", math.sqrt(square))
             _same(stated.rms_dph, math.sqrt(square), f"{where}, field {role}.{side}.rms_dph")
             _same(stated.max_abs_dph, largest, f"{where}, field {role}.{side}.max_abs_dph")
-    for role, pooled in (
-        ("train", evaluation.train),
-        ("exam", evaluation.exam),
-        ("left_out", evaluation.left_out),
-    ):
+    for role, pooled in (("train", evaluation.train), ("exam", evaluation.exam), ("left_out", evaluation.left_out)):
         if pooled is not None:
             _check_pooled(pooled, f"{where}, field {role}")
 
@@ -148,10 +144,7 @@ def _check_budget(
     """
     if training is None:
         raise InputError(where, "stands without training.json", _EXPECTED)
-    drift = next(
-        (one for one in budget.contributions if one.id == AGEING and one.distribution == "rectangular"),
-        None,
-    )
+    drift = next((one for one in budget.contributions if one.id == AGEING and one.distribution == "rectangular"), None)
     stated = {"drift_dph_per_year": drift.standard_uncertainty * math.sqrt(3.0)} if drift else {}
     interval = {"interval": {"days": budget.interval_days} | stated} if budget.interval_days else {}
     limits = _limits(interval, where).model_copy(update={"instrument": budget.instruments})
@@ -221,9 +214,7 @@ def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> 
         if verdict in NEED_REASON:
             why = [text for unit in units for text in (*unit.failures, unit.named(verdict)) if text]
             raise InputError(
-                str(folder),
-                f"its verdict is {verdict} ({'; '.join(why)[:200]})",
-                "a PASS, or --accept-fail REASON",
+                str(folder), f"its verdict is {verdict} ({'; '.join(why)[:200]})", "a PASS, or --accept-fail REASON"
             )
         return None
     if verdict not in NEED_REASON:
@@ -345,12 +336,7 @@ def joint_texts(
     main = (
         c_environment()
         .get_template("main_axes.c.j2")
-        .render(
-            models=listed,
-            n=numeric,
-            period_us=example_period_us(listed[0]),
-            samples=example_samples(listed[0]),
-        )
+        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]), samples=example_samples(listed[0]))
     )
     texts["main.c"] = main.encode("ascii")
     texts[RECORD] = joint_record_text(models, texts)

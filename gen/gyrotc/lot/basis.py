@@ -15,16 +15,7 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..results.fleet import LotFunctions
 
-PARAMETERS = (
-    "constant",
-    "short",
-    "short_scale",
-    "long",
-    "long_scale",
-    "coupled",
-    "coupled_scale_t",
-    "coupled_scale_r",
-)
+PARAMETERS = ("constant", "short", "short_scale", "long", "long_scale", "coupled", "coupled_scale_t", "coupled_scale_r")
 """Standard deviations in units of the lot and scales in half ranges; a process is given by their logarithms."""
 PRIOR_LOG = np.log([1.0, 0.3, 0.15, 1.0, 0.7, 0.3, 0.8, 0.8])  # as kPriorMean of gen/core/evidence.cpp
 _PRIOR_SD = np.array([3.0, 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5])  # as kPriorSd there

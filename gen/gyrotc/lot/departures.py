@@ -30,11 +30,7 @@ from .use import MapPosterior, MapPrior
 Span = tuple[float, float]
 
 _CENTERS = 17  # of regions over the run's temperatures: at half of the narrowest one's width
-_WIDTHS = (
-    0.125,
-    0.25,
-    0.5,
-)  # of regions, shares of the run's span: narrower ones hold too few means of a short run
+_WIDTHS = (0.125, 0.25, 0.5)  # of regions, shares of the run's span: narrower ones hold too few means of a short run
 _STILL_C_PER_MIN = 0.2  # a chamber that holds: nine tenths of the paper's holds are slower
 _LEAST_SHARE = 0.05  # of a run, ramps of one direction: less says nothing of them
 _CELLS = 8  # of T, for the table

@@ -85,11 +85,7 @@ class EarlierPrior(MapPrior):
             return Given(None, [finding], prior=use)
         findings = [_does_not_hold(use)] if use.chosen == "full" else []
         return Given(
-            map_of_both,
-            findings,
-            f"the earlier model {_MEANS[use.chosen]}",
-            prior=use,
-            known=known_map(posterior),
+            map_of_both, findings, f"the earlier model {_MEANS[use.chosen]}", prior=use, known=known_map(posterior)
         )
 
 
@@ -222,11 +218,7 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
 
 
 def _use(
-    prior: EarlierPrior,
-    posterior: MapPosterior,
-    found: Sequence[Hypothesis],
-    run: UnitMeans,
-    scaling: Scaling | None,
+    prior: EarlierPrior, posterior: MapPosterior, found: Sequence[Hypothesis], run: UnitMeans, scaling: Scaling | None
 ) -> EarlierUse:
     """`scaling`: of the map that was made with the earlier model; None: there is none."""
     alone, chosen = prior.alone(), found[0]

@@ -27,10 +27,7 @@ from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, freedom_o
 from .service import Moved, covariance_at, fitted_ageing
 from .use import prior_of, process_result, rounded
 
-_CELLS = (
-    33,
-    13,
-)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
+_CELLS = (33, 13)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read
 
 
@@ -230,11 +227,7 @@ def lot_from(
 
 def _clusters(state: LotState) -> tuple[LotCluster, ...]:
     return tuple(
-        LotCluster(
-            units=int(n),
-            mean=rounded(m),
-            covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(c)),
-        )
+        LotCluster(units=int(n), mean=rounded(m), covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(c)))
         for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
     )
 
@@ -242,12 +235,7 @@ def _clusters(state: LotState) -> tuple[LotCluster, ...]:
 def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, ...]:
     clusters = iter(found.state.cluster.tolist())
     return tuple(
-        LotUnit(
-            serial=serial,
-            model_hash=model_hash,
-            cluster=next(clusters) if kept else None,
-            p_value=float(p),
-        )
+        LotUnit(serial=serial, model_hash=model_hash, cluster=next(clusters) if kept else None, p_value=float(p))
         for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
     )
 

@@ -147,12 +147,7 @@ class LotState:
 
 
 def fitted(
-    units: UnitSums,
-    basis: LotBasis,
-    rank: int,
-    cluster: NDArray[np.int64],
-    rounds: int,
-    start: LotState | None = None,
+    units: UnitSums, basis: LotBasis, rank: int, cluster: NDArray[np.int64], rounds: int, start: LotState | None = None
 ) -> LotState:
     """Expectation and maximisation over a number of rounds; clusters stay as given."""
     first = PRIOR_LOG.copy()
@@ -212,11 +207,7 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, tuple[Floa
     means = np.einsum("cij,cj->ci", covariances, totals)
     own = means[state.cluster]
     moved = np.subtract(_times(posterior, units.moment + own @ inverse), own)
-    return (
-        replace(state, means=means, covariances=covariances),
-        (posterior, log_determinant),
-        np.asarray(moved),
-    )
+    return (replace(state, means=means, covariances=covariances), (posterior, log_determinant), np.asarray(moved))
 
 
 def _log_evidence(units: UnitSums, state: LotState, posterior: FloatArray, log_determinant: FloatArray) -> float:
@@ -259,11 +250,7 @@ _MOST_DIRECTIONS = 6  # beyond them no lot has gained
 _UNITS_A_DIRECTION = 5  # with fewer a direction is a portrait of one of them
 _MOST_CLUSTERS = 4  # each that is tried costs as much time as all directions
 _LEAST_IN_CLUSTER = 3  # units: as for a lot
-_ROUNDS = (
-    8,
-    16,
-    20,
-)  # with all functions, with those that count, for each model: the evidence changes by < 1 then
+_ROUNDS = (8, 16, 20)  # with all functions, with those that count, for each model: the evidence changes by < 1 then
 _SAMPLE = 256  # units at most that say which functions count: a variance from so many is known to a tenth
 _AGAIN = 6  # rounds of a model that starts from another of nearly the same units
 _COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing

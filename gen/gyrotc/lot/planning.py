@@ -251,12 +251,7 @@ class _Found:
 
 
 def next_run(
-    model: Model,
-    known: MapPosterior,
-    noise_dph: float,
-    mean_s: float,
-    scenario: str | Path,
-    price: Price,
+    model: Model, known: MapPosterior, noise_dph: float, mean_s: float, scenario: str | Path, price: Price
 ) -> NextRun:
     """The runs of growing length that tell most of a unit's map, and the one that is best for its price.
 

@@ -58,11 +58,7 @@ def _innovations(
     """Innovations of all stops, (n, axes), and their variances for a scale of 1, by the filter in float64."""
     known = Learning(spread=spread, reference_c=center_c, authority_dph=1.0, noise_deg_per_sqrt_h=1.0)
     prior = replace(
-        service_prior(known, envelope_c),
-        noise_var=var,
-        authority_dph=np.inf,
-        span_c=np.inf,
-        gate_square=np.inf,
+        service_prior(known, envelope_c), noise_var=var, authority_dph=np.inf, span_c=np.inf, gate_square=np.inf
     )
     found, variances = [], []
     for runs in past:
@@ -339,11 +335,7 @@ Spoil = Callable[[int, FloatArray, float], FloatArray]
 
 
 def served(
-    service: Sequence[Mission],
-    method: Corrector,
-    draw: np.random.Generator,
-    arw: float,
-    spoil: Spoil | None = None,
+    service: Sequence[Mission], method: Corrector, draw: np.random.Generator, arw: float, spoil: Spoil | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Errors under way and stated sigmas, (n, axes)."""
     errors, sigmas = [], []

@@ -168,14 +168,7 @@ class Panel:
         self._add("line", x, y, color, label, width=width, dash=dash, title=title)
 
     def dots(
-        self,
-        x: ArrayLike,
-        y: ArrayLike,
-        color: str,
-        label: str = "",
-        *,
-        size: float = 4.0,
-        hollow: bool = False,
+        self, x: ArrayLike, y: ArrayLike, color: str, label: str = "", *, size: float = 4.0, hollow: bool = False
     ) -> None:
         """Points, `size` across."""
         self._add("rings" if hollow else "dots", x, y, color, label, width=size)
@@ -371,13 +364,7 @@ def _legend(panels: Sequence[Panel], width: float) -> tuple[str, float]:
 
 
 def _panel(
-    panel: Panel,
-    box: tuple[float, float, float, float],
-    xs: AxisScale,
-    ys: AxisScale,
-    *,
-    left: bool,
-    bottom: bool,
+    panel: Panel, box: tuple[float, float, float, float], xs: AxisScale, ys: AxisScale, *, left: bool, bottom: bool
 ) -> str:
     x, y, w, h = box
     parts = []

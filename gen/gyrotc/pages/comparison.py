@@ -168,10 +168,7 @@ def comparison_picture(result: Comparison) -> Markup:
 def _rows_of(methods: Sequence[Method]) -> dict[str, Any]:
     """Names of the methods, the first one uppermost."""
     last = len(methods) - 1
-    return {
-        "y_ticks": [(last - k, m.id) for k, m in enumerate(methods)],
-        "y_range": (-0.6, last + 0.6),
-    }
+    return {"y_ticks": [(last - k, m.id) for k, m in enumerate(methods)], "y_range": (-0.6, last + 0.6)}
 
 
 def _environment(methods: Sequence[Method], k: int, exponent: int) -> Panel:

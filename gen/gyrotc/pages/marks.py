@@ -13,13 +13,7 @@ from ..common.arrays import FloatArray
 from ..common.texts import picture_text
 from .display import is_plain, power
 
-_ROUND = (
-    1.0,
-    2.0,
-    5.0,
-    10.0,
-    20.0,
-)  # steps whose multiples people read at a glance; 10 begins the next decade
+_ROUND = (1.0, 2.0, 5.0, 10.0, 20.0)  # steps whose multiples people read at a glance; 10 begins the next decade
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +130,7 @@ def scale_of(
     if logarithmic:
         more = (high / low) ** margin
         return AxisScale(
-            low if limits[0] is not None else low / more,
-            high if limits[1] is not None else high * more,
-            math.inf,
+            low if limits[0] is not None else low / more, high if limits[1] is not None else high * more, math.inf
         )
     room = margin * (high - low)
     low, high = low - room * (limits[0] is None), high + room * (limits[1] is None)
@@ -240,13 +232,7 @@ def mark_svg(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale) -> str:
             return _boxes(mark, box, xs, ys, (x, y))
 
 
-def _boxes(
-    mark: Drawn,
-    box: Box,
-    xs: AxisScale,
-    ys: AxisScale,
-    at: tuple[FloatArray, FloatArray],
-) -> str:
+def _boxes(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale, at: tuple[FloatArray, FloatArray]) -> str:
     """Bars, words, and words on squares."""
     x0, _, w, h = box
     x, y = at

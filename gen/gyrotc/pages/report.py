@@ -282,14 +282,7 @@ def page_from(source: Path) -> Iterator[None]:
     """
     try:
         yield
-    except (
-        ArithmeticError,
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        jinja2.TemplateError,
-    ) as error:
+    except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, jinja2.TemplateError) as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise InputError(str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them") from error
 

@@ -1,4 +1,4 @@
-"""The short pages, of `check --plots`, of `plan.json` and of a unit in service (`service.json`). They compute nothing new."""
+"""The short pages: of `check --plots`, of `plan.json`, and of a unit in service (`service.json`)."""
 
 from __future__ import annotations
 
@@ -131,8 +131,7 @@ def write_check_page(path: Path, result: Checked, pictures: Sequence[Sequence[Pi
     warnings = list(zip(result.warnings, drawn[len(problems) :], strict=True))
     page = page_environment().get_template("check.html.j2")
     write_result(
-        path,
-        page.render(result=result, problems=problems, warnings=warnings, title=title, more=max(-left, 0)),
+        path, page.render(result=result, problems=problems, warnings=warnings, title=title, more=max(-left, 0))
     )
 
 

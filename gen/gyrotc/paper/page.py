@@ -1,6 +1,6 @@
 """Every table and figure of docs/paper.md made again, or checked; and the record of all that they are made of.
 
-python -m gyrotc.paper.page docs            its part of docs/results/summary.json, page, figures, a run for simulation.md
+python -m gyrotc.paper.page docs            its part of docs/results/summary.json, page, figures, run of simulation.md
 python -m gyrotc.paper.page docs --check    the same measured again and compared with what is there; changes nothing
 """
 
@@ -177,12 +177,7 @@ def _holds_table(gyros: Gyros) -> str:
             row.append(_median_worst(ratios))
         rows.append(row)
     return _markdown(
-        [
-            "RMS ÷ that of a constant",
-            "as recorded: median, worst",
-            "at the temperature of set 1: median, worst",
-        ],
-        rows,
+        ["RMS ÷ that of a constant", "as recorded: median, worst", "at the temperature of set 1: median, worst"], rows
     )
 
 

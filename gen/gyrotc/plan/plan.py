@@ -256,11 +256,7 @@ def _accuracy(sensitivity: Sensitivity) -> list[Accuracy]:
         rms = float(np.hypot(floor, error))
         out.append(
             Accuracy(
-                hours=float(hours[count - 1]),
-                runs=count,
-                map_error_dph=error,
-                rms_dph=rms,
-                rms_over_floor=rms / floor,
+                hours=float(hours[count - 1]), runs=count, map_error_dph=error, rms_dph=rms, rms_over_floor=rms / floor
             )
         )
     return out

@@ -37,12 +37,7 @@ class Part(BaseModel):
     """An object inside a result. Fields that are not known are let through when one is read, and forgotten."""
 
     model_config = ConfigDict(
-        frozen=True,
-        extra="ignore",
-        strict=True,
-        allow_inf_nan=False,
-        populate_by_name=True,
-        protected_namespaces=(),
+        frozen=True, extra="ignore", strict=True, allow_inf_nan=False, populate_by_name=True, protected_namespaces=()
     )
 
     @classmethod

@@ -175,11 +175,7 @@ class ResidualTest(Part):
 
 _OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
 
-PARTS = {
-    "exam": "exam runs",
-    "left_out": "spans left out of training in turn",
-    "train": "the training runs themselves",
-}
+PARTS = {"exam": "exam runs", "left_out": "spans left out of training in turn", "train": "the training runs themselves"}
 """What a model may be judged by, in words."""
 
 
@@ -201,8 +197,7 @@ class Evaluation(UnitResult):
     left_out: Pooled | None = Field(default=None, description="without exam runs: spans left out of training in turn")
 
     generalises: bool | None = Field(
-        default=None,
-        description="whether the correction held on history that it had not seen; null: not known",
+        default=None, description="whether the correction held on history that it had not seen; null: not known"
     )
     rows_left_out: Count | None = Field(
         default=None, description="rows of training runs that were outliers; null: not known"
@@ -219,8 +214,7 @@ class Evaluation(UnitResult):
     )
 
     residual: ResidualTest | None = Field(
-        default=None,
-        description="of the runs that the model is judged by; null without an RMS or a noise floor",
+        default=None, description="of the runs that the model is judged by; null without an RMS or a noise floor"
     )
     without_outliers: Statistics | None = Field(
         default=None,
@@ -365,8 +359,7 @@ class Changes(UnitResult):
     )
     as_found_missing: str = Field(default="", description="why there is no state as found")
     history: tuple[Calibration, ...] = Field(
-        default=(),
-        description="all calibrations that are known by their chain of `--previous`, this one last",
+        default=(), description="all calibrations that are known by their chain of `--previous`, this one last"
     )
 
     @property

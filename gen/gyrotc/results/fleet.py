@@ -104,8 +104,7 @@ class FleetUnit(Part):
     )
     model_hash: str | None = Field(default=None, description="hash of the model")
     verdict: Verdict | None = Field(
-        default=None,
-        description="the worst of all limits, `FAIL` where another check failed; null without limits",
+        default=None, description="the worst of all limits, `FAIL` where another check failed; null without limits"
     )
     limits_met: Count | None = Field(default=None, description="limits that are met; null without limits")
     limits_held: Count | None = Field(default=None, description="limits in all; null without limits")
@@ -119,8 +118,7 @@ class FleetUnit(Part):
     outlier_reason: str | None = Field(default=None, description="why it is an outlier, as in `reasons` of the fleet")
 
     released: str | None = Field(
-        default=None,
-        description="why it is released although a finding bars it (`--release`); null: it is not",
+        default=None, description="why it is released although a finding bars it (`--release`); null: it is not"
     )
 
     @property
@@ -247,8 +245,7 @@ class Copy(Part):
     other_serial: str = Field(description="the other's serial")
     share: Share = Field(description="of the recordings of the one with fewer, about: of rows, or of the time of noise")
     likeness: Share | None = Field(
-        default=None,
-        description="correlation of the noise where no rows are the same; null: rows are the same",
+        default=None, description="correlation of the noise where no rows are the same; null: rows are the same"
     )
 
     @property

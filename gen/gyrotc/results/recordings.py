@@ -315,6 +315,5 @@ class Plan(Result):
     shortest: Shortest | None = Field(description="where limits were required")
     additions: Additions | None = Field(description="where a pair was given")
     thermometers: tuple[ThermometerPlace, ...] | None = Field(
-        default=None,
-        description="places for a further thermometer, the most telling first; those that have one last",
+        default=None, description="places for a further thermometer, the most telling first; those that have one last"
     )

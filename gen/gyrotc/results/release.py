@@ -96,8 +96,7 @@ class Limit(Part):
     )
     verdict: Verdict | None = Field(default=None, description="null: of a gyrotc that did not state it")
     standard_uncertainty: Figure = Field(
-        default=None,
-        description="1 sigma, in the unit of the figure; null where there is none or it is not known",
+        default=None, description="1 sigma, in the unit of the figure; null where there is none or it is not known"
     )
     degrees_of_freedom: Figure = Field(default=None, description="of that uncertainty; null: many")
     coverage_factor: Figure = Field(
@@ -147,8 +146,7 @@ class HeldLimits(UnitResult):
     verdict: Verdict | None = Field(default=None, description="the worst of all limits; null: there are none")
     decision_rule: DecisionRule | None = Field(default=None, description="of the limits file")
     display: str = Field(
-        default="",
-        description="unit in which pages show rates; empty: deg/h, as every figure of the file is in",
+        default="", description="unit in which pages show rates; empty: deg/h, as every figure of the file is in"
     )
 
     @property
@@ -348,8 +346,7 @@ class MapError(Part):
     mean_dph: float | None = Field(default=None, description="mean there, deg/h; only of `--exhaustive`")
     inputs_visited: Count = Field(description="inputs that were tried")
     mismatches: Count | None = Field(
-        default=None,
-        description="inputs that differ from integers computed separately; only of `--exhaustive`",
+        default=None, description="inputs that differ from integers computed separately; only of `--exhaustive`"
     )
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
 

@@ -251,8 +251,7 @@ class Training(UnitResult):
         default=None, description="with `--prior`: whether the earlier model still holds, and what it did"
     )
     known: KnownMap | None = Field(
-        default=None,
-        description="with a lot or an earlier model: what `--prior` of the next recalibration reads",
+        default=None, description="with a lot or an earlier model: what `--prior` of the next recalibration reads"
     )
 
 

@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.assess.budget import budget_of, combined, figure_uncertainties
-from gyrotc.assess.limits import (
-    Limits,
-    coverage_factor,
-    decided,
-    instruments_in,
-    last_day,
-    load_limits,
-    worst_of,
-)
+from gyrotc.assess.limits import Limits, coverage_factor, decided, instruments_in, last_day, load_limits, worst_of
 from gyrotc.common.errors import InputError
 from gyrotc.common.metrics import Averages, statistics, time_statistics
 from gyrotc.jobs.build import build_into
@@ -26,14 +18,7 @@ from gyrotc.pages.display import rounded
 from gyrotc.pages.report import write_report
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_optional, read_result
-from gyrotc.results.evaluation import (
-    Changes,
-    EvaluatedRun,
-    Evaluation,
-    FigureUncertainty,
-    RunStatistics,
-    Statistics,
-)
+from gyrotc.results.evaluation import Changes, EvaluatedRun, Evaluation, FigureUncertainty, RunStatistics, Statistics
 from gyrotc.results.release import Budget, Verification
 from gyrotc.results.training import Training
 from gyrotc.simulate.campaign import simulate
@@ -186,11 +171,7 @@ def test_what_passes_with_a_guard_band_is_seldom_beyond_its_limit() -> None:
 
 
 def test_an_unknown_uncertainty_cannot_pass_without_condition() -> None:
-    rules: dict[Any, str] = {
-        "guard_band": "CONDITIONAL PASS",
-        "guard_band_binary": "FAIL",
-        "simple_acceptance": "PASS",
-    }
+    rules: dict[Any, str] = {"guard_band": "CONDITIONAL PASS", "guard_band_binary": "FAIL", "simple_acceptance": "PASS"}
     for rule, verdict in rules.items():
         one = decided("at_most.rms_dph", 0.5, 1.0, 1.0, rule, None)
         assert (one.verdict, one.expanded_uncertainty, one.uncertainty_from) == (verdict, None, "not known")

@@ -14,14 +14,7 @@ from gyrotc.assess.product_guards import guarded
 from gyrotc.common.errors import InputError
 from gyrotc.model import Guard, Model, Term
 from gyrotc.results.base import Finding
-from gyrotc.results.evaluation import (
-    EvaluatedRun,
-    Evaluation,
-    ModelSizes,
-    Pooled,
-    RunStatistics,
-    Statistics,
-)
+from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics, Statistics
 from gyrotc.results.release import MapError, Verification, VerifiedTarget, WorstError
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise

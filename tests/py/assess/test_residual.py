@@ -34,8 +34,7 @@ def test_white_noise_passes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lengths", "trained"),
-    [(LENGTHS, LENGTHS), (LENGTHS, None), ((60,), (300, 40)), ((8, 9), (30, 30)), ((100,), ())],
+    ("lengths", "trained"), [(LENGTHS, LENGTHS), (LENGTHS, None), ((60,), (300, 40)), ((8, 9), (30, 30)), ((100,), ())]
 )
 def test_white_noise_stays_within_its_band_of_rms_over_floor(
     lengths: tuple[int, ...], trained: tuple[int, ...] | None

@@ -136,10 +136,7 @@ def test_a_fail_that_was_edited_into_a_pass_is_refused(
     _passed(folder)
     if hashes == "made again":
         _hash_again(folder, "limits.json", "budget.json")
-    for command in (
-        ("certificate", folder, "--draft", "--out", tmp_path / "C"),
-        ("sign", folder, "--key", key),
-    ):
+    for command in (("certificate", folder, "--draft", "--out", tmp_path / "C"), ("sign", folder, "--key", key)):
         assert _status(*command) == 2
         reported = capsys.readouterr().err
         assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), reported
@@ -148,12 +145,7 @@ def test_a_fail_that_was_edited_into_a_pass_is_refused(
 
 @pytest.mark.parametrize(
     ("name", "field"),
-    [
-        ("expanded_dph", 1e-6),
-        ("coverage_factor", 1.0),
-        ("valid_until", "2099-01-01"),
-        ("interval_days", 9999.0),
-    ],
+    [("expanded_dph", 1e-6), ("coverage_factor", 1.0), ("valid_until", "2099-01-01"), ("interval_days", 9999.0)],
 )
 def test_a_budget_is_computed_again(passing: Path, tmp_path: Path, name: str, field: object) -> None:
     folder = shutil.copytree(passing, tmp_path / "out")
@@ -318,10 +310,7 @@ def test_every_leaf_and_payload_is_guarded(
 
 def _refused(folder: Path, tmp_path: Path, name: str, public: Any, check_signature: Any) -> None:
     if name != "c/release.json":
-        for command in (
-            lambda: certificate(folder, tmp_path / "C", draft=True),
-            lambda: release_of(folder),
-        ):
+        for command in (lambda: certificate(folder, tmp_path / "C", draft=True), lambda: release_of(folder)):
             with pytest.raises(GyrotcError, match=name.rpartition("/")[2].replace(".", r"\.")):
                 command()
         assert not (tmp_path / "C").exists()
@@ -345,11 +334,7 @@ def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None
 
 
 def test_verifying_a_signature_refuses_what_the_marker_does_not_know(
-    passing: Path,
-    tmp_path: Path,
-    key: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    passing: Path, tmp_path: Path, key: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, public = shutil.copytree(passing, tmp_path / "out"), key.with_suffix(".pub")
     assert _status("sign", folder, "--key", key) == 0

@@ -46,17 +46,11 @@ def pooled(rms: float) -> Pooled:
 def drawn(rng: np.random.Generator, model: Model) -> tuple[Evaluation, HeldLimits]:
     """A result with limits near its figures, some of them without an uncertainty or with few degrees of freedom."""
     parts = {name: pooled(rng.uniform(1e-4, 1e-2)) for name in ("exam", "left_out", "train")}
-    kept = {
-        "exam": ("exam", "train"),
-        "left_out": ("left_out", "train"),
-        "train": ("train",),
-    }
+    kept = {"exam": ("exam", "train"), "left_out": ("left_out", "train"), "train": ("train",)}
     role = rng.choice(["exam", "left_out", "train"])
     known = {
         name: FigureUncertainty(
-            standard=rng.uniform(0.0, 1e-3),
-            freedom=rng.choice([None, 2.0, 4.0, 5.0, 20.0]),
-            method="drawn",
+            standard=rng.uniform(0.0, 1e-3), freedom=rng.choice([None, 2.0, 4.0, 5.0, 20.0]), method="drawn"
         )
         for name in _FIGURES
         if rng.random() < 0.8
@@ -68,12 +62,7 @@ def drawn(rng: np.random.Generator, model: Model) -> tuple[Evaluation, HeldLimit
     names = [name for name in _FIGURES if rng.random() < 0.5]
     bounds = {name: float(rng.uniform(1e-4, 1e-2)) for name in names}
     limits = Limits.model_validate(
-        {
-            "schema": 1,
-            "at_most": bounds,
-            "decision_rule": str(rng.choice(_RULES)),
-            "product": "NAV",
-        }
+        {"schema": 1, "at_most": bounds, "decision_rule": str(rng.choice(_RULES)), "product": "NAV"}
     )
     return evaluation, held_against(limits, model, evaluation, VERIFICATION)
 
@@ -138,14 +127,7 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
         evaluation, held = drawn(rng, model)
         limits = held if rng.random() < 0.8 else None
         one = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=limits)
-        task = unit.Task(
-            Unit(Path(f"u{number}"), None),
-            "d",
-            _NO_FLEET,
-            tmp_path / f"u{number}",
-            False,
-            "",
-        )
+        task = unit.Task(Unit(Path(f"u{number}"), None), "d", _NO_FLEET, tmp_path / f"u{number}", False, "")
         dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", runs=(), sketch=(), noise_signs=()))
         entry = unit._entry_of(task, "0" * 64, dataset, one, ())
         folder = tmp_path / entry.name
@@ -156,17 +138,7 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
         built.append(one)
         entries.append(entry)
     views = {
-        entry.name: UnitResults(
-            model,
-            one.evaluation,
-            None,
-            VERIFICATION,
-            None,
-            None,
-            one.limits,
-            None,
-            None,
-        )
+        entry.name: UnitResults(model, one.evaluation, None, VERIFICATION, None, None, one.limits, None, None)
         for entry, one in zip(entries, built, strict=True)
     }
     monkeypatch.setattr(catalogue, "unit_of", lambda folder: views[folder.name])
@@ -204,9 +176,7 @@ def test_structure_that_is_left_leads_to_a_diagnosis(
     assert ("gyrotc diagnose DATASET" in page) == left
 
 
-def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(
-    model_dict: dict[str, Any],
-) -> None:
+def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(model_dict: dict[str, Any]) -> None:
     model = Model.from_dict(model_dict)
     known = {"rms_dph": FigureUncertainty(standard=1e-6, freedom=None, method="")}
     update = {"exam": None, "train": pooled(1e-3), "uncertainty": known}

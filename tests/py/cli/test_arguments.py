@@ -23,15 +23,7 @@ from recordings import columns, toml, write_csv
 SEED = 26
 COMMANDS: dict[str, Any] = typer.main.get_command(application()).commands  # type: ignore[attr-defined]
 LEFT_OUT = {"scheduler", "help", "install_completion", "show_completion", "wait"}  # a host, a shell, a minute
-SLOW = {
-    "build",
-    "compare",
-    "diagnose",
-    "evaluate",
-    "fleet",
-    "plan",
-    "verify",
-}  # seconds each where all is in order
+SLOW = {"build", "compare", "diagnose", "evaluate", "fleet", "plan", "verify"}  # seconds each where all is in order
 MAY_FAIL = re.compile(r"exit status 1|fail|differ|not met|1 where", re.IGNORECASE)
 NUMBERS = [
     "0", "-0", "1", "2", "-1", "0.5", "1e-320", "1e7", "1e308", "-1e308", "nan", "inf", "-inf", "1e999", "9" * 30,
@@ -39,19 +31,7 @@ NUMBERS = [
 ]  # fmt: skip
 TEXTS = [text for text in hostile_strings(300) if "\x00" not in text]
 GOOD = ["data", "data/run-01.csv", "result", "result/model.json", "out", "new", "limits.toml", "fleet.toml"]
-BAD = [
-    "missing",
-    "broken",
-    "broken/dataset.toml",
-    "pipe",
-    "loop",
-    "/dev/null",
-    "/proc/self/mem",
-    ".",
-    "..",
-    "/",
-    "",
-]
+BAD = ["missing", "broken", "broken/dataset.toml", "pipe", "loop", "/dev/null", "/proc/self/mem", ".", "..", "/", ""]
 
 
 @pytest.fixture(scope="module")
@@ -83,22 +63,7 @@ def place(start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     os.chdir(before)
 
 
-WORDS = [
-    "f32",
-    "q31",
-    "csv",
-    "parquet",
-    "paper",
-    "lot",
-    "x",
-    "y",
-    "z",
-    "all",
-    "linear",
-    "cubic",
-    "host-gcc-O2",
-    "PASS",
-]
+WORDS = ["f32", "q31", "csv", "parquet", "paper", "lot", "x", "y", "z", "all", "linear", "cubic", "host-gcc-O2", "PASS"]
 OTHERS = st.sampled_from(NUMBERS) | st.sampled_from(WORDS) | st.sampled_from(TEXTS)
 
 
@@ -144,11 +109,7 @@ def test_any_arguments_end_by_a_known_status(calls: int, place: Path) -> None:
 
     @seed(SEED)
     @settings(
-        max_examples=calls,
-        deadline=None,
-        database=None,
-        suppress_health_check=list(HealthCheck),
-        print_blob=True,
+        max_examples=calls, deadline=None, database=None, suppress_health_check=list(HealthCheck), print_blob=True
     )
     @given(typed())
     def check(words: list[str]) -> None:
@@ -173,19 +134,7 @@ def test_an_empty_unit_is_one_message(place: Path) -> None:
 
 def _names(count: int) -> list[bytes]:
     names = {text.encode("utf-8", "surrogatepass").replace(b"/", b"|").replace(b"\x00", b"")[:200] for text in TEXTS}
-    names |= {
-        b"\xff\xfe",
-        b"a\\b",
-        b"-rf",
-        b"--help",
-        b" ",
-        b"\xe4\xb8",
-        b"a\nb",
-        b"a\x1b[2J",
-        b"%s",
-        b"con",
-        b"nul.",
-    }
+    names |= {b"\xff\xfe", b"a\\b", b"-rf", b"--help", b" ", b"\xe4\xb8", b"a\nb", b"a\x1b[2J", b"%s", b"con", b"nul."}
     return sorted(names - {b"", b".", b".."})[:: max(1, len(names) // count)]
 
 

@@ -87,9 +87,7 @@ def test_what_a_text_tells_of_the_work_that_is_done() -> None:
         assert sum(share for _, share in stages) == pytest.approx(1.0)
 
 
-def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a clock that stands still but where it is set."""
     clock = SimpleNamespace(monotonic=lambda: now)
     monkeypatch.setattr(stage_module, "time", clock)
@@ -273,10 +271,7 @@ def test_bash_completes_commands_and_options(tmp_path: Path, gyrotc: Command) ->
     ],
 )
 def test_a_shell_completes_the_words_that_an_option_takes(
-    typed: str,
-    offered: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     whole = typed.rsplit(maxsplit=1)[-1].startswith("-")
     monkeypatch.setenv("_GYROTC_COMPLETE", "complete_bash")
@@ -288,11 +283,7 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [
-        (ExportFormat, (export.Format,)),
-        (RunFormat, (campaign.Format, rows.Format)),
-        (NoiseLevel, (campaign.Noise,)),
-    ],
+    [(ExportFormat, (export.Format,)), (RunFormat, (campaign.Format, rows.Format)), (NoiseLevel, (campaign.Noise,))],
     ids=["export", "runs", "noise"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:

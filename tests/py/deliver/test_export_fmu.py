@@ -81,10 +81,7 @@ class Imported:
         return ctypes.c_void_p(made) if made else None
 
     def value(self, call: str, unit: Any, name: str, kind: Any, value: float | None = None) -> tuple[int, Any]:
-        refs, values = (
-            (ctypes.c_uint32 * 1)(self.refs[name]),
-            (kind * 1)(*(() if value is None else (value,))),
-        )
+        refs, values = ((ctypes.c_uint32 * 1)(self.refs[name]), (kind * 1)(*(() if value is None else (value,))))
         done = getattr(self.library, f"fmi3{call}")(unit, refs, ctypes.c_size_t(1), values, ctypes.c_size_t(1))
         return done, values[0]
 

@@ -363,15 +363,7 @@ def firmware(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("gcc is not installed")
     folder = tmp_path_factory.mktemp("firmware")
     (folder / "firmware.c").write_text(FIRMWARE)
-    command = [
-        "gcc",
-        "-std=c99",
-        "-O2",
-        "-ffp-contract=off",
-        "-o",
-        folder / "firmware",
-        folder / "firmware.c",
-    ]
+    command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-o", folder / "firmware", folder / "firmware.c"]
     subprocess.run(command, check=True)
     return folder / "firmware"
 

@@ -163,10 +163,7 @@ def test_every_cell_of_a_gyros_rows_is_guarded(table: str, fleet: Path, tmp_path
         for cell in CELLS[table]:
             number = cell in ("id", "calibration") or cell.endswith("_dph")
             changed = f"coalesce({cell}, 0) + 7" if number else f"coalesce({cell}, '') || '1'"
-            for what in (
-                f"UPDATE {table} SET {cell} = {changed} WHERE {where}",
-                f"DELETE FROM {table} WHERE {where}",
-            ):
+            for what in (f"UPDATE {table} SET {cell} = {changed} WHERE {where}", f"DELETE FROM {table} WHERE {where}"):
                 place.write_bytes(before)
                 with sqlite3.connect(place) as base:
                     assert base.execute(what).rowcount == 1
@@ -194,11 +191,7 @@ def test_a_payload_that_is_not_what_its_row_says_is_refused(
             base.execute("UPDATE calibration SET serial = 'RLG-9'")
             hash_rows(base, "RLG-9")  # as who knows of the hashes makes them again
     done = gyrotc(
-        "catalogue",
-        place / "catalogue.sqlite",
-        "RLG-9" if change == "another" else "RLG-1",
-        "--on",
-        "2026-08-31",
+        "catalogue", place / "catalogue.sqlite", "RLG-9" if change == "another" else "RLG-1", "--on", "2026-08-31"
     )
     assert done.returncode == 2 and str(path) in done.stderr and len(done.stderr.splitlines()) == 1
 
@@ -212,8 +205,7 @@ def test_what_is_no_catalogue_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "more",
-    ["CREATE VIEW more AS SELECT 1", "CREATE TRIGGER sqlitet AFTER INSERT ON recording BEGIN SELECT 1; END"],
+    "more", ["CREATE VIEW more AS SELECT 1", "CREATE TRIGGER sqlitet AFTER INSERT ON recording BEGIN SELECT 1; END"]
 )
 def test_a_catalogue_with_other_tables_is_refused_before_it_is_asked(more: str, tmp_path: Path) -> None:
     path = tmp_path / "a.sqlite"

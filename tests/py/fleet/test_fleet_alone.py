@@ -76,11 +76,7 @@ def test_done_is_done_until_a_byte_of_a_recording_changes(task: Task) -> None:
 def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_path: Path) -> None:
     do_unit(task)
     (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\ncenters = 20\n")
-    others = {
-        "options": FitOptions(seed=1),
-        "numerics": None,
-        "limits": load_limits(tmp_path / "limits.toml"),
-    }
+    others = {"options": FitOptions(seed=1), "numerics": None, "limits": load_limits(tmp_path / "limits.toml")}
     for name, value in others.items():
         assert done_before(replace(task, fleet=replace(task.fleet, **{name: value}))) is None, name
     assert done_before(replace(task, full=True)) is None

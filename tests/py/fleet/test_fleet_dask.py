@@ -207,13 +207,7 @@ class Held:
     """A fleet whose workers hold each gyro until it is let go; whoever begins with the deadly one is killed."""
 
     def __init__(
-        self,
-        world: Path,
-        folder: Path,
-        *,
-        held: Sequence[str] = SERIALS,
-        deadly: str = "",
-        lab: Path | None = None,
+        self, world: Path, folder: Path, *, held: Sequence[str] = SERIALS, deadly: str = "", lab: Path | None = None
     ) -> None:
         self.folder, self.out, self.lab = folder, folder / "out", lab or world / "lab" / "few"
         for name in held:

@@ -26,22 +26,14 @@ def entries(lot: Lot) -> Iterator[FleetEntry]:
             fit = np.polynomial.Polynomial.fit(t, rate, 3)
             reported = [
                 Averages(
-                    run["time_s"],
-                    r := run[f"rate_{axis}_dph"],
-                    r - fit(run["temperature_c"]),
-                    run["temperature_c"],
+                    run["time_s"], r := run[f"rate_{axis}_dph"], r - fit(run["temperature_c"]), run["temperature_c"]
                 )
                 for run in means
             ]
             facts = facts_of([(f"run-{k:02d}.csv", a) for k, a in enumerate(reported, 1)])
             spikes = sum(int((np.abs(np.diff(run[f"rate_{axis}_dph"])) > 0.04).sum()) // 2 for run in runs)
             yield FleetEntry(
-                name=f"{name}-{axis}",
-                dataset=name,
-                axis=axis,
-                status="done",
-                facts=facts,
-                rows_left_out=spikes,
+                name=f"{name}-{axis}", dataset=name, axis=axis, status="done", facts=facts, rows_left_out=spikes
             )
 
 

@@ -30,13 +30,7 @@ def test_a_barred_unit_is_not_entered_until_it_is_released(tmp_path: Path, monke
     assert catalogued(out, None, None).calibrations == 0
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
     assert unit.barred == ("sign_reversed",)
-    run.run_fleet(
-        manifest,
-        out,
-        jobs=1,
-        tag="May",
-        releases={"RLG-1": "mounted upside down, see log"},
-    )
+    run.run_fleet(manifest, out, jobs=1, tag="May", releases={"RLG-1": "mounted upside down, see log"})
     [one] = catalogued(out, "RLG-1", "2026-04-01").found
     assert one.tag == "May; released: mounted upside down, see log"
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
@@ -46,12 +40,7 @@ def test_a_barred_unit_is_not_entered_until_it_is_released(tmp_path: Path, monke
 @pytest.mark.parametrize("released", [None, "mounted upside down"])
 def test_the_page_of_a_fleet_names_a_barred_unit_and_its_finding(tmp_path: Path, released: str | None) -> None:
     unit = FleetEntry(
-        name="a",
-        axis=None,
-        status="done",
-        findings=("sign_reversed",),
-        verdict="PASS",
-        released=released,
+        name="a", axis=None, status="done", findings=("sign_reversed",), verdict="PASS", released=released
     )
     write_summary(tmp_path, [unit])
     page = (tmp_path / "fleet.html").read_text("utf-8")
@@ -68,13 +57,7 @@ def test_a_lot_leaves_out_a_barred_unit(tmp_path: Path, monkeypatch: pytest.Monk
         tmp_path,
         [
             FleetEntry(name="a", axis=None, status="done", findings=("sign_reversed",)),
-            FleetEntry(
-                name="b",
-                axis=None,
-                status="done",
-                findings=("sign_reversed",),
-                released="see log",
-            ),
+            FleetEntry(name="b", axis=None, status="done", findings=("sign_reversed",), released="see log"),
             *(FleetEntry(name=name, axis=None, status="done") for name in names[2:]),
         ],
     )
@@ -100,14 +83,7 @@ def test_findings_that_bar_a_unit(finding: str) -> None:
 
 def test_a_release_needs_its_reason(tmp_path: Path, gyrotc: Command) -> None:
     gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
-    result = gyrotc(
-        "fleet",
-        tmp_path / "fleet.toml",
-        "--out",
-        tmp_path / "out",
-        "--release",
-        "RLG-1",
-    )
+    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out", "--release", "RLG-1")
     assert result.returncode == 2
     assert "--reason" in result.stderr
     assert not (tmp_path / "out").exists()

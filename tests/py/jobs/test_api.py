@@ -20,21 +20,14 @@ pd = pytest.importorskip("pandas")
 def frame(seed: int) -> pd.DataFrame:
     rows = columns(720, seed=seed)
     return pd.DataFrame(
-        {
-            "t [s]": rows["time_s"],
-            "T [K]": rows["temperature_c"] + 273.15,
-            "gyro": (rows["rate_dph"] - 20.0) / 3600.0,
-        }
+        {"t [s]": rows["time_s"], "T [K]": rows["temperature_c"] + 273.15, "gyro": (rows["rate_dph"] - 20.0) / 3600.0}
     )
 
 
 def test_a_frame_gives_the_rows_that_it_holds() -> None:
     runs = {"warm": frame(1), "cold": frame(2)}
     data = gyrotc.Dataset.from_pandas(runs, rate_unit="deg/s", serial="RLG-1", exam="warm")
-    assert [(run.file, run.role) for run in data.runs] == [
-        ("cold.parquet", "train"),
-        ("warm.parquet", "exam"),
-    ]
+    assert [(run.file, run.role) for run in data.runs] == [("cold.parquet", "train"), ("warm.parquet", "exam")]
     np.testing.assert_allclose(data.runs[0].rows().rate_dph, runs["cold"]["gyro"] * 3600.0, rtol=1e-12)
     np.testing.assert_allclose(data.runs[0].rows().temperature_c, runs["cold"]["T [K]"] - 273.15, atol=1e-9)
     assert repr(data) == "Dataset(RLG-1: 2 runs, 1 of them exams, 1440 rows)"

@@ -190,18 +190,7 @@ def test_usage_errors_exit_2_and_help_shows_an_example(gyrotc: Command, tmp_path
     assert gyrotc("build").returncode == 2
     assert gyrotc("build", tmp_path / "nothing", "--out", tmp_path / "o").returncode == 2
     assert not (tmp_path / "o").exists()
-    for command in (
-        "simulate",
-        "check",
-        "fit",
-        "emit",
-        "verify",
-        "evaluate",
-        "build",
-        "compare",
-        "diagnose",
-        "report",
-    ):
+    for command in ("simulate", "check", "fit", "emit", "verify", "evaluate", "build", "compare", "diagnose", "report"):
         done = gyrotc(command, "--help")
         assert done.returncode == 0
         assert "Example: gyrotc" in done.stdout

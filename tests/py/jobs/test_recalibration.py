@@ -14,13 +14,7 @@ import pytest
 from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
 from gyrotc.lot.departures import Departures, Hypothesis, revised, updated, within
-from gyrotc.lot.earlier import (
-    EarlierPrior,
-    known_map,
-    posterior_of_known,
-    posterior_of_means,
-    widened,
-)
+from gyrotc.lot.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
@@ -208,11 +202,7 @@ def dataset(folder: Path, seed: int, day: str, *, check: bool, change: Change | 
     text = 'schema = 1\nserial = "RLG-0007"\nearth_rate = "removed"\n'
     for k in range(int(data.run.max()) + 1):
         mine = data.select(data.run == k)
-        columns = {
-            "time_s": mine.time_s,
-            "temperature_c": mine.temperature_c,
-            "rate_dph": mine.bias_dph,
-        }
+        columns = {"time_s": mine.time_s, "temperature_c": mine.temperature_c, "rate_dph": mine.bias_dph}
         write_csv(folder / f"run-{k}.csv", columns)
         text += f'[[run]]\nfile = "run-{k}.csv"\nstarted = {day}T00:00:00Z\nenvironment = "e{k}"\n'
     (folder / "dataset.toml").write_text(text, "utf-8")

@@ -285,27 +285,14 @@ def before_any_run() -> MapPrior:
     n = len(basis.kept)
     asked = Asked(t, r, np.full(len(t), 1.0 / len(t)), 0.0)
     return MapPrior(
-        basis,
-        7e-3,
-        1e-3,
-        *ENVELOPE_OF_RUNS,
-        np.zeros((1, n)),
-        covariance[None],
-        np.ones(1),
-        rest,
-        asked,
-        np.inf,
+        basis, 7e-3, 1e-3, *ENVELOPE_OF_RUNS, np.zeros((1, n)), covariance[None], np.ones(1), rest, asked, np.inf
     )
 
 
 def measured(rng: np.random.Generator, own: Floats, steps: list[ChamberStep]) -> UnitMeans:
     t, r = inputs_of(read("paper")[1], 10.0, steps, MEAN_S)
     return UnitMeans(
-        t,
-        r,
-        bias_of_runs(own, t, r) + NOISE_OF_RUNS * rng.normal(size=len(t)),
-        np.ones(len(t)),
-        NOISE_OF_RUNS,
+        t, r, bias_of_runs(own, t, r) + NOISE_OF_RUNS * rng.normal(size=len(t)), np.ones(len(t)), NOISE_OF_RUNS
     )
 
 

@@ -99,12 +99,7 @@ def test_limits_events_and_statistics_carry_their_unit_with_them() -> None:
     warm = Size(value=1.0, low=0.5, high=2.0, unit="C")
     rms, share = (
         ComparedStatistic(
-            statistic=name,
-            measured=3.6,
-            simulated_mean=1.8,
-            simulated_low=0.0,
-            simulated_high=3.6,
-            p_value=0.5,
+            statistic=name, measured=3.6, simulated_mean=1.8, simulated_low=0.0, simulated_high=3.6, p_value=0.5
         )
         for name in ("rms_dph", "autocorrelation")
     )

@@ -161,13 +161,7 @@ def test_a_part_of_a_fleets_picture_is_enlarged_and_comes_back(pages: dict[str, 
     x, y, w, h = box
     for kind, px, py in (("mousePressed", 0.4, 0.4), ("mouseMoved", 0.6, 0.6), ("mouseReleased", 0.6, 0.6)):
         tab.call(
-            "Input.dispatchMouseEvent",
-            type=kind,
-            x=x + px * w,
-            y=y + py * h,
-            button="left",
-            buttons=1,
-            clickCount=1,
+            "Input.dispatchMouseEvent", type=kind, x=x + px * w, y=y + py * h, button="left", buttons=1, clickCount=1
         )
     near = tab.value(numbers)
     span = [float(t.replace("−", "-")) for t in near]
@@ -233,7 +227,4 @@ def test_paper(name: str, pages: dict[str, Path], tab: Browser) -> None:
     tab.call("Emulation.setEmulatedMedia", media="print")
     assert tab.value("getComputedStyle(document.querySelector('tr')).breakInside") == "avoid"
     assert tab.value("getComputedStyle(document.querySelector('h2')).breakAfter") == "avoid"
-    assert tab.value("getComputedStyle(document.body).backgroundColor") in (
-        "rgb(255, 255, 255)",
-        "rgba(0, 0, 0, 0)",
-    )
+    assert tab.value("getComputedStyle(document.body).backgroundColor") in ("rgb(255, 255, 255)", "rgba(0, 0, 0, 0)")

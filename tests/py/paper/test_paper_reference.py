@@ -77,13 +77,7 @@ def networks(gyro: tuple[int, Path], groups: list[PaperGroup]) -> dict[str, list
             data, neurons = group.train, NEURONS[group.environment] if kind == "random" else None
             engine = trained(method, data, scaling_of(data), seed=gyro[0], centers=neurons, **options)
             plain = reference.network(
-                kind,
-                data.temperature_c,
-                data.slope_c_per_min,
-                data.bias_dph,
-                gyro[0],
-                neurons=neurons,
-                **options,
+                kind, data.temperature_c, data.slope_c_per_min, data.bias_dph, gyro[0], neurons=neurons, **options
             )
             found[row].append(Both(group, engine, plain))
     return found
@@ -112,10 +106,7 @@ def test_inputs_and_means_are_the_front_end_s(gyro: tuple[int, Path], groups: li
             assert np.abs(slope - data.slope_c_per_min).max() < INPUT_C_PER_MIN
             gathered = average(data, 100.0)
             assert len(gathered) == 288
-            for ours, column in (
-                (gathered.temperature_c, data.temperature_c),
-                (gathered.bias_dph, data.bias_dph),
-            ):
+            for ours, column in ((gathered.temperature_c, data.temperature_c), (gathered.bias_dph, data.bias_dph)):
                 np.testing.assert_allclose(ours, reference.means(column), rtol=1e-12)
             np.testing.assert_array_equal(gathered.weight, reference.rows_of(len(data)))
 
