@@ -194,13 +194,9 @@ evidence: setup
 mutants: setup
 	@$(PYTHON) -m tests.mutants.run --docs docs
 
-## hidden effects found again, up to an hour: docs/results.md (SEED=n goes on with a run or repeats it)
+## hidden effects found again, two fresh seeds of both worlds, an hour: docs/results.md (SEED="n m" goes on or repeats)
 blind: setup
-	@$(PYTHON) -m tests.blind.run --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
-
-## hidden effects in a world of other physics, a quarter of an hour: docs/results.md (SEED=n goes on with a run or repeats it)
-blind-other: setup
-	@$(PYTHON) -m tests.blind.other.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
+	@$(PYTHON) -m tests.blind --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## events planted in recordings (steps, drifts, gains, a loose thermometer): found, named, placed (EACH=36, SEED=)
 events: setup
@@ -249,4 +245,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet fleet-kills lot lot-prior uncertainty faults kills mutants oracle blind blind-other events invariance odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet fleet-kills lot lot-prior uncertainty faults kills mutants oracle blind events invariance odd cycles packages dist release lock offline site clean

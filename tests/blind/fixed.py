@@ -1,8 +1,7 @@
 """Recordings of both worlds that never change: twelve with a cause hidden at k of at least 2.5, eighty of any kind.
 
 Each of the twelve must be named right by `make test`; of the eighty one in each class may be wrong in `make check`, and
-two foreign effects of the own world. `make blind` and `make blind-other` measure with fresh draws how often names are
-right.
+two foreign effects of the own world. `make blind` measures with fresh draws how often names are right.
 """
 
 from __future__ import annotations

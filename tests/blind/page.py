@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
-
-from gyrotc.pages.chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
-from gyrotc.store.files import write_atomically
 from results import recorded, write
 
 from .effects import FAMILY
 from .grade import Row
-from .table import SAID, markdown, table
+from .table import markdown, table
 
 _HEAD = """## Hidden effects (`make blind`)
 
@@ -55,25 +50,6 @@ def write_section(
     runs = [result, *(run for run in before if run["seed"] != head["seed"])]
     runs.sort(key=lambda run: str(run["started"]), reverse=True)
     write(docs, name, {"runs": runs}, section)
-    write_atomically(docs / RELIABILITY, reliability_diagram(docs))
-
-
-RELIABILITY = "reliability.svg"
-_WORLDS = {"blind": ("this world", AFTER), "blind-other": ("other world", BEFORE)}
-
-
-def reliability_diagram(docs: Path) -> str:
-    """How often what was said with a probability is true, of the newest run of each world, with limits of 95 %."""
-    panel = Panel(x="probability that was stated", y="share that is true", x_range=(0, 1), y_range=(0, 1))
-    panel.line([0.0, 1.0], [0.0, 1.0], COVERED, "as stated", dash="5 3")
-    for name, (label, color) in _WORLDS.items():
-        runs = (recorded(docs, name) or {"runs": []})["runs"][:1]
-        said = [row for run in runs for row in run["table"] if row["name"].startswith(SAID)]
-        at = [float(row["goal"].rstrip("%")) / 100.0 for row in said]
-        low, share, high = ([row[key] for row in said] for key in ("low", "share", "high"))
-        panel.errors(at, low, high, color)
-        panel.dots(at, share, color, f"{label}, {sum(row['of'] for row in said)} statements", size=8.0)
-    return drawing([panel], height=300.0, width=HALF)
 
 
 def section(record: dict[str, Any]) -> str:

@@ -1,26 +1,16 @@
-"""Blind runs: recordings are drawn, diagnosed by a process that does not know the truth, and graded.
+"""A blind run of the own world: recordings are drawn, diagnosed by a process that does not know the truth, and graded.
 
-    python -m tests.blind.run [--records 640] [--seed N] [--workers 1] [--docs docs]
-
-The seed comes from the operating system and is printed. The same seed makes the same recordings again
-(`--seed N`, and `--only 17` for one of them), so a printed seed is enough to replay what was seen. A run that
-was stopped goes on with its seed; without one, the newest unfinished run of the same code goes on. With
-`--docs` the table of what is done stands in docs/results.md after every campaign.
+The same seed makes the same recordings again, so that a printed seed is enough to replay what was seen.
 """
 
 from __future__ import annotations
 
-import argparse
-import hashlib
 import json
 import os
-import secrets
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -31,12 +21,8 @@ import numpy as np
 from . import campaign as campaigns
 from .draw import Order, campaign_of, orders, recording_of
 from .grade import Row, grade
-from .page import write_page
-from .table import ended, table, text
 
 PER_CAMPAIGN = 32
-ROOT = Path(__file__).resolve().parents[2]
-CODE = ROOT / "gen" / "gyrotc"
 
 Store = Callable[[Row], None]
 
@@ -134,39 +120,26 @@ def one_campaign(plan: Plan, number: int, todo: list[tuple[int, Order]], tool: T
     return rows
 
 
-def run(
-    plan: Plan, folder: Path, *, workers: int = 1, after: Callable[[list[Row]], None] = lambda _: None
-) -> list[Row]:
+def run(plan: Plan, folder: Path) -> list[Row]:
     """A whole run; rows that `folder` holds already are not made again.
 
     Args:
         plan: What to make.
         folder: Where rows and cached banks are kept.
-        workers: Processes side by side.
-        after: Called after every campaign with the rows so far.
     """
     path = folder / f"{plan.seed}-{plan.records}.jsonl"
     done = {row["number"]: row for row in rows_of(path)}
     cache = folder / "cache"
     cache.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as stream:
+    with Tool(cache) as tool, path.open("a", encoding="utf-8") as stream:
 
         def store(row: Row) -> None:
             stream.write(json.dumps(row) + "\n")
             stream.flush()
             print(_line(row), flush=True)
 
-        jobs = plan.jobs(set(done))
-
-        def several(first: int) -> None:
-            with Tool(cache) as tool:
-                for number, todo in jobs[first::workers]:
-                    rows = one_campaign(plan, number, todo, tool, store)
-                    done.update({r["number"]: r for r in rows})
-                    after([done[k] for k in sorted(done)])
-
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(several, range(workers)))
+        for number, todo in plan.jobs(set(done)):
+            done.update({r["number"]: r for r in one_campaign(plan, number, todo, tool, store)})
     return [done[k] for k in sorted(done)]
 
 
@@ -189,84 +162,11 @@ def _line(row: Row) -> str:
     return f"{row['number']:4d} {row['design']:10s} {hidden} {row['stress']} -> {row['verdict']}: {found}"
 
 
-def code_version() -> str:
-    """Hash of the package's Python sources."""
-    digest = hashlib.sha256()
-    for path in sorted(CODE.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def commit() -> str:
-    found = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-    )
-    return found.stdout.strip() or "unknown"
-
-
-def _begin(arguments: argparse.Namespace) -> tuple[Plan, dict[str, Any]]:
-    """A new run, or the one to go on with, and its head."""
-    folder: Path = arguments.folder
-    folder.mkdir(parents=True, exist_ok=True)
-    version = code_version()
-    heads = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.head.json"))]
-    for head in sorted(heads, key=lambda h: str(h["started"]), reverse=True):
-        plan = Plan(head["seed"], head["records"], arguments.per_campaign, arguments.weakest)
-        same = head["code"] == version and head["records"] == arguments.records
-        left = plan.jobs({r["number"] for r in rows_of(folder / f"{plan.seed}-{plan.records}.jsonl")})
-        if head["seed"] == arguments.seed or (arguments.seed is None and same and left):
-            return plan, head
-    seed = secrets.randbits(32) if arguments.seed is None else arguments.seed
-    head = {
-        "seed": seed,
-        "records": arguments.records,
-        "code": version,
-        "commit": commit(),
-        "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
-    }
-    (folder / f"{seed}-{arguments.records}.head.json").write_text(json.dumps(head), encoding="utf-8")
-    return Plan(seed, arguments.records, arguments.per_campaign, arguments.weakest), head
-
-
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--records", type=int, default=640)
-    parser.add_argument("--seed", type=int, default=None)
-    parser.add_argument("--only", type=int, default=None, help="write this recording of --seed and stop")
-    parser.add_argument("--per-campaign", type=int, default=PER_CAMPAIGN)
-    parser.add_argument("--weakest", type=float, default=0.5, help="smallest k of a cause hidden alone")
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "blind")
-    parser.add_argument("--docs", type=Path, default=None)
-    arguments = parser.parse_args()
-    if arguments.only is not None:
-        plan = Plan(arguments.seed, arguments.records, arguments.per_campaign, arguments.weakest)
-        print(_replay(plan, arguments.only, arguments.folder))
-        return
-    plan, head = _begin(arguments)
-    print(f"blind run, seed {plan.seed} (go on or repeat with --seed {plan.seed})", flush=True)
-
-    def after(rows: list[Row]) -> None:
-        if arguments.docs is not None:
-            write_page(arguments.docs, head, rows)
-
-    rows = run(plan, arguments.folder, workers=arguments.workers, after=after)
-    after(rows)
-    print(text(rows))
-    sys.exit(ended(table(rows)))
-
-
-def _replay(plan: Plan, number: int, folder: Path) -> str:
+def written(plan: Plan, number: int, target: Path) -> str:
     """Writes one recording of a run and says what is hidden in it."""
     order = plan.orders()[number]
     campaign, yardstick = campaign_of(plan.seed, number // plan.per_campaign)
     hidden, declared = recording_of(plan.seed, number, order, campaign, yardstick)
-    target = folder / f"{plan.seed}-{number:04d}"
     campaigns.write(campaign, hidden, target, declare=declared, serial=f"U-{number:04d}")
     truth = list(zip(hidden.names, hidden.k, hidden.parameters, strict=True))
-    return f"{target}: {order.stratum} {truth} {hidden.stress}"
-
-
-if __name__ == "__main__":
-    main()
+    return f"{order.stratum} {truth} {hidden.stress}"

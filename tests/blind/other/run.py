@@ -1,36 +1,26 @@
 """Blind runs in the other world: each recording has its own temperatures; who diagnoses is not reported.
 
-    python -m tests.blind.other.run [--records 200] [--seed N] [--docs docs]
-
-The seed comes from the operating system and is printed; the same seed makes the same recordings, and a run that was
-stopped goes on with `--seed`. `--only 17` writes one recording with its truth. Whoever changes the detector runs with
-a new seed: what was drawn before may have been looked at.
+Whoever changes the detector runs with a new seed: what was drawn before may have been looked at.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import secrets
 import shutil
-import sys
 import tempfile
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..grade import Row
 from ..page import answer_lines, run_lines, write_section
-from ..run import ROOT, Tool, code_version, commit, rows_of
-from ..table import ended, markdown
+from ..run import Tool, rows_of
 from .grade import answers, graded, table
 from .mechanisms import CATALOGUE
 from .record import draw_recording, reported, write
 
-_TELLS = 10  # recordings between two writings of the page
 _SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
-_HEAD = """## Hidden effects in a world that is no sibling (`make blind-other`)
+_HEAD = """## Hidden effects in a world that is no sibling (`make blind`)
 
 Gyros of another make (tests/blind/other, which imports nothing of gyrotc): heat by finite volumes through case, glass
 and mirror with properties that depend on temperature, a chamber that switches, relays of Preisach, an etalon's waves,
@@ -57,19 +47,8 @@ def orders(records: int) -> list[tuple[str, str]]:
     return out
 
 
-def run(
-    seed: int,
-    records: int,
-    folder: Path,
-    *,
-    hours: float = 5.0,
-    after: Callable[[list[Row]], None] = lambda _: None,
-) -> list[Row]:
-    """Recordings of a run, one after the other; rows that `folder` holds already are not made again.
-
-    Args:
-        after: Called with the rows so far after every tenth recording, so that a run that is stopped has its page.
-    """
+def run(seed: int, records: int, folder: Path, *, hours: float = 5.0) -> list[Row]:
+    """Recordings of a run, one after the other; rows that `folder` holds already are not made again."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{seed}-{records}.jsonl"
     done = {row["number"]: row for row in rows_of(path)}
@@ -89,10 +68,15 @@ def run(
             stream.write(json.dumps(row) + "\n")
             stream.flush()
             print(_line(row), flush=True)
-            if len(done) % _TELLS == 0:
-                after([done[k] for k in sorted(done)])
             _sweep(Path(name))
     return [done[k] for k in sorted(done)]
+
+
+def written(seed: int, records: int, number: int, target: Path) -> str:
+    """Writes one recording of a run and says what is hidden in it."""
+    recording = draw_recording(seed, number, *orders(records)[number])
+    write(recording, target, f"V-{number:04d}")
+    return str(reported(recording.truth))
 
 
 def _sweep(folder: Path) -> None:
@@ -136,42 +120,3 @@ def _section(run: dict[str, Any]) -> str:
         ]
         lines += [f"| `{one['kind']}` | {one['k']:.1f} | {' + '.join(one['named'])} |" for one in named]
     return "\n".join([*lines, "", ""])
-
-
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--records", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=None)
-    parser.add_argument("--only", type=int, default=None, help="write this recording of --seed and stop")
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "blind-other")
-    parser.add_argument("--docs", type=Path, default=None)
-    arguments = parser.parse_args()
-    seed = secrets.randbits(32) if arguments.seed is None else arguments.seed
-    if arguments.only is not None:
-        stratum, name = orders(arguments.records)[arguments.only]
-        recording = draw_recording(seed, arguments.only, stratum, name)
-        write(recording, arguments.folder / f"{seed}-{arguments.only:04d}", f"V-{arguments.only:04d}")
-        print(arguments.folder / f"{seed}-{arguments.only:04d}", reported(recording.truth))
-        return
-    print(f"blind run in the other world, seed {seed} (go on or repeat with --seed {seed})", flush=True)
-    head = {
-        "seed": seed,
-        "records": arguments.records,
-        "code": code_version(),
-        "commit": commit(),
-        "started": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
-    }
-
-    def after(rows: list[Row]) -> None:
-        if arguments.docs is not None:
-            write_page(arguments.docs, head, rows)
-
-    rows = run(seed, arguments.records, arguments.folder, after=after)
-    after(rows)
-    print(markdown(table(rows)))
-    sys.exit(ended(table(rows)))
-
-
-if __name__ == "__main__":
-    main()

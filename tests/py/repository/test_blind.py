@@ -1,9 +1,9 @@
 """Hidden effects: fresh recordings of an independent generator, diagnosed by a process that is not reported.
 
-The seed of the draws is new in every run and printed; `python -m tests.blind.run --seed N --records 40
---per-campaign 21 --weakest 1.7` makes the same recordings again. `make blind` measures the figures; here only
-what is far from them fails: with the rates below, which are above the measured ones, a test fails by chance
-with a probability below 1e-4.
+The seed of the draws is new in every run and printed; `python -m tests.blind --world own --seed N --records 40
+--per-campaign 21 --weakest 1.7` makes the same recordings again. `make blind` measures the figures; here only what is
+far from them fails: with the rates below, which are above the measured ones, a test fails by chance with a probability
+below 1e-4.
 """
 
 from __future__ import annotations

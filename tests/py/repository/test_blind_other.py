@@ -1,6 +1,6 @@
 """The other blind world: its own physics, checked by what physics says, and a few of its recordings diagnosed.
 
-`make blind-other` measures the figures. Here three recordings show that every stage of it still runs.
+`make blind` measures the figures. Here three recordings show that every stage of it still runs.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tests.blind.other.run import orders, run  # noqa: E402
 from tests.blind.other.yardstick import Yardstick  # noqa: E402
 
 WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
-SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind-other`
+SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind`
 
 
 def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:

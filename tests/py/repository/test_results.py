@@ -25,6 +25,7 @@ from bench import runtime  # noqa: E402
 from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
 from bench.splits import Judged, Split, counts  # noqa: E402
+from tests.blind import both  # noqa: E402
 from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
 from tests.blind.other import run as other  # noqa: E402
@@ -255,8 +256,41 @@ def test_no_run_time_error_was_left_but_those_with_an_argument() -> None:
     assert left == {("map of a bank", "q31"), ("map of any bank", "q31"), ("memory", "q31")}
 
 
-def test_the_diagram_of_reliability_is_of_the_newest_runs() -> None:
-    assert (DOCS / blind.RELIABILITY).read_text("utf-8") == blind.reliability_diagram(DOCS)
+def test_the_diagram_of_reliability_is_of_the_fresh_seeds() -> None:
+    assert (DOCS / both.RELIABILITY).read_text("utf-8") == both.reliability_diagram(DOCS)
+
+
+def test_the_table_of_both_worlds_is_that_of_the_recordings_that_are_kept() -> None:
+    kept = recorded(DOCS, "blind-both")
+    rows = [json.loads(line) for line in (DOCS / both.ROWS).read_text("utf-8").splitlines()]
+    assert {row["seed"] for row in rows} == set(kept["seeds"])
+    assert both.section({**kept, "worlds": both.tables(rows)}) == both.section(kept)
+
+
+def _answered(stratum: str, truth: list[str], k: float, named: list[str], p: float, **other: Any) -> dict[str, Any]:
+    said = [{"id": name, "p": p, "true": name in truth} for name in named]
+    verdict = "explained" if named else "consistent"
+    row = {"number": 1, "stratum": stratum, "truth": truth, "k": k, "verdict": verdict, "named": named, "said": said}
+    return {**row, "shipped": 0.0, "worse": 0.0, "surely_worse": 0.0, **other}
+
+
+def test_what_is_asked_on_fresh_seeds_counts_each_recording_where_it_belongs() -> None:
+    rows = [
+        _answered("clean", [], 0.0, [], 0.0),
+        _answered("clean", [], 0.0, [], 0.0, verdict="unexplained"),
+        _answered("foreign", ["foreign"], 3.0, ["hysteresis"], 0.99),
+        _answered("one", ["hysteresis"], 2.0, ["warm_up"], 0.7),
+        _answered("one", ["hysteresis"], 3.0, ["hysteresis"], 0.99, shipped=1.0, worse=1.0),
+    ]
+    entries = both.table([both.kept("other", 1, row) for row in rows])
+    found = {entry["name"]: (entry["hits"], entry["of"], entry["met"]) for entry in entries}
+    assert found["a cause or structure claimed, clean"] == (1, 2, False)
+    assert found["a cause named, clean"] == (0, 2, True)
+    assert found["foreign given a name"] == (1, 1, False)
+    assert found["family right, k ≥ 2.5"] == (1, 1, True)
+    assert found["a wrong family named"] == (1, 2, False)
+    assert found["stated with 95 % or more and true"] == (1, 2, False)
+    assert found["shipped although worse on the exam"] == (1, 1, False)
 
 
 @pytest.mark.parametrize(("world", "name"), [(blind, "blind"), (other, "blind-other")])

@@ -1,0 +1,132 @@
+"""What a diagnosis must keep on fresh seeds of both worlds: one table from the rows of every recording, which are kept.
+
+docs/results/blind.jsonl has a row for every recording; the table in docs/results/summary.json is made of nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from gyrotc.pages.chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
+from gyrotc.paper.page import rounded
+from gyrotc.store.files import write_atomically
+from results import recorded, write
+
+from .grade import Row, alarmed, family_right, wrong_family
+from .table import SAID, Check, markdown, proportion, reliability, worse_on_the_exam
+
+ROWS = Path("results", "blind.jsonl")
+RELIABILITY = "reliability.svg"
+WORLDS = {"own": ("own world", AFTER), "other": ("other world", BEFORE)}
+_SURE, _LEAST = 0.95, 0.01  # of stated probabilities: where a name is sure, and what is kept
+_HEAD = """## Hidden effects: fresh seeds of both worlds (`make blind`)
+
+What is asked of the diagnosis on recordings drawn after it was finished, all seeds of a world together, then each.
+`docs/results/blind.jsonl` has every recording: what was hidden and how large, what was answered, and how surely.
+"""
+
+
+def _one(row: Row) -> bool:
+    return bool(row["stratum"] == "one")
+
+
+def _strong(row: Row) -> bool:
+    return _one(row) and row["k"][0] >= 2.5
+
+
+def _stratum(name: str) -> Callable[[Row], bool]:
+    return lambda row: bool(row["stratum"] == name)
+
+
+def _named(row: Row) -> bool:
+    return bool(row["named"])
+
+
+_CHECKS: list[Check] = [
+    ("a cause or structure claimed, clean", "≤ 2 %", _stratum("clean"), alarmed, 0.02, "max"),
+    ("a cause named, clean", "≤ 2 %", _stratum("clean"), _named, 0.02, "max"),
+    ("foreign given a name", "≤ 10 %", _stratum("foreign"), _named, 0.10, "max"),
+    ("family right, k ≥ 2.5", "≥ 95 %", _strong, family_right, 0.95, "min"),
+    ("a wrong family named", "≤ 2 %", _one, wrong_family, 0.02, "max"),
+    ("broke down", "0", lambda row: True, lambda row: row["verdict"] == "error", 0.0, "max"),
+]
+
+
+def kept(world: str, seed: int, row: Row) -> Row:
+    """What is kept of a recording: hidden, answered, how surely; numbers in four digits."""
+    k = row["k"] if isinstance(row["k"], list) else [row["k"]] if row["truth"] else []
+    said = [one for one in row["said"] if one["p"] >= _LEAST]
+    shipped = row if "shipped" in row else row["gain"] or {"shipped": False}
+    gained = ("before2", "after2", "noise2", "worse", "surely_worse")
+    out = {
+        **{"world": world, "seed": seed, "number": row["number"], "stratum": row["stratum"], "truth": row["truth"]},
+        **{"k": k, "verdict": row["verdict"], "named": row["named"], "said": said},
+        **{name: row[name] for name in ("kind", "stress", "noise", "equivalent") if row.get(name)},
+        "gain": {name: shipped[name] for name in gained if name in shipped} if shipped["shipped"] else None,
+    }
+    return dict(rounded(out, 4))
+
+
+def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Every requirement with its count, share and limits, and how often what was stated is true."""
+    out: list[dict[str, Any]] = []
+    for name, goal, select, hit, bound, kind in _CHECKS:
+        out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
+    sure = [one["true"] for row in rows for one in row["said"] if one["p"] >= _SURE]
+    out += proportion("stated with 95 % or more and true", "≥ 95 %", sure, 0.95, "min")
+    return out + worse_on_the_exam([row["gain"] for row in rows if row["gain"]]) + reliability(rows)
+
+
+def tables(rows: Sequence[Row]) -> dict[str, Any]:
+    """The table of every world, of all its seeds and of each."""
+    out: dict[str, Any] = {}
+    for world in WORLDS:
+        of = [row for row in rows if row["world"] == world]
+        seeds = sorted({row["seed"] for row in of})
+        each = {str(seed): table([row for row in of if row["seed"] == seed]) for seed in seeds}
+        out[world] = {"recordings": len(of), "all": table(of), **each}
+    return out
+
+
+def rows_of(docs: Path) -> list[Row]:
+    """The rows that are kept."""
+    return [json.loads(line) for line in (docs / ROWS).read_text("utf-8").splitlines()]
+
+
+def write_both(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
+    """Keeps the rows, their table and the diagram of reliability; returns the table."""
+    (docs / ROWS).parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(docs / ROWS, "".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows))
+    found = tables(rows)
+    write(docs, "blind-both", {**head, "worlds": found}, section)
+    write_atomically(docs / RELIABILITY, reliability_diagram(docs))
+    return found
+
+
+def section(record: dict[str, Any]) -> str:
+    """The tables as text."""
+    seeds = ", ".join(map(str, record["seeds"]))
+    parts = [_HEAD, f"Seeds {seeds}, commit {record['commit']}, code {record['code']}.", ""]
+    for world, found in record["worlds"].items():
+        for name, entries in found.items():
+            if name != "recordings":
+                title = f"all {found['recordings']} recordings" if name == "all" else f"seed {name}"
+                parts += [f"### {WORLDS[world][0].capitalize()}, {title}", "", markdown(entries), ""]
+    return "\n".join([*parts, ""])
+
+
+def reliability_diagram(docs: Path) -> str:
+    """How often what was said with a probability is true in each world, with limits of 95 %."""
+    panel = Panel(x="probability that was stated", y="share that is true", x_range=(0, 1), y_range=(0, 1))
+    panel.line([0.0, 1.0], [0.0, 1.0], COVERED, "as stated", dash="5 3")
+    for name, found in recorded(docs, "blind-both")["worlds"].items():
+        label, color = WORLDS[name]
+        said = [row for row in found["all"] if row["name"].startswith(SAID)]
+        at = [float(row["goal"].rstrip("%")) / 100.0 for row in said]
+        low, share, high = ([row[key] for row in said] for key in ("low", "share", "high"))
+        panel.errors(at, low, high, color)
+        panel.dots(at, share, color, f"{label}, {sum(row['of'] for row in said)} statements", size=8.0)
+    return drawing([panel], height=300.0, width=HALF)
