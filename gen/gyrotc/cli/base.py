@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
@@ -22,11 +23,35 @@ from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
 from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
-from .words import GyroAxis, completing
 
 if TYPE_CHECKING:
     from ..lot.use import LotPrior
     from ..recordings.records import Applied
+
+
+# Words of options repeat literal types of modules that are too slow to import for `--help`; a test compares both.
+class GyroAxis(str, Enum):
+    """Axis of a gyro."""
+
+    x = "x"
+    y = "y"
+    z = "z"
+
+
+class NoiseLevel(str, Enum):
+    """Noise of a simulated gyro whose scenario states none."""
+
+    paper = "paper"
+    class_ = "class"
+
+
+def completing(words: Sequence[str]) -> Callable[[str], list[str]]:
+    """The completion of an option whose values the job itself checks: a list of words, or an axis of the data."""
+
+    def begun(incomplete: str) -> list[str]:
+        return [word for word in words if word.startswith(incomplete)]
+
+    return begun
 
 
 GROUPS = {

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import date
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +24,7 @@ from .base import (
     AcceptOption,
     DirArg,
     DisplayOption,
+    GyroAxis,
     JsonOption,
     LotOption,
     OutOption,
@@ -34,10 +36,21 @@ from .base import (
     write_json,
     written_place,
 )
-from .words import ExportFormat, GyroAxis
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
+
+
+class ExportFormat(str, Enum):
+    """What `gyrotc export` writes."""
+
+    px4 = "px4"
+    ardupilot = "ardupilot"
+    csv = "csv"
+    json = "json"
+    a2l = "a2l"
+    cdf = "cdf"
+    fmu = "fmu"
 
 
 @app.command()

@@ -13,8 +13,19 @@ from rich.table import Table
 
 from ..common.errors import InputError
 from ..pages.display import DISPLAYS, NATIVE, plain, rate_unit, sci, shown, with_unit
-from .base import PLAN, DisplayOption, JsonOption, LotOption, SeedOption, app, progress, show, tell, write_json
-from .words import NoiseLevel
+from .base import (
+    PLAN,
+    DisplayOption,
+    JsonOption,
+    LotOption,
+    NoiseLevel,
+    SeedOption,
+    app,
+    progress,
+    show,
+    tell,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from ..results.recordings import Additions, DetectionLimit, Plan, Shortest, ThermometerPlace

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Sequence
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +18,7 @@ from .base import (
     DatasetArg,
     DisplayOption,
     JsonOption,
+    NoiseLevel,
     OutOption,
     SeedOption,
     TrustUnitsOption,
@@ -27,7 +29,14 @@ from .base import (
     write_json,
     written_place,
 )
-from .words import NoiseLevel, RunFormat
+
+
+class RunFormat(str, Enum):
+    """Format of the files of a data set."""
+
+    csv = "csv"
+    parquet = "parquet"
+
 
 _ROLES = ("time", "temperature", "rate", "rate_x", "rate_y", "rate_z", "pulses")
 

@@ -6,16 +6,24 @@ import functools
 import json
 import types
 from collections.abc import Collection, Iterator
+from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
 
 from ..common.errors import InputError
 from .base import app, tell
-from .words import Shell
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
+
+
+class Shell(str, Enum):
+    """Shells that `gyrotc completion` has a script for."""
+
+    bash = "bash"
+    zsh = "zsh"
+    fish = "fish"
 
 
 @app.command()

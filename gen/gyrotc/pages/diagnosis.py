@@ -29,8 +29,7 @@ from ..results.diagnosed import (
 )
 from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .display import rate_unit, shown, words
-from .report import page_environment, page_from, write_page
-from .thermal import sorted_by_rate
+from .report import page_environment, page_from, sorted_by_rate, write_page
 
 PICTURES, SERIES = "pictures", "series.json"
 

@@ -1,4 +1,7 @@
-"""`report.html`: one self-contained page from DIR/*.json and DIR/trace/*.csv, with pictures. Computes nothing new."""
+"""`report.html`: one self-contained page from DIR/*.json and DIR/trace/*.csv, with pictures. Computes nothing new.
+
+The first pictures of a lab are bias against temperature, heating and cooling in two colours, and Allan deviation.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..common.arrays import numpy_of
+from ..common.arrays import BoolArray, FloatArray, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average
@@ -25,11 +29,12 @@ from ..common.texts import file_stem, html_environment
 from ..model import Model
 from ..recordings.description import exclude_line
 from ..results.evaluation import Calibration, EvaluatedRun
-from ..results.training import LeftOutRows, Training
+from ..results.training import LeftOutRows, NoiseTerms, Training
 from ..store.files import write_atomically
 from ..store.folder import result_folder
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import (
+    COVERAGE,
     bound_words,
     displayed,
     in_unit,
@@ -43,7 +48,6 @@ from .display import (
     words,
     words_of_candidate,
 )
-from .thermal import allan_deviation, bias_against_temperature
 from .unit import UnitResults, unit_in
 
 _CURVES = (
@@ -56,27 +60,32 @@ _REST_C_PER_MIN = 0.1  # means at up to this rate are drawn as at rest: a cell o
 _BAND = 2.0  # sigma that a band reaches, about 95 %
 
 
-def bias_over_time(
-    runs: Sequence[tuple[str, str, Averages]], left_out_s: Sequence[Sequence[float]] = ()
-) -> Markup | None:
-    """Measured and compensated bias of every run (label, role, averages), one panel a run, common scales.
+@dataclass(frozen=True, slots=True)
+class _Traced:
+    """A run of which there is a trace: its means, and times (s) of rows that were left out of training."""
 
-    Args:
-        left_out_s: Times of rows that were left out of training, for each run, s; drawn as marks above.
-    """
-    marks = [*left_out_s, *[()] * (len(runs) - len(left_out_s))]
-    rates = in_unit(np.concatenate([np.r_[a.before_dph, a.after_dph, 0.0] for _, _, a in runs]))
+    run: EvaluatedRun
+    means: Averages
+    left_out_s: list[float]
+
+
+def _bias_over_time(traced: Sequence[_Traced]) -> Markup | None:
+    """Measured and compensated bias, one panel a run, common scales; marks above rows that training left out."""
+    if not traced:
+        return None
+    rates = in_unit(np.concatenate([np.r_[one.means.before_dph, one.means.after_dph, 0.0] for one in traced]))
     span = (float(rates.min()), float(rates.max()))
     pictures = []
-    for k, ((label, role, a), times) in enumerate(zip(runs, marks, strict=True)):
-        panel = Panel(x="time, h", y=f"bias, {rate_unit()}", title=f"{label} ({role})", y_range=span)
-        first = a.time_s[0] if a.time_s.size else 0.0
-        hours = (a.time_s - first) / 3600.0
+    for k, one in enumerate(traced):
+        title = f"{one.run.environment or one.run.file} ({one.run.role})"
+        panel = Panel(x="time, h", y=f"bias, {rate_unit()}", title=title, y_range=span)
+        first = one.means.time_s[0]
+        hours = (one.means.time_s - first) / 3600.0
         panel.horizontal(0.0)
-        panel.line(hours, in_unit(a.before_dph), BEFORE, "" if k else "measured", width=1.0)
-        panel.line(hours, in_unit(a.after_dph), AFTER, "" if k else "compensated", width=1.0)
-        if len(times) and a.time_s.size:
-            panel.tops((np.array(times) - first) / 3600.0)
+        panel.line(hours, in_unit(one.means.before_dph), BEFORE, "" if k else "measured", width=1.0)
+        panel.line(hours, in_unit(one.means.after_dph), AFTER, "" if k else "compensated", width=1.0)
+        if one.left_out_s:
+            panel.tops((np.array(one.left_out_s) - first) / 3600.0)
         pictures.append(drawing([panel], width=THIRD, height=110.0))
     return side_by_side(*pictures)
 
@@ -220,9 +229,24 @@ def write_report(folder: Path, display: str | None = None) -> Path:
     unit = unit_in(folder)
     with displayed(display or unit.display), page_from(folder):
         unit = unit.shown()
-        pictures = _pictures(folder, unit)
+        traced, training = list(_traced(folder, unit)), unit.training
+        pictures = {
+            "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
+            "bias": _bias_over_time(traced),
+            "map": map_with_centers(unit.model),
+            "curve": curve_by_size(training) if training else None,
+            "lot": prior_and_posterior(training) if training else None,
+            "allan": allan_deviation(training.noise) if training else None,
+            "trend": _trend(unit),
+        }
         template = page_environment().get_template("report.html.j2")
-        text = template.render(unit=unit, pictures=pictures, left_out=_left_out(unit.training), **vars(unit))
+        of_file: dict[str, list[LeftOutRows]] = {}
+        for stretch in unit.left_out:
+            of_file.setdefault(stretch.file, []).append(stretch)
+        left_out = [  # files, stretches of them, and the line that leaves these out of all figures
+            (name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier")) for name, mine in of_file.items()
+        ]
+        text = template.render(unit=unit, pictures=pictures, left_out=left_out, **vars(unit))
     return write_page(folder, text)
 
 
@@ -264,10 +288,12 @@ def page_environment() -> jinja2.Environment:
     Filters print figures and words (`words`); the test `moved_input` tells causes that change what the map sees.
     """
     environment = html_environment(
-        sci=sci, number=_number, times=_times, chance=_chance, known=with_uncertainty, plain=plain, rounded=rounded,
+        sci=sci, times=_times, known=with_uncertainty, plain=plain, rounded=rounded,
         words=words, candidate=words_of_candidate, limit_words=limit_words, bound_words=bound_words,
         measured_words=measured_words,
     )  # fmt: skip
+    environment.filters["number"] = lambda value, digits=2: "–" if value is None else f"{value:.{digits}f}"
+    environment.filters["chance"] = lambda value: "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.2g} %"
     environment.globals["rate"] = rate_unit
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
     return environment
@@ -287,36 +313,6 @@ def page_from(source: Path) -> Iterator[None]:
         raise InputError(str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them") from error
 
 
-def _left_out(training: Training | None) -> list[tuple[str, list[LeftOutRows], str]]:
-    """Files of which rows were left out of training: stretches, and the line that leaves them out of all figures."""
-    outliers = training.outliers if training else None
-    stretches = outliers.stretches if outliers else ()
-    of_file = {name: [s for s in stretches if s.file == name] for name in dict.fromkeys(s.file for s in stretches)}
-    return [(name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier")) for name, mine in of_file.items()]
-
-
-@dataclass(frozen=True, slots=True)
-class _Traced:
-    """A run of which there is a trace: its means, and times (s) of rows that were left out of training."""
-
-    run: EvaluatedRun
-    means: Averages
-    left_out_s: list[float]
-
-
-def _pictures(folder: Path, unit: UnitResults) -> dict[str, Markup | None]:
-    traced = list(_traced(folder, unit))
-    return {
-        "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
-        "bias": _over_time(traced),
-        "map": map_with_centers(unit.model),
-        "curve": curve_by_size(unit.training) if unit.training else None,
-        "lot": prior_and_posterior(unit.training) if unit.training else None,
-        "allan": allan_deviation(unit.training.noise) if unit.training else None,
-        "trend": _trend(unit),
-    }
-
-
 def thermal_picture(folder: Path, unit: UnitResults) -> Markup | None:
     """Bias of one axis against temperature, from the traces of its folder; None where there are none."""
     return bias_against_temperature(unit.model, [one.means for one in _traced(folder, unit)])
@@ -328,21 +324,12 @@ def _trend(unit: UnitResults) -> Markup | None:
 
 def _traced(folder: Path, unit: UnitResults) -> Iterator[_Traced]:
     """Runs of a result that have a trace."""
-    outliers = unit.training.outliers if unit.training else None
-    stretches = outliers.stretches if outliers else ()
     for run in unit.evaluation.runs:
         means = _trace(folder / "trace", run, unit.evaluation.average_s)
         if means is not None and means.time_s.size:
-            mine = [s.from_s for s in stretches if s.file == run.file and run.role == "train"]
+            mine = [s.from_s for s in unit.left_out if s.file == run.file and run.role == "train"]
             first, last = means.time_s[0], means.time_s[-1]
             yield _Traced(run, means, [t for t in mine if first <= t <= last])
-
-
-def _over_time(traced: Sequence[_Traced]) -> Markup | None:
-    if not traced:
-        return None
-    runs = [(one.run.environment or one.run.file, one.run.role, one.means) for one in traced]
-    return bias_over_time(runs, [one.left_out_s for one in traced])
 
 
 def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:
@@ -370,15 +357,124 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     return average(*(np.concatenate(columns.pop(0)) for _ in names), scored=scored, average_s=average_s)
 
 
-def _number(value: float | None, digits: int = 2) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
-
-
 def _times(value: float | None) -> str:
     if value is None:
         return "–"
     return f"{value:.2f}×" if value < 9.995 else f"{value:.1f}×" if value < 99.95 else f"{value:.0f}×"
 
 
-def _chance(value: float) -> str:
-    return "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.2g} %"
+MOVING_C_PER_MIN = 0.1
+"""Slower than that temperature stands still: no chamber's programme asks for less, and a hold drifts by less."""
+_DOT = 2.5  # points, across
+_FLOOR_OVER_B = float(np.sqrt(2.0 * np.log(2.0) / np.pi))  # IEEE Std 952-2020, annex C
+_TAU_OVER_Q = float(np.sqrt(3.0))  # Allan deviation times averaging time over Q: the same annex
+
+
+def sorted_by_rate(slope: FloatArray) -> tuple[tuple[str, str, BoolArray], ...]:
+    """Heating, cooling and held: words, colour and which rows."""
+    return (
+        ("held", COVERED, np.abs(slope) <= MOVING_C_PER_MIN),
+        ("heating", BEFORE, slope > MOVING_C_PER_MIN),
+        ("cooling", AFTER, slope < -MOVING_C_PER_MIN),
+    )
+
+
+def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup | None:
+    """Bias over temperature before and after, then what remains over temperature and over its rate.
+
+    Args:
+        runs: Means of every run that has some.
+    """
+    there = [a for a in runs if a.time_s.size]
+    if not there:
+        return None
+    t = np.concatenate([a.temperature_c for a in there])
+    before, after = (in_unit(np.concatenate([getattr(a, name) for a in there])) for name in ("before_dph", "after_dph"))
+    slope = np.concatenate(  # zero of a single one
+        [np.gradient(a.temperature_c, a.time_s / 60.0) if a.time_s.size > 1 else np.zeros(1) for a in there]
+    )
+    kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
+    first = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="measured, and the map")
+    second = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="before and after, on one scale")
+    third = Panel(x="temperature, C", y=f"residual, {rate_unit()}", title="what remains, over temperature")
+    fourth = Panel(x="dT/dt, C/min", y=f"residual, {rate_unit()}", title="what remains, over dT/dt")
+    second.dots(t, before, COVERED, "before", size=_DOT)
+    for panel in (second, third, fourth):
+        panel.horizontal(0.0)
+    for label, color, of in kinds:
+        first.dots(t[of], before[of], color, label, size=_DOT)
+        second.dots(t[of], after[of], color if label != "held" else ACCENT, f"after, {label}", size=_DOT)
+        third.dots(t[of], after[of], color, size=_DOT)
+        fourth.dots(slope[of], after[of], color, size=_DOT)
+    _fit(first, model, kinds, slope)
+    return side_by_side(*(drawing([panel], width=HALF, height=210.0) for panel in (first, second, third, fourth)))
+
+
+def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]], slope: FloatArray) -> None:
+    """The map at the median rate of heating and of cooling, and at rest with its band of U."""
+    t0, t1 = model.envelope.temperature_c
+    t = np.linspace(t0, t1, 160) if t1 > t0 else np.array([t0 - 0.5, t0 + 0.5])
+    rest = in_unit(model.map_dph(t, np.zeros_like(t)))
+    sigma = _sigma_at_rest(model, t)
+    if sigma is not None:
+        sigma = in_unit(sigma)
+        panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2")
+    panel.line(t, rest, ACCENT, "map at rest", width=1.4)
+    for label, color, of in kinds:
+        if label != "held":
+            rate = float(np.median(slope[of]))
+            words = f"map at {rate:+.2g} C/min".replace("-", "−")
+            panel.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, words, dash="5 3", width=1.6)
+
+
+def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
+    """1 sigma of the correction at dT/dt = 0, deg/h, as the table's cells have it; None where it has none."""
+    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
+
+    def cell(cells: tuple[int, int]) -> tuple[int, NDArray[np.int64]]:
+        columns, rows = cells
+        column = np.clip(((t - t0) / (t1 - t0 or 1.0) * columns).astype(np.int64), 0, columns - 1)
+        return min(max(int((0.0 - r0) / (r1 - r0 or 1.0) * rows), 0), rows - 1), column
+
+    known, seen = model.uncertainty_dph, model.coverage
+    if known is None:
+        return None
+    at, covered = cell(known.cells), np.ones(t.shape, dtype=bool)
+    if seen is not None:
+        row, columns = cell(seen.cells)
+        covered = np.array([seen.rows[row][k] == "1" for k in columns])
+    cells = np.where(covered, np.array(known.rows)[at], np.array(known.uncovered or known.rows)[at])
+    return np.asarray(cells, dtype=np.float64)
+
+
+def allan_deviation(noise: NoiseTerms) -> Markup | None:
+    """Allan deviation over averaging time with its uncertainty, and the lines of N, B, K and Q that are resolved.
+
+    N: sigma = N / sqrt(tau); B: sigma = B sqrt(2 ln 2 / pi); K: sigma = K sqrt(tau / 3); Q: sigma = sqrt(3) Q / tau
+    (IEEE Std 952-2020, annex C; IEEE Std 647 has the same).
+    """
+    points = [p for p in noise.allan if p.deviation_dph > 0.0]
+    if len(points) < 2:
+        return None
+    tau, value, freedom = (
+        np.array([getattr(p, name) for p in points]) for name in ("tau_s", "deviation_dph", "freedom")
+    )
+    panel = Panel(x="averaging time, s", y=f"Allan deviation, {rate_unit()}", x_log=True, y_log=True)
+    spread = value / np.sqrt(2.0 * freedom)
+    low, high = np.maximum(value - spread, 0.1 * value), value + spread
+    panel.y_range = (float(low.min()) / 1.5, float(high.max()) * 1.5)
+    at = np.geomspace(tau[0], tau[-1], 60)
+    n, b = noise.arw_deg_per_sqrt_h, noise.bias_instability_dph
+    k, q = noise.rate_random_walk_dph_per_sqrt_h, noise.quantisation_arcsec
+    if n:
+        panel.line(at, in_unit(60.0 * n / np.sqrt(at)), BEFORE, f"N = {sci(n)} deg/√h", dash="5 3")
+    if b:
+        panel.horizontal(b * _FLOOR_OVER_B, COVERED, f"B = {sci(b)} {rate_unit()}", dash="5 3", width=1.2)
+    if k:
+        panel.line(at, k * np.sqrt(at / 3600.0 / 3.0), ACCENT, f"K = {sci(k)} {rate_unit()}/√h", dash="2 3")
+    if q:
+        panel.line(at, in_unit(_TAU_OVER_Q * q / at), COVERED, f"Q = {sci(q)} arcsec", dash="2 3")
+    panel.errors(tau, low, high, AFTER)
+    panel.line(tau, value, AFTER, "compensated training records")
+    panel.dots(tau, value, AFTER, size=6.0)
+    return drawing([panel], width=HALF)

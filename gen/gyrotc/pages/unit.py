@@ -11,7 +11,7 @@ from ..results.base import read_optional, read_result
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation, Pooled
 from ..results.release import Budget, HeldLimits, Limit, Verdict, Verification
-from ..results.training import CandidateModel, Manifest, Training
+from ..results.training import CandidateModel, LeftOutRows, Manifest, Training
 from .display import COVERAGE, NATIVE, limit_words, plain, shown, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
@@ -109,6 +109,12 @@ class UnitResults:
     def named(self, verdict: str) -> str:
         """The limits of a verdict, in words."""
         return "; ".join(limit_words(one.limit) for one in self.held if one.decision == verdict)
+
+    @property
+    def left_out(self) -> tuple[LeftOutRows, ...]:
+        """Stretches of rows that training left out as outliers."""
+        outliers = self.training.outliers if self.training else None
+        return outliers.stretches if outliers else ()
 
     @property
     def capped(self) -> tuple[str, ...]:

@@ -19,9 +19,11 @@ import pytest
 from conftest import Command, invoked, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, StageLine, folded, time_left
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, GyroAxis, NoiseLevel, StageLine, folded, time_left
+from gyrotc.cli.fleet import ExportFormat
 from gyrotc.cli.main import _hoisted, application, run
-from gyrotc.cli.words import ExportFormat, GyroAxis, NoiseLevel, RunFormat, Shell
+from gyrotc.cli.recordings import RunFormat
+from gyrotc.cli.shell import Shell
 from gyrotc.deliver import export
 from gyrotc.model import Model
 from gyrotc.recordings.importers import rows

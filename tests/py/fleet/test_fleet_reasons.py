@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from gyrotc.common.metrics import Averages
 from gyrotc.fleet.outliers import facts_of, step_in
-from gyrotc.fleet.page import summary_of
-from gyrotc.fleet.reasons import reasons
+from gyrotc.fleet.page import reasons, summary_of
 from gyrotc.results.fleet import Copy, FleetEntry, Reason
 from lot import AXES, FAULTS, Lot
 
