@@ -1,4 +1,4 @@
-"""The catalogue of a fleet: which table a gyro may carry on a day, and from which data."""
+"""The catalogue of a fleet: which table a gyro may carry on a day, from which data, and what a finding bars from it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ import re
 import shutil
 import sqlite3
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from conftest import ROOT, Command
 from gyrotc.common.errors import InputError
+from gyrotc.fleet import run
 from gyrotc.fleet.catalogue import SCHEMA, catalogued, enter, export, hash_rows, withdraw
 from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.page import write_summary
 from gyrotc.fleet.run import run_fleet
+from gyrotc.lot import job
 from gyrotc.results.base import read_result
-from gyrotc.results.fleet import FleetEntry
+from gyrotc.results.fleet import FleetEntry, FleetSummary, FleetUnit
 from gyrotc.results.release import Verification
 from gyrotc.results.training import Manifest
 from gyrotc.store.files import json_text, write_atomically
@@ -351,3 +355,75 @@ def test_without_second_names_every_gyro_has_its_own_files(tmp_path: Path, monke
     (tmp_path / "other.c").write_text("int x;")
     with pytest.raises(InputError, match="what its name says"):
         share_by_hash(tmp_path / "store", tmp_path / "other.c")
+
+
+def test_a_barred_unit_is_not_entered_until_it_is_released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
+    manifest, out = load_manifest(tmp_path / "fleet.toml"), tmp_path / "out"
+    summed = run._one_of_each_serial
+    monkeypatch.setattr(
+        run,
+        "_one_of_each_serial",
+        lambda entries: [e.model_copy(update={"findings": ("sign_reversed",)}) for e in summed(entries)],
+    )
+    run.run_fleet(manifest, out, jobs=1)
+    assert catalogued(out, None, None).calibrations == 0
+    [unit] = read_result(out / "fleet.json", FleetSummary).serials
+    assert unit.barred == ("sign_reversed",)
+    run.run_fleet(manifest, out, jobs=1, tag="May", releases={"RLG-1": "mounted upside down, see log"})
+    [one] = catalogued(out, "RLG-1", "2026-04-01").found
+    assert one.tag == "May; released: mounted upside down, see log"
+    [unit] = read_result(out / "fleet.json", FleetSummary).serials
+    assert (unit.barred, unit.released) == ((), "mounted upside down, see log")
+
+
+@pytest.mark.parametrize("released", [None, "mounted upside down"])
+def test_the_page_of_a_fleet_names_a_barred_unit_and_its_finding(tmp_path: Path, released: str | None) -> None:
+    unit = FleetEntry(
+        name="a", axis=None, status="done", findings=("sign_reversed",), verdict="PASS", released=released
+    )
+    write_summary(tmp_path, [unit])
+    page = (tmp_path / "fleet.html").read_text("utf-8")
+    assert ("not released: sign reversed" in page) == (released is None)
+    assert ("Not released: 1" in page) == (released is None)
+
+
+def test_a_lot_leaves_out_a_barred_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("a", "b", "c", "d")
+    for name in names:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "training.json").touch()
+    write_summary(
+        tmp_path,
+        [
+            FleetEntry(name="a", axis=None, status="done", findings=("sign_reversed",)),
+            FleetEntry(name="b", axis=None, status="done", findings=("sign_reversed",), released="see log"),
+            *(FleetEntry(name=name, axis=None, status="done") for name in names[2:]),
+        ],
+    )
+    read: list[str] = []
+
+    def unit(place: Path) -> SimpleNamespace:
+        read.append(place.name)
+        model = SimpleNamespace(serial=place.name, axis=None)
+        return SimpleNamespace(model=model, training=SimpleNamespace(lot=None, prior=None))
+
+    monkeypatch.setattr(job, "_unit", unit)
+    monkeypatch.setattr(job, "LEAST_UNITS", 3)
+    assert [one.model.serial for one in job._units(tmp_path, None)] == ["b", "c", "d"]
+    assert read == ["b", "c", "d"]
+
+
+@pytest.mark.parametrize("finding", ["axes_exchanged", "does_not_generalise", "copy_of_other"])
+def test_findings_that_bar_a_unit(finding: str) -> None:
+    unit = FleetUnit(name="a", axis=None, status="done", findings=("rate_outliers", finding))
+    assert unit.barred == (finding,)
+    assert FleetUnit(name="a", axis=None, status="done", findings=("rate_outliers",)).barred == ()
+
+
+def test_a_release_needs_its_reason(tmp_path: Path, gyrotc: Command) -> None:
+    gyro(tmp_path, "2026-03-01", seed=1, rms_dph=1e3)
+    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out", "--release", "RLG-1")
+    assert result.returncode == 2
+    assert "--reason" in result.stderr
+    assert not (tmp_path / "out").exists()
