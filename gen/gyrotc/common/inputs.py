@@ -318,7 +318,8 @@ def _look_through(content: Any, where: str, *, finite: bool = False) -> None:
                     _look_at(key, where)
                     below.append(inner)
             elif isinstance(value, list):
-                below.extend(value)
+                if set(map(type, value)) != {float} or not all(map(math.isfinite, value)):
+                    below.extend(value)
             else:
                 _look_at(value, where)
         levels = below

@@ -23,6 +23,7 @@ Gyros of a fleet are too many for a spectrum of each pair: of each run the signs
 from __future__ import annotations
 
 import base64
+import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -156,14 +157,14 @@ AXES_ALIKE = 0.9
 """Likeness of two axes that were recorded together: below it, what shakes both of them may do it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class NoisePrint:
     """What a run is compared by: times, s, and rates of its rows or of means of several, shape (n,) each."""
 
     time_s: FloatArray
     rate: FloatArray
 
-    @property
+    @functools.cached_property
     def period_s(self) -> float:
         """Median step, s."""
         return median(np.diff(self.time_s))

@@ -45,9 +45,10 @@ def _text(content: Any, level: int) -> str:
     if not isinstance(content, _NESTED) or not content:
         return _encoder(level).encode(content)
     inner = content.values() if isinstance(content, dict) else content
+    kinds = set(map(type, inner))  # few, however many numbers there are
     line, last = "\n" + " " * (level + 1), "\n" + " " * level
-    if not any(isinstance(part, _NESTED) for part in inner):
-        if len(content) > _SERIES and not isinstance(content, dict) and not any(isinstance(x, str) for x in content):
+    if not any(issubclass(kind, _NESTED) for kind in kinds):
+        if len(content) > _SERIES and not isinstance(content, dict) and not any(issubclass(k, str) for k in kinds):
             return _line().encode(content)
         text = _encoder(level).encode(content)
         return text[0] + line + text[1:-1] + last + text[-1]

@@ -82,6 +82,7 @@ def fit(
     findings: list[dict[str, object]] = []
     rows: list[dict[str, object]] = []
     reason = ""
+    process = None
     like_auto = method in (AUTO, "mrbf") and centers is None
     given = (
         prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s) if like_auto and prior else None
@@ -96,6 +97,7 @@ def fit(
     elif method == AUTO:
         found = chosen_by_cross_validation(samples, scaling, power_on, seed=seed, average_s=average_s)
         method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
+        process = found.process
         findings += found.findings
     else:
         outcome = trained(
@@ -112,6 +114,7 @@ def fit(
     return Fit(
         method, outcome, scaling, findings, floor, average_s, mean, rows, reason,
         given.lot if given else None, given.prior if given else None, given.known if given else None,
+        process,
     )  # fmt: skip
 
 

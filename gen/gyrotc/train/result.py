@@ -63,6 +63,7 @@ class Fit:
         lot: What a lot did for it, where one was given.
         prior: What an earlier model did for it, where one was given.
         known: What it follows, where a lot or an earlier model was used, for `training.json`.
+        process: The evidence model of its samples, where model selection has made one.
     """
 
     method: str
@@ -77,6 +78,7 @@ class Fit:
     lot: LotUse | None = None
     prior: EarlierUse | None = None
     known: KnownMap | None = None
+    process: Process | None = None
 
     @property
     def networks(self) -> Sequence[Network]:

@@ -187,7 +187,9 @@ def _time_of(samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.fl
     if len(time_s) == 0:
         return np.empty(0)
     after = np.minimum(stream.first_rows(samples), len(time_s) - 1)
-    near = np.unique(np.r_[np.maximum(after - 1, 0), after])
+    after = after[np.diff(after, prepend=-1) > 0]
+    near = np.stack([np.maximum(after - 1, 0), after], axis=1).reshape(-1)
+    near = near[np.diff(near, prepend=-1) > 0]
     return np.asarray(np.interp(samples, stream.samples_of(near), time_s[near]))
 
 

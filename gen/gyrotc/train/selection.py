@@ -396,13 +396,17 @@ NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The candidate that is emitted: name, networks, the table of all candidates, why, and what a user should know."""
+    """The candidate that is emitted: name, networks, the table of all candidates, why, and what a user should know.
+
+    `process`: the evidence model of all samples, if it could be solved.
+    """
 
     method: str
     outcome: Outcome
     rows: list[dict[str, Any]]
     reason: str
     findings: list[dict[str, Any]]
+    process: Process | None
 
 
 def chosen_by_cross_validation(
@@ -444,7 +448,7 @@ def chosen_by_cross_validation(
     misses = name == "constant" and _misses(comparison)
     if misses:
         findings.insert(0, _does_not_generalise(comparison))
-    return Chosen(name, outcome, rows, _reason(comparison, name, misses), findings)
+    return Chosen(name, outcome, rows, _reason(comparison, name, misses), findings, process)
 
 
 def _trained(

@@ -273,7 +273,7 @@ def uncertainty(
         added: What terms add to the map at each sample, deg/h; the samples are in order then.
     """
     samples = cleaned(data)
-    process = fit.outcome.process or fit_process(samples, fit.scaling)
+    process = fit.outcome.process or fit.process or fit_process(samples, fit.scaling)
     scale, between = _calibrated(samples, process, fit)
     at_samples = _variance(process, fit, samples.temperature_c, samples.slope_c_per_min, scale)
     t, r = _points(fit)
