@@ -402,7 +402,8 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         bank = build(records, 0)
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
         small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
-        path.write_bytes(kept._packed("a.bank", signature_bank._content(replace(bank, **small))))
+        content = signature_bank._content(replace(bank, **small))
+        path.write_bytes(kept._head("a.bank", content) + content)
     return path.read_bytes()
 
 

@@ -21,7 +21,7 @@ from ..model import DataFile, Model, load_model
 from ..results.base import read_optional
 from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry, FleetSummary
 from ..store.files import check_own, digest_of, open_or_create, write_own
-from ..store.folder import kept_by_hash, result_folder
+from ..store.folder import result_folder, share_by_hash
 from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
 from ..tables.emit import image_of
 from ..tables.quantise import NUMERICS, quantise
@@ -208,8 +208,8 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
             found = "is not what the other results give"
             raise InputError(str(folder / ENTRY), found, "a result as fleet wrote it")
         data = unit.model.data
-        row["image_sha256"] = kept_by_hash(out / PAYLOADS, _image(folder, unit.model)).name
-        row["model_sha256"] = kept_by_hash(out / PAYLOADS, folder / "model.json").name
+        row["image_sha256"] = share_by_hash(out / PAYLOADS, _image(folder, unit.model)).name
+        row["model_sha256"] = share_by_hash(out / PAYLOADS, folder / "model.json").name
         if unit.budget:
             row |= {"valid_until": unit.budget.valid_until, "expanded_dph": unit.budget.expanded_dph}
     places = ", ".join(f":{name}" for name in row)

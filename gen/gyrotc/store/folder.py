@@ -153,8 +153,8 @@ def kept_by_hash(store: Path, source: Path) -> Path:
     return place
 
 
-def share_by_hash(store: Path, path: Path) -> None:
-    """Makes a file of this job another name of the one that is kept under its hash; raises as `kept_by_hash`.
+def share_by_hash(store: Path, path: Path) -> Path:
+    """Makes a file another name of the one that is kept under its hash, which is returned; raises as `kept_by_hash`.
 
     Where the file system has no such names, or no more of them, the file stays.
     """
@@ -163,6 +163,7 @@ def share_by_hash(store: Path, path: Path) -> None:
     with suppress(OSError):
         os.link(place, part)
         part.replace(path)
+    return place
 
 
 def write_result(path: Path, text: str) -> None:
