@@ -32,7 +32,7 @@ from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
 from gyrotc.store.files import json_text
 from gyrotc.train.data import cleaned, scaling_of
-from gyrotc.train.means import UnitMeans, unit_means
+from gyrotc.train.result import UnitMeans, unit_means
 from numpy.typing import NDArray
 
 from .growth import gyrotc

@@ -30,7 +30,7 @@ from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import read_truth
 from gyrotc.train.data import TrainingData, cleaned, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.means import UnitMeans, unit_means
+from gyrotc.train.result import UnitMeans, unit_means
 from gyrotc.train.methods import fit
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.uncertainty import uncertainty

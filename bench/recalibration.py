@@ -28,7 +28,7 @@ from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
-from gyrotc.train.means import unit_means
+from gyrotc.train.result import unit_means
 from gyrotc.train.methods import fit
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.uncertainty import uncertainty

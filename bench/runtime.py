@@ -20,9 +20,10 @@ from gyrotc.tables import vectors
 from gyrotc.tables.emit import emit, emitted_tables
 from gyrotc.tables.vectors import make_vectors
 from gyrotc.target.history import answers
-from gyrotc.target.maps import evaluate_map
+from gyrotc.target.history import evaluate_map
 from gyrotc.target.table import Table
-from gyrotc.verify.board import Job, board_entries
+from gyrotc.verify.emitted import Job
+from gyrotc.verify.board import board_entries
 from gyrotc.verify.job import visit_all
 from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compiler_version, symbols
 from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from gyrotc.model import Envelope, Model, Network, Scale
-from gyrotc.target import maps
+from gyrotc.target.history import evaluate_map
 from gyrotc.target.table import Table, f32_words
 from models import random_model
 from numpy.typing import NDArray
@@ -113,7 +113,7 @@ def extreme_bank(seed: int) -> Model:
 def worst_error_dph(model: Model, table: Table, seed: int) -> float:
     """Largest departure of the table from the model over inputs that are sought where it is large."""
     bits = _inputs(model, table, seed)
-    status, words = maps.evaluate_map(table, bits)
+    status, words = evaluate_map(table, bits)
     inputs = table.decode_inputs(bits)
     usable = (status >= 0) & np.all(np.isfinite(inputs), axis=1)
     t, slope = inputs[usable].T

@@ -8,7 +8,7 @@ from gyrotc.model import load_model
 from gyrotc.tables.emit import emitted_tables
 from gyrotc.tables.vectors import make_vectors
 from gyrotc.target.history import answers
-from gyrotc.verify.board import Job
+from gyrotc.verify.emitted import Job
 
 
 def job_of(folder: Path) -> Job:

@@ -10,17 +10,7 @@ from importlib import import_module
 
 from .base import Cause, Features, History, Needs, Parameter, Scene
 
-__all__ = [
-    "CATALOGUE",
-    "Cause",
-    "Features",
-    "History",
-    "Needs",
-    "Parameter",
-    "Scene",
-    "register",
-    "separate_by",
-]
+__all__ = ["CATALOGUE", "Cause", "Features", "History", "Needs", "Parameter", "Scene", "register", "separate_by"]
 
 
 CATALOGUE: dict[str, Cause] = {}

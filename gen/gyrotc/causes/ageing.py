@@ -11,19 +11,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import (
-    Cause,
-    Features,
-    History,
-    Needs,
-    Parameter,
-    Reach,
-    Scene,
-    SearchRule,
-    Telling,
-    Values,
-    Wording,
-)
+from .base import Cause, Features, History, Needs, Parameter, Reach, Scene, SearchRule, Telling, Values, Wording
 
 _STRAIGHT = math.inf
 

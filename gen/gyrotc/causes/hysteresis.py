@@ -59,10 +59,7 @@ CAUSE = Cause(
     kind="add",
     equation="z = max(T - w, min(T + w, z)); bias += amplitude (z - T)",
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
-    parameters=(
-        _WIDTH,
-        Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
-    ),
+    parameters=(_WIDTH, Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True)),
     words=Wording(
         name="The bias remembers the direction of the last temperature change",
         short="hyster.",

@@ -15,20 +15,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..target.recursions import TableKind
-from .base import (
-    Cause,
-    Features,
-    History,
-    Parameter,
-    Reach,
-    Scene,
-    SearchRule,
-    Tabled,
-    Telling,
-    Values,
-    Wording,
-    turns,
-)
+from .base import Cause, Features, History, Parameter, Reach, Scene, SearchRule, Tabled, Telling, Values, Wording, turns
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:

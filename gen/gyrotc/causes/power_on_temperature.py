@@ -8,19 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import (
-    Cause,
-    Features,
-    History,
-    Needs,
-    Parameter,
-    Scene,
-    SearchRule,
-    Telling,
-    Values,
-    Wording,
-    anywhere,
-)
+from .base import Cause, Features, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
 
 _REPEATED = "the same hold after power-ons at three temperatures, each twice"
 _REFERENCE_C = 20.0  # room temperature: where the offset counts as none

@@ -51,11 +51,7 @@ _TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
 def _record(values: Values, block_s: float) -> list[float]:
     tau_s = values["tau_s"]
-    return [
-        memory_gain(block_s, tau_s),
-        values["amplitude_dph_per_c"] * half_block_before(block_s, tau_s),
-        0.0,
-    ]
+    return [memory_gain(block_s, tau_s), values["amplitude_dph_per_c"] * half_block_before(block_s, tau_s), 0.0]
 
 
 CAUSE = Cause(
@@ -66,10 +62,7 @@ CAUSE = Cause(
     equation="tau dz/dt = T - z; bias += amplitude (z - T)",
     source="Langmuir flow and alignment follow temperature differences in the block "
     "(Podgorski and Aronowitz 1968, Aronowitz and Lim 1979)",
-    parameters=(
-        _TAU,
-        Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True),
-    ),
+    parameters=(_TAU, Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True)),
     words=Wording(
         name="The bias follows a temperature difference inside the gyro",
         short="gradient",

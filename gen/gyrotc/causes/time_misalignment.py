@@ -9,19 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..target.recursions import delayed
-from .base import (
-    CORNERS,
-    RATES,
-    Cause,
-    Features,
-    History,
-    Parameter,
-    Reach,
-    Scene,
-    SearchRule,
-    Values,
-    Wording,
-)
+from .base import CORNERS, RATES, Cause, Features, History, Parameter, Reach, Scene, SearchRule, Values, Wording
 
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
 _FAR_S = np.arange(700.0, 1201.0, 100.0)

@@ -8,19 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import (
-    Cause,
-    Features,
-    History,
-    Needs,
-    Parameter,
-    Scene,
-    SearchRule,
-    Telling,
-    Values,
-    Wording,
-    anywhere,
-)
+from .base import Cause, Features, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:

@@ -64,10 +64,7 @@ CAUSE = Cause(
     kind="add",
     equation="bias += amplitude exp(-t_on/tau)",
     source="start-up drift: discharge, clean-up of the gas at the electrodes, dither, electronics",
-    parameters=(
-        _TAU,
-        Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True),
-    ),
+    parameters=(_TAU, Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True)),
     words=Wording(
         name="The bias settles after power-on whatever the temperature is",
         short="warm-up",

@@ -401,8 +401,7 @@ def sign(
     from ..jobs.release import check_emitted, release_of
     from ..store.files import json_text, write_own
     from ..store.folder import result_folder
-    from ..tables.record import RELEASE, SIGNATURE
-    from ..verify.signatures import load_private_key, sign_record
+    from ..tables.record import RELEASE, SIGNATURE, load_private_key, sign_record
 
     private = load_private_key(key, lambda: _passphrase(key, passphrase_file)) if key else None
     with progress() as say:

@@ -31,7 +31,7 @@ from ..results.fleet import Lot
 from ..results.training import MapMeans, Training
 from ..target.learning import E_ID, KNOTS, OK, Learner, full
 from ..train.fitting import FitOptions
-from ..train.means import means_of
+from ..train.result import means_of
 
 
 def prior_from(

@@ -43,11 +43,10 @@ from ..store.files import write_atomically, write_own
 from ..store.folder import scratch_folder
 from ..store.marker import check_intact, sha256
 from ..tables.emit import config_text, emitted_tables, runtime_texts
-from ..tables.record import RECORD, joint_record_text
+from ..tables.record import RECORD, check_signature, joint_record_text, load_public_key
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.job import verify
-from ..verify.signatures import check_signature, load_public_key
 from ..verify.toolchain import all_targets, compile_c, run_program
 
 _EXPECTED = "what gyrotc build wrote; build it again"

@@ -22,7 +22,7 @@ from ..common.errors import InputError
 from ..common.metrics import LEAST_SPAN_C
 from ..results.evaluation import At, MapDifference
 from ..results.training import ChangeKind, CheckedCell, MapChange
-from ..train.means import UnitMeans
+from ..train.result import UnitMeans
 from .basis import PRIOR_LOG
 from .learn import FALSE_ALARM
 from .use import MapPosterior, MapPrior

@@ -22,8 +22,7 @@ from ..results.fleet import KnownMap
 from ..results.training import ChangeKind, EarlierUse, Training, TriedChange
 from ..train.data import Scaling, TrainingData
 from ..train.evidence import Asked
-from ..train.means import UnitMeans, means_of
-from ..train.result import Given
+from ..train.result import Given, UnitMeans, means_of
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
 from .learn import Envelope, sums_of, that_count

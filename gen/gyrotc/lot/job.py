@@ -21,7 +21,7 @@ from ..store.marker import check_intact
 from ..tables.emit import MONTH_H
 from ..target.learning import KNOTS
 from ..train.evidence import MEAN_S
-from ..train.means import UnitMeans, means_of
+from ..train.result import UnitMeans, means_of
 from .earlier import posterior_of_result
 from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, freedom_of, learn, of_few
 from .service import Moved, covariance_at, fitted_ageing

@@ -23,7 +23,7 @@ from scipy.special import fdtrc, gammaincc
 
 from .._core import posteriors
 from ..common.arrays import FloatArray, Progress
-from ..train.means import UnitMeans
+from ..train.result import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md

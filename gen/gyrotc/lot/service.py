@@ -24,9 +24,8 @@ from ..tables.emit import MONTH_H, emitted_tables, prior_of, service_prior, walk
 from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
 from ..train.data import TrainingData, scaling_of
 from ..train.evidence import TrainingFailed
-from ..train.means import unit_means
 from ..train.methods import fit
-from ..train.result import predict
+from ..train.result import predict, unit_means
 from .use import MapPosterior
 
 if TYPE_CHECKING:

@@ -275,10 +275,7 @@ def _looked_at(run: Run) -> tuple[RunFacts, list[Finding]]:
 
 
 def _of_all_runs(
-    dataset: Dataset,
-    facts: Sequence[RunFacts],
-    envelope: Envelope | None,
-    earlier: Mapping[str, Model] | None,
+    dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | None, earlier: Mapping[str, Model] | None
 ) -> Iterator[Finding]:
     """What all runs together raise."""
     for warning in dataset.warnings:
@@ -446,8 +443,7 @@ def _of_warning(result: CheckResult, warning: Finding) -> Iterator[Picture]:
     else:
         for file in files[:_MOST_FILES]:
             yield from _file_rows(
-                dataset,
-                [Mark(m.file, m.rows, m.span_s) for m in warning.rows if m.file == file] or [Mark(file)],
+                dataset, [Mark(m.file, m.rows, m.span_s) for m in warning.rows if m.file == file] or [Mark(file)]
             )
 
 

@@ -116,10 +116,7 @@ class SmoothFit:
 
     @staticmethod
     def of(
-        cells: Sequence[RunCells],
-        maps: Sequence[FloatArray],
-        noise: Noise,
-        changes: Sequence[FloatArray | None],
+        cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: Noise, changes: Sequence[FloatArray | None]
     ) -> SmoothFit:
         """Fits all runs.
 
@@ -249,10 +246,7 @@ _RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play 
 
 
 def evidence_beside_memories(
-    means: tuple[FloatArray, FloatArray, FloatArray],
-    used: NDArray[np.bool_],
-    change: FloatArray,
-    known: FloatArray,
+    means: tuple[FloatArray, FloatArray, FloatArray], used: NDArray[np.bool_], change: FloatArray, known: FloatArray
 ) -> float:
     """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
 

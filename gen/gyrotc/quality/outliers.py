@@ -71,10 +71,7 @@ _BURST = 0.1  # share of departing rows from which a block is left out whole
 _BURST_ROWS = 10  # with fewer rows a block, one spike alone would be a tenth of it
 _SLACK = 3.0  # changes of the level from block to block that the bias itself may make
 _FEW = 5  # rows a block from which its median means something
-_USUAL, _ALIKE = (
-    0.9,
-    0.01,
-)  # share of steps that are no larger, and of it: nearer rows are at one step of a converter
+_USUAL, _ALIKE = (0.9, 0.01)  # share of steps that are no larger, and of it: nearer rows are at one step of a converter
 _TOGETHER = 10  # rows of a burst that do not move the level; a longer departure is a piece of record
 
 

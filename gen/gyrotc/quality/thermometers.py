@@ -14,14 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..common.arrays import PART, FloatArray, those
-from ..common.metrics import (
-    MAD_TO_SIGMA,
-    Averages,
-    median,
-    median_of_parts,
-    middle_of_five,
-    quantile_of_parts,
-)
+from ..common.metrics import MAD_TO_SIGMA, Averages, median, median_of_parts, middle_of_five, quantile_of_parts
 from ..common.statistics import cell_means
 from ..recordings.records import Dataset, Mark, Rows, Run
 from ..recordings.units import channel_kind

@@ -178,12 +178,7 @@ def _drift(run: Run, time: FloatArray, at: Sequence[int], even: BoolArray) -> It
 
 
 def _drifting(
-    run: Run,
-    time: FloatArray,
-    at: Sequence[int],
-    span: tuple[int, int],
-    every: tuple[float, float],
-    total: float,
+    run: Run, time: FloatArray, at: Sequence[int], span: tuple[int, int], every: tuple[float, float], total: float
 ) -> Finding:
     """The finding, of the steps of a span; `every`: s from row to row, usually and there."""
     first, last = span

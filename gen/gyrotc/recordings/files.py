@@ -27,7 +27,7 @@ import pyarrow.csv as pacsv
 from ..common.arrays import FloatArray, give_back, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
-from .values import Fault
+from .description import Fault
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 _KEPT_BYTES = 2**25  # of columns in memory: forty runs of the paper's size

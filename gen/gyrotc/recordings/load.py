@@ -16,13 +16,12 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
 from .copies import noise_signs, sketch
-from .description import FILE, Description, Problems, RunEntry, check_serial, parse_description
+from .description import FILE, Description, Problems, RunEntry, arrange, check_serial, parse_description
 from .overlap import counted_once, shared_axes, shared_rows
 from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
 from .units import NATIVE
-from .values import arrange
 
 __all__ = [
     "asked_axes",
@@ -210,13 +209,7 @@ def load(
     """
     problems = Problems(collect=False)
     dataset = survey(
-        folder,
-        problems,
-        axis=axis,
-        applied=applied,
-        exam_only=exam_only,
-        trust_units=trust_units,
-        once=True,
+        folder, problems, axis=axis, applied=applied, exam_only=exam_only, trust_units=trust_units, once=True
     )
     assert dataset is not None
     return dataset
@@ -377,12 +370,7 @@ def _recordings(folder: Path, description: Description, problems: Problems) -> t
     with_rows: set[int] = set()
     for name in dict.fromkeys(entry.file for entry in description.run):
         recording = open_recording(
-            name,
-            folder / name,
-            description.columns,
-            description.units,
-            description.pulse_weight_arcsec,
-            problems,
+            name, folder / name, description.columns, description.units, description.pulse_weight_arcsec, problems
         )
         if recording is None:
             continue

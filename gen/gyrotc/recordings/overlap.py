@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from .copies import AXES_ALIKE, noise_copies, windows_in_common
-from .description import FILE, Problems, exclude_line
+from .description import FILE, MIN_ROWS, Problems, exclude_line
 from .reading import Reader, Recording
 from .records import Exclusion, Run, SharedAxes, SharedRows
-from .values import MIN_ROWS
 
 _PART = 2**20  # rows that are compared at once
 _MOST = 20  # stretches of two runs that are reported
@@ -56,10 +55,7 @@ def shared_rows(
 
 
 def _same_noise(
-    runs: Sequence[Run],
-    recordings: Mapping[str, Recording],
-    axis: str | None,
-    known: Container[tuple[int, int]],
+    runs: Sequence[Run], recordings: Mapping[str, Recording], axis: str | None, known: Container[tuple[int, int]]
 ) -> Iterator[tuple[int, int, SharedRows]]:
     """Pairs of runs with the same noise, without those that are known: the later one first."""
     prints = []

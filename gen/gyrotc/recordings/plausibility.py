@@ -14,11 +14,10 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.metrics import median
-from .description import Description, RunEntry
+from .description import Description, Layout, RunEntry
 from .reading import Evidence, Recording
 from .records import Curve, EarthRate, Run
 from .units import Conversion
-from .values import Layout
 
 EARTH_RATE_DPH = 15.04106717866910  # 7.2921150e-5 rad/s (WGS 84), deg/h
 
@@ -38,12 +37,7 @@ def earth_rate_warning(stated: str | None, mean_dph: float) -> str:
 
 
 def earth_rate(
-    latitude_deg: float,
-    azimuth_deg: float,
-    elevation_deg: float,
-    *,
-    latitude_sigma_deg: float,
-    axis_sigma_deg: float,
+    latitude_deg: float, azimuth_deg: float, elevation_deg: float, *, latitude_sigma_deg: float, axis_sigma_deg: float
 ) -> EarthRate:
     """Component of Earth's rate along an axis: Ω (cos φ cos A cos E + sin φ sin E), and its uncertainty.
 

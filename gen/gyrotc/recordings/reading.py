@@ -14,13 +14,12 @@ from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import median_step
 from .copies import Fingerprints, NoisePrint, fingerprints_of, noise_of
-from .description import Columns, Problems
+from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, faults, rate_faults
 from .files import CsvFile, Source
 from .parser_process import Parser, open_confined
 from .records import Applied, EarthRate, Mark, Rows
 from .tables import LoggerTable
 from .units import Conversion, declared
-from .values import MIN_ROWS, Fault, Layout, arrange, faults, rate_faults
 
 _PARSER = Parser(".importers.parquet", "open_numbers", "pyarrow.parquet")
 _COPIES = 2.0  # of the columns while they are checked
@@ -332,11 +331,7 @@ def open_file(name: str, path: Path) -> Source:
 
 
 def _checked(
-    file: Source,
-    layout: Layout,
-    units: Mapping[str, Conversion],
-    pulse_weight_arcsec: float | None,
-    problems: Problems,
+    file: Source, layout: Layout, units: Mapping[str, Conversion], pulse_weight_arcsec: float | None, problems: Problems
 ) -> tuple[FloatArray, Evidence, Fingerprints, tuple[NoisePrint, ...]]:
     """Reads all columns and checks them; the times, and what units are judged by and copies are known by."""
     values = file.columns(file.names)

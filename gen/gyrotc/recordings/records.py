@@ -233,10 +233,7 @@ class SharedRows:
     @property
     def marks(self) -> tuple[Mark, Mark]:
         """The marks of both stretches."""
-        return (
-            Mark(self.file, self.rows, self.span_s),
-            Mark(self.other_file, self.other_rows, self.other_span_s),
-        )
+        return (Mark(self.file, self.rows, self.span_s), Mark(self.other_file, self.other_rows, self.other_span_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -206,16 +206,7 @@ def rate_of(name: str, value: float) -> tuple[float, str] | None:
     plain = name.lower().rsplit("/", 1)[-1].rsplit(".", 1)[-1]
     if not np.isfinite(value) or value <= 0.0:
         return None
-    if plain in (
-        "fs",
-        "fs_hz",
-        "sample_rate",
-        "samplerate",
-        "sampling_rate",
-        "rate_hz",
-        "samplingfrequency",
-        "fsamp",
-    ):
+    if plain in ("fs", "fs_hz", "sample_rate", "samplerate", "sampling_rate", "rate_hz", "samplingfrequency", "fsamp"):
         return float(value), f"{name} = {value:g} in the file, in Hz"
     if plain in ("dt", "ts", "dt_s", "ts_s", "sample_time", "sampletime"):
         return 1.0 / float(value), f"{name} = {value:g} in the file, in s"

@@ -55,20 +55,12 @@ NOISE: dict[str, NoiseLevels] = {
     "paper": NoiseLevels(arw_deg_per_sqrt_h=7e-4 * (100.0 / 3600.0) ** 0.5),
     # a dithered unit of the 0.008 deg/h class: 0.012 deg/h of 100-s means
     "class": NoiseLevels(
-        arw_deg_per_sqrt_h=2e-3,
-        bias_instability_dph=1e-3,
-        rate_random_walk_dph_per_sqrt_h=2e-4,
-        quantum_arcsec=0.5,
+        arw_deg_per_sqrt_h=2e-3, bias_instability_dph=1e-3, rate_random_walk_dph_per_sqrt_h=2e-4, quantum_arcsec=0.5
     ),
 }
 """Levels that stand where a scenario gives none."""
 
-_DECLARED = (
-    "arw_deg_per_sqrt_h",
-    "bias_instability_dph",
-    "rate_random_walk_dph_per_sqrt_h",
-    "quantum_arcsec",
-)
+_DECLARED = ("arw_deg_per_sqrt_h", "bias_instability_dph", "rate_random_walk_dph_per_sqrt_h", "quantum_arcsec")
 _SHOWN = {"gyro", "chamber", "sensor", "channel"}
 _DEFAULT_PULSE_ARCSEC = 0.01  # finer than the noise of any row, so that only a declared quantum shows
 _PULSES_PER_QUANTUM = 16  # a power of 2, so that pulses and quantum are exact multiples

@@ -163,12 +163,7 @@ class LaserStates:
 
 
 def laser_states(
-    laser: Laser,
-    mirror_c: FloatArray,
-    gas_c: FloatArray,
-    path_c: FloatArray,
-    day: float,
-    contamination_ppm: FloatArray,
+    laser: Laser, mirror_c: FloatArray, gas_c: FloatArray, path_c: FloatArray, day: float, contamination_ppm: FloatArray
 ) -> LaserStates:
     """States of the laser from the true temperatures of its nodes, C, shape (n,).
 
@@ -225,12 +220,7 @@ def laser_readings(laser: Laser, states: LaserStates, rng: np.random.Generator) 
 
 
 def thermometer_readings(
-    one: Thermometer,
-    node_c: FloatArray,
-    air_c: FloatArray,
-    time_s: FloatArray,
-    day: float,
-    rng: np.random.Generator,
+    one: Thermometer, node_c: FloatArray, air_c: FloatArray, time_s: FloatArray, day: float, rng: np.random.Generator
 ) -> FloatArray:
     """What a thermometer shows, C.
 

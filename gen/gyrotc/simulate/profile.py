@@ -100,9 +100,7 @@ Step = Annotated[
     | Annotated[Nested, Tag("nested_c")]
     | Annotated[Repeat, Tag("repeat")],
     Discriminator(
-        _kind,
-        custom_error_type="step",
-        custom_error_message="a step has one of the keys " + ", ".join(_KINDS),
+        _kind, custom_error_type="step", custom_error_message="a step has one of the keys " + ", ".join(_KINDS)
     ),
 ]
 Repeat.model_rebuild()

@@ -68,8 +68,7 @@ def config_text(models: Sequence[Model]) -> bytes:
     needs = needs_of(models)
     template = c_environment().get_template("gtc_config.h.j2")
     text = template.render(
-        options=[{"name": name, "value": value} for name, value in needs.items()],
-        cost_lines=list(_cost_lines(needs)),
+        options=[{"name": name, "value": value} for name, value in needs.items()], cost_lines=list(_cost_lines(needs))
     )
     return text.encode("ascii")
 

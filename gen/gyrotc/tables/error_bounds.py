@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed
 from ..model import Envelope, Model, Network, Term
-from ..target.maps import evaluate_map
+from ..target.history import evaluate_map
 from ..target.q31 import GAUSS_ERROR
 from ..target.recursions import TableKind
 from ..target.table import Numeric, Table, f32_words

@@ -31,13 +31,11 @@ from ..common.inputs import runtime_folders
 from ..model import Model, load_model
 from ..recordings.records import Applied, Rows
 from ..target.f32 import FUSIBLE
-from ..target.front_end import samples_per_block
-from ..target.history import replay
-from ..target.maps import evaluate_map
+from ..target.front_end import missed_before, samples_per_block
+from ..target.history import evaluate_map, replay
 from ..target.recursions import TableKind
 from ..target.sigma import RULES
 from ..target.table import ARRAYS, Numeric, Table, Words
-from ..train.samples import missed_before
 from . import f32, q31
 from .error_bounds import channel_error_dph, with_authority
 

@@ -170,12 +170,7 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
     channels = ["temperature_c", *channel_names(model)]
     stand_ins = [f"fallback model of {term.channel}" for term in model.terms if term.stand_in is not None]
     networks = [*[""] * len(model.networks), *stand_ins]
-    return {
-        "networks": networks,
-        "centers": centers,
-        "guards": channels,
-        "terms": [term.id for term in model.terms],
-    }
+    return {"networks": networks, "centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
 
 
 def _width(width: float | None) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import steps_are
 from ..common.inputs import need_memory
 from .arithmetic import Arithmetic, Numbers
 from .recursions import Course
@@ -21,6 +22,8 @@ MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
+_GAP = 1.5  # median row periods
+_MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,3 +378,14 @@ class Stream:
         total = np.concatenate([[0], np.cumsum(self.dropped)])
         runs = self.position - self.missed  # where the missing samples before each row begin
         return np.asarray(at // samples_per_block + total[np.searchsorted(runs, at, side="right")])
+
+
+def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
+    """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
+    late = np.flatnonzero(steps_are(time_s, lambda step: step / row_period_s > _GAP))
+    if len(late) == 0:
+        return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
+    missed = np.zeros(time_s.size, dtype=np.int64)
+    gaps = (time_s[late + 1] - time_s[late]) / row_period_s
+    missed[late + 1] = np.minimum(np.rint(gaps) - 1.0, _MAX_MISSED).astype(np.int64)
+    return missed

@@ -49,11 +49,7 @@ from .uncertainty import of_few
 ShapeId = Literal["line", "product", "curve"]
 
 #: The simplest first, and the kind of the record of each.
-SHAPES: dict[ShapeId, TableKind] = {
-    "line": TableKind.AUXILIARY,
-    "product": TableKind.PRODUCT,
-    "curve": TableKind.CURVE,
-}
+SHAPES: dict[ShapeId, TableKind] = {"line": TableKind.AUXILIARY, "product": TableKind.PRODUCT, "curve": TableKind.CURVE}
 _SHOWN = (0.002, 0.998)  # quantiles of a channel between which its range is taken: spikes are none of it
 # In half ranges: least of what is left of bent functions, among 0.25 to 1.2 and 0.4 to 1.5.
 _CENTER, _WIDTH = 0.5, 0.9
@@ -129,11 +125,7 @@ def _fixed(id: ShapeId, values: FloatArray, reference: float, samples: TrainingD
     if id == "curve":
         low, high = (float(x) for x in np.nanquantile(values, _SHOWN))
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        return {
-            "reference": middle - _CENTER * half,
-            "second_center": middle + _CENTER * half,
-            "width": _WIDTH * half,
-        }
+        return {"reference": middle - _CENTER * half, "second_center": middle + _CENTER * half, "width": _WIDTH * half}
     return {"reference": reference}
 
 
@@ -254,10 +246,7 @@ def _names(dataset: Dataset) -> list[str]:
 
 
 def chosen_channels(
-    dataset: Dataset,
-    samples: TrainingData,
-    columns: Mapping[str, FloatArray],
-    average_s: float,
+    dataset: Dataset, samples: TrainingData, columns: Mapping[str, FloatArray], average_s: float
 ) -> ChannelChoice | None:
     """Chooses channels; None where there is none, or no map beside which to judge them.
 

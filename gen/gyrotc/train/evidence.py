@@ -257,12 +257,7 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
         step_s: Length of a mean, s.
     """
     points = allan_variance(residuals, step_s)
-    names = (
-        "quantisation_arcsec",
-        "arw_deg_per_sqrt_h",
-        "bias_instability_dph",
-        "rate_random_walk_dph_per_sqrt_h",
-    )
+    names = ("quantisation_arcsec", "arw_deg_per_sqrt_h", "bias_instability_dph", "rate_random_walk_dph_per_sqrt_h")
     terms: dict[str, float | None] = dict.fromkeys(names)
     below: dict[str, float] = {}
     if len(points) >= len(names) and all(p.deviation_dph > 0.0 for p in points):

@@ -28,11 +28,10 @@ from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMe
 from .channels import chosen_channels, seen_by_target, with_channels
 from .data import Span, TrainingData, average, cleaned, joined, scaling_of, training_spans, whole_runs
 from .evidence import MEAN_S, TrainingFailed, noise_terms, sensitivities, stretches
-from .means import unit_means
 from .methods import fit
 from .mrbf import Bumps
 from .options import AUTO, SIMPLE, BuildOptions
-from .result import AGREE_S, Fit, Prior, longest_same_s, predict, snapped, stuck_after_s
+from .result import AGREE_S, Fit, Prior, longest_same_s, predict, snapped, stuck_after_s, unit_means
 from .samples import Blocks, run_blocks
 from .uncertainty import coverage, rezero_dph, uncertainty
 

@@ -35,10 +35,7 @@ _LIMITS_C = (0.6, 3.5)  # refined; blocks of 10 s at 5 C/min are 0.8 C long, wid
 _BEYOND_C = 5.0  # a bump's middle may lie so far outside the samples
 _MOST = 24  # as many as a map of the evidence process has
 _SPLINE_C = (12.0, 30.0)  # between knots: of T, and of what depends on dT/dt
-_CELL_C, _CELL_C_PER_MIN = (
-    0.25,
-    0.5,
-)  # of bins: a quarter of the narrowest bump; splines are smooth over dT/dt
+_CELL_C, _CELL_C_PER_MIN = (0.25, 0.5)  # of bins: a quarter of the narrowest bump; splines are smooth over dT/dt
 _SLOW_S = 600.0  # noise of gyros is slower than this in part: more samples of one place say no more
 _OUTLIER = 4.5  # robust standard deviations, as in the evidence process
 _PARAMETERS = 3  # of a bump: place, width, height

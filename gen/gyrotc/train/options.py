@@ -52,8 +52,7 @@ class BuildOptions:
         ),
     )
     seed: Annotated[int, Interval(ge=0, lt=2**63)] = field(
-        default=0,
-        metadata=_meaning("Number from which everything random is drawn; the same number, the same result."),
+        default=0, metadata=_meaning("Number from which everything random is drawn; the same number, the same result.")
     )
     centers: Annotated[int, Interval(ge=0, le=MOST_CENTERS)] | None = field(
         default=None, metadata=_meaning("Number of centers; by default the data decide.")
@@ -66,8 +65,7 @@ class BuildOptions:
         default=100.0, metadata=_meaning("Length of the means of which RMS figures are taken, s.")
     )
     channels: bool = field(
-        default=False,
-        metadata=_meaning("Let recorded channels be inputs, those that hold on unseen history alone."),
+        default=False, metadata=_meaning("Let recorded channels be inputs, those that hold on unseen history alone.")
     )
 
     def __post_init__(self) -> None:

@@ -52,10 +52,7 @@ def fit_bank(data: TrainingData, scaling: Scaling, *, seed: int, centers: int | 
         bounds = {"temperature_c": list(scaling.temperature_c), "slope_c_per_min": list(region)}
         networks.append({**outcome.networks[0], "region": bounds})
     names = ("cooling", "holding", "warming")
-    return Outcome(
-        networks=networks,
-        curves={name: outcome.curves for name, outcome in zip(names, found, strict=True)},
-    )
+    return Outcome(networks=networks, curves={name: outcome.curves for name, outcome in zip(names, found, strict=True)})
 
 
 def _part(data: TrainingData, region: tuple[float, float]) -> TrainingData:
@@ -289,11 +286,7 @@ def _smallest(curve: FloatArray) -> int:
 
 
 def _criterion(
-    problem: _Problem,
-    dictionary: Dictionary,
-    width: float,
-    whole: _core.EqualGaussians,
-    path: _core.OlsPath,
+    problem: _Problem, dictionary: Dictionary, width: float, whole: _core.EqualGaussians, path: _core.OlsPath
 ) -> FloatArray:
     """Mean squared error that the rule expects of each model on the path."""
     if problem.rule in ("blocks", "runs"):
@@ -361,12 +354,7 @@ def _folds(means: TrainingData, rule: str) -> Sequence[tuple[NDArray[np.bool_], 
 
 
 def _outcome(
-    problem: _Problem,
-    best: _Choice,
-    choices: Sequence[_Choice],
-    scaling: Scaling,
-    ridge: float,
-    seconds: float,
+    problem: _Problem, best: _Choice, choices: Sequence[_Choice], scaling: Scaling, ridge: float, seconds: float
 ) -> Outcome:
     places = best.dictionary.centers[np.array(best.path.chosen[1 : best.columns], dtype=np.int64) - 1]
     gaussians = np.concatenate([places, np.full((len(places), 2), best.width)], axis=1)

@@ -76,13 +76,7 @@ class _Fold:
     weight: FloatArray
 
 
-def chosen_parts(
-    samples: TrainingData,
-    scaling: Scaling,
-    parts: Parts,
-    average_s: float,
-    most: int,
-) -> PartsTrial:
+def chosen_parts(samples: TrainingData, scaling: Scaling, parts: Parts, average_s: float, most: int) -> PartsTrial:
     """Chooses parts one after the other.
 
     Args:
@@ -170,13 +164,7 @@ class _Course:
     noise_dph: float
 
     @classmethod
-    def of(
-        cls,
-        samples: TrainingData,
-        scaling: Scaling,
-        parts: Parts,
-        average_s: float,
-    ) -> _Course:
+    def of(cls, samples: TrainingData, scaling: Scaling, parts: Parts, average_s: float) -> _Course:
         means = average(samples, MEAN_S)
         columns, where, at = [means.bias_dph], {}, 1
         for name, values in parts.columns.items():

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import steps_are
 from ..quality.outliers import departing_rows
 from ..target import table as status_bits
 from ..target.arithmetic import F32
@@ -20,6 +19,7 @@ from ..target.front_end import (
     Steps,
     Stream,
     follow,
+    missed_before,
     period_us,
     samples_per_block,
 )
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
 
 _PART = 2**18  # rows that are looked at together: bounds memory
-_GAP = 1.5  # median row periods
-_MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,17 +63,6 @@ class Blocks:
     def used(self) -> NDArray[np.bool_]:
         """Which blocks are training samples."""
         return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
-
-
-def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
-    """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    late = np.flatnonzero(steps_are(time_s, lambda step: step / row_period_s > _GAP))
-    if len(late) == 0:
-        return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
-    missed = np.zeros(time_s.size, dtype=np.int64)
-    gaps = (time_s[late + 1] - time_s[late]) / row_period_s
-    missed[late + 1] = np.minimum(np.rint(gaps) - 1.0, _MAX_MISSED).astype(np.int64)
-    return missed
 
 
 def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:

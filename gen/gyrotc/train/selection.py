@@ -191,11 +191,7 @@ def _surely(gains: FloatArray, level: float) -> bool:
     return len(gains) > 1 and bool(gains.mean() > _LEAST) and surely_above_0(gains, significance=level)
 
 
-_COUNTED = {
-    "run": ("whole run", "whole runs"),
-    "branch": ("branch", "branches"),
-    "part": ("part", "parts"),
-}
+_COUNTED = {"run": ("whole run", "whole runs"), "branch": ("branch", "branches"), "part": ("part", "parts")}
 
 
 def compare_candidates(
@@ -410,12 +406,7 @@ class Chosen:
 
 
 def chosen_by_cross_validation(
-    samples: TrainingData,
-    scaling: Scaling,
-    power_on: NDArray[np.int64] | None,
-    *,
-    seed: int,
-    average_s: float,
+    samples: TrainingData, scaling: Scaling, power_on: NDArray[np.int64] | None, *, seed: int, average_s: float
 ) -> Chosen:
     """Trains the candidate that model selection chooses; where that fails or must not be used, the next choice.
 

@@ -194,13 +194,7 @@ class Mixed:
         except RuntimeError as error:
             raise TrainingFailed(f"the mixed model cannot be solved ({error})") from error
         return np.array(
-            [
-                self.center + one - 0.5 * square,
-                line - 0.75 * cube,
-                1.5 * square,
-                1.25 * cube,
-                rate / self.rate,
-            ]
+            [self.center + one - 0.5 * square, line - 0.75 * cube, 1.5 * square, 1.25 * cube, rate / self.rate]
         )
 
 

@@ -95,11 +95,7 @@ def rezero_dph(between: float, runs: int) -> float:
 
 
 def start_sigma(
-    id: str,
-    parameters: dict[str, float],
-    rules: dict[str, Any],
-    samples: TrainingData,
-    channel: FloatArray | None,
+    id: str, parameters: dict[str, float], rules: dict[str, Any], samples: TrainingData, channel: FloatArray | None
 ) -> float:
     """What a term does not know of the time before it began, 1 σ: deg/h, for a play deg/h/C.
 
@@ -295,12 +291,7 @@ def uncertainty(
 
 
 def _asked(
-    samples: TrainingData,
-    process: Process,
-    fit: Fit,
-    cells: tuple[int, int],
-    scale: float,
-    at_samples: FloatArray,
+    samples: TrainingData, process: Process, fit: Fit, cells: tuple[int, int], scale: float, at_samples: FloatArray
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Where corrections are asked for, as the samples or a lot's units show: cells, variances, weights."""
     asked = process.asked
@@ -340,11 +331,7 @@ def _cell(fit: Fit, cells: tuple[int, int], t: FloatArray, r: FloatArray) -> NDA
 
 
 def _means(
-    cell: NDArray[np.int64],
-    values: FloatArray,
-    weight: FloatArray,
-    cells: tuple[int, int],
-    otherwise: FloatArray,
+    cell: NDArray[np.int64], values: FloatArray, weight: FloatArray, cells: tuple[int, int], otherwise: FloatArray
 ) -> FloatArray:
     """Weighted means by cell, a row for each cell of dT/dt; `otherwise` where a cell has none."""
     n = cells[0] * cells[1]

@@ -19,16 +19,14 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
 from ..common.inputs import read_input
-from ..model import Model
 from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
 from ..store.folder import scratch_folder
 from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
 from ..target.history import answers
-from ..target.table import Table
 from .bounds import instruction_bounds
-from .emitted import board_files, checked_sources
-from .learning import learned_on
+from .emitted import Job, board_files, checked_sources
+from .replay import learned_on
 from .sizes import function_costs
 from .toolchain import (
     Object,
@@ -256,17 +254,6 @@ def _compare_groups(crcs: Words, expected: Words) -> BoardComparison:
 
 _CODE = "tT"
 _CONSTANT = "rR"
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """What is to be verified: emitted C, its tables, and what the reference answers to its vectors."""
-
-    c_folder: Path
-    model: Model
-    tables: dict[str, Table]
-    expected: dict[str, NDArray[np.uint32]]
-    trusted: bool = False  # the user takes the code of the folder as it is
 
 
 def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:

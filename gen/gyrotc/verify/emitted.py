@@ -16,7 +16,11 @@ import os
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
@@ -28,11 +32,23 @@ from ..store.marker import read_marker
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
 from ..tables.text import ARITHMETICS, LEARNING, amalgamate
+from ..target.table import Table
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})
 _SHOWN = 160  # characters of a line
 _BEYOND = 2**16  # bytes that are read of a file beyond its right length
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be verified: emitted C, its tables, and what the reference answers to its vectors."""
+
+    c_folder: Path
+    model: Model
+    tables: dict[str, Table]
+    expected: dict[str, NDArray[np.uint32]]
+    trusted: bool = False  # the user takes the code of the folder as it is
 
 
 def c_hash(c_folder: Path, left_out: Mapping[str, bytes] | None = None) -> str:

@@ -311,10 +311,7 @@ _NUMBERS = "for (i = 0U; i < n; i++) {"  # of numbers_fit(); n is that of the re
 _RECORDS = {"n_sigma": 1, "network[NETWORK_CENTERS].bits": 5, "n_networks": 7, "n_terms": 6, "n_channels": 4}
 #: Lines whose quotient has 32 bits: of means and slopes, which fit a word (GTC_ASSERT of `mean` and `quotient`),
 #: and of a part by its whole, in 2^-31.
-SHORT_QUOTIENTS = (
-    "const uint_least64_t q = (magnitude + (den / 2U)) / den;",
-    "part = (part << 31) / whole;",
-)
+SHORT_QUOTIENTS = ("const uint_least64_t q = (magnitude + (den / 2U)) / den;", "part = (part << 31) / whole;")
 #: Whole numbers of the header are looked at from the counts on before they are looked at from the first on.
 _WHOLES = "for (i = first; i < N_WHOLE; i++) {"
 POWER = ("while (rest != 0U) {", "for (rest = blocks; rest != 0U; rest >>= 1) {")

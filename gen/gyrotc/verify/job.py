@@ -39,12 +39,14 @@ from ..results.release import (
 from ..store.folder import scratch_folder
 from ..store.marker import check_intact
 from ..tables.emit import expected_answers
+from ..tables.record import check_signature, load_public_key
 from ..tables.vectors import Vectors, make_vectors
 from ..target.q31 import exp2_table
 from ..target.table import Table
-from .board import Job, board_entries, log_entries
+from .board import board_entries, log_entries
 from .emitted import (
     EDITABLE,
+    Job,
     c_hash,
     checked_sources,
     file_entries,
@@ -54,7 +56,6 @@ from .emitted import (
     texts_again,
 )
 from .replay import replay_dataset
-from .signatures import check_signature, load_public_key
 from .toolchain import Target, all_targets, compile_objects, confined, end_all, link, runtime_object
 
 __all__ = ["Visited", "chosen_targets", "file_entries", "verify", "visit_all"]
@@ -376,9 +377,7 @@ def _merged(earlier: list[VerifiedTarget], entries: list[VerifiedTarget]) -> lis
 
 
 def _counts(
-    entries: Sequence[VerifiedTarget],
-    checks: Sequence[VerifiedFile | MapError | SignatureCheck],
-    named: set[str],
+    entries: Sequence[VerifiedTarget], checks: Sequence[VerifiedFile | MapError | SignatureCheck], named: set[str]
 ) -> tuple[int, int, int]:
     """Targets passed, failed, missing. A named target that is missing has failed, and so has a check."""
     status = [entry.status for entry in entries]

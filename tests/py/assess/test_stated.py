@@ -271,7 +271,7 @@ def test_every_leaf_and_payload_is_guarded(
     passing: Path, tmp_path: Path, key: Path, of_a_file: int, least: int
 ) -> None:
     """Certificate, signing, export, lot and the signature's own check refuse whatever of it was changed."""
-    from gyrotc.verify.signatures import check_signature, load_private_key, load_public_key, sign_record
+    from gyrotc.tables.record import check_signature, load_private_key, load_public_key, sign_record
 
     print(f"seed {SEED}")
     rng = random.Random(SEED)

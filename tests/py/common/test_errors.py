@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from gyrotc.common.errors import InputError, install_command
 from gyrotc.fleet.run import Cluster, _connected
-from gyrotc.verify.signatures import _serialization
+from gyrotc.tables.record import _serialization
 
 
 def _without(package: str, monkeypatch: pytest.MonkeyPatch) -> None:

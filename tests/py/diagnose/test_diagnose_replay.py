@@ -29,11 +29,11 @@ from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Rows, Run, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.maps import evaluate_map
+from gyrotc.target.front_end import missed_before
+from gyrotc.target.history import evaluate_map
 from gyrotc.target.recursions import first_order, play
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
-from gyrotc.train.samples import missed_before
 from gyrotc.verify.replay import history_of
 from numpy.typing import NDArray
 from single_cycles import NOISE, clean_cycle

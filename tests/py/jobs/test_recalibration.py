@@ -22,9 +22,8 @@ from gyrotc.results.release import Verification
 from gyrotc.results.training import Training
 from gyrotc.tables.emit import emitted_tables
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
-from gyrotc.train.means import UnitMeans, unit_means
 from gyrotc.train.methods import fit
-from gyrotc.train.result import predict
+from gyrotc.train.result import UnitMeans, predict, unit_means
 from numpy.typing import NDArray
 from recordings import write_csv
 

@@ -23,9 +23,8 @@ from gyrotc.results.recordings import ChamberStep
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import TrainingData
 from gyrotc.train.evidence import Asked
-from gyrotc.train.means import UnitMeans
 from gyrotc.train.methods import fit
-from gyrotc.train.result import predict
+from gyrotc.train.result import UnitMeans, predict
 from gyrotc.train.uncertainty import coverage, uncertainty
 from models import random_model
 from numpy.typing import NDArray

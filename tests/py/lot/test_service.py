@@ -27,7 +27,7 @@ from gyrotc.results.fleet import LotAgeing
 from gyrotc.tables.emit import MONTH_H, data_sheet_spread, emit, service_prior, walk
 from gyrotc.target.learning import KNOTS, Learner, full
 from gyrotc.train.data import TrainingData
-from gyrotc.train.means import UnitMeans
+from gyrotc.train.result import UnitMeans
 
 GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"
 LEARNING = Learning(

@@ -23,7 +23,7 @@ import pytest
 import scipy.io
 from conftest import Command, run_gyrotc
 from gyrotc.quality.check import check
-from gyrotc.recordings.importers import names
+from gyrotc.recordings import units
 from gyrotc.recordings.importers.job import ImportOptions, import_files
 from gyrotc.recordings.importers.map_file import Map, load_map
 from gyrotc.recordings.importers.stamps import Stamps
@@ -532,11 +532,11 @@ def test_a_column_name_of_many_blanks_is_not_searched(monkeypatch: pytest.Monkey
     """Before: the search for a unit took the square of its 100,000 blanks, 55 s."""
     steps: list[int] = []
     for name in ("_BRACKETS", "_AFTER_SIGN", "_WITH_SIGN"):
-        monkeypatch.setattr(names, name, _Counted(getattr(names, name), steps))
-    names.split_unit.cache_clear()
-    assert names.meaning("rate of these blanks [deg/h]", None).unit == "deg/h" and steps, "nothing is counted"
+        monkeypatch.setattr(units, name, _Counted(getattr(units, name), steps))
+    units.split_unit.cache_clear()
+    assert units.meaning("rate of these blanks [deg/h]", None).unit == "deg/h" and steps, "nothing is counted"
     steps.clear()
-    names.meaning("x" + " " * 100_000 + "y", None)
+    units.meaning("x" + " " * 100_000 + "y", None)
     assert sum(steps) <= 100_000, "more than a step for each character"
 
 
@@ -589,9 +589,9 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from gyrotc.recordings import tables
-    from gyrotc.recordings.importers import formats
+    from gyrotc.recordings.importers import job as import_job
 
-    def in_this_process(parser: formats.Parser, path: Path) -> LoggerFile:
+    def in_this_process(parser: import_job.Parser, path: Path) -> LoggerFile:
         module = importlib.import_module(parser.module, "gyrotc.recordings")
         file: LoggerFile = getattr(module, parser.function)(path)
         return file
@@ -605,7 +605,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 
     (tmp_path / name).write_bytes(head + bytes(2000))
     monkeypatch.setattr(tables, "importlib", Importlib)
-    monkeypatch.setattr(formats, "open_confined", in_this_process)
+    monkeypatch.setattr(import_job, "open_confined", in_this_process)
     status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
     assert status == 2
     assert error.startswith(f"gyrotc: {name}: ")

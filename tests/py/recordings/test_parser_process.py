@@ -15,11 +15,10 @@ import pyarrow.parquet as pq
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.recordings import parser_process
-from gyrotc.recordings.importers import formats
+from gyrotc.recordings.importers import job as import_job
 from gyrotc.recordings.importers.map_file import Map
-from gyrotc.recordings.parser_process import Parser, open_confined
+from gyrotc.recordings.parser_process import Parser, landlock_version, open_confined
 from gyrotc.recordings.reading import ParquetFile
-from gyrotc.recordings.sandbox import landlock_version
 from gyrotc.recordings.tables import LoggerFile
 from logger_binaries import BINARY_CASES
 from logger_files import Case, truth
@@ -129,8 +128,8 @@ def test_a_process_hands_back_what_the_library_reads(
         parsers.append(parser)
         return open_confined(parser, path)
 
-    monkeypatch.setattr(formats, "open_confined", confined)
-    with closing(formats.open_logger_file(path, Map())) as there:
+    monkeypatch.setattr(import_job, "open_confined", confined)
+    with closing(import_job.open_logger_file(path, Map())) as there:
         module = importlib.import_module(parsers[0].module, "gyrotc.recordings")
         with closing(getattr(module, parsers[0].function)(path)) as here:
             assert (there.format, there.facts, there.since_power_on) == (

@@ -17,7 +17,7 @@ import pytest
 from gyrotc.model import Model, load_model
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.maps import evaluate_map
+from gyrotc.target.history import evaluate_map
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"

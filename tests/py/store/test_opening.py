@@ -227,7 +227,7 @@ _DOOR = {
     "store/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
     "store/update.py copy2",  # into a folder that the job has just made
     "cli/fleet.py copytree",  # likewise
-    "recordings/importers/formats.py open",  # into a scratch folder that the job has just made
+    "recordings/importers/job.py open",  # into a scratch folder that the job has just made
     "recordings/importers/spreadsheet.py open",  # likewise
 }
 

@@ -19,7 +19,7 @@ from gyrotc.model import Guard, Model, Term, load_model
 from gyrotc.tables.emit import COSTS, SWITCHES, config_text, emit, emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.target.f32 import gauss
-from gyrotc.target.maps import evaluate_map
+from gyrotc.target.history import evaluate_map
 from gyrotc.target.table import MAGIC, Table
 from models import random_model
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.target.arithmetic import F32
-from gyrotc.target.front_end import Settings, expand_missed, samples_per_block
+from gyrotc.target.front_end import Settings, expand_missed, missed_before, samples_per_block
 from gyrotc.target.samples import Guarded
-from gyrotc.train.samples import Blocks, missed_before, run_blocks
+from gyrotc.train.samples import Blocks, run_blocks
 
 
 def recording(temperature: np.ndarray, time_s: np.ndarray | None = None, *, from_s: float = 0.0) -> Any:

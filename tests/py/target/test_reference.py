@@ -13,8 +13,7 @@ from conftest import quick_and_slow
 from gyrotc.common.errors import CheckFailed
 from gyrotc.tables.quantise import NUMERICS, _limits, outside, quantise
 from gyrotc.target import table as layout
-from gyrotc.target.history import replay
-from gyrotc.target.maps import evaluate_map
+from gyrotc.target.history import evaluate_map, replay
 from gyrotc.target.q31 import GAUSS_ERROR, exp2
 from gyrotc.target.table import ARRAYS, HELD, Table, f32_words
 from libc_build import ROOT, UNGUARDED, runtime

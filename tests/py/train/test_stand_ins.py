@@ -16,8 +16,7 @@ from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Rows
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import NUMERICS, channels_of, quantise
-from gyrotc.target.history import Replay, replay
-from gyrotc.target.maps import stand_in
+from gyrotc.target.history import Replay, replay, stand_in
 from gyrotc.target.table import CHANNEL_LOST, Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.result import rescaled

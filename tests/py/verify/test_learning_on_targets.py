@@ -16,7 +16,7 @@ from gyrotc.model import BiasSpread, Learning, Model, load_model
 from gyrotc.tables.emit import data_sheet_spread, emit, prior_of
 from gyrotc.target.learning import E_ID, E_IMAGE, KEPT_WORDS, OK, REFUSED, Learner
 from gyrotc.verify.job import verify
-from gyrotc.verify.learning import drawn_calls, expected_words
+from gyrotc.verify.replay import drawn_calls, expected_words
 
 GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"
 FIRMWARE = "cortex-m4f"

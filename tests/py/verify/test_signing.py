@@ -12,9 +12,8 @@ from emitted import GOLDEN, emitted, spoil
 from gyrotc.common.errors import InputError
 from gyrotc.model import load_model
 from gyrotc.tables.emit import emit
-from gyrotc.tables.record import RELEASE, SIGNATURE
+from gyrotc.tables.record import RELEASE, SIGNATURE, load_private_key, load_public_key
 from gyrotc.verify.job import verify
-from gyrotc.verify.signatures import load_private_key, load_public_key
 
 
 def _openssl(*arguments: object) -> subprocess.CompletedProcess[bytes]:

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ..tables import Chunk, Column, LoggerTable
-from ..units import Conversion, conversion
+from ..units import Conversion, conversion, words
 from .map_file import TimeMap
-from .names import words
 from .stamps import Stamps, forms_of
 
 _CODES = {
@@ -25,15 +24,7 @@ _CODES = {
     "min": "%M", "second": "%S", "seconds": "%S", "sec": "%S",
 }  # fmt: skip
 # Digits of that part of a second.
-_FRACTIONS = {
-    "ms": 3,
-    "msec": 3,
-    "millis": 3,
-    "millisecond": 3,
-    "milliseconds": 3,
-    "us": 6,
-    "microseconds": 6,
-}
+_FRACTIONS = {"ms": 3, "msec": 3, "millis": 3, "millisecond": 3, "milliseconds": 3, "us": 6, "microseconds": 6}
 _ORDER = ("%Y", "%m", "%d", "%H", "%M", "%S", "%f")
 _TIME_OF_DAY = {"%H", "%M", "%S"}
 

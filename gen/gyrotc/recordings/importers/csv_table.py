@@ -15,16 +15,7 @@ import pyarrow as pa
 from ...common.errors import InputError
 from ..files import blocks_of_lines, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable
-from .csv_dialect import (
-    HEXADECIMAL,
-    MISSING,
-    Dialect,
-    cells_of,
-    dialect_of,
-    kind_of_cells,
-    plain_lines,
-    plain_number,
-)
+from .csv_dialect import HEXADECIMAL, MISSING, Dialect, cells_of, dialect_of, kind_of_cells, plain_lines, plain_number
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
@@ -54,12 +45,7 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
         for k, (name, unit) in enumerate(zip(_unique(dialect.names), dialect.units, strict=True))
     )
     table = CsvTable(
-        name="",
-        columns=columns,
-        path=path,
-        dialect=dialect,
-        size=path.stat().st_size,
-        **_stated_rate(dialect),
+        name="", columns=columns, path=path, dialect=dialect, size=path.stat().st_size, **_stated_rate(dialect)
     )
     return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.to_map())
 

@@ -12,10 +12,9 @@ from pathlib import Path
 
 from ...common.errors import InputError
 from ..tables import Column, LoggerFile, LoggerTable
-from ..units import NATIVE, UnitError, channel_unit, conversion
+from ..units import NATIVE, Meaning, UnitError, channel_unit, conversion, meaning, split_unit, words
 from .clock import fraction_of, parts_of
 from .map_file import Choice, ImportPlan, Map
-from .names import Meaning, meaning, split_unit, words
 
 Ask = Callable[[str], str | None]
 """Asks a person on a terminal; None where there is none."""

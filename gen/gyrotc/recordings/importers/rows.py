@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...store.files import create
+from ..description import Layout, faults, likely_temperature
 from ..reading import Evidence
 from ..tables import Chunk, Column, LoggerTable
-from ..units import Conversion, UnitError, channel_unit, conversion
-from ..values import Layout, faults, likely_temperature
+from ..units import Conversion, UnitError, channel_unit, conversion, meaning
 from .clock import Clock
 from .map_file import Choice, ImportPlan, TimeMap
-from .names import meaning
 
 NAMES = {
     "temperature": "temperature_c",

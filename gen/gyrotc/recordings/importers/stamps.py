@@ -41,16 +41,7 @@ _DATES = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d-%b-%Y",
     "%d %b %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y-%j", "%Y%m%d",
 )  # fmt: skip
-_TIMES = (
-    "%H:%M:%S.%f",
-    "%H:%M:%S,%f",
-    "%H:%M:%S:%f",
-    "%H:%M:%S",
-    "%I:%M:%S.%f %p",
-    "%I:%M:%S %p",
-    "%H%M%S",
-    "%H:%M",
-)
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S:%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%H%M%S", "%H:%M")
 _JOINTS = (" ", "T", "  ", "_", " - ", ", ")
 _MAYBE = re.compile(r"\d{1,4}[-/.: ]|\d{8}|\d{6}")
 _DIGITS_ONLY = re.compile(r"(%[A-Za-z])+")

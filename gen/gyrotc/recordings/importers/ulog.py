@@ -46,9 +46,7 @@ def open_ulog(path: Path) -> LoggerFile:
     tables: list[LoggerTable] = [_table(topic) for topic in topics if not (topic.name == "sensor_combined" and gyros)]
     if not tables:
         raise InputError(
-            path.name,
-            "no topic sensor_gyro or sensor_combined",
-            "a log with SDLOG_PROFILE that has raw sensors",
+            path.name, "no topic sensor_gyro or sensor_combined", "a log with SDLOG_PROFILE that has raw sensors"
         )
     facts = {str(k).lower(): str(v) for k, v in log.msg_info_dict.items() if isinstance(v, str | int)}
     return LoggerFile(path, "PX4 ULog", tuple(tables), facts, since_power_on=True)
@@ -56,10 +54,7 @@ def open_ulog(path: Path) -> LoggerFile:
 
 def _table(topic: Any) -> LoggerTable:
     units = _UNITS[topic.name]
-    columns, parts = (
-        [Column("timestamp", "us", _WHY)],
-        {"timestamp": part_of(numbers(topic.data["timestamp"]))},
-    )
+    columns, parts = ([Column("timestamp", "us", _WHY)], {"timestamp": part_of(numbers(topic.data["timestamp"]))})
     for name, values in topic.data.items():
         label = _AXES.get(name, name)
         if name != "timestamp" and "timestamp" not in name and values.dtype.kind in "iuf":
