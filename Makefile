@@ -208,7 +208,7 @@ invariance: setup
 
 ## training on 2,000 odd but valid data sets, minutes (SETS=2000; SEED=n begins with the n-th: shares)
 odd: setup
-	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/train/test_odd_training.py
+	@GYROTC_ODD="$$SET_SETS" GYROTC_ODD_SEED="$${SET_SEED:-0}" $(PYTHON) -m pytest -q tests/py/train/test_train.py -k "survives_odd or asked_for_by_name"
 
 ## memory named from 100 clean single cycles at four levels of noise (CYCLES=100): at most 2 %
 cycles: setup

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import gyrotc
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import Command, packed
+from conftest import ROOT, Command, packed
 from gyrotc.assess.limits import load_limits
 from gyrotc.common import inputs
-from gyrotc.common.errors import InputError
+from gyrotc.common.errors import InputError, install_command
 from gyrotc.common.inputs import parse_json, parse_toml
 from gyrotc.diagnose import signature_bank
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.fleet.manifest import load_manifest
+from gyrotc.fleet.run import Cluster, _connected
 from gyrotc.model import load_model
 from gyrotc.pages import report
 from gyrotc.recordings.load import load
@@ -32,6 +35,7 @@ from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
 from gyrotc.simulate.truth import simulated_floor
 from gyrotc.store import cache as kept
+from gyrotc.tables.record import _serialization
 from gyrotc.train.samples import run_blocks
 from gyrotc.verify.board import log_parts
 from recordings import columns, csv_text, described, write_csv
@@ -129,10 +133,7 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     for limits, reported in (
         ("", "bytes that unpack to 201326592 or more; expected at most 250 times"),
         ("rows=1000000", "8388608 rows; expected at most 1000000 (--max rows=...)"),
-        (
-            "parquet_ratio=1e6 memory_gib=0.1",
-            "GiB of memory for 8388608 rows of 3 columns; expected at most 0.1",
-        ),
+        ("parquet_ratio=1e6 memory_gib=0.1", "GiB of memory for 8388608 rows of 3 columns; expected at most 0.1"),
     ):
         done = subprocess.run(
             [sys.executable, "-c", program, folder], capture_output=True, text=True, check=True,
@@ -211,23 +212,13 @@ def test_the_noise_of_a_truth(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.full(100, 2.0, dtype=np.float32))
     assert simulated_floor(tmp_path, ["a.csv"], 10.0) == 2.0
     whole = (tmp_path / "a.npy").read_bytes()
-    for wrong in (
-        whole[:-1],
-        whole.replace(b"(100,)", b"(10**9,)"),
-        whole.replace(b"<f4", b"|O "),
-        whole[:9],
-    ):
+    for wrong in (whole[:-1], whole.replace(b"(100,)", b"(10**9,)"), whole.replace(b"<f4", b"|O "), whole[:9]):
         (tmp_path / "a.npy").write_bytes(wrong)
         assert "is no whole array of numbers" in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
 
 
 def test_results_of_other_types_are_refused_by_field() -> None:
-    content: dict[str, Any] = {
-        "schema": "gyrotc.verify/1",
-        "gyrotc_version": "0.1.0",
-        "serial": "A",
-        "axis": None,
-    }
+    content: dict[str, Any] = {"schema": "gyrotc.verify/1", "gyrotc_version": "0.1.0", "serial": "A", "axis": None}
     content |= {"passed": 1, "failed": 0, "missing": 0, "targets": [], "emitted": [], "errors": []}
     content |= {"model_hash": "00", "c_hash": "00", "error_bound_dph": 0.0}
     content |= {"worst_error_dph": {"value": 0.0, "inputs_visited": 0}}
@@ -305,13 +296,7 @@ def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch
         path.write_bytes(damaged)
         assert kept.kept(path.name, signature_bank._bank) is None and not path.exists()
     content = pickle.dumps(_Runs())
-    for foreign in (
-        b"",
-        b"x",
-        whole[:-1],
-        content,
-        packed(path.name, content),
-    ):
+    for foreign in (b"", b"x", whole[:-1], content, packed(path.name, content)):
         path.write_bytes(foreign)
         assert kept.kept(path.name, signature_bank._bank) is None
     assert not Path("/tmp/gyrotc-was-here").exists()
@@ -376,3 +361,35 @@ def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n")
     run = EvaluatedRun.model_construct(file="a.csv")
     assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))
+
+
+def _without(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [n for n in sys.modules if n.split(".")[0] == package]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+
+
+def test_the_estimator_without_scikit_learn_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    _without("sklearn", monkeypatch)
+    monkeypatch.delitem(sys.modules, "gyrotc.train.estimator", raising=False)
+    with pytest.raises(ModuleNotFoundError, match=re.escape('pip install "gyrotc[sklearn]"')):
+        _ = gyrotc.RBFNetworkRegressor
+
+
+def test_a_signature_without_its_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    _without("cryptography", monkeypatch)
+    with pytest.raises(InputError, match=re.escape('pip install "gyrotc[sign]"')):
+        _serialization()
+
+
+def test_a_scheduler_without_its_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    _without("distributed", monkeypatch)
+    cluster = Cluster("tcp://127.0.0.1:1", 1.0, print)
+    with pytest.raises(InputError, match=re.escape('pip install "gyrotc[dask]"')), _connected(cluster):
+        pass
+
+
+@pytest.mark.parametrize("extra", ["sklearn", "sign", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros", "mdf"])
+def test_an_extra_that_is_named_exists(extra: str) -> None:
+    assert install_command(extra) == f'pip install "gyrotc[{extra}]"'
+    assert re.search(rf"(?m)^{extra} = \[", (ROOT / "gen" / "pyproject.toml").read_text("utf-8"))

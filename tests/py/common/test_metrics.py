@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 from gyrotc.common import metrics
 from gyrotc.common.metrics import MAD_TO_SIGMA, average, median, middle_of_five, statistics, time_statistics
-from gyrotc.common.statistics import (
-    CHI2_95_ONE,
-    CHI2_95_TWO,
-    NORMAL_95,
-    TOLERANCE,
-    main_directions,
-    orthonormal,
-)
+from gyrotc.common.statistics import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95, TOLERANCE, main_directions, orthonormal
 from gyrotc.results.evaluation import Pooled
 from scipy import stats
 from scipy.linalg import subspace_angles

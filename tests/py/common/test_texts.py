@@ -94,12 +94,7 @@ def test_comments_and_literals_hold_the_allowed_alone_and_benign_text_as_it_is()
         comment, literal = c_comment(text), c_literal(text)
         assert C_COMMENT.fullmatch(comment) and len(comment) <= 1000
         assert re.fullmatch(r"[ -!#-$&->@-\[\]-~]*", literal) and len(literal) <= 64
-    for text in (
-        "RLG-0042",
-        "ramp 1 C/min, 2 x -40 ... 60 C",
-        "http://x.org/a?b=1&c",
-        "K. Meyer (lab 3); 50 % load",
-    ):
+    for text in ("RLG-0042", "ramp 1 C/min, 2 x -40 ... 60 C", "http://x.org/a?b=1&c", "K. Meyer (lab 3); 50 % load"):
         assert c_comment(text) == text
     assert c_comment("Grün*/\n??/") == "Gr<U+00FC>n*<U+002F><U+000A>?<U+003F>/"
     assert c_comment("x" * 2000).endswith("x...")
@@ -407,12 +402,7 @@ _DIAGNOSIS: dict[str, Any] = {
             "extended": None,
         }
     ],
-    "unexplained": {
-        "best_partial_match": ["text"],
-        "share_explained": 0.5,
-        "p_value": 0.1,
-        "looks_like": "text",
-    },
+    "unexplained": {"best_partial_match": ["text"], "share_explained": 0.5, "p_value": 0.1, "looks_like": "text"},
     "causes": [
         {
             "id": "auxiliary",
@@ -568,13 +558,7 @@ def test_the_scenario_of_a_diagnosis_reads_back() -> None:
         assert written is not None
         content = tomllib.loads(written)
         assert content["channel"][0]["name"] == content["cause"][0]["channel"] == text
-        assert content["title"].endswith(text) and set(content) == {
-            "extends",
-            "title",
-            "noise",
-            "channel",
-            "cause",
-        }
+        assert content["title"].endswith(text) and set(content) == {"extends", "title", "noise", "channel", "cause"}
 
 
 _FREE = """

@@ -148,11 +148,7 @@ def test_a_transition_carries_its_duration() -> None:
 
 @pytest.mark.parametrize(
     ("seed", "number", "name"),
-    [
-        (1865575792, 13, "hysteresis"),
-        (1809580124, 1008, "hysteresis"),
-        (1809580124, 42, "map_too_coarse"),
-    ],
+    [(1865575792, 13, "hysteresis"), (1809580124, 1008, "hysteresis"), (1809580124, 42, "map_too_coarse")],
 )
 @pytest.mark.slow
 def test_what_a_unit_always_does_is_no_event(tmp_path: Path, seed: int, number: int, name: str) -> None:
@@ -333,11 +329,7 @@ def cycle(seed: int = 1) -> Columns:
     t = np.arange(ROWS) * 1.0
     temperature = 20.0 + 30.0 * np.sin(t * (4.0 * np.pi / ROWS))
     rate = 0.02 * np.sin(temperature / 12.0) + g.normal(0.0, 0.1, ROWS)
-    return {
-        "time_s": t,
-        "temperature_c": np.round(temperature + g.normal(0.0, 0.005, ROWS), 4),
-        "rate_dph": rate,
-    }
+    return {"time_s": t, "temperature_c": np.round(temperature + g.normal(0.0, 0.005, ROWS), 4), "rate_dph": rate}
 
 
 def fitted(folder: Path, table: Columns, run: str = RUN) -> Fitted:
@@ -424,9 +416,7 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
 
 
 @pytest.mark.slow
-def test_the_report_lists_what_was_left_out_with_the_line_to_paste(
-    tmp_path: Path,
-) -> None:
+def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Path) -> None:
     from gyrotc.jobs.build import build
 
     table = cycle()

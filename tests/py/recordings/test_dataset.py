@@ -27,18 +27,7 @@ from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.records import Applied
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from recordings import (
-    ACCEPTED,
-    REFUSED,
-    ROWS,
-    RUN,
-    columns,
-    columns_of_pulses,
-    csv_text,
-    described,
-    toml,
-    write_csv,
-)
+from recordings import ACCEPTED, REFUSED, ROWS, RUN, columns, columns_of_pulses, csv_text, described, toml, write_csv
 
 Table = dict[str, np.ndarray]
 
@@ -90,12 +79,7 @@ FORMS = st.tuples(
 
 def check_same(folder: Path, table: Table) -> None:
     rows = load(folder).runs[0].rows()
-    got = {
-        "time_s": rows.time_s,
-        "temperature_c": rows.temperature_c,
-        "rate_dph": rows.rate_dph,
-        **rows.channels,
-    }
+    got = {"time_s": rows.time_s, "temperature_c": rows.temperature_c, "rate_dph": rows.rate_dph, **rows.channels}
     assert set(got) == set(table)
     for name, values in table.items():
         np.testing.assert_array_equal(got[name], values)
@@ -206,12 +190,7 @@ def test_touching_spans_share_no_row_and_lose_none(tmp_path: Path) -> None:
 
 
 def test_times_of_a_run(tmp_path: Path) -> None:
-    stated = [
-        "2026-03-01T08:00:00Z",
-        "2026-03-01T09:00:00+01:00",
-        '"2026-03-01T08:00:00Z"',
-        "2026-03-01 08:00:00",
-    ]
+    stated = ["2026-03-01T08:00:00Z", "2026-03-01T09:00:00+01:00", '"2026-03-01T08:00:00Z"', "2026-03-01 08:00:00"]
     for index, text in enumerate(stated):
         run = load(folder_of(tmp_path / str(index), f"{RUN}\nstarted = {text}")).runs[0]
         assert run.started == datetime(2026, 3, 1, 8, tzinfo=timezone.utc)
@@ -512,12 +491,7 @@ DAMAGE: tuple[Callable[[bytearray, random.Random], None], ...] = (_flip, _cut, _
 
 @pytest.mark.parametrize(
     ("case", "name"),
-    [
-        ("no dataset.toml", "a.csv"),
-        ("Parquet", "a.parquet"),
-        ("several runs", "dataset.toml"),
-        ("pulses", "a.csv"),
-    ],
+    [("no dataset.toml", "a.csv"), ("Parquet", "a.parquet"), ("several runs", "dataset.toml"), ("pulses", "a.csv")],
 )
 def test_damaged_files_are_read_or_refused(case: str, name: str, tmp_path: Path) -> None:
     seed = random.SystemRandom().randrange(10**6)

@@ -207,8 +207,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     ),
     "day or month": (
         lines(
-            "time,temp_c,rate_dph",
-            lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}",
+            "time,temp_c,rate_dph", lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}"
         ),
         (),
         ("cannot be distinguished", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
@@ -315,27 +314,10 @@ def test_values_that_are_right_as_they_are_come_in_and_it_is_recorded(tmp_path: 
 
 def test_the_kept_map_reads_the_next_file_and_twice_gives_the_same_bytes(tmp_path: Path, run: Run) -> None:
     text = lines("t;T;G", lambda k, t, r: f"{10 * k};{t};{r / 3600}".replace(".", ","))
-    stated = [
-        "--column",
-        "rate=G",
-        "--column",
-        "temperature=T",
-        "--rate-unit",
-        "deg/s",
-        "--temperature-unit",
-        "degC",
-    ]
+    stated = ["--column", "rate=G", "--column", "temperature=T", "--rate-unit", "deg/s", "--temperature-unit", "degC"]
     (tmp_path / "one.csv").write_text(text)
     first = run(
-        "import",
-        tmp_path / "one.csv",
-        "--out",
-        tmp_path / "A",
-        *stated,
-        "--time-unit",
-        "s",
-        "--serial",
-        "RLG-1",
+        "import", tmp_path / "one.csv", "--out", tmp_path / "A", *stated, "--time-unit", "s", "--serial", "RLG-1"
     )
     assert first[0] == 0, first[2]
     (tmp_path / "one-again.csv").write_text(text)
@@ -376,15 +358,7 @@ def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
         )
     result = tmp_path / "import.json"
     status, _, error = run(
-        "import",
-        tmp_path / "a.csv",
-        tmp_path / "b.csv",
-        "--out",
-        tmp_path / "R",
-        "--format",
-        "csv",
-        "--json",
-        result,
+        "import", tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "R", "--format", "csv", "--json", result
     )
     assert status == 0, error
     dataset = load(tmp_path / "R")
@@ -581,12 +555,7 @@ def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
     ],
 )
 def test_a_missing_library_is_named_with_the_extra_that_brings_it(
-    name: str,
-    extra: str,
-    head: bytes,
-    tmp_path: Path,
-    run: Run,
-    monkeypatch: pytest.MonkeyPatch,
+    name: str, extra: str, head: bytes, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from gyrotc.recordings import tables
     from gyrotc.recordings.importers import job as import_job
@@ -613,12 +582,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 
 
 GOES_ON = {
-    "pulses": (
-        "time_s,pulses,temp_c",
-        "{k},{k},20.5",
-        "--pulse-weight-arcsec W",
-        ("--pulse-weight-arcsec", "2.0"),
-    ),
+    "pulses": ("time_s,pulses,temp_c", "{k},{k},20.5", "--pulse-weight-arcsec W", ("--pulse-weight-arcsec", "2.0")),
     "increments": (
         "Time (s),DeltaAngle X (rad),Temp (C)",
         "{k},0.0001{k},20.5",

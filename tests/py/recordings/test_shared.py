@@ -153,10 +153,7 @@ EXPORTED: dict[str, Callable[[NDArray[np.float64], Floats], tuple[Floats, Floats
     "a scale of 1 + 1e-6": lambda t, r: (t, r * (1.0 + 1e-6)),
     "turned over, other unit, offset": lambda t, r: (t, 7.5 - r / 3600.0),
     "means of four rows": lambda t, r: (t.reshape(-1, 4).mean(axis=1), r.reshape(-1, 4).mean(axis=1)),
-    "interpolated": lambda t, r: (
-        np.arange(3.0, t[-1], 7.3),
-        np.interp(np.arange(3.0, t[-1], 7.3), t, r),
-    ),
+    "interpolated": lambda t, r: (np.arange(3.0, t[-1], 7.3), np.interp(np.arange(3.0, t[-1], 7.3), t, r)),
     "its second half": lambda t, r: (t[len(t) // 2 :] - t[len(t) // 2], r[len(t) // 2 :]),
 }
 

@@ -185,10 +185,7 @@ def test_earths_rate_along_the_axis_tells_the_unit(factor: float, refused: bool,
     table["rate_dph"] = factor * (earth + 0.3 + rng.normal(0.0, 2.0, 600))
     head = 'schema = 1\nserial = "A"\nearth_rate = "compute"\nlatitude_deg = 48.0\n'
     folder = made(
-        tmp_path / "R",
-        table,
-        head=head,
-        run='file = "a.csv"\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0',
+        tmp_path / "R", table, head=head, run='file = "a.csv"\naxis_azimuth_deg = 0.0\naxis_elevation_deg = 0.0'
     )
     if refused:
         with pytest.raises(InputError, match=r"Earth's rate along the axis|below that of any gyro"):

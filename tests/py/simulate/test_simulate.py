@@ -78,14 +78,7 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_paper_has_its_six_environments_twice_with_eight_hours_each(paper: Path) -> None:
     dataset = load(paper)
     assert [run.role for run in dataset.runs] == ["train"] * 6 + ["exam"] * 6
-    assert [run.environment for run in dataset.runs[:6]] == [
-        "20 C",
-        "-40 C",
-        "60 C",
-        "1 C/min",
-        "3 C/min",
-        "5 C/min",
-    ]
+    assert [run.environment for run in dataset.runs[:6]] == ["20 C", "-40 C", "60 C", "1 C/min", "3 C/min", "5 C/min"]
     assert [run.power_on_s for run in dataset.runs[:6]] == [-3600.0] * 3 + [0.0] * 3
     assert all(len(run.rows().time_s) == 2880 and run.row_period_s == 10.0 for run in dataset.runs)
     assert len({run.started for run in dataset.runs}) == 12

@@ -251,8 +251,7 @@ def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "unrelated": 3}],
+    "wrong", [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "unrelated": 3}]
 )
 def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match=f"--{[*wrong][-1]}"):

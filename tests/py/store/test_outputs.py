@@ -11,6 +11,7 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +25,7 @@ from gyrotc.store import folder as folders
 from gyrotc.store import update as exchanging
 from gyrotc.store import update as updating
 from gyrotc.store.files import Lock, json_text, write_atomically
-from gyrotc.store.folder import result_folder, write_result
+from gyrotc.store.folder import result_folder, scratch_folder, write_result
 from gyrotc.store.marker import MARKER, check_separate, faults, read_marker
 from recordings import columns, toml, write_csv
 
@@ -159,15 +160,7 @@ def test_inputs_and_sources_are_out_of_reach(tmp_path: Path) -> None:
     data.mkdir(parents=True)
     (tmp_path / "alias").symlink_to(data)
     package = Path(folders.__file__).parents[1]
-    for out in (
-        data,
-        data / "out",
-        tmp_path / "lab",
-        tmp_path / "alias" / "x",
-        package,
-        package / "x",
-        Path("/"),
-    ):
+    for out in (data, data / "out", tmp_path / "lab", tmp_path / "alias" / "x", package, package / "x", Path("/")):
         with pytest.raises(InputError), result_folder(out, "build", inputs=[data]):
             pytest.fail("began")
     with pytest.raises(InputError), result_folder(package, "emit", entries=["c"]):
@@ -461,15 +454,7 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(made: Path, tmp_path:
 def test_two_jobs_into_one_place(made: Path, tmp_path: Path, gyrotc: Command) -> None:
     lock = Lock(tmp_path / "out", "build")
     try:
-        refused(
-            gyrotc,
-            tmp_path,
-            "fit",
-            made / "A",
-            "--out",
-            tmp_path / "out",
-            reported=f"process {os.getpid()} on",
-        )
+        refused(gyrotc, tmp_path, "fit", made / "A", "--out", tmp_path / "out", reported=f"process {os.getpid()} on")
     finally:
         lock.release()
     assert gyrotc("fit", made / "A", "--out", tmp_path / "out").returncode == 0
@@ -534,3 +519,69 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(number: signal.Signals, ma
     os.close(waiting)
     assert (job.returncode, says) == (-number, f"gyrotc: interrupted ({number.name})\n")
     assert writing and list(place.iterdir()) == []
+
+
+JOB = """
+import time
+from gyrotc.store.folder import scratch_folder
+with scratch_folder() as folder:
+    print(folder, flush=True)
+    time.sleep(600)
+"""
+MANY = """
+from gyrotc.store.folder import scratch_folder
+for _ in range(300):
+    with scratch_folder() as folder:
+        (folder / "x").write_text("1")
+"""
+
+
+@pytest.fixture(autouse=True)
+def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+
+def _left_by_a_killed_job(tmp_path: Path) -> Path:
+    job = subprocess.Popen(
+        [sys.executable, "-c", JOB], env={"TMPDIR": str(tmp_path)}, stdout=subprocess.PIPE, text=True
+    )
+    with job:
+        assert job.stdout is not None
+        left = Path(job.stdout.readline().strip())
+        assert left.is_dir() and left.parent == tmp_path
+        with scratch_folder():
+            assert left.is_dir(), "its job lives"
+        job.kill()
+    return left
+
+
+def test_what_a_killed_job_left_goes_with_the_next(tmp_path: Path) -> None:
+    left = _left_by_a_killed_job(tmp_path)
+    (left / "program").write_text("whatever it made")
+    assert left.is_dir()
+    with scratch_folder() as folder:
+        assert not left.exists() and folder.is_dir() and not any(folder.iterdir())
+        with scratch_folder() as other:
+            assert folder.is_dir() and other != folder
+    assert not any(tmp_path.iterdir())
+
+
+def test_nothing_else_is_removed(tmp_path: Path) -> None:
+    thesis = tmp_path / "thesis"
+    thesis.mkdir()
+    for name in ("gyrotc-12345678", ".gyrotc-scratch-notes", ".gyrotc-scratch-123456789"):
+        (tmp_path / name).mkdir(mode=0o700)
+        (tmp_path / name / "thesis").write_text("years")
+    (tmp_path / ".gyrotc-scratch-12345678").mkdir(mode=0o755)  # not as gyrotc makes it
+    (tmp_path / ".gyrotc-scratch-abcdefgh").symlink_to(thesis)
+    (tmp_path / ".gyrotc-scratch-file1234").write_text("a file")
+    before = sorted(tmp_path.rglob("*"))
+    with scratch_folder():
+        pass
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_two_that_begin_at_once_have_a_folder_each(tmp_path: Path) -> None:
+    jobs = [subprocess.Popen([sys.executable, "-c", MANY], env={"TMPDIR": str(tmp_path)}) for _ in range(3)]
+    assert [job.wait(300) for job in jobs] == [0, 0, 0]
+    assert not any(tmp_path.iterdir())

@@ -113,8 +113,7 @@ def test_seeded_fault_in_the_uncertainty_is_seen(word: int, numeric: str, tmp_pa
 
 
 @pytest.mark.parametrize(
-    "macro",
-    ["Q31_BIAS_FRAC_BITS", "BLOCK_US", "ID", "PERIOD_MAX_US", "T_MIN_C", "AUTHORITY_MIN_DPH", "N_CHANNELS"],
+    "macro", ["Q31_BIAS_FRAC_BITS", "BLOCK_US", "ID", "PERIOD_MAX_US", "T_MIN_C", "AUTHORITY_MIN_DPH", "N_CHANNELS"]
 )
 @pytest.mark.slow
 def test_a_wrong_macro_of_the_header_is_seen(macro: str, uncertain: Path, tmp_path: Path) -> None:

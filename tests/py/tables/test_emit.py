@@ -173,9 +173,7 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
     done = gyrotc("verify", tmp_path, "--target", "host-gcc-O2")
     assert done.returncode == 0, done.stdout + done.stderr
     checked = subprocess.run(
-        [sys.executable, str(ROOT / "tools" / "check_table.py"), str(tmp_path)],
-        capture_output=True,
-        check=False,
+        [sys.executable, str(ROOT / "tools" / "check_table.py"), str(tmp_path)], capture_output=True, check=False
     )
     assert checked.returncode == 0, checked.stdout
 

@@ -161,13 +161,7 @@ def test_the_longest_stretch_of_one_reading_is_found() -> None:
 
 
 def test_a_coarse_sensor_is_never_taken_for_stuck() -> None:
-    assert [stuck_after_s(s) for s in (0.01, 10.0, 100.0, 101.0, float("inf"))] == [
-        120.0,
-        200.0,
-        2000.0,
-        0.0,
-        0.0,
-    ]
+    assert [stuck_after_s(s) for s in (0.01, 10.0, 100.0, 101.0, float("inf"))] == [120.0, 200.0, 2000.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("numeric", ["f32", "q31"])

@@ -172,15 +172,7 @@ def test_a_negative_zero_does_not_reach_a_table() -> None:
 
 
 LAYOUT, SELF_TEST = -2, -3
-SCALARS = (
-    "slope_blocks",
-    "lead_blocks",
-    "calibrated",
-    "block_us",
-    "bias_frac_bits",
-    "fallback",
-    "rezero",
-)
+SCALARS = ("slope_blocks", "lead_blocks", "calibrated", "block_us", "bias_frac_bits", "fallback", "rezero")
 EDGES = [0, 1, 2, 0xFFFF, 0x10000, 0x3FFFFFFF, 0x40000000, 0x7FFFFFFF, 0x80000000, 0x80000001, 0xFFFFFFFF]
 EDGES += [0x7F800000, 0x7FC00000, 0x4E6E6B28, 0x42C80000, 0x3F800000, 0xBF800000, 0x4AE4E1C0]
 

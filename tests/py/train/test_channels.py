@@ -177,9 +177,7 @@ def test_what_must_not_be_an_input_is_refused_with_the_reason(rng: np.random.Gen
     assert "does not change" in found["still_v"][1]
 
 
-def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_reported(
-    rng: np.random.Generator,
-) -> None:
+def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_reported(rng: np.random.Generator) -> None:
     samples = history(rng)
     supply = wander(rng)
     made = replace(samples, bias_dph=samples.bias_dph + 8e-4 * supply)
@@ -346,10 +344,7 @@ def model(built: Path) -> Model:
 def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as_such(
     built: Path, model: Model
 ) -> None:
-    assert {t.channel: t.id for t in model.terms} == {
-        "supply_v": "auxiliary_curve",
-        "magnetic_ut": "auxiliary_product",
-    }
+    assert {t.channel: t.id for t in model.terms} == {"supply_v": "auxiliary_curve", "magnetic_ut": "auxiliary_product"}
     assert all(t.stand_in is not None for t in model.terms)
     training = json.loads((built / "training.json").read_text("utf-8"))
     shapes = {row["name"]: row["shape"] for row in training["channels"]}

@@ -327,11 +327,7 @@ def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path
         pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
     names = source.read_text("utf-8").split("\n", 1)[0].split(",")
     table = dict(zip(names, np.loadtxt(source, delimiter=",", skiprows=1).T, strict=True))
-    table = {
-        "time_s": table["time_s"],
-        "temperature_c": table["temperature_c"],
-        "rate_dph": table[f"rate_{axis}_dph"],
-    }
+    table = {"time_s": table["time_s"], "temperature_c": table["temperature_c"], "rate_dph": table[f"rate_{axis}_dph"]}
     whole = cut_at(tmp_path / "whole", table, [])
     close(whole, cut_at(tmp_path / "two", table, [2000.0]))
     moved = cut_at(tmp_path / "moved", table | {"rate_dph": table["rate_dph"] + 1e4}, [])

@@ -205,13 +205,7 @@ def drawn(rng: np.random.Generator, runs: int, patches: int, between: float, mis
     """What runs left out leave in units of the noise of a patch: a constant of each run, a misfit of each patch."""
     ones = np.ones(patches)
     return [
-        np.stack(
-            [
-                rng.normal(0.0, between) + rng.normal(0.0, np.hypot(1.0, misfit), patches),
-                ones * misfit**2,
-                ones,
-            ]
-        )
+        np.stack([rng.normal(0.0, between) + rng.normal(0.0, np.hypot(1.0, misfit), patches), ones * misfit**2, ones])
         for _ in range(runs)
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -13,11 +14,13 @@ from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.truth import simulated_floor
-from gyrotc.train.data import TrainingData, average, joined
+from gyrotc.train.data import TrainingData, average, cleaned, joined
 from gyrotc.train.estimator import RBFNetworkRegressor
+from gyrotc.train.evidence import TrainingFailed
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import METHODS, fit
 from gyrotc.train.result import Fit, predict
+from odd_training import odd_samples
 from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -308,3 +311,39 @@ def test_the_default_reaches_the_noise_and_a_plane_does_not(seed: int, tmp_path:
     print(f"seed {seed}: RMS ÷ floor {reached:.4f}")
     assert reached < MOST
     assert rms_dph(fit(train, centers=0, average_s=AVERAGE_S), exam) / floor > MOST
+
+
+SETS = int(os.environ.get("GYROTC_ODD", "40"))
+FIRST = int(os.environ.get("GYROTC_ODD_SEED", "0"))
+
+
+def beyond(found: Fit, data: TrainingData) -> float:
+    """How far the map lies outside the means of the data over the whole envelope, in spans of the means."""
+    means = average(cleaned(data), 100.0).bias_dph
+    low, high = float(means.min()), float(means.max())
+    s = found.scaling
+    grid = np.meshgrid(np.linspace(*s.temperature_c, 41), np.linspace(*s.slope_c_per_min, 21))
+    bias = predict(found, *grid)
+    assert np.all(np.isfinite(bias))
+    outside = float(np.maximum(low - bias, bias - high).max())
+    return outside / max(high - low, 1e-6 * max(abs(low), abs(high)), 1e-300)
+
+
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + SETS))
+def test_the_ladder_survives_odd_samples_and_keeps_to_them(seed: int) -> None:
+    data = odd_samples(seed)
+    found = fit(data, method="auto")
+    assert beyond(found, data) < 1.02, f"seed {seed}: {found.method}"
+    assert not found.candidates or [row["id"] for row in found.candidates if row["chosen"]] == [found.method]
+
+
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + SETS // 2))
+def test_a_map_asked_for_by_name_comes_or_says_why_not(seed: int) -> None:
+    data = odd_samples(seed)
+    try:
+        found = fit(data, method="mrbf")
+    except TrainingFailed as failure:
+        assert "evidence model" in str(failure)
+        return
+    reported = {finding["id"] for finding in found.findings}
+    assert beyond(found, data) < 1.02 or "map_beyond_data" in reported, f"seed {seed}"

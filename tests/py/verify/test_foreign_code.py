@@ -70,11 +70,7 @@ PLANTED = {
     "a trigraph": ("gtc_rlg_0042.c", r"Model:  ", "Model: ??/"),
     "a carriage return": ("gtc_rlg_0042.c", r"Model:  ", "Model: \r"),
     "code in the header": ("gtc_rlg_0042.h", r'#include "gtc.h"', '#include "gtc.h"\n' + CALL.strip()),
-    "code in the vectors": (
-        "vectors_rlg_0042.h",
-        r"#include <stdint.h>",
-        "#include <stdint.h>\n" + CALL.strip(),
-    ),
+    "code in the vectors": ("vectors_rlg_0042.h", r"#include <stdint.h>", "#include <stdint.h>\n" + CALL.strip()),
     "a call as a vector": ("vectors_rlg_0042.h", r"(?m)^(    \{ 0x[0-9a-f]*UL)", r"\1 + system(0)"),
     "code in the runtime": ("gtc.c", r"\Z", CALL),
     "code in the runtime's header": ("gtc.h", r"\Z", CALL),

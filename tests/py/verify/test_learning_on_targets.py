@@ -24,10 +24,7 @@ FIRMWARE = "cortex-m4f"
 
 def learning_model() -> Model:
     known = Learning(
-        spread=data_sheet_spread(2e-4, 1e-4, 2e-4),
-        reference_c=20.0,
-        authority_dph=0.03,
-        noise_deg_per_sqrt_h=5e-4,
+        spread=data_sheet_spread(2e-4, 1e-4, 2e-4), reference_c=20.0, authority_dph=0.03, noise_deg_per_sqrt_h=5e-4
     )
     return load_model(GOLDEN).model_copy(update={"learning": known})
 

@@ -82,12 +82,7 @@ def test_natural_expressions_are_caught_where_float_is_computed_in_double(folder
 
 def natural_expressions(folder: Path) -> None:
     """Joins product and sum of the float32 map into one expression each."""
-    spoil(
-        folder / "c" / "gtc.c",
-        r"(\w+) = ([^;=\n]+ \* [^;\n]+);\n +acc = acc \+ \1;",
-        r"acc = acc + \2;",
-        count=0,
-    )
+    spoil(folder / "c" / "gtc.c", r"(\w+) = ([^;=\n]+ \* [^;\n]+);\n +acc = acc \+ \1;", r"acc = acc + \2;", count=0)
 
 
 def test_a_wrong_rounding_shift_is_caught(folder: Path) -> None:

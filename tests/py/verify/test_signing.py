@@ -87,11 +87,7 @@ def test_an_older_release_does_not_replace_a_newer_one(key: Path, tmp_path: Path
         assert gyrotc("sign", folder, "--key", key).returncode == 0
         return folder
 
-    old, new, undated = (
-        of("old", calibrated_on="2026-03-07"),
-        of("new", calibrated_on="2026-09-07"),
-        of("undated"),
-    )
+    old, new, undated = (of("old", calibrated_on="2026-03-07"), of("new", calibrated_on="2026-09-07"), of("undated"))
     public = key.with_suffix(".pub")
 
     def status(result: Path, now: Path) -> str | None:
