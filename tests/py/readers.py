@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import gyrotc.pages.report as pages
 import numpy as np
@@ -49,6 +50,9 @@ from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES_EVERY = 50  # drawing takes a second
+_TRACED = ("bias_against_temperature", "_bias_over_time")
+_DRAWN = ("map_with_centers", "curve_by_size", "prior_and_posterior", "allan_deviation", "_trend")
+_PICTURES = dict.fromkeys((*_TRACED, *_DRAWN), lambda *_: None)
 SCENARIO = """title = "small"
 [profile.a]
 start_c = 20.0
@@ -318,13 +322,9 @@ def _report(result: Path, folder: Path, name: str) -> Callable[[bytes], None]:
         for path in result.glob("*.json"):
             shutil.copyfile(path, work / path.name)
         (work / f"{name}.json").write_bytes(data)
-        pictures = pages._pictures
-        if number % PICTURES_EVERY:
-            pages._pictures = lambda *_: dict.fromkeys(("bias", "map", "curve", "allan", "trend"))
-        try:
+        quick = _PICTURES if number % PICTURES_EVERY else {}
+        with patch.multiple(pages, **quick):
             pages.write_report(work)
-        finally:
-            pages._pictures = pictures
         Earlier(work)
 
     return read
