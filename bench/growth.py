@@ -35,6 +35,12 @@ CPU seconds of `gyrotc build` of the paper's recordings on all targets found, co
 first, with an empty cache, and a later one of another gyro. Load before it: {load:.1f}.
 
 """
+_CITED = """
+## Before
+
+CPU seconds (MB: megabytes) as they were measured on {commit}, on two processors; by size where there are several.
+
+"""
 _BUILD = """import json, resource, sys
 from pathlib import Path
 def used():
@@ -55,6 +61,23 @@ print([used.ru_utime + used.ru_stime, used.ru_maxrss])
 """
 _COLUMNS = ("what grows", "command", "sizes ", "CPU s ", "peak MiB ", "slope of CPU ", "slope of memory ")
 
+# Measured on commit 3e1e809 on a machine of two processors, before the cost was cut; cited, not measured here.
+# By figure: CPU s by size, or one number (MB: megabytes).
+_BEFORE: dict[str, Any] = {
+    "commit": "3e1e809",
+    "check of 1e8 rows": 87.0,
+    "fit of 1e8 rows": 69.0,
+    "diagnose of 1e8 rows": 112.0,
+    "fit of runs": {"12": 1.44, "102": 9.2},
+    "fit of centers": {"16": 1.9, "64": 9.8, "256": 30.8},
+    "lot of 1000 units": 38.7,
+    "lot of 1000 units, MB": 804.0,
+    "fleet of 1000 serials": 212.0,
+    "build": 21.9,
+    "build, compiling": 12.9,
+    "a serial's files, MB": 1.31,
+}
+
 Say = Callable[[str], None]
 _Job = tuple[int, list[str]]  # size; words behind `gyrotc`
 
@@ -69,7 +92,7 @@ def growth(say: Say) -> dict[str, Any]:
         say("stages of a build")
         stages = _stages(Path(place) / "stages")
     slopes = {row["what"]: _slope(row["sizes"], "seconds") for row in rows if row["what"] in ("runs", "centers")}
-    return {"machine": machine(), "rows": rows, "slopes": slopes, **stages}
+    return {"machine": machine(), "rows": rows, "slopes": slopes, "before": _BEFORE, **stages}
 
 
 def _stages(folder: Path) -> dict[str, Any]:
@@ -167,9 +190,18 @@ def section(result: dict[str, Any]) -> str:
             _HEAD.format(**result),
             table(_COLUMNS, [_row(row) for row in result["rows"]])
             + _STAGES.format(**result)
-            + table(("stage", "first ", "later "), stages),
+            + table(("stage", "first ", "later "), stages)
+            + _CITED.format(**result["before"])
+            + table(
+                ("figure", "then "),
+                [[name, _then(value)] for name, value in result["before"].items() if name != "commit"],
+            ),
         ]
     )
+
+
+def _then(value: float | dict[str, float]) -> str:
+    return " / ".join(f"{size}: {one:g}" for size, one in value.items()) if isinstance(value, dict) else f"{value:g}"
 
 
 def _row(row: dict[str, Any]) -> list[str]:
