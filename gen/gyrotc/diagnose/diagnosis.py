@@ -23,7 +23,7 @@ from ..train.result import channel_guard, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import Records, records_of
 from .extension import Extension, Refitting, extend, stand_ins_of
-from .gain import emitted_means, gain_of
+from .gain import emitted_means, floor_of, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refit import Effect, added_range, terms_of
@@ -109,7 +109,8 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         analysis = replace(analysis, attribution=analysis.attribution.without_causes(), separations=())
     named = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = named if cycle is None else cycle.able
-    extension = extend(refitting, states, say)
+    left_dph = analysis.left_dph if cycle is None else cycle.residual - cycle.explained
+    extension = extend(refitting, states, floor_of(records, left_dph, chosen.average_s), say)
     if cycle is not None:
         cycle = replace(cycle, preferred=bool(extension.shipped))
         analysis = replace(

@@ -34,7 +34,7 @@ from ..train.result import Fit
 from ..train.selection import CandidateScores, compare_candidates
 from .attribution import choose
 from .blocks import Records
-from .gain import Gain, floor_of, gain_of
+from .gain import Gain, gain_of
 from .pipeline import search_of
 from .refine import Refined
 from .refit import (
@@ -144,10 +144,6 @@ class Refitting:
         all_of_them = [effect for stage in stages for effect in stage]
         whole = [known(run, all_of_them) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
-
-    def on_training(self, effects: Sequence[Effect]) -> list[Averages]:
-        """Residuals of the training runs themselves: more first differences for the noise floor."""
-        return self._residuals(self.everything(), self.train, self.everything(), effects)
 
     def left_out(self, held: list[BoolArray], count: int) -> Chain:
         """Residuals of held-out training samples; causes are chosen anew on the others."""
@@ -272,7 +268,7 @@ class Extension:
         crossed: The cross-validation on the training runs that decided so.
         samples: Training samples as the extended map sees them.
         added: What the effects add to the map at each of them, deg/h.
-        floor: Noise floor of the scored samples, deg/h.
+        floor: Noise floor of means over `average_s`, deg/h.
         lot: What a lot did for the map that is left; None without one.
         baseline_rms, baseline_centers: RMS (deg/h) and number of centers of the model without causes.
         measured_on: "exam" or "left out".
@@ -308,8 +304,8 @@ class Extension:
         return next((e.bumps for e in self.shipped if e.bumps is not None), None)
 
 
-def extend(refitting: Refitting, causes: Sequence[Refined], say: Progress) -> Extension:
-    """Refits the model with the causes and measures the gain."""
+def extend(refitting: Refitting, causes: Sequence[Refined], floor: float, say: Progress) -> Extension:
+    """Refits the model with the causes and measures the gain over a noise floor, deg/h."""
     say("measuring the gain")
     single_cycle, average_s = refitting.single_cycle, refitting.average_s
     effects = completed(refitting.train, [Effect.of(c) for c in causes])
@@ -317,7 +313,6 @@ def extend(refitting: Refitting, causes: Sequence[Refined], say: Progress) -> Ex
     chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
     if single_cycle and effects:  # found together: one alone is another model
         chain = [chain[0], *(chain[-1] for _ in effects)]
-    floor = floor_of([*chain[-1], *refitting.on_training(effects)])
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
     steps = [gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
     crossed = shipping(refitting, effects)

@@ -20,13 +20,15 @@ from ..recordings.records import Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emit import quantise_all
+from ..train.evidence import steps_of, stretches
+from .blocks import Records
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
 _HOUR_S = 3600.0  # the angle after one hour is a figure of merit
 _SEED = 1  # of the draws
 _DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
-_FAR = 4.0  # robust standard deviations, beyond which a difference says nothing about the floor
+_FAR = 4.0  # robust standard deviations: a difference beyond says no more of the floor than one of as much
 
 
 @dataclass(frozen=True)
@@ -107,12 +109,18 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
     return found
 
 
-def floor_of(runs: Sequence[Averages]) -> float:
-    """Noise floor from first differences of the averaged residuals without the far ones, deg/h."""
-    steps = np.concatenate([np.diff(r.after_dph) for r in runs if r.after_dph.size > 1] or [np.zeros(1)])
-    steps = steps - np.median(steps)
-    near = np.abs(steps) <= _FAR * MAD_TO_SIGMA * np.median(np.abs(steps))
-    return float(np.sqrt(np.mean(steps[near] ** 2) / 2.0))
+def floor_of(records: Records, left_dph: FloatArray, average_s: float) -> float:
+    """Noise floor of means over `average_s`, deg/h: the Allan deviation of what map and causes leave of block means.
+
+    Of these, shape (N,), and not of what a correction leaves: its delay is far above the noise on a quick ramp. From
+    all differences of neighbouring means, so that it does not hang on where means begin; a far one counts as less.
+    """
+    width = max(round(average_s / records.block_s), 1)
+    run = np.repeat(np.arange(len(records.kept)), [kept.size for kept in records.kept])
+    parts = stretches(left_dph, np.concatenate(records.kept).astype(float), run, 1.0)
+    steps = np.abs(np.concatenate([steps_of(p, width) for p in parts if p.size >= 2 * width] or [left_dph]))
+    near = np.minimum(steps, _FAR * MAD_TO_SIGMA * np.median(steps))
+    return float(np.sqrt(np.mean(near**2) / 2.0 * width * records.block_s / average_s))
 
 
 def gain_of(

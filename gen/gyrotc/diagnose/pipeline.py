@@ -65,6 +65,12 @@ class Analysis:
     after: Search
     extended: Ensemble | None
 
+    @property
+    def left_dph(self) -> FloatArray:
+        """What map and causes leave, as large as the noise is of which they have taken a part, deg/h, shape (N,)."""
+        left = (self.ensemble if self.extended is None else self.extended).residual
+        return np.asarray(left * np.sqrt(left.size / max(self.after.freedom, 1)))
+
 
 def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
     """Everything from rows to named causes."""

@@ -201,7 +201,7 @@ class Diagnosed(UnitResult):
     verdict: DiagnosisVerdict = Field(description="see docs/diagnosis.md")
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")
-    noise_floor_dph: Figure = Field(description="of the runs that were judged, deg/h")
+    noise_floor_dph: Figure = Field(description="of means over `average_s` of the training runs, deg/h")
     discrepancies: tuple[Statistic, ...] = Field(description="the rarest first")
     causes: tuple[NamedCause, ...] = Field(description="what was found")
     baseline: Baseline | None = Field(description="null where nothing could be decided")

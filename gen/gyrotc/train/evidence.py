@@ -229,7 +229,7 @@ def allan_variance(residuals: Sequence[FloatArray], step_s: float) -> list[Allan
     for stretch in residuals:
         factors = [2**k for k in range(32) if 2 ** (k + 1) <= len(stretch) // 2]
         for factor in factors:
-            differences = _differences(stretch, factor)
+            differences = steps_of(stretch, factor)
             square, count = total.get(factor, (0.0, 0))
             total[factor] = (square + 0.5 * float(differences @ differences), count + len(differences))
     return [
@@ -239,7 +239,7 @@ def allan_variance(residuals: Sequence[FloatArray], step_s: float) -> list[Allan
     ]
 
 
-def _differences(rates: FloatArray, factor: int) -> FloatArray:
+def steps_of(rates: FloatArray, factor: int) -> FloatArray:
     """Every difference of two means over `factor` rates that follow one another: two of sums of sums."""
     angle = np.concatenate([[0.0], np.cumsum(rates - rates.mean())])
     return np.asarray(angle[2 * factor :] - 2.0 * angle[factor:-factor] + angle[: -2 * factor]) / factor

@@ -438,7 +438,7 @@ def block_noise(seed: int, scale: float = 1.0) -> np.ndarray:
 def test_the_share_is_of_what_can_be_removed() -> None:
     wave = np.sin(np.arange(36 * HOURS) / 40.0)
     before, after = residual(block_noise(1) + wave), residual(block_noise(1) + 0.5 * wave)
-    gain = gain_of([before], [after], floor_of([residual(block_noise(1))]), AVERAGE_S)
+    gain = gain_of([before], [after], 1.0, AVERAGE_S)
     assert gain.share == pytest.approx(0.75, abs=0.08), "half of the amplitude, three quarters of the power"
     assert gain.low is not None and gain.high is not None and gain.low < 0.75 < gain.high
     assert gain.positive
@@ -457,12 +457,26 @@ def test_without_excess_there_is_no_share() -> None:
     assert gain.share is None and gain.low is None
 
 
+def floor(left: np.ndarray, block_s: float) -> float:
+    """Noise floor of what is left of a steady temperature, one number for each block."""
+    time = block_s * np.arange(left.size, dtype=float)
+    history = History(time_s=time, temperature_c=np.full(left.size, 20.0), on_s=None, run=0, runs=1, day=None)
+    return floor_of(Records((Record("r", history, left, np.ones(left.size, dtype=bool)),), block_s), left, AVERAGE_S)
+
+
 def test_slow_changes_and_outliers_are_not_floor() -> None:
     slow = 5.0 * np.sin(np.arange(36 * HOURS) / 300.0)
     spikes = np.zeros(36 * HOURS)
-    spikes[::100] = 30.0
-    assert floor_of([residual(block_noise(4) + slow)]) == pytest.approx(1.0, rel=0.08)
-    assert floor_of([residual(block_noise(4) + spikes)]) == pytest.approx(1.0, rel=0.08)
+    spikes[::400] = 30.0
+    assert floor(block_noise(4) + slow, AVERAGE_S) == pytest.approx(1.0, rel=0.08)
+    assert floor(block_noise(4) + spikes, AVERAGE_S) == pytest.approx(1.0, rel=0.08)
+
+
+@pytest.mark.parametrize("block_s", [10.0, 30.0, 60.0, 90.0, 120.0])
+def test_the_floor_is_of_full_means_whatever_the_blocks(block_s: float) -> None:
+    """100 s hold one or two means over 60 s: differences of such means made the floor 5 % too large."""
+    many = np.concatenate([block_noise(k, np.sqrt(AVERAGE_S / block_s)) for k in range(60)])
+    assert floor(many, block_s) == pytest.approx(1.0, rel=0.025)
 
 
 def test_a_short_exam_has_an_interval() -> None:
