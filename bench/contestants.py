@@ -17,7 +17,7 @@ import numpy as np
 from gyrotc import _core
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.truth import read_truth
+from gyrotc.simulate.scenario import read_truth
 from gyrotc.train.data import TrainingData, average
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import fit

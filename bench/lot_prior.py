@@ -27,7 +27,7 @@ from gyrotc.results.fleet import Lot
 from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
-from gyrotc.simulate.truth import read_truth
+from gyrotc.simulate.scenario import read_truth
 from gyrotc.train.data import TrainingData, cleaned, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.result import UnitMeans, unit_means

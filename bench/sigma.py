@@ -22,7 +22,7 @@ from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.arithmetic import FLOAT64
+from gyrotc.target.recursions import FLOAT64
 from gyrotc.target.history import replay
 from gyrotc.target.recursions import TermOutcome, recursion_of
 from gyrotc.target.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table

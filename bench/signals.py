@@ -22,7 +22,7 @@ from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
-from gyrotc.simulate.truth import read_truth
+from gyrotc.simulate.scenario import read_truth
 from gyrotc.tables.quantise import applied_of, quantise
 from gyrotc.train.channels import seen_by_target
 from gyrotc.train.data import TrainingData, average, joined

@@ -7,8 +7,8 @@ import pytest
 from emitted import GOLDEN
 from gyrotc.model import Model, load_model
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.arithmetic import F32, Q31
 from gyrotc.target.front_end import Settings, follow
+from gyrotc.target.recursions import F32, Q31
 from gyrotc.target.samples import Guarded
 from numpy.typing import NDArray
 from results import Results

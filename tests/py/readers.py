@@ -36,7 +36,7 @@ from gyrotc.results.recordings import Plan
 from gyrotc.results.training import DeclaredUnits, Manifest
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read as read_scenario
-from gyrotc.simulate.truth import simulated_floor
+from gyrotc.simulate.scenario import simulated_floor
 from gyrotc.store import cache as kept
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise

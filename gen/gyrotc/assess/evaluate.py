@@ -40,7 +40,7 @@ from ..results.evaluation import (
     Statistics,
 )
 from ..results.training import Training
-from ..simulate.truth import simulated_floor
+from ..simulate.scenario import simulated_floor
 from ..store.files import create
 from ..tables.emit import emitted_tables
 from ..target.history import Replay

@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..target.arithmetic import FLOAT64
-from ..target.recursions import Recursion, TableKind, first_order, recursion_of
+from ..target.recursions import FLOAT64, Recursion, TableKind, first_order, recursion_of
 
 
 @dataclass(frozen=True, slots=True)

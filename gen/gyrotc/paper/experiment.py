@@ -30,7 +30,7 @@ from ..recordings.load import load
 from ..simulate.campaign import Noise, simulate
 from ..simulate.gyro import CELL_S
 from ..simulate.instrument import SimulatedRecord
-from ..simulate.truth import simulated_floor
+from ..simulate.scenario import simulated_floor
 from ..store.files import write_atomically
 from ..train.data import TrainingData, joined, scaling_of
 from ..train.fitting import front_end, samples_of

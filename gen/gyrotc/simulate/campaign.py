@@ -27,8 +27,7 @@ from ..store.files import create, json_text, write_own
 from ..store.folder import result_folder
 from .gyro import CELL_S, BiasMap, bridge_arcsec, draw, quantised
 from .instrument import SimulatedRecord, record
-from .scenario import NoiseLevels, Scenario, read
-from .truth import FILE as TRUTH_FILE
+from .scenario import TRUTH_FILE, NoiseLevels, Scenario, read
 
 __all__ = [
     "NOISE",

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import steps_are
 from ..common.inputs import need_memory
-from .arithmetic import Arithmetic, Numbers
-from .recursions import Course
+from .recursions import Arithmetic, Course, Numbers
 from .samples import HELD, RESTART, Guarded, judge_readings
 from .table import WARMING
 

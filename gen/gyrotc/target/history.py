@@ -16,9 +16,20 @@ from numpy.typing import NDArray
 
 from . import f32, q31
 from . import table as status_bits
-from .arithmetic import F32, Q31, Arithmetic, Bells, Numbers, Operations
 from .front_end import FALLBACK, KEEP, MAP, Settings, Steps, Stream, follow, period_us, with_missing
-from .recursions import CourseChannel, Recursion, TableKind, TermOutcome, recursion_of
+from .recursions import (
+    F32,
+    Q31,
+    Arithmetic,
+    Bells,
+    CourseChannel,
+    Numbers,
+    Operations,
+    Recursion,
+    TableKind,
+    TermOutcome,
+    recursion_of,
+)
 from .samples import Guarded
 from .sigma import evidence_of, sigma_bits
 from .table import CHANNEL_LOST, CLAMPED, E_ARG, HELD, MISSING_Q31, UNCOVERED, Table, Words

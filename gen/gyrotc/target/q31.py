@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
-from .arithmetic import divided
+from .recursions import divided
 from .table import Table
 
 ENTRIES = 64  # docs/numerics.md, "Why the lookup table has 64 entries"

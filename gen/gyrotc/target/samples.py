@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arithmetic import Arithmetic, Numbers
+from .recursions import Arithmetic, Numbers
 
 HELD, ACCEPTED, RESTART = 0, 1, 2  # any three numbers
 PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond: libc/gtc_num_f32.h

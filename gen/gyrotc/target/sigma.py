@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from . import f32, q31
-from .arithmetic import Numbers
 from .front_end import FALLBACK as FALLEN
 from .front_end import MAP, Steps
-from .recursions import Course, TableKind, TermOutcome
+from .recursions import Course, Numbers, TableKind, TermOutcome
 from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
 #: Words of a table's uncertainty behind its two grids, without those of the terms.

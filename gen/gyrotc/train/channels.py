@@ -33,10 +33,9 @@ from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
-from ..target.arithmetic import F32
 from ..target.front_end import with_missing
 from ..target.history import channel_at
-from ..target.recursions import CourseChannel, TableKind
+from ..target.recursions import F32, CourseChannel, TableKind
 from ..target.samples import Guarded
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, TrainingFailed, conditioned, fit_process

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..quality.outliers import departing_rows
 from ..target import table as status_bits
-from ..target.arithmetic import F32
 from ..target.front_end import (
     FALLBACK,
     KEEP,
@@ -23,6 +22,7 @@ from ..target.front_end import (
     period_us,
     samples_per_block,
 )
+from ..target.recursions import F32
 from ..target.samples import PLAUSIBLE_C, Guarded
 
 if TYPE_CHECKING:

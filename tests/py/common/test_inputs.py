@@ -32,8 +32,7 @@ from gyrotc.results.base import checked_result, read_result
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation
 from gyrotc.results.release import Verification
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read
-from gyrotc.simulate.truth import simulated_floor
+from gyrotc.simulate.scenario import read, simulated_floor
 from gyrotc.store import cache as kept
 from gyrotc.tables.record import _serialization
 from gyrotc.train.samples import run_blocks

@@ -17,7 +17,7 @@ from gyrotc.pages.display import displayed, shown
 from gyrotc.recordings.load import load
 from gyrotc.results.evaluation import Comparison
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.truth import simulated_floor
+from gyrotc.simulate.scenario import simulated_floor
 from gyrotc.tables.emit import emit
 from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of

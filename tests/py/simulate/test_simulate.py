@@ -17,8 +17,7 @@ from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import NOISE, RowLength, campaign, gyro_map, rows, simulate
 from gyrotc.simulate.gyro import CELL_S, cell_noise, quantised, white_sigma_arcsec
 from gyrotc.simulate.instrument import SimulatedRecord
-from gyrotc.simulate.scenario import NoiseLevels, names, read
-from gyrotc.simulate.truth import read_truth, simulated_floor
+from gyrotc.simulate.scenario import NoiseLevels, names, read, read_truth, simulated_floor
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.stats import chi2

@@ -16,8 +16,7 @@ from gyrotc.simulate.campaign import campaign, simulate
 from gyrotc.simulate.gyro import laser_bias, laser_readings, laser_states, thermometer_readings
 from gyrotc.simulate.instrument import ThermalNetwork, chamber_air, thermal_network
 from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
-from gyrotc.simulate.scenario import Chamber, Gyro, Laser, Scenario, Thermometer, read
-from gyrotc.simulate.truth import read_truth
+from gyrotc.simulate.scenario import Chamber, Gyro, Laser, Scenario, Thermometer, read, read_truth
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy.integrate import solve_ivp

@@ -228,7 +228,7 @@ _DOOR = {
     "store/update.py copy2",  # into a folder that the job has just made
     "cli/fleet.py copytree",  # likewise
     "recordings/importers/job.py open",  # into a scratch folder that the job has just made
-    "recordings/importers/spreadsheet.py open",  # likewise
+    "recordings/importers/csv_table.py open",  # likewise
 }
 
 

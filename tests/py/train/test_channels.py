@@ -17,7 +17,7 @@ from gyrotc.model import Model, load_model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.truth import read_truth
+from gyrotc.simulate.scenario import read_truth
 from gyrotc.tables.quantise import applied_of
 from gyrotc.train.channels import SHAPES, chosen_channels, shape_of
 from gyrotc.train.data import TrainingData, cleaned, scaling_of

@@ -13,7 +13,7 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.truth import simulated_floor
+from gyrotc.simulate.scenario import simulated_floor
 from gyrotc.train.data import TrainingData, average, cleaned, joined
 from gyrotc.train.estimator import RBFNetworkRegressor
 from gyrotc.train.evidence import TrainingFailed

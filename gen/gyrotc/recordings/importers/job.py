@@ -467,7 +467,7 @@ _PARSERS = {
     "parquet": Parser(".importers.parquet", "open_parquet", "pyarrow.parquet"),
     "feather": Parser(".importers.parquet", "open_feather", "pyarrow.feather"),
     "numpy": Parser(".importers.numpy_file", "open_numpy", "numpy"),
-    "spreadsheet": Parser(".importers.spreadsheet", "open_spreadsheet", "openpyxl", unpacks=True),
+    "spreadsheet": Parser(".importers.csv_table", "open_spreadsheet", "openpyxl", unpacks=True),
     "netcdf": Parser(".importers.netcdf", "open_netcdf", "xarray"),
     "tdms": Parser(".importers.tdms", "open_tdms", "nptdms"),
     "ulog": Parser(".importers.ulog", "open_ulog", "pyulog"),
