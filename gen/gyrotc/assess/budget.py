@@ -305,7 +305,9 @@ def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Con
     rms = judged[1].after.rms_dph if judged and judged[0] != "train" else None
     if judged is None or rms is None or known is None or not floor:
         return "thermal history that was not trained: no recordings were left out to tell it"
-    of_floor = 0.0 if evaluation.noise_floor_source == "simulated" else _of_floor(training)
+    means = training.samples * training.block_s / training.average_s
+    # Relative standard error of a floor from successive differences (von Neumann): sqrt(3/4n)
+    of_floor = 0.0 if evaluation.noise_floor_source == "simulated" else math.sqrt(0.75 / max(means, 1.0))
     excess = rms**2 - floor**2 - explained**2
     error = 2.0 * math.hypot(rms * known.standard, floor**2 * of_floor)
     shown = excess > _SHOWN * error
@@ -317,12 +319,6 @@ def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Con
         freedom=known.freedom,
         statistical=True,
     )
-
-
-def _of_floor(training: Training) -> float:
-    """Relative standard error of a floor from successive differences (von Neumann): sqrt(3/4n)."""
-    means = training.samples * training.block_s / training.average_s
-    return math.sqrt(0.75 / max(means, 1.0))
 
 
 _BLOCK_S = 7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
@@ -353,12 +349,14 @@ def figure_uncertainties(
     found = _jackknife(blocks) if len(blocks) >= 2 else {}
     after = np.concatenate([a.after_dph for a in judged]) if judged else np.zeros(0)
     if after.size > 1:
-        found["max_abs_dph"] = FigureUncertainty(
-            standard=_of_largest(float(after.std()), after.size),
-            freedom=None,
-            method=f"extreme-value distribution of {after.size} means",
-        )
-    found = {name: _scaled(one, 1.0 / scale if name == "improvement" else scale) for name, one in found.items()}
+        # Of the largest magnitude of n normal numbers: pi/sqrt(6) times Gumbel's scale sigma/sqrt(2 ln 2n)
+        largest = float(float(after.std()) * np.pi / np.sqrt(6.0) / np.sqrt(2.0 * np.log(2.0 * after.size)))
+        method = f"extreme-value distribution of {after.size} means"
+        found["max_abs_dph"] = FigureUncertainty(standard=largest, freedom=None, method=method)
+    if scale != 1.0:
+        for name, one in found.items():
+            factor = 1.0 / scale if name == "improvement" else scale
+            found[name] = one.model_copy(update={"standard": one.standard * factor})
     if "rms_dph" in found and floor is not None and floor[0] > 0.0:
         rms_dph = scale * float(np.sqrt(np.mean(after**2)))
         found["rms_over_floor"] = _over_floor(found["rms_dph"], rms_dph, *floor)
@@ -385,8 +383,7 @@ def root_mean(squares: Iterable[tuple[float, int]]) -> float | None:
 def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[FloatArray, FloatArray]]:
     """Stretches of at most an hour inside the runs: means before and after."""
     total = sum(a.after_dph.size for a in judged)
-    length = min(_BLOCK_S / average_s, total / _LEAST_BLOCKS)
-    length = max(length, float(_LEAST_MEANS))
+    length = max(min(_BLOCK_S / average_s, total / _LEAST_BLOCKS), float(_LEAST_MEANS))
     parts = []
     for a in judged:
         pieces = max(1, round(a.after_dph.size / length))
@@ -416,11 +413,6 @@ def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> dict[str, Fig
     }
 
 
-def _of_largest(sigma: float, count: int) -> float:
-    """1 sigma of the largest magnitude of normal numbers: pi/sqrt(6) times Gumbel's scale sigma/sqrt(2 ln 2n)."""
-    return float(sigma * np.pi / np.sqrt(6.0) / np.sqrt(2.0 * np.log(2.0 * count)))
-
-
 def _of_windows(
     judged: Sequence[Averages], runs: Sequence[EvaluatedRun], average_s: float
 ) -> Iterable[tuple[str, FigureUncertainty]]:
@@ -437,18 +429,8 @@ def _of_windows(
         value, a = max(known, key=lambda pair: pair[0])
         length_s = _FIRST_S if name.startswith("first") else a.after_dph.size * average_s
         windows = max(1, int(length_s / window_s))
-        yield (
-            name,
-            FigureUncertainty(
-                standard=value / np.sqrt(2.0 * windows),
-                freedom=float(windows),
-                method=f"{windows} windows of the worst run, taken as normal",
-            ),
-        )
-
-
-def _scaled(one: FigureUncertainty, factor: float) -> FigureUncertainty:
-    return one if factor == 1.0 else one.model_copy(update={"standard": one.standard * factor})
+        standard, method = value / np.sqrt(2.0 * windows), f"{windows} windows of the worst run, taken as normal"
+        yield name, FigureUncertainty(standard=standard, freedom=float(windows), method=method)
 
 
 def _over_floor(rms: FigureUncertainty, rms_dph: float, floor_dph: float, differences: int | None) -> FigureUncertainty:

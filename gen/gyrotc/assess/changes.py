@@ -103,7 +103,7 @@ class Earlier:
         self.manifest = read_optional(folder / "manifest.json", Manifest)
         changes = read_optional(folder / "changes.json", Changes)
         self.history = changes.history if changes else ()
-        self.date = _stated(self.model)
+        self.date = stated_day(self.model)
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--previous") -> Earlier:
@@ -170,7 +170,7 @@ def changes_since(
         axis=model.axis,
         same_model=old.hash == model.hash,
         model_hash=TextChange(before=old.hash, after=model.hash),
-        recordings=_recordings(old, model),
+        recordings=_changed_hashes(*({d.file: d.sha256 for d in m.data} for m in (old, model))),
         map=moved,
         envelope=Envelopes.of(
             temperature_c=(old.envelope.temperature_c, model.envelope.temperature_c),
@@ -179,14 +179,15 @@ def changes_since(
         figures=dict(_figures(earlier, model, evaluation)),
         findings=NameChanges(new=_only(after, before), gone=_only(before, after)),
         versions=dict(_versions(earlier.manifest, manifest)),
-        files=_files(earlier.manifest, manifest),
+        files=_changed_hashes(*(_emitted(m) for m in (earlier.manifest, manifest))),
         as_found=found,
         as_found_missing=missing,
-        history=history_of(earlier, model, evaluation, found, moved, _stated(model) or started_on(dataset)),
+        history=history_of(earlier, model, evaluation, found, moved, stated_day(model) or started_on(dataset)),
     )
 
 
-def _stated(model: Model) -> str | None:
+def stated_day(model: Model) -> str | None:
+    """Day of the calibration, where the recordings state it."""
     date = model.meta.get("calibrated_on")
     return None if date is None else str(date)
 
@@ -211,11 +212,6 @@ def _changed_hashes(before: dict[str, str], after: dict[str, str]) -> FileChange
     return FileChanges(
         new=_only(after.keys(), before.keys()), gone=_only(before.keys(), after.keys()), other_bytes=tuple(other)
     )
-
-
-def _recordings(old: Model, new: Model) -> FileChanges:
-    before, after = ({d.file: d.sha256 for d in m.data} for m in (old, new))
-    return _changed_hashes(before, after)
 
 
 def _of_means(*evaluations: Evaluation | None) -> float | None:
@@ -255,8 +251,9 @@ def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None
     worst = np.unravel_index(int(np.argmax(np.abs(difference))), difference.shape)
     floor = new.noise_floor_dph
     rms = float(np.sqrt(np.mean(difference**2)))
-    expected = _expected_rms(old, new, t, slope)
-    expected = of_means if expected is None else expected
+    before, after = (_variance(model, t, slope) for model in (old, new))
+    # RMS that the uncertainties of both maps give although nothing has moved
+    expected = of_means if before is None or after is None else float(np.sqrt(np.mean(before + after)))
     return MapDifference(
         rms_dph=rms,
         mean_dph=float(np.mean(difference)),
@@ -269,24 +266,12 @@ def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None
     )
 
 
-def _expected_rms(old: Model, new: Model, t: FloatArray, slope: FloatArray) -> float | None:
-    """RMS that the uncertainties of two maps give over points of T and dT/dt although nothing has moved."""
-    before, after = (_variance(model, t, slope) for model in (old, new))
-    if before is None or after is None:
-        return None
-    return float(np.sqrt(np.mean(before + after)))
-
-
 def _variance(model: Model, t: FloatArray, slope: FloatArray) -> FloatArray | None:
     if model.uncertainty_dph is None:
         return None
-    rows = np.array(model.uncertainty_dph.rows)
-    place = []
-    for x, span, n in (
-        (slope, model.envelope.slope_c_per_min, rows.shape[0]),
-        (t, model.envelope.temperature_c, rows.shape[1]),
-    ):
-        low, high = span
+    rows, place = np.array(model.uncertainty_dph.rows), []
+    spans = (model.envelope.slope_c_per_min, model.envelope.temperature_c)
+    for x, (low, high), n in zip((slope, t), spans, rows.shape, strict=True):
         share = (x - low) / (high - low) if high > low else np.zeros_like(x)
         place.append(np.clip((share * n).astype(np.int64), 0, n - 1))
     return np.asarray(rows[place[0], place[1]] ** 2)
@@ -301,10 +286,8 @@ def _figures(earlier: Earlier, model: Model, evaluation: Evaluation) -> Iterator
     if old is None or new is None or old[0] != new[0]:
         return
     yield "judged_on", new[0]
-    before, after = old[1].after, new[1].after
-    yield "rms_dph", FigureChange(before=before.rms_dph, after=after.rms_dph)
-    yield "std_dph", FigureChange(before=before.std_dph, after=after.std_dph)
-    yield "max_abs_dph", FigureChange(before=before.max_abs_dph, after=after.max_abs_dph)
+    for name in ("rms_dph", "std_dph", "max_abs_dph"):
+        yield name, FigureChange(before=getattr(old[1].after, name), after=getattr(new[1].after, name))
 
 
 def _ids(evaluation: Evaluation | None) -> set[str]:
@@ -320,7 +303,5 @@ def _versions(old: Manifest | None, new: Manifest) -> Iterator[tuple[str, TextCh
             yield name, TextChange(before=before.get(name), after=after.get(name))
 
 
-def _files(old: Manifest | None, new: Manifest) -> FileChanges:
-    """Emitted files."""
-    before, after = ({k: v for k, v in m.files.items() if k.startswith("c/")} if m else {} for m in (old, new))
-    return _changed_hashes(before, after)
+def _emitted(manifest: Manifest | None) -> dict[str, str]:
+    return {k: v for k, v in manifest.files.items() if k.startswith("c/")} if manifest else {}

@@ -27,6 +27,7 @@ from ..model import Model, load_model
 from ..quality.check import findings_of_run
 from ..quality.findings import RunFacts, facts_of
 from ..quality.outliers import departing_rows
+from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Rows, Run
 from ..results.base import Finding, read_result
 from ..results.evaluation import (
@@ -49,7 +50,7 @@ from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
-from .findings import findings_of, residual_findings, residual_test
+from .findings import beyond_noise, findings_of, residual_test
 
 __all__ = ["AnsweredRows", "Watch", "evaluate"]
 
@@ -157,7 +158,7 @@ def evaluate(
     result = _with_what_is_known(result, parts, training)
     of_runs = [found for p in parts for found in p.findings]
     found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), training)
-    found += residual_findings(result, [(p.run, p.averages) for p in parts])
+    found += [*beyond_noise(result), *late_findings([(p.run, p.averages) for p in parts])]
     return result.model_copy(update={"findings": tuple(found)})
 
 

@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA, Averages
+from ..common.metrics import MAD_TO_SIGMA
 from ..model import Model
 from ..quality.check import findings_of_data_set
 from ..quality.findings import RunFacts, finding, temperature_findings
-from ..quality.thermometers import late_findings
-from ..recordings.records import Dataset, Run
+from ..recordings.records import Dataset
 from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.training import Training
@@ -103,13 +102,7 @@ def _correlation(judged: Sequence[FloatArray]) -> float | None:
     return found / _LAGS
 
 
-def residual_findings(result: Evaluation, runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
-    """Findings about the residual of the runs that were evaluated."""
-    yield from _beyond_noise(result)
-    yield from late_findings(runs)
-
-
-def _beyond_noise(result: Evaluation) -> Iterator[Finding]:
+def beyond_noise(result: Evaluation) -> Iterator[Finding]:
     """The RMS that the model is judged by, where noise alone would not give it."""
     judged, test = result.judged(), result.residual
     if judged is None or test is None or result.noise_floor_dph is None:
@@ -167,21 +160,10 @@ def findings_of(
     """
     found = [*temperature_findings(facts)]
     if not found:
-        found += _of_training(training)
-        found += _unseen(result, training)
-        found += _coverage(model)
-    found += of_runs
-    found += findings_of_data_set(dataset, facts)
-    found += _weights(model)
-    found += _outliers(result)
-    return found
-
-
-def _of_training(training: Training | None) -> Iterator[Finding]:
-    """What the choice of the correction found; `fit` wrote it."""
-    for said in training.findings if training else ():
-        if said.id in _OF_TRAINING:
-            yield said
+        # What the choice of the correction found; `fit` wrote it
+        found += [said for said in (training.findings if training else ()) if said.id in _OF_TRAINING]
+        found += [*_unseen(result, training), *_coverage(model)]
+    return [*found, *of_runs, *findings_of_data_set(dataset, facts), *_weights(model), *_outliers(result)]
 
 
 def _unseen(result: Mapping[str, Any], training: Training | None) -> Iterator[Finding]:

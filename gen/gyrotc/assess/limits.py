@@ -99,7 +99,9 @@ def _by_rule(
     k = coverage_factor(known.freedom)
     expanded = k * known.standard
     band = 0.0 if rule == "simple_acceptance" else expanded
-    verdict = _verdict(sign * (bound - measured), band, rule)
+    room = sign * (bound - measured)
+    near: Verdict = "CONDITIONAL PASS" if rule == "guard_band" else "FAIL"
+    verdict: Verdict = "FAIL" if room < 0.0 else "PASS" if room >= band else near
     beyond = _NORMAL.cdf(sign * (measured - bound) / known.standard) if known.standard else 0.0
     return Limit(
         limit=name,
@@ -123,14 +125,6 @@ def _bare(name: str, measured: float | None, bound: float, sign: float, why: str
     return Limit(
         limit=name, measured=measured, bound=bound, met=met, verdict="PASS" if met else "FAIL", uncertainty_from=why
     )
-
-
-def _verdict(room: float, band: float, rule: DecisionRule) -> Verdict:
-    if room < 0.0:
-        return "FAIL"
-    if room >= band:
-        return "PASS"
-    return "CONDITIONAL PASS" if rule == "guard_band" else "FAIL"
 
 
 def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict | None:
@@ -323,9 +317,14 @@ def load_limits(path: Path) -> Limits:
 
 def held_against(limits: Limits, model: Model, evaluation: Evaluation, verification: Verification | None) -> HeldLimits:
     """Every limit with what was measured, and whether all are met."""
+    covers = limits.covers.model_dump(exclude_none=True)
+    has = {name: getattr(model.envelope, name) for name in covers}
     checks = (
         *_amounts(limits, _measured(model, evaluation, verification), evaluation),
-        *_ranges(limits.covers, model),
+        *(
+            _limit(f"covers.{name}", a, (low, high), a[0] <= low and high <= a[1], "range of the recordings")
+            for (name, (low, high)), a in zip(covers.items(), has.values(), strict=True)
+        ),
         *_needs(limits.needs, evaluation, verification),
     )
     return HeldLimits(
@@ -380,12 +379,7 @@ def _measured(model: Model, evaluation: Evaluation, verification: Verification |
 _NOT_RANDOM = {
     "uncertainty_dph": "is itself a standard uncertainty",
     "error_bound_dph": "proven for every input",
-    "covered": "counted",
-    "centers": "counted",
-    "table_bytes": "counted",
-    "rom_bytes": "counted",
-    "ram_bytes": "counted",
-    "rows_left_out": "counted",
+    **dict.fromkeys(("covered", "centers", "table_bytes", "rom_bytes", "ram_bytes", "rows_left_out"), "counted"),
 }
 """Figures that no noise of a recording moves."""
 
@@ -419,12 +413,6 @@ def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -
                 _NOT_RANDOM.get(name) or known.get(name),
                 measured_on(name),
             )
-
-
-def _ranges(covers: Covers, model: Model) -> Iterator[Limit]:
-    for name, (low, high) in covers.model_dump(exclude_none=True).items():
-        has = getattr(model.envelope, name)
-        yield _limit(f"covers.{name}", has, (low, high), has[0] <= low and high <= has[1], "range of the recordings")
 
 
 def _needs(needs: Required, evaluation: Evaluation, verification: Verification | None) -> Iterator[Limit]:

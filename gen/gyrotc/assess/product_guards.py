@@ -73,8 +73,14 @@ def guarded(model: Model, asked: Mapping[str, ProductGuard], file: str, recorded
     for channel, guard in asked.items():
         where = f"{file}, field guards.{channel}"
         if channel == TEMPERATURE and channel not in recorded:
-            guards[channel] = _of_temperature(model, guard, where)
-            fields = _fields(guards[channel], model.block_s)
+            guards[channel] = own = _of_temperature(model, guard, where)
+            fields = {  # the same in the fields of the temperature in `model.json`
+                "max_step_c": own.max_step,
+                "max_rate_c_per_min": own.max_rate_per_min,
+                "agree_s": own.agree_s,
+                "stuck_s": own.stuck_s,
+                "hold_blocks": min(max(1, round(own.missing_s / model.block_s)), _MOST_BLOCKS),
+            }
         elif channel not in recorded:
             raise InputError(where, "is no channel of the recordings", ", ".join([TEMPERATURE, *recorded]))
         elif channel in channel_names(model):
@@ -95,17 +101,6 @@ def _of_temperature(model: Model, guard: ProductGuard, where: str) -> Guard:
         )
     base = guard_of(model, None).model_copy(update={"fallback": min(max(0.0, low), high)})
     return _merged(base, guard, where)
-
-
-def _fields(guard: Guard, block_s: float) -> dict[str, Any]:
-    """The same in the fields of the temperature in `model.json`."""
-    return {
-        "max_step_c": guard.max_step,
-        "max_rate_c_per_min": guard.max_rate_per_min,
-        "agree_s": guard.agree_s,
-        "stuck_s": guard.stuck_s,
-        "hold_blocks": min(max(1, round(guard.missing_s / block_s)), _MOST_BLOCKS),
-    }
 
 
 def _merged(base: Guard, guard: ProductGuard, where: str) -> Guard:

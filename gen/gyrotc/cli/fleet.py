@@ -7,7 +7,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from enum import Enum
@@ -113,7 +113,10 @@ def fleet(
                 wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, releases=releases, done=done
             )
     if share:
-        _tell_share(shard or "", entries)
+        missing = sum(entry.status != "done" for entry in entries)
+        tell(f"share {shard}: {len(entries) - missing} of {len(entries)} done; gyrotc fleet --gather makes the summary")
+        if missing:
+            raise CheckFailed(f"{missing} of {len(entries)} gyros of the share are not done")
         return
     summary = summary_of(entries)
     write_json(json_file, summary.content())
@@ -123,13 +126,6 @@ def fleet(
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
         raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed{left}")
-
-
-def _tell_share(name: str, entries: Sequence[FleetEntry]) -> None:
-    done = sum(entry.status == "done" for entry in entries)
-    tell(f"share {name}: {done} of {len(entries)} done; gyrotc fleet --gather makes the summary")
-    if done < len(entries):
-        raise CheckFailed(f"{len(entries) - done} of {len(entries)} gyros of the share are not done")
 
 
 @app.command()
@@ -156,7 +152,10 @@ def catalogue(
     """
     from ..fleet.catalogue import catalogued, export, withdraw
 
-    asked = _day(day)
+    try:
+        asked = (date.fromisoformat(day) if day else date.today()).isoformat()
+    except ValueError as error:
+        raise InputError("--on", repr(day), "a day such as 2026-09-01") from error
     if withdrawn is not None:
         if exported is not None or serial is not None:
             raise InputError("--withdraw", "goes with no serial", "--withdraw HASH alone")
@@ -188,13 +187,6 @@ def catalogue(
         tell(f"{answer.calibrations} calibrations in all")
     elif not answer.found:
         raise CheckFailed(f"{serial} may carry no table of this catalogue on {asked}")
-
-
-def _day(text: str | None) -> str:
-    try:
-        return (date.fromisoformat(text) if text else date.today()).isoformat()
-    except ValueError as error:
-        raise InputError("--on", repr(text), "a day such as 2026-09-01") from error
 
 
 def _tell_comparison(summary: FleetSummary) -> None:

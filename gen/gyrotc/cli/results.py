@@ -64,11 +64,6 @@ def training_lines(training: Training) -> Iterator[str]:
         tried = (f"{r.id} {sci(r.left_out_rms_dph)}" for r in training.candidates if r.left_out_rms_dph is not None)
         yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
     yield from _channel_lines(training)
-    yield from _lot_lines(training)
-
-
-def _lot_lines(training: Training) -> Iterator[str]:
-    """What came from the lot or an earlier model, and what from the unit's own runs."""
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
     if training.prior is not None:
@@ -245,10 +240,11 @@ def summary(result: Evaluation) -> str:
     text += f" ({'; '.join(beside)})" if beside else ""
     if part.before.std_dph is not None and part.after.std_dph:
         text += f", about the mean {part.before.std_dph / part.after.std_dph:.2f}"
-    floor, rms = result.noise_floor_dph, part.after.rms_dph
+    floor, rms, known = result.noise_floor_dph, part.after.rms_dph, (result.uncertainty or {}).get("rms_dph")
+    spread = COVERAGE * known.standard if known else None
     if floor and rms is not None:
         text += (
-            f"; RMS {_known_to(result, 'rms_dph', rms)} {rate_unit()} = {rms / floor:.4f} x noise floor "
+            f"; RMS {with_uncertainty(rms, spread)} {rate_unit()} = {rms / floor:.4f} x noise floor "
             f"({result.noise_floor_source})"
         )
     if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
@@ -256,12 +252,6 @@ def summary(result: Evaluation) -> str:
         rows = sum(run.outlier_rows for run in result.runs if run.role == role)
         text += f"; {sci(robust.rms_dph)} without {rows} rows that are outliers"
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
-
-
-def _known_to(result: Evaluation, figure: str, value: float) -> str:
-    """A figure that the model is judged by, rounded to what is known of it."""
-    known = (result.uncertainty or {}).get(figure)
-    return with_uncertainty(value, COVERAGE * known.standard if known else None)
 
 
 def _of_a_constant(result: Evaluation, judged: Pooled) -> float | None:

@@ -64,28 +64,24 @@ class CertifiedRow:
 
 def rows_of(unit: UnitResults) -> list[CertifiedRow]:
     """Results of an axis: the bias after compensation, then every limit, those that are not met first."""
-    return [*_bias(unit), *map(_row, unit.held)]
-
-
-def _bias(unit: UnitResults) -> Iterator[CertifiedRow]:
-    budget = unit.budget
-    if budget is not None and budget.expanded_dph > 0.0:
-        found = digits_of(0.0, budget.expanded_dph)
-        yield CertifiedRow(
-            text="bias after compensation, deg/h",
-            page=f"0 ± {rounded(budget.expanded_dph)}",
-            value="0",
-            spread=found.decimal(found.spread),
-            factor=f"{budget.coverage_factor:.2f}",
-            unit=_UNITS[0][1],
-        )
+    rows, budget = [_row(limit) for limit in unit.held], unit.budget
+    if budget is None or budget.expanded_dph <= 0.0:
+        return rows
+    found = digits_of(0.0, budget.expanded_dph)
+    bias = CertifiedRow(
+        text="bias after compensation, deg/h",
+        page=f"0 ± {rounded(budget.expanded_dph)}",
+        value="0",
+        spread=found.decimal(found.spread),
+        factor=f"{budget.coverage_factor:.2f}",
+        unit=_UNITS[0][1],
+    )
+    return [bias, *rows]
 
 
 def _row(limit: Limit) -> CertifiedRow:
-    verdict = limit.decision
-    plain = CertifiedRow(
-        text=limit_words(limit.limit), page=measured_words(limit), bound=bound_words(limit), verdict=verdict
-    )
+    text, page, bound = limit_words(limit.limit), measured_words(limit), bound_words(limit)
+    plain = CertifiedRow(text, page, bound=bound, verdict=limit.decision)
     unit = next((unit for end, unit in _UNITS if limit.limit.endswith(end)), "")
     known = limit.expanded_uncertainty
     if not unit or not known or not math.isfinite(known) or not isinstance(limit.measured, float):
@@ -122,16 +118,14 @@ def certificate_page(
 
 def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
     """The XML of a DCC; arguments as of the page."""
-    environment = html_environment(line=_line, day=lambda text: text[:10], rounded=rounded)
+    # Text as a DCC takes it: words with a blank between them, and never none
+    environment = html_environment(
+        line=lambda value: " ".join(str(value).split()) or "-", day=lambda text: text[:10], rounded=rounded
+    )
     text = environment.get_template("dcc.xml.j2").render(
         units=units, rows=[rows_of(unit) for unit in units], facts=facts, accepted=accepted
     )
     return re.sub(r"\n\s*\n+", "\n", text)
-
-
-def _line(value: object) -> str:
-    """Text as a DCC takes it: words with a blank between them, and never none."""
-    return " ".join(str(value).split()) or "-"
 
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")

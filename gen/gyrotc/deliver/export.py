@@ -198,19 +198,17 @@ def export(folder: Path, format: Format, out: Path, options: Exporting = Exporti
         data, lines = fmu(folder, models)
         write_atomically(out, data)
         return lines
-    shifted = [_as_emitted(part, model) for part, model in zip(parts, models, strict=True)]
+    # The models whose maps the tables beside them compute (`emit --zero-at`)
+    shifted = [
+        read_options(part / "c").shifted(model) if (part / "c" / RECORD).is_file() else model
+        for part, model in zip(parts, models, strict=True)
+    ]
     if format in get_args(Autopilot):
         text, lines = _cubics(shifted, cast(Autopilot, format), options)
     else:
         text, lines = _tables(shifted, format, options)
     write_atomically(out, text)
     return lines
-
-
-def _as_emitted(part: Path, model: Model) -> Model:
-    """The model whose map the tables beside it compute (`emit --zero-at`)."""
-    c = part / "c"
-    return read_options(c).shifted(model) if (c / RECORD).is_file() else model
 
 
 def _cubics(models: Sequence[Model], format: Autopilot, options: Exporting) -> tuple[str, list[str]]:
@@ -266,9 +264,14 @@ def fmu(folder: Path, models: Sequence[Model]) -> tuple[bytes, list[str]]:
         CheckFailed: It was changed, or holds no float32.
     """
     check_emitted(folder, "not exported")
-    sources = _sources(folder / "c", models)
+    names = ["gtc.h", "gtc_config.h", "gtc.c", *(f"gtc_{m.id}.{end}" for m in models for end in ("h", "c"))]
+    sources, whole = {name: (folder / "c" / name).read_bytes() for name in names}, hashlib.sha256()
+    if any(b"gtc_f32_table_t" not in sources[f"gtc_{m.id}.h"] for m in models):
+        raise CheckFailed("a table has no float32, which a unit of co-simulation computes in")
+    for name, data in sources.items():
+        whole.update(f"{name} {len(data)}\n".encode() + data)
+    token = "{" + whole.hexdigest()[:32] + "}"  # another table is another unit
     inputs = ["temperature_c", *sorted({name for model in models for name in channel_names(model)})]
-    token = _token(sources)
     sources["fmu.c"] = _wrapper(models, inputs, token)
     name = f"gtc_{models[0].id if len(models) == 1 else table_id(models[0].serial, None)}"
     files = {"modelDescription.xml": _description(models, name, inputs, token)}
@@ -278,22 +281,6 @@ def fmu(folder: Path, models: Sequence[Model]) -> tuple[bytes, list[str]]:
     files |= {f"sources/{file}": data for file, data in sources.items()}
     files["sources/buildDescription.xml"] = _build_description(name, sources)
     return _zipped(files), [f"inputs {', '.join(inputs)}; {platform}"]
-
-
-def _sources(c: Path, models: Sequence[Model]) -> dict[str, bytes]:
-    names = ["gtc.h", "gtc_config.h", "gtc.c", *(f"gtc_{m.id}.{end}" for m in models for end in ("h", "c"))]
-    sources = {name: (c / name).read_bytes() for name in names}
-    if any(b"gtc_f32_table_t" not in sources[f"gtc_{m.id}.h"] for m in models):
-        raise CheckFailed("a table has no float32, which a unit of co-simulation computes in")
-    return sources
-
-
-def _token(sources: Mapping[str, bytes]) -> str:
-    """The instantiation token: another table is another unit."""
-    whole = hashlib.sha256()
-    for name, data in sources.items():
-        whole.update(f"{name} {len(data)}\n".encode() + data)
-    return "{" + whole.hexdigest()[:32] + "}"
 
 
 def _wrapper(models: Sequence[Model], inputs: Sequence[str], token: str) -> bytes:
@@ -346,28 +333,20 @@ def _description(models: Sequence[Model], name: str, inputs: Sequence[str], toke
 def _variables(root: Element, models: Sequence[Model], inputs: Sequence[str]) -> list[int]:
     """The variables; returns the references of the outputs."""
     listed, used = SubElement(root, "ModelVariables"), set[str]()
-    for kind, facts in (
-        *_clock(example_period_us(models[0])),
-        *_outputs(models, len(inputs)),
-        *_inputs(models, inputs),
-    ):
+    of_time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
+    period = {
+        "name": "sample_period_us", "valueReference": "1", "causality": "parameter", "variability": "fixed",
+        "description": "From sample to sample, microseconds; a step takes one for each",
+        "start": str(example_period_us(models[0])),
+    }  # fmt: skip
+    clock = (("Float64", of_time), ("UInt32", period))
+    for kind, facts in (*clock, *_outputs(models, len(inputs)), *_inputs(models, inputs)):
         name = toml_comment(facts["name"], 200)
         if name in used:  # a recorded channel with the name of an output
             name = f"channel {facts['valueReference']} {name}"
         used.add(name)
         SubElement(listed, kind, facts | {"name": name})
     return [int(one.attrib["valueReference"]) for one in listed if one.attrib["causality"] == "output"]
-
-
-def _clock(period_us: int) -> Iterator[tuple[str, dict[str, str]]]:
-    yield ("Float64", {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"})
-    yield (
-        "UInt32",
-        {
-            "name": "sample_period_us", "valueReference": "1", "causality": "parameter", "variability": "fixed",
-            "description": "From sample to sample, microseconds; a step takes one for each", "start": str(period_us),
-        },
-    )  # fmt: skip
 
 
 def _outputs(models: Sequence[Model], n_inputs: int) -> Iterator[tuple[str, dict[str, str]]]:

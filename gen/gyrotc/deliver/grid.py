@@ -105,20 +105,19 @@ def map_result(grids: Sequence[MapGrid]) -> MapOnGrid:
         serial=grids[0].model.serial,
         axis=None,
         units={"temperature_c": "C", "slope_c_per_min": "C/min", "bias_dph": "deg/h"},
-        maps=tuple(_of_axis(grid) for grid in grids),
-    )
-
-
-def _of_axis(grid: MapGrid) -> MapOfAxis:
-    return MapOfAxis(
-        axis=grid.model.axis,
-        model_hash=grid.model.hash,
-        temperature_c=tuple(grid.temperature_c.tolist()),
-        slope_c_per_min=tuple(grid.slope_c_per_min.tolist()),
-        bias_dph=tuple(tuple(row) for row in grid.bias_dph.tolist()),
-        linear_rms_dph=grid.rms_dph,
-        linear_largest_dph=grid.largest_dph,
-        terms=tuple(term.id for term in grid.model.terms),
+        maps=tuple(
+            MapOfAxis(
+                axis=grid.model.axis,
+                model_hash=grid.model.hash,
+                temperature_c=tuple(grid.temperature_c.tolist()),
+                slope_c_per_min=tuple(grid.slope_c_per_min.tolist()),
+                bias_dph=tuple(tuple(row) for row in grid.bias_dph.tolist()),
+                linear_rms_dph=grid.rms_dph,
+                linear_largest_dph=grid.largest_dph,
+                terms=tuple(term.id for term in grid.model.terms),
+            )
+            for grid in grids
+        ),
     )
 
 

@@ -114,18 +114,16 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
         known: dict[tuple[str, str, str], set[str | None]] = {}
         for *inputs, model_hash in base.execute("SELECT serial, axis, input_sha256, model_hash FROM calibration"):
             known.setdefault(tuple(inputs), set()).add(model_hash)
-        new = [e for e in made if _is_new(e, known.get((e.serial or "", e.axis or "", e.key or ""), set()))]
+        added = 0
         with base:  # one transaction
-            return sum(_add(base, out, entry, _tag_of(entry, tag)) for entry in new)
-
-
-def _is_new(entry: FleetEntry, known: set[str | None]) -> bool:
-    """Whether what came of it is not in the catalogue; `known`: models that came of the same inputs, None for none."""
-    return not known or (entry.model_hash is not None and known == {None})
-
-
-def _tag_of(entry: FleetEntry, tag: str) -> str:
-    return f"{tag}; released: {entry.released}".removeprefix("; ") if entry.released else tag
+            for (
+                one
+            ) in made:  # what came of it is not in the catalogue: no model of the same inputs, or none but failures
+                of_inputs = known.get((one.serial or "", one.axis or "", one.key or ""), set())
+                if not of_inputs or (one.model_hash is not None and of_inputs == {None}):
+                    released = f"{tag}; released: {one.released}".removeprefix("; ")
+                    added += _add(base, out, one, released if one.released else tag)
+        return added
 
 
 @contextmanager
@@ -208,7 +206,7 @@ def _add(base: sqlite3.Connection, out: Path, entry: FleetEntry, tag: str) -> in
             found = "is not what the other results give"
             raise InputError(str(folder / ENTRY), found, "a result as fleet wrote it")
         data = unit.model.data
-        row["image_sha256"] = share_by_hash(out / PAYLOADS, _image(folder, unit.model)).name
+        row["image_sha256"] = share_by_hash(out / PAYLOADS, folder / "c" / f"gtc_{unit.model.id}.bin").name
         row["model_sha256"] = share_by_hash(out / PAYLOADS, folder / "model.json").name
         if unit.budget:
             row |= {"valid_until": unit.budget.valid_until, "expanded_dph": unit.budget.expanded_dph}
@@ -287,10 +285,6 @@ def _file_of(place: Path) -> Path:
     if not path.is_file():
         raise InputError(str(place), "has no catalogue", "the --out of gyrotc fleet")
     return path
-
-
-def _image(folder: Path, model: Model) -> Path:
-    return folder / "c" / f"gtc_{model.id}.bin"
 
 
 def catalogued(place: Path, serial: str | None, day: str | None) -> CatalogueAnswer:

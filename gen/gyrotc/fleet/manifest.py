@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -91,12 +92,9 @@ def mine(fleet: Fleet, share: Share) -> Fleet:
 
     Which share a unit belongs to follows from the hash of its name alone: all machines agree without talking.
     """
-    units = (unit for unit in fleet.units if _number(unit.folder) % share.of == share.number - 1)
-    return replace(fleet, units=tuple(units))
-
-
-def _number(name: str) -> int:
-    return int.from_bytes(hashlib.sha256(os.fsencode(name)).digest()[:8], "big")
+    numbers = (hashlib.sha256(os.fsencode(unit.folder)).digest()[:8] for unit in fleet.units)
+    own = (int.from_bytes(number, "big") % share.of == share.number - 1 for number in numbers)
+    return replace(fleet, units=tuple(compress(fleet.units, own)))
 
 
 class _Part(BaseModel):
@@ -129,10 +127,17 @@ def load_manifest(path: Path) -> Fleet:
         InputError: It cannot be read, a field is wrong, nothing is named, or two results would have one name.
     """
     if path.is_dir():
-        folders = [folder for folder in _listed(path) if _has_recordings(folder)]
-        every = tuple(unit for folder in folders for unit in _units(folder, None))
+        try:
+            listed = sorted(path.iterdir())
+        except OSError as error:
+            raise InputError(str(path), f"cannot be read ({error.strerror})", "a folder of data sets") from error
+        every = tuple(unit for folder in listed if _has_recordings(folder) for unit in _units(folder, None))
         return _distinct(path, Fleet(every, FitOptions(), None, None))
-    manifest = _parsed(path)
+    content = read_toml(path, "a manifest or a folder")
+    try:
+        manifest = _Manifest.model_validate(content)
+    except ValidationError as error:
+        raise refused(error, lambda field: f"{path}, field {field}") from error
     named = (
         *((folder, manifest.axis) for folder in _matching(path, manifest.datasets)),
         *((path.parent / entry.dataset, entry.axis) for entry in manifest.unit),
@@ -153,14 +158,6 @@ def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
     yield from (Unit(folder, name) for name in axes)
 
 
-def _parsed(path: Path) -> _Manifest:
-    content = read_toml(path, "a manifest or a folder")
-    try:
-        return _Manifest.model_validate(content)
-    except ValidationError as error:
-        raise refused(error, lambda field: f"{path}, field {field}") from error
-
-
 def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
     for pattern in patterns:
         if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
@@ -176,21 +173,12 @@ def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
         yield from found
 
 
-def _listed(folder: Path) -> list[Path]:
-    try:
-        return sorted(folder.iterdir())
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be read ({error.strerror})", "a folder of data sets") from error
-
-
 def _has_recordings(folder: Path) -> bool:
     """Whether a folder is a data set. One that cannot be read may be one: its job will say what is wrong."""
     if folder.name.startswith("."):
         return False
     try:
-        if not folder.is_dir():
-            return False
-        if _is_result(folder):
+        if not folder.is_dir() or _is_result(folder):
             return False
         return (folder / "dataset.toml").is_file() or any(
             file.suffix.lower() in (".csv", ".parquet") for file in folder.iterdir()

@@ -295,7 +295,7 @@ _Pairs = dict[tuple[int, int], tuple[float, float | None]]
 
 
 def _same_rows(entries: Sequence[FleetEntry]) -> _Pairs:
-    words = [_words_of(entry.sketch) for entry in entries]
+    words = [[e.sketch[k : k + _DIGITS] for k in range(0, len(e.sketch), _DIGITS)] for e in entries]
     holders: dict[str, list[int]] = defaultdict(list)
     for number, of_one in enumerate(words):
         for word in of_one:
@@ -310,10 +310,6 @@ def _same_rows(entries: Sequence[FleetEntry]) -> _Pairs:
         for (a, b), count in common.items()
         if count >= min(_LEAST_COMMON, len(words[a])) and (entries[a].serial or "") != (entries[b].serial or "")
     }
-
-
-def _words_of(sketch: str) -> list[str]:
-    return [sketch[k : k + _DIGITS] for k in range(0, len(sketch), _DIGITS)]
 
 
 def _same_noise(entries: Sequence[FleetEntry]) -> _Pairs:

@@ -57,7 +57,11 @@ def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetE
 
 
 def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry]]:
-    pool = _pool(min(jobs, len(tasks)))
+    """On fresh processes with one thread each: a serial is too small to share."""
+    for name in _THREADS:
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_end_with_parent)
     try:
         numbers: dict[Future[FleetEntry], int] = {pool.submit(do_unit, task): n for n, task in tasks.items()}
         for future in as_completed(numbers):
@@ -86,14 +90,6 @@ def _alone(task: Task) -> FleetEntry:
     except BrokenProcessPool:
         return failed(task, _DIED)
     return entry
-
-
-def _pool(jobs: int) -> ProcessPoolExecutor:
-    """Fresh processes with one thread each: a serial is too small to share."""
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_end_with_parent)
 
 
 def _end_with_parent() -> None:
@@ -213,21 +209,16 @@ def _described(cluster: Cluster, client: Any) -> str:
 def _entry_on_dask(task: Task, result: FleetEntry | tuple[Any, Any, Any]) -> FleetEntry:
     """What has become of a task: its entry, or type, value and place of what was raised."""
     if isinstance(result, FleetEntry):
-        return _there(task, result)
+        if result.status == "done":  # in the fleet's folder here: a worker may have another folder under that path
+            os.listdir(task.out.parent)  # noqa: PTH208 a network file system looks anew
+            if not (task.out / ENTRY).is_file():
+                return failed(task, f"{task.out}: its worker has written it into another folder of that name")
+        return result
     error = result[1]
     if type(error).__name__ != "KilledWorker":
         return failed(task, f"{type(error).__name__}: {error}; workers need the same gyrotc")
     times, last = error.allowed_failures + 1, error.last_worker.name
     return failed(task, f"{times} workers died with it, the last one {last} (out of memory?)")
-
-
-def _there(task: Task, entry: FleetEntry) -> FleetEntry:
-    """The entry if its result is in the fleet's folder here: a worker may have another folder under that path."""
-    if entry.status == "done":
-        os.listdir(task.out.parent)  # noqa: PTH208 a network file system looks anew
-        if not (task.out / ENTRY).is_file():
-            return failed(task, f"{task.out}: its worker has written it into another folder of that name")
-    return entry
 
 
 Done = Callable[[FleetEntry], None]

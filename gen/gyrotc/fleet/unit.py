@@ -22,7 +22,6 @@ from ..quality.events import found_events
 from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
-from ..results.evaluation import Evaluation
 from ..results.fleet import Facts, FleetEntry
 from ..store.cache import inputs_of, program_of
 from ..store.files import Lock, digest_of, json_text, write_atomically
@@ -41,8 +40,12 @@ def move_away(place: Path) -> str:
     Raises:
         InputError: A job is writing there.
     """
-    if not place.exists() or not _changed(place):
+    if not place.exists():
         return ""
+    with suppress(InputError):  # the marker itself is damaged
+        marker = read_marker(place)
+        if marker is None or not survey(place, marker)[1]:
+            return ""
     lock = Lock(place, "fleet")
     try:
         names = (f"{place.name}.changed-{k}" for k in itertools.count(1))
@@ -51,14 +54,6 @@ def move_away(place: Path) -> str:
     finally:
         lock.release()
     return other.name
-
-
-def _changed(place: Path) -> bool:
-    try:
-        marker = read_marker(place)
-        return marker is not None and bool(survey(place, marker)[1])
-    except InputError:  # the marker itself is damaged
-        return True
 
 
 def clean_units(out: Path, names: Sequence[str]) -> None:
@@ -238,7 +233,8 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
     """What the summary says of the gyro, and what it is compared with others by."""
     role, judged = built.evaluation.judged() or (None, None)
     floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None
-    held = built.limits
+    held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
+    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
     entry = FleetEntry(
         name=task.unit.name,
         dataset=task.shown,
@@ -261,10 +257,8 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
         verdict=built.unit.decision,
         limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
         limits_held=len(held.limits) if held and held.limits else None,
-        expanded_uncertainty_dph=_expanded(built.evaluation),
-        date=_day_of(
-            built.model.meta, [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
-        ),
+        expanded_uncertainty_dph=coverage_factor(known.freedom) * known.standard if known else None,
+        date=_day_of(built.model.meta, days),
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
@@ -281,12 +275,6 @@ def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]])
         return facts
     named = (f for f in built.evaluation.findings if f.id == "run_outlier")
     return facts.model_copy(update={"own": (*found_events(dataset), *named)})
-
-
-def _expanded(evaluation: Evaluation) -> float | None:
-    """Uncertainty of the RMS as the page of the unit states it, deg/h."""
-    known = (evaluation.uncertainty or {}).get("rms_dph")
-    return coverage_factor(known.freedom) * known.standard if known else None
 
 
 def _day_of(meta: Mapping[str, Any], days: Sequence[str]) -> str | None:

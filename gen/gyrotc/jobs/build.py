@@ -430,7 +430,18 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
     total = Pooled.of([means for parts in judged.values() for means in parts])
     return Method(
         id=method,
-        groups=tuple(_group(name, Pooled.of(parts)) for name, parts in judged.items()),
+        groups=tuple(
+            Group(
+                environment=name,
+                samples=part.samples,
+                before_rms_dph=part.before.rms_dph,
+                before_std_dph=part.before.std_dph,
+                after_rms_dph=part.after.rms_dph,
+                after_std_dph=part.after.std_dph,
+                improvement=part.improvement,
+            )
+            for name, part in ((name, Pooled.of(parts)) for name, parts in judged.items())
+        ),
         exam_rms_dph=total.after.rms_dph,
         exam_std_dph=total.after.std_dph,
         before_rms_dph=total.before.rms_dph,
@@ -445,15 +456,3 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
 
 def _fit(method: str, data: TrainingData, options: BuildOptions) -> Fit:
     return fit(data, method=method, seed=options.seed, average_s=options.average_s)
-
-
-def _group(environment: str, part: Pooled) -> Group:
-    return Group(
-        environment=environment,
-        samples=part.samples,
-        before_rms_dph=part.before.rms_dph,
-        before_std_dph=part.before.std_dph,
-        after_rms_dph=part.after.rms_dph,
-        after_std_dph=part.after.std_dph,
-        improvement=part.improvement,
-    )

@@ -119,9 +119,11 @@ def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Li
         if not (math.isfinite(stated) and stated >= 0.0):
             raise InputError("--ageing", f"{stated:g}", "deg/h, 0 or more")
         return stated, "as stated"
-    years = _years(earlier.date, started_on(dataset))
-    if years is None:
+    try:
+        then, now = (date.fromisoformat(str(day)[:10]) for day in (earlier.date, started_on(dataset)))
+    except ValueError:
         return 0.0, "none: one of the calibrations has no date, and no --ageing is stated"
+    years = max((now - then).days, 0) / DAYS_A_YEAR
     drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
     if drift is not None:
         return drift * years / math.sqrt(3.0), "the type's largest drift, by the limits file"
@@ -130,14 +132,6 @@ def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Li
         return 0.0, "none: neither --ageing, nor a drift of the type, nor earlier calibrations"
     drift = math.sqrt(math.fsum(d**2 for d in drifts) / len(drifts))
     return drift * years, f"by {len(drifts) + 1} earlier calibrations"
-
-
-def _years(before: str | None, after: str | None) -> float | None:
-    try:
-        days = (date.fromisoformat(str(after)[:10]) - date.fromisoformat(str(before)[:10])).days
-    except ValueError:
-        return None
-    return max(days, 0) / DAYS_A_YEAR
 
 
 Moved = Literal["nothing", "offset", "slope", "shape"]

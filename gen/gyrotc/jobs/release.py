@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from .. import __version__
 from ..assess.budget import AGEING, budget_of
+from ..assess.changes import stated_day
 from ..assess.limits import Limits, held_against, worst_of
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
@@ -274,14 +275,9 @@ def _unit(model: Model, unit: UnitResults | None) -> ReleasedUnit:
         limits=limits.limits if limits else (),
         expanded_dph=budget.expanded_dph if budget else None,
         coverage_factor=budget.coverage_factor if budget else None,
-        calibrated_on=budget.calibrated_on if budget else _day_of(model),
+        calibrated_on=budget.calibrated_on if budget else stated_day(model),
         valid_until=budget.valid_until if budget else None,
     )
-
-
-def _day_of(model: Model) -> str | None:
-    stated = model.meta.get("calibrated_on")
-    return None if stated is None else str(stated)
 
 
 AXES = ("x", "y", "z")

@@ -105,17 +105,13 @@ class Departures:
         if kind == "full":
             return self._regional()
         shapes = list(_lines(self.run))[: 1 if kind == "offset" else None]
-        sizes, sigmas = self._sizes(shapes)
-        best = int(np.argmax(np.abs(sizes[1:]) / sigmas[1:])) + 1 if len(shapes) > 1 else 0
-        parts = [_named(*one) for one in zip(shapes, sizes, sigmas, strict=True)]
-        return _change(shapes[best], float(sizes[best]), float(sigmas[best]), ", ".join(parts))
-
-    def _sizes(self, shapes: list[_Shape]) -> tuple[FloatArray, FloatArray]:
-        """Sizes of shapes that change together, and 1 sigma of each."""
         columns = np.array([s.values for s in shapes]).T
         known = np.linalg.solve(self.covariance, columns)
         covariance = np.linalg.inv(columns.T @ known)
-        return np.asarray(covariance @ (known.T @ self.left)), np.sqrt(np.diag(covariance))
+        sizes, sigmas = covariance @ (known.T @ self.left), np.sqrt(np.diag(covariance))
+        best = int(np.argmax(np.abs(sizes[1:]) / sigmas[1:])) + 1 if len(shapes) > 1 else 0
+        parts = [_named(*one) for one in zip(shapes, sizes, sigmas, strict=True)]
+        return _change(shapes[best], float(sizes[best]), float(sigmas[best]), ", ".join(parts))
 
     def _regional(self) -> MapChange:
         """The single shape that explains most; a region pays for being one of many (a scan: Naus 1965)."""
@@ -193,10 +189,9 @@ def _change(shape: _Shape, size: float, sigma: float, text: str) -> MapChange:
 _SIZES = np.logspace(0.0, 5.0, 21)  # of a change, over 1 sigma of the earlier map: five decades, four to each
 _GRID = (61, 25)  # points of T and of dT/dt over the envelope, as for the distance of two maps
 _RIDGE = 1e-9  # of a line written in the functions: their sines nearly repeat one another inside the envelope
-_STRONG = np.log(
-    20.0
-)  # evidence that is strong (Kass and Raftery 1995), which more than an offset needs: where the run
-# has not been, an offset is the same, and any other change a guess
+# Strong evidence (Kass and Raftery 1995), which more than an offset needs: where the run has not been, an offset is the
+# same, and any other change a guess
+_STRONG = np.log(20.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,10 +300,11 @@ def _changes(prior: MapPrior, run: UnitMeans, where: FloatArray) -> Iterator[tup
     n = len(prior.means[0])
     offset = np.eye(n)[:, :1]
     ends = (run.temperature_c, prior.temperature_c), (run.slope_c_per_min, prior.slope_c_per_min)
-    lines = [
-        prior.unit_dph * _written(where, np.clip(place, *_relative(seen, span)))
-        for place, (seen, span) in zip(_places(), ends, strict=True)
-    ]
+    gram, lines = where.T @ where, []
+    for place, (seen, (low, high)) in zip(_places(), ends, strict=True):
+        a, b = (2.0 * (float(x) - low) / max(high - low, 1e-9) - 1.0 for x in (seen.min(), seen.max()))
+        line = where.T @ np.clip(place, a, b)  # in the functions' own unit
+        lines.append(prior.unit_dph * np.linalg.solve(gram + _RIDGE * np.trace(gram) * np.eye(len(gram)), line))
     process = PRIOR_LOG.copy()
     process[0] = 0.0
     yield "unchanged", np.zeros((n, 1))
@@ -323,25 +319,11 @@ def _places() -> tuple[FloatArray, FloatArray]:
     return t.ravel(), r.ravel()
 
 
-def _relative(seen: FloatArray, span: tuple[float, float]) -> tuple[float, float]:
-    """Where inputs end within a span that goes from -1 to 1."""
-    low, high = span
-    ends = (2.0 * (float(x) - low) / max(high - low, 1e-9) - 1.0 for x in (seen.min(), seen.max()))
-    a, b = ends
-    return a, b
-
-
 def _inputs(prior: MapPrior) -> tuple[FloatArray, FloatArray]:
     """The same in C and C/min."""
     spans = prior.temperature_c, prior.slope_c_per_min
     t, r = (0.5 * (a + b) + 0.5 * (b - a) * x for (a, b), x in zip(spans, _places(), strict=True))
     return t, r
-
-
-def _written(where: FloatArray, line: FloatArray) -> FloatArray:
-    """Coefficients of the functions that give a line over the envelope, in the functions' own unit."""
-    gram = where.T @ where
-    return np.asarray(np.linalg.solve(gram + _RIDGE * np.trace(gram) * np.eye(len(gram)), where.T @ line))
 
 
 def _expanded(gain: FloatArray, scatter: FloatArray) -> float:

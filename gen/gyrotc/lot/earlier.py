@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -82,10 +81,19 @@ class EarlierPrior(MapPrior):
             text = f"The earlier model is not used: a map with it is refused: {map_of_both}."
             finding = {"id": "map_refused", "text": text, "evidence": {"method": "prior"}}
             return Given(None, [finding], prior=use)
-        findings = [_does_not_hold(use)] if use.chosen == "full" else []
-        return Given(
-            map_of_both, findings, f"the earlier model {_MEANS[use.chosen]}", prior=use, known=known_map(posterior)
-        )
+        findings = []
+        if use.chosen == "full":
+            text = (
+                "The earlier model no longer holds: its shape has changed, most by "
+                f"{use.change.text if use.change else ''}. Where the check run has not been the map is uncertain by as "
+                "much as it has changed elsewhere. Record the whole programme again, or look for what happened to the "
+                "unit."
+            )
+            odds = {one.kind: one.log10_odds for one in use.tried}
+            evidence = {"log10_odds": odds, "moved_rms_dph": use.moved.rms_dph, "model": use.model_hash}
+            findings = [{"id": "prior_does_not_hold", "text": text, "evidence": evidence}]
+        because = f"the earlier model {_MEANS[use.chosen]}"
+        return Given(map_of_both, findings, because, prior=use, known=known_map(posterior))
 
 
 def stated_sigma_dph(rows: FloatArray, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
@@ -229,7 +237,15 @@ def _use(
         ageing_dph=prior.ageing_dph,
         ageing_from=prior.ageing_from,
         chosen=chosen.kind,
-        tried=tuple(_tried(one) for one in found),
+        tried=tuple(
+            TriedChange(
+                kind=one.kind,
+                log10_odds=one.log_odds / math.log(10.0),
+                moved_rms_dph=one.moved.rms_dph,
+                expanded_uncertainty_dph=one.moved.expanded_uncertainty_dph or 0.0,
+            )
+            for one in found
+        ),
         moved=chosen.moved,
         accepted=scaling is not None,
         change=departures.change(chosen.kind),
@@ -241,15 +257,6 @@ def _use(
         text="",
     )
     return use.model_copy(update={"text": _text(use)})
-
-
-def _tried(one: Hypothesis) -> TriedChange:
-    return TriedChange(
-        kind=one.kind,
-        log10_odds=one.log_odds / math.log(10.0),
-        moved_rms_dph=one.moved.rms_dph,
-        expanded_uncertainty_dph=one.moved.expanded_uncertainty_dph or 0.0,
-    )
 
 
 def _text(use: EarlierUse) -> str:
@@ -264,18 +271,3 @@ def _text(use: EarlierUse) -> str:
     if not use.accepted:
         return text
     return f"{text}; {use.prior_sigma_dph:.2g} deg/h (1 sigma over the envelope) became {use.sigma_dph:.2g}"
-
-
-def _does_not_hold(use: EarlierUse) -> dict[str, Any]:
-    change = use.change
-    return {
-        "id": "prior_does_not_hold",
-        "text": f"The earlier model no longer holds: its shape has changed, most by {change.text if change else ''}. "
-        "Where the check run has not been the map is uncertain by as much as it has changed elsewhere. Record the "
-        "whole programme again, or look for what happened to the unit.",
-        "evidence": {
-            "log10_odds": {one.kind: one.log10_odds for one in use.tried},
-            "moved_rms_dph": use.moved.rms_dph,
-            "model": use.model_hash,
-        },
-    }

@@ -23,7 +23,7 @@ from ..target.learning import KNOTS
 from ..train.evidence import MEAN_S
 from ..train.result import UnitMeans, means_of
 from .earlier import posterior_of_result
-from .learn import LEAST_UNITS, Envelope, Learned, LotState, folds_of, freedom_of, learn, of_few
+from .learn import LEAST_UNITS, Envelope, Learned, folds_of, freedom_of, learn, of_few
 from .service import Moved, covariance_at, fitted_ageing
 from .use import prior_of, process_result, rounded
 
@@ -57,8 +57,7 @@ def load_lot(path: Path) -> Lot:
 
 def checksum_of(lot: Lot) -> str:
     """SHA-256 of the canonical form without its checksum."""
-    content = {key: value for key, value in lot.content().items() if key != "checksum"}
-    return digest_of(content)
+    return digest_of({key: value for key, value in lot.content().items() if key != "checksum"})
 
 
 def lot_of(
@@ -107,19 +106,16 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
     chosen = [u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None]
     distinct = {u.model.serial: u for u in chosen}
     if len(distinct) < LEAST_UNITS:
-        others = (
-            f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
-            if units
-            else ""
-        )
-        raise InputError(str(fleet), f"{len(distinct)} calibrated units{others}", f"{LEAST_UNITS} at least")
+        others = f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
+        found = f"{len(distinct)} calibrated units{others if units else ''}"
+        raise InputError(str(fleet), found, f"{LEAST_UNITS} at least")
     return [*distinct.values()]
 
 
 def _unit(place: Path) -> _Calibrated:
     check_intact(place, ("training.json", "model.json"), needed=False)
-    where = place / "training.json"
-    training, model = read_result(where, Training), load_model(place / "model.json")
+    where, model = place / "training.json", load_model(place / "model.json")
+    training = read_result(where, Training)
     return _Calibrated(model, training, means_of(training.means, where), where)
 
 
@@ -192,12 +188,15 @@ def lot_from(
         between_dph: Standard deviation of the constant from power-on to power-on, deg/h.
         ageing: Of units that were calibrated twice.
     """
-    state = found.state
+    state, cluster = found.state, iter(found.state.cluster.tolist())
     inside = [u for u, kept in zip(units, found.inside, strict=True) if kept]
     lot = Lot(
         gyrotc_version=__version__,
         axis=axis,
-        units=_named(names, found),
+        units=tuple(
+            LotUnit(serial=serial, model_hash=model_hash, cluster=next(cluster) if kept else None, p_value=float(p))
+            for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
+        ),
         text=_in_words(names, found),
         temperature_c=envelope[0],
         slope_c_per_min=envelope[1],
@@ -205,7 +204,10 @@ def lot_from(
         center_dph=found.center_dph,
         unit_dph=found.unit_dph,
         functions=state.basis.result(),
-        clusters=_clusters(state),
+        clusters=tuple(
+            LotCluster(units=int(n), mean=rounded(m), covariance=tuple(rounded(r[: k + 1]) for k, r in enumerate(c)))
+            for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
+        ),
         directions=tuple(rounded(d) for d in state.directions.T),
         rest=process_result(state.rest),
         of_mean=process_result(state.of_mean),
@@ -223,21 +225,6 @@ def lot_from(
     )
     lot = lot.model_copy(update={"at_rest": _at_rest(lot)} | ({"ageing": ageing} if ageing else {}))
     return lot.model_copy(update={"checksum": checksum_of(lot)})
-
-
-def _clusters(state: LotState) -> tuple[LotCluster, ...]:
-    return tuple(
-        LotCluster(units=int(n), mean=rounded(m), covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(c)))
-        for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
-    )
-
-
-def _named(names: Sequence[tuple[str, str]], found: Learned) -> tuple[LotUnit, ...]:
-    clusters = iter(found.state.cluster.tolist())
-    return tuple(
-        LotUnit(serial=serial, model_hash=model_hash, cluster=next(clusters) if kept else None, p_value=float(p))
-        for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
-    )
 
 
 def _occupancy(units: Sequence[UnitMeans], envelope: Envelope) -> FloatArray:

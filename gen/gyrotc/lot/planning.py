@@ -1,10 +1,8 @@
 """Which run to record next for a unit, and the shortest programme that reaches an accuracy with a lot.
 
-What a programme promises does not depend on what will be measured: the posterior's covariance follows from the
-temperatures alone, and these from the chamber and the thermal network of the simulated instrument.
-
-The posterior's covariance after a run follows from the temperatures alone, so what a run is expected to bring is known
-before it is recorded: the mean of the variance over where corrections are asked for, before less after.
+The posterior's covariance after a run follows from the temperatures alone, and these from the chamber and the thermal
+network of the simulated instrument. So what a run or a programme brings is known before it is recorded: the mean of the
+variance over where corrections are asked for, before less after.
 """
 
 from __future__ import annotations
@@ -75,34 +73,25 @@ def plan_with_lot(lot: Lot, scenario: str | Path, accuracy_dph: float) -> LotPla
     prior = prior_of(lot)
     floor = lot.noise_dph * float(np.sqrt(lot.mean_s / AVERAGE_S))
     ends = extremes_of(plan)
+    alone, wide = LotBasis.over(lot.temperature_c, lot.slope_c_per_min), PRIOR_LOG.copy()
+    wide[0] = CONSTANT  # the process that a unit alone is fitted by, before it has seen anything
+    known = _question(prior, prior.basis, prior.covariances[int(np.argmax(prior.share))])
+    unknown = _question(prior, alone, np.diag(alone.variance(wide)))
     return LotPlan(
         gyrotc_version=__version__,
         lot=lot.checksum,
         scenario=name,
         accuracy_dph=accuracy_dph,
         before_dph=prior.alone().rms_sigma_dph(),
-        with_lot=_searched(plan, ends, _with(prior), accuracy_dph, floor),
-        without=_searched(plan, ends, _without(prior), accuracy_dph, floor),
+        with_lot=_searched(plan, ends, known, accuracy_dph, floor),
+        without=_searched(plan, ends, unknown, accuracy_dph, floor),
     )
 
 
-def _with(prior: LotPrior) -> MapQuestion:
+def _question(prior: LotPrior, basis: LotBasis, covariance: FloatArray) -> MapQuestion:
     lot, asked = prior.lot, prior.asked
-    largest = int(np.argmax(prior.share))
-    values = prior.basis.values(asked.temperature_c, asked.slope_c_per_min)
-    sigma = lot.noise_dph / lot.unit_dph
-    return MapQuestion(prior.basis, prior.covariances[largest], sigma, lot.mean_s, values, asked.share, lot.unit_dph)
-
-
-def _without(prior: LotPrior) -> MapQuestion:
-    """The process that a unit alone is fitted by, before it has seen anything."""
-    lot, asked = prior.lot, prior.asked
-    basis = LotBasis.over(lot.temperature_c, lot.slope_c_per_min)
-    wide = PRIOR_LOG.copy()
-    wide[0] = CONSTANT
     values = basis.values(asked.temperature_c, asked.slope_c_per_min)
-    sigma = lot.noise_dph / lot.unit_dph
-    return MapQuestion(basis, np.diag(basis.variance(wide)), sigma, lot.mean_s, values, asked.share, lot.unit_dph)
+    return MapQuestion(basis, covariance, lot.noise_dph / lot.unit_dph, lot.mean_s, values, asked.share, lot.unit_dph)
 
 
 def _searched(
@@ -187,8 +176,7 @@ def extremes_of(plan: Scenario) -> tuple[float, float]:
         corners(p.steps, p.start_c, 60.0 * (p.record_from_min + p.record_min), plan.chamber.max_c_per_min)[1]
         for p in plan.profile.values()
     ]
-    every = np.concatenate(ends)
-    return float(every.min()), float(every.max())
+    return float(np.concatenate(ends).min()), float(np.concatenate(ends).max())
 
 
 def programme_csv(programme: LotProgramme) -> str:
@@ -279,7 +267,22 @@ def next_run(
     if not found:
         raise InputError("--hours", f"{price.most_h:g}", "time for a ramp at least")
     floor = noise_dph * float(np.sqrt(mean_s / AVERAGE_S))
-    proposals = tuple(_proposed(start, one, before, floor, price) for one in found)
+    shares = [1.0 - (one.sigma_dph / before) ** 2 if before > 0.0 else 0.0 for one in found]
+    proposals = tuple(
+        ProposedRun(
+            programme=LotProgramme(
+                start_c=start,
+                steps=one.steps,
+                hours=one.hours,
+                sigma_dph=one.sigma_dph,
+                rms_over_floor=float(np.sqrt(1.0 + (one.sigma_dph / floor) ** 2)),
+                reached=True,
+            ),
+            removed_share=min(max(of, 0.0), 1.0),
+            price=price.of(one.hours),
+        )
+        for one, of in zip(found, shares, strict=True)
+    )
     worth = [p.removed_share / max(p.price, 1e-12) for p in proposals]
     return NextRun(
         gyrotc_version=__version__,
@@ -317,19 +320,3 @@ def _growing(plan: Scenario, question: MapQuestion, before: float, price: Price)
             return
         kept = sorted(longer, key=lambda f: -(before**2 - f.sigma_dph**2) / price.of(f.hours))[:_KEPT]
         yield kept[0]
-
-
-def _proposed(start_c: float, found: _Found, before: float, floor: float, price: Price) -> ProposedRun:
-    share = 1.0 - (found.sigma_dph / before) ** 2 if before > 0.0 else 0.0
-    return ProposedRun(
-        programme=LotProgramme(
-            start_c=start_c,
-            steps=found.steps,
-            hours=found.hours,
-            sigma_dph=found.sigma_dph,
-            rms_over_floor=float(np.sqrt(1.0 + (found.sigma_dph / floor) ** 2)),
-            reached=True,
-        ),
-        removed_share=min(max(share, 0.0), 1.0),
-        price=price.of(found.hours),
-    )

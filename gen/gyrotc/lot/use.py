@@ -9,7 +9,6 @@ proofs. What the posterior may be wrong by becomes the table's sigma.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -232,15 +231,20 @@ class LotPrior(MapPrior):
         posterior = self.with_runs(unit)
         if posterior.p_value < FALSE_ALARM:
             use = _use(self, posterior, serial, accepted=False, scaling=own)
-            return Given(None, [_unrelated(use)], lot=use)
+            text = (
+                f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
+                "units is refused), so it was calibrated without it, from its own runs alone. Look for what makes it "
+                "differ: another design, another batch of mirrors, the wrong lot, a fault."
+            )
+            evidence = {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum}
+            return Given(None, [{"id": "not_of_its_lot", "text": text, "evidence": evidence}], lot=use)
         found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
         if isinstance(found, str):
             use = _use(self, posterior, serial, accepted=False, scaling=own)
             text = f"The lot is not used: a map with it is refused: {found}."
             return Given(None, [{"id": "map_refused", "text": text, "evidence": {"method": "lot"}}], lot=use)
         use = _use(self, posterior, serial, accepted=True, scaling=found[1])
-        known = known_map(posterior)
-        return Given(found, [], "the unit fits its lot", lot=use, known=known)
+        return Given(found, [], "the unit fits its lot", lot=use, known=known_map(posterior))
 
 
 def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
@@ -437,16 +441,6 @@ def curve_of(alone: MapPosterior, posterior: MapPosterior, scaling: Scaling) -> 
         posterior_dph=rounded(posterior.mean_dph(t, still)),
         posterior_sigma_dph=rounded(np.sqrt(posterior.variance_dph2(t, still))),
     )
-
-
-def _unrelated(use: LotUse) -> dict[str, Any]:
-    return {
-        "id": "not_of_its_lot",
-        "text": f"The unit does not fit its lot (p = {use.p_value:.2g}; one in {1.0 / use.false_alarm:.0f} of its "
-        "units is refused), so it was calibrated without it, from its own runs alone. Look for what makes it differ: "
-        "another design, another batch of mirrors, the wrong lot, a fault.",
-        "evidence": {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum},
-    }
 
 
 def known_map(posterior: MapPosterior) -> KnownMap:

@@ -49,15 +49,10 @@ def with_published(result: Comparison) -> Comparison:
         return result
     methods = []
     for method in result.methods:
-        after = AFTER_DPH.get(method.id, {})
-        groups = tuple(_with_paper(group, after) for group in method.groups)
         seconds = RUNNING_S.get(method.id, {}).values()
-        with_groups = method.model_copy(update={"groups": groups})
-        methods.append(
-            with_groups.model_copy(update={"published_train_s": (min(seconds), max(seconds))})
-            if seconds
-            else with_groups
-        )
+        known: dict[str, Any] = {"groups": tuple(_with_paper(g, AFTER_DPH.get(method.id, {})) for g in method.groups)}
+        known |= {"published_train_s": (min(seconds), max(seconds))} if seconds else {}
+        methods.append(method.model_copy(update=known))
     return result.model_copy(update={"methods": tuple(methods)})
 
 
@@ -201,12 +196,6 @@ def _together(methods: Sequence[Method]) -> Panel:
     default = np.array([m.id == _DEFAULT for m in methods])
     for of, color in ((~default, COVERED), (default, AFTER)):
         panel.bars(excess[of], place[of], color)
-    panel.words(
-        excess,
-        place,
-        [
-            f"{f'{m.centers} centers, ' if m.centers else ''}{m.table_bytes} bytes, trained in {m.train_s:.3f} s"
-            for m in methods
-        ],
-    )
+    costs = [(f"{m.centers} centers, " if m.centers else "") + f"{m.table_bytes} bytes" for m in methods]
+    panel.words(excess, place, [f"{c}, trained in {m.train_s:.3f} s" for c, m in zip(costs, methods, strict=True)])
     return panel

@@ -229,16 +229,7 @@ def write_report(folder: Path, display: str | None = None) -> Path:
     unit = unit_in(folder)
     with displayed(display or unit.display), page_from(folder):
         unit = unit.shown()
-        traced, training = list(_traced(folder, unit)), unit.training
-        pictures = {
-            "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
-            "bias": _bias_over_time(traced),
-            "map": map_with_centers(unit.model),
-            "curve": curve_by_size(training) if training else None,
-            "lot": prior_and_posterior(training) if training else None,
-            "allan": allan_deviation(training.noise) if training else None,
-            "trend": _trend(unit),
-        }
+        pictures = _pictures(folder, unit)
         template = page_environment().get_template("report.html.j2")
         of_file: dict[str, list[LeftOutRows]] = {}
         for stretch in unit.left_out:
@@ -311,6 +302,19 @@ def page_from(source: Path) -> Iterator[None]:
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, jinja2.TemplateError) as error:
         what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise InputError(str(source), f"no page can be made of it ({what})", "results as gyrotc wrote them") from error
+
+
+def _pictures(folder: Path, unit: UnitResults) -> dict[str, Markup | None]:
+    traced, training = list(_traced(folder, unit)), unit.training
+    return {
+        "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
+        "bias": _bias_over_time(traced),
+        "map": map_with_centers(unit.model),
+        "curve": curve_by_size(training) if training else None,
+        "lot": prior_and_posterior(training) if training else None,
+        "allan": allan_deviation(training.noise) if training else None,
+        "trend": _trend(unit),
+    }
 
 
 def thermal_picture(folder: Path, unit: UnitResults) -> Markup | None:
