@@ -161,18 +161,20 @@ class _Search:
         """The bumps of the smallest criterion."""
         x, best, at = np.zeros(0), float(self.y @ self.y), np.zeros(0)
         for number in range(1, _MOST + 1):
-            x, square = self._refined(self._with_next(x))
-            if square + price * number < best:
-                best, at = square + price * number, x
+            x, square = self._apart(*self._refined(self._with_next(x)))
+            count = x.size // 2
+            if square + price * count < best:
+                best, at = square + price * count, x
             elif number > _LEAST and square + price * number > best + _WORSE * price:
                 break
+            if count < number:
+                break
         while x.size > 2:  # what was taken first may be needless beside what came later
-            x, square = self._refined(self._without_least(x))
+            x, square = self._apart(*self._refined(self._without_least(x)))
             if square + price * (x.size // 2) < best:
                 best, at = square + price * (x.size // 2), x
-        centers, log_widths = np.split(at, 2)
+        centers, widths = _places(at)
         heights = self._solved(at)[0]
-        widths = np.exp(log_widths)
         return Bumps(tuple(centers.tolist()), tuple(widths.tolist()), tuple(heights.tolist()), self.range)
 
     def _with_next(self, x: FloatArray) -> FloatArray:
@@ -195,6 +197,17 @@ class _Search:
         loss = heights**2 / np.einsum("ij,ij->i", inverse, inverse)
         return np.delete(x.reshape(2, -1), int(loss.argmin()), axis=1).reshape(-1)
 
+    def _apart(self, x: FloatArray, square: float) -> tuple[FloatArray, float]:
+        """Refined bumps without those that have moved onto others: the heights of two in one place grow without end."""
+        while x.size > 2:
+            columns = self._columns(x)
+            own = np.array([_beside(columns, k) for k in range(columns.shape[1])])
+            energy = np.einsum("ij,ij->j", *[self._raw(*_places(x))] * 2)
+            if (own > _OWN * energy).all():
+                break
+            x, square = self._refined(np.delete(x.reshape(2, -1), int((own / energy).argmin()), axis=1).reshape(-1))
+        return x, square
+
     def _refined(self, x: FloatArray) -> tuple[FloatArray, float]:
         """Places and widths by least squares, and the sum of squares that is left."""
         from scipy.optimize import least_squares
@@ -213,11 +226,22 @@ class _Search:
         return np.asarray(heights, dtype=np.float64), np.asarray(self.y - columns @ heights)
 
     def _columns(self, x: FloatArray) -> FloatArray:
-        centers, log_widths = np.split(x, 2)
-        return self._rest(self._raw(centers, np.exp(log_widths)))
+        return self._rest(self._raw(*_places(x)))
 
     def _raw(self, centers: FloatArray, widths: FloatArray) -> FloatArray:
         return np.asarray(np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * self.root[:, None])
+
+
+def _places(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centers and widths, C."""
+    centers, log_widths = np.split(x, 2)
+    return centers, np.exp(log_widths)
+
+
+def _beside(columns: FloatArray, k: int) -> float:
+    """Energy of a column that is its own beside the others."""
+    q = np.linalg.qr(np.delete(columns, k, axis=1))[0]
+    return float(np.square(columns[:, k] - q @ (q.T @ columns[:, k])).sum())
 
 
 def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatArray:

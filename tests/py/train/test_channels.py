@@ -433,6 +433,15 @@ def test_bumps_have_their_place_and_width_and_mend_what_a_smooth_map_cannot() ->
     assert np.allclose(predict(whole, t, r), predict(finer, t, r) + found(t), atol=1e-9), "one network holds both"
 
 
+def test_bumps_that_move_onto_each_other_become_one() -> None:
+    """Two in one place had heights of 2,387 and -2,387 deg/h, which no table holds; `diagnose` ended with exit 3."""
+    data = samples(np.random.default_rng(1), bumps=False)
+    height, x = 4e-3, (data.temperature_c + 5.0) / 0.9
+    with_dip = data.bias_dph + height * (1.0 - 2.0 * x**2) * np.exp(-(x**2))
+    found = find_bumps(replace(data, bias_dph=with_dip), scaling_of(data))
+    assert found.centers_c and sum(map(abs, found.heights_dph)) < 10.0 * height, found
+
+
 def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
     return found.beside(finer.networks[0], finer.scaling.half_range_c)
 
