@@ -63,6 +63,24 @@ def run_gyrotc(*args: str | Path, cwd: Path | None = None) -> subprocess.Complet
     return subprocess.CompletedProcess(["gyrotc", *words], status, out.getvalue(), err.getvalue())
 
 
+def on_terminal(command: Sequence[str | Path], cwd: Path | None = None, *, progress: bool = True) -> tuple[int, str]:
+    """Exit status of a command on a terminal of 80 columns, and all that it has shown there, colours left out.
+
+    Without `progress` only its stdout is a terminal.
+    """
+    environment = os.environ | {"COLUMNS": "80", "TERM": "xterm"}
+    reader, writer = os.openpty()
+    places: Any = {"stdin": subprocess.DEVNULL, "stdout": writer, "stderr": writer if progress else None}
+    with subprocess.Popen(command, env=environment, cwd=cwd, **places) as process:
+        os.close(writer)
+        shown = b""
+        with contextlib.suppress(OSError):  # Linux says so when the other side has gone
+            while part := os.read(reader, 4096):
+                shown += part
+        os.close(reader)
+    return process.returncode, re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+
+
 def invoked(*args: object) -> Result:
     """The command in this process, which has all modules already."""
     from gyrotc.cli.main import application

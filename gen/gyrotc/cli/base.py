@@ -106,14 +106,8 @@ LOT: Stages = (("smoothness of the maps", 0.2), ("", 0.3), ("every unit left out
 
 _AXIS = re.compile(r"[xyz] \((\d+) of (\d+)\): ")  # of a job that does one axis after the other
 _COUNTED = re.compile(r"(\d+) of (\d+)")
+_FINISHED = re.compile(r"(\d+) of (\d+) gyros done")
 _PERCENT = re.compile(r"(\d+) ?%")
-
-
-def time_left(done: float, total: float, elapsed_s: float) -> str:
-    """Percent, and the time that the rest will take if it goes on like this; empty for the first two seconds."""
-    if elapsed_s < _SILENT_S or done <= 0.0:
-        return ""
-    return f", {int(100 * done / total)} %, about {_words(elapsed_s / done * (total - done))} left"
 
 
 def _words(left_s: float) -> str:
@@ -165,7 +159,9 @@ class StageLine:
 
 
 def _within(text: str) -> float:
-    """The part of a stage that lies before its text: before the third of four it is a half."""
+    """The part of a stage that lies before its text: before the third of four it is a half, after it more."""
+    if finished := _FINISHED.search(text):
+        return int(finished[1]) / max(int(finished[2]), 1)
     if counted := _COUNTED.search(text):
         number, of = int(counted[1]), int(counted[2])
         return (number - 1) / of if 1 <= number <= of else 0.0

@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 import shutil
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
@@ -32,7 +31,6 @@ from .base import (
     lot_in,
     progress,
     tell,
-    time_left,
     write_json,
     written_place,
 )
@@ -213,19 +211,17 @@ def _tell_comparison(summary: FleetSummary) -> None:
 
 
 class _Done:
-    """Tells each gyro as it comes, and how many are left."""
+    """Tells each gyro as it comes, and how many are done of those that had to be."""
 
     def __init__(self, total: int, say: Callable[[str], None]) -> None:
-        self._total, self._say, self._start = total, say, time.monotonic()
-        self._seen, self._done = 0, 0
-        say(f"{total} gyros")
+        self._waiting, self._say, self._done = total, say, 0
+        say(f"0 of {total} gyros done")
 
     def __call__(self, entry: FleetEntry) -> None:
-        self._seen += 1
-        self._done += not entry.kept  # what is kept takes no time
+        self._waiting -= entry.kept  # what is kept takes no time
+        self._done += not entry.kept
         _tell_entry(entry)
-        left = time_left(self._done, self._total - self._seen + self._done, time.monotonic() - self._start)
-        self._say(f"{self._seen} of {self._total} gyros{left}")
+        self._say(f"{self._done} of {self._waiting} gyros done")
 
 
 def _tell_entry(entry: FleetEntry) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 import json
 import os
@@ -19,11 +18,11 @@ from types import SimpleNamespace
 from typing import Any, get_args
 
 import pytest
-from conftest import Command, invoked, quick_and_slow
+from conftest import Command, invoked, on_terminal, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base
 from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, GyroAxis, NoiseLevel, StageLine, folded, time_left
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, GyroAxis, NoiseLevel, StageLine, folded
 from gyrotc.cli.fleet import ExportFormat
 from gyrotc.cli.main import _hoisted, application, run
 from gyrotc.cli.recordings import RunFormat
@@ -68,11 +67,17 @@ def test_every_stage_of_emit_has_a_place(model_dict: dict[str, Any], tmp_path: P
     assert shares == sorted(shares) and len(set(shares)) == len(reported) == len(EMIT)
 
 
-def test_the_time_left() -> None:
-    assert time_left(1, 10, 1.9) == "" and time_left(0, 10, 60.0) == ""
-    assert time_left(5, 20, 30.0) == ", 25 %, about 90 s left"
-    assert time_left(10, 1000, 60.0) == ", 1 %, about 99 min left"
-    assert time_left(1, 1000, 60.0) == ", 0 %, about 16.6 h left"
+def test_the_time_left_of_a_fleet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before: percent and time left stood twice on one line, once of what is done and once of what comes next."""
+    now = 1000.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    course = StageLine()
+    course.say("0 of 20 gyros done")
+    assert course.line(now) == "0 of 20 gyros done" and course.line(now + 9.0) == "0 of 20 gyros done, 9 s"
+    for done, elapsed, left in ((5, 30.0, "90 s"), (10, 1200.0, "20 min"), (20, 9000.0, "0 s")):
+        now = 1000.0 + elapsed
+        course.say(f"{done} of 20 gyros done")
+        assert course.line(now) == f"{done} of 20 gyros done, {5 * done} %, about {left} left"
 
 
 def test_what_a_text_tells_of_the_work_that_is_done() -> None:
@@ -221,17 +226,9 @@ def test_a_terminal_of_80_columns_gets_lines_of_80_columns(tmp_path: Path) -> No
     command = [str(PROGRAM), "check", str(tmp_path / "R")]
     whole = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert max(len(line) for line in whole.splitlines()) > 80
-    environment = os.environ | {"COLUMNS": "80", "TERM": "xterm"}
-    reader, writer = os.openpty()
-    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=writer, env=environment) as process:
-        os.close(writer)
-        reported = b""
-        with contextlib.suppress(OSError):  # Linux says so when the other side has gone
-            while part := os.read(reader, 4096):
-                reported += part
-        os.close(reader)
-    assert process.returncode == 0
-    lines = reported.decode().splitlines()
+    status, reported = on_terminal(command, progress=False)
+    assert status == 0
+    lines = reported.splitlines()
     assert all(len(line) <= 80 for line in lines if len(line.split()) > 1)
     assert "".join("".join(lines).split()) == "".join(whole.split())
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, Command
+from conftest import ROOT, Command, on_terminal
 from gyrotc.fleet import run as running
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import Cluster, run_fleet
@@ -141,6 +141,16 @@ def test_relative_paths_name_the_recordings_of_who_types_them(world: Path, dask:
         model = json.loads((world / "lab" / "fleet" / serial / "model.json").read_text())
         recording = (world / "lab" / "few" / serial / "run-01.csv").read_bytes()
         assert {data["sha256"] for data in model["data"]} == {hashlib.sha256(recording).hexdigest()}
+
+
+def test_a_terminal_shows_how_many_gyros_of_a_cluster_are_done(world: Path, dask: Dask, tmp_path: Path) -> None:
+    command = [BIN / "gyrotc", "fleet", "fleet.toml", "--out", tmp_path / "out", "--scheduler", dask.address]
+    status, shown = on_terminal(command, cwd=world / "lab")
+    assert status == 0, shown
+    assert f"{dask.address}: 2 workers" in shown and "3 of 3 done, 0 failed" in shown
+    lines = [line.strip() for line in re.split(r"[\r\n]", shown) if "gyros done" in line]
+    assert any("0 of 3 gyros done" in line for line in lines), lines
+    assert all(line.count(" %") <= 1 and line.count("left") <= 1 for line in lines), "one estimate"
 
 
 def test_a_worker_that_finds_other_recordings_refuses_them(
