@@ -22,6 +22,7 @@ ROWS = Path("results", "blind.jsonl")
 RELIABILITY = "reliability.svg"
 WORLDS = {"own": ("own world", AFTER), "other": ("other world", BEFORE)}
 _SURE, _LEAST = 0.95, 0.01  # of stated probabilities: where a name is sure, and what is kept
+_STEEP = 1.2  # exponent of a spectrum from which on flicker noise, 1/f, no longer stands for it
 _HEAD = """## Hidden effects: fresh seeds of both worlds (`make blind`)
 
 What is asked of the diagnosis on recordings drawn after it was finished, all seeds of a world together, then each.
@@ -41,12 +42,17 @@ def _stratum(name: str) -> Callable[[Row], bool]:
     return lambda row: bool(row["stratum"] == name)
 
 
+def _steep(row: Row) -> bool:
+    return bool(row["stratum"] == "clean" and row.get("alpha", 0.0) > _STEEP)
+
+
 def _named(row: Row) -> bool:
     return bool(row["named"])
 
 
 _CHECKS: list[Check] = [
     ("a cause or structure claimed, clean", "≤ 2 %", _stratum("clean"), alarmed, 0.02, "max"),
+    ("... of these, in noise steeper than flicker", "≤ 2 %", _steep, alarmed, 0.02, "max"),
     ("a cause named, clean", "≤ 2 %", _stratum("clean"), _named, 0.02, "max"),
     ("foreign given a name", "≤ 10 %", _stratum("foreign"), _named, 0.10, "max"),
     ("family right, k ≥ 2.5", "≥ 95 %", _strong, family_right, 0.95, "min"),
@@ -64,7 +70,11 @@ def kept(world: str, seed: int, row: Row) -> Row:
     out = {
         **{"world": world, "seed": seed, "number": row["number"], "stratum": row["stratum"], "truth": row["truth"]},
         **{"k": k, "verdict": row["verdict"], "named": row["named"], "said": said},
-        **{name: row[name] for name in ("kind", "stress", "noise", "equivalent") if row.get(name)},
+        **{
+            name: row[name]
+            for name in ("kind", "stress", "alpha", "declared", "row_s", "noise", "equivalent")
+            if row.get(name)
+        },
         "gain": {name: shipped[name] for name in gained if name in shipped} if shipped["shipped"] else None,
     }
     return dict(rounded(out, 4))

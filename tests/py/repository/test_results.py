@@ -277,7 +277,7 @@ def _answered(stratum: str, truth: list[str], k: float, named: list[str], p: flo
 def test_what_is_asked_on_fresh_seeds_counts_each_recording_where_it_belongs() -> None:
     rows = [
         _answered("clean", [], 0.0, [], 0.0),
-        _answered("clean", [], 0.0, [], 0.0, verdict="unexplained"),
+        _answered("clean", [], 0.0, [], 0.0, verdict="unexplained", alpha=1.4),
         _answered("foreign", ["foreign"], 3.0, ["hysteresis"], 0.99),
         _answered("one", ["hysteresis"], 2.0, ["warm_up"], 0.7),
         _answered("one", ["hysteresis"], 3.0, ["hysteresis"], 0.99, shipped=1.0, worse=1.0),
@@ -285,6 +285,7 @@ def test_what_is_asked_on_fresh_seeds_counts_each_recording_where_it_belongs() -
     entries = both.table([both.kept("other", 1, row) for row in rows])
     found = {entry["name"]: (entry["hits"], entry["of"], entry["met"]) for entry in entries}
     assert found["a cause or structure claimed, clean"] == (1, 2, False)
+    assert found["... of these, in noise steeper than flicker"] == (1, 1, False)
     assert found["a cause named, clean"] == (0, 2, True)
     assert found["foreign given a name"] == (1, 1, False)
     assert found["family right, k ≥ 2.5"] == (1, 1, True)
