@@ -196,6 +196,9 @@ class Wording:
     advice: str = ""
 
 
+OVERTONES = "overtones"
+"""Beside the parameters of a wave that is no sine: how many overtones its columns have."""
+
 Values = Mapping[str, float]
 
 Kind = Literal["input", "add", "random", "static", "record"]

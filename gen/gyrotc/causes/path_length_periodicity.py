@@ -15,7 +15,21 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..target.recursions import TableKind
-from .base import Cause, Features, History, Parameter, Reach, Scene, SearchRule, Tabled, Telling, Values, Wording, turns
+from .base import (
+    OVERTONES,
+    Cause,
+    Features,
+    History,
+    Parameter,
+    Reach,
+    Scene,
+    SearchRule,
+    Tabled,
+    Telling,
+    Values,
+    Wording,
+    turns,
+)
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
@@ -25,8 +39,9 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
 
 def _features(history: History, values: Values) -> Features:
     angle = 2.0 * math.pi * history.temperature_c / values["period_c"]
-    known = np.ones(len(angle), dtype=bool)
-    return Features(np.column_stack((np.cos(angle), np.sin(angle))), known)
+    numbers = range(1, 2 + int(values.get(OVERTONES, 0)))
+    columns = [wave(number * angle) for number in numbers for wave in (np.cos, np.sin)]
+    return Features(np.column_stack(columns), np.ones(len(angle), dtype=bool))
 
 
 def _amplitudes(weights: FloatArray) -> dict[str, float]:

@@ -102,6 +102,8 @@ def attribute(search: Search) -> Attribution:
         return nothing
     gains = Gains(search)
     singles = list(gains.single())
+    if CATALOGUE[best_of(singles, gains.size).members[0].id].family == "static_map":
+        singles += gains.waves()
     weigher = MarginalLikelihood(gains)
     stage = _stage(search, gains, _single(gains, singles, weigher).members)
     if stage is None:

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ..causes import CATALOGUE
-from ..causes.base import Cause, History, Parameter, Reach, SearchRule, Values
+from ..causes.base import OVERTONES, Cause, History, Parameter, Reach, SearchRule, Values
 from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .blocks import Records, centred_slope
@@ -189,6 +189,11 @@ def searched(cause: str) -> SearchRule:
     search = CATALOGUE[cause].search
     assert search is not None
     return search
+
+
+def price_of(candidate: Candidate) -> int:
+    """Number of its parameters: a sine and a cosine for each overtone of a wave, beside those of its kind."""
+    return searched(candidate.id).price + 2 * int(candidate.values.get(OVERTONES, 0))
 
 
 def shape_parameter(cause: str) -> Parameter | None:

@@ -13,17 +13,18 @@ gains nothing.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
+from ..causes.base import OVERTONES
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, searched
+from .candidates import Candidate, columns_of, price_of, searched
 from .joined import variance_ratio_of
 from .noise import Whitener
 from .search import Search
@@ -58,6 +59,7 @@ class SizeLimit:
         return bool(contribution.std() <= self.spread_dph)
 
 
+_OVERTONES = (1, 2)  # as many as a term of four has room for beside other terms (`refit`)
 _INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
 
 
@@ -70,7 +72,7 @@ class Point:
 
     def criterion(self, size: int) -> float:
         """Gain less the price of the parameters: half the difference of BIC, times two."""
-        return self.gain - sum(searched(m.id).price for m in self.members) * float(np.log(size))
+        return self.gain - sum(map(price_of, self.members)) * float(np.log(size))
 
 
 CauseSet = tuple[Candidate, ...]
@@ -206,6 +208,28 @@ class Gains:
     def added(self) -> Iterator[Point]:
         """Those models of one candidate that leave the map's input as it is."""
         yield from self._on(self.base, ())
+
+    def waves(self) -> Iterator[Point]:
+        """Models of one wave that is no sine: its columns with the first overtones."""
+        left_out = orthonormal(self.beside, self.map)
+        target = self.target - left_out @ (left_out.T @ self.target)
+        for candidate, _ in self.plain:
+            if CATALOGUE[candidate.id].overtone is None:
+                continue
+            for number in _OVERTONES:
+                wave = replace(candidate, values={**candidate.values, OVERTONES: number})
+                columns = columns_of(self.search.records, wave.id, wave.values)
+                white = self.whiten(columns)
+                rest = white - left_out @ (left_out.T @ white)
+                weights = np.linalg.lstsq(rest, target, rcond=_INDEPENDENT)[0]
+                if float(((self.limit.shares(columns) * weights) ** 2).sum()) <= 1.0:
+                    yield Point((wave,), float(target @ (rest @ weights)))
+
+    def white(self, candidate: Candidate) -> FloatArray:
+        """Whitened columns of a candidate that adds some, nothing projected out."""
+        if OVERTONES in candidate.values:
+            return self.whiten(columns_of(self.search.records, candidate.id, candidate.values))
+        return self.whole[:, next(at for c, at in (*self.plain, *self.random) if c == candidate)]
 
     def pairs(self) -> Iterator[Point]:
         """All models of two candidates of which at most one changes the input."""

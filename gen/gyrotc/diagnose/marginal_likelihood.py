@@ -25,7 +25,7 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, diagnosed, searched
+from .candidates import Candidate, diagnosed, price_of
 from .gains import CauseSet, Gains, Point, best_of
 from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
@@ -97,8 +97,8 @@ class MarginalLikelihood:
         if key not in self._done:
             swapped = [m for m in members if m.role == "input"]
             mapped = self._map(swapped[0]) if swapped else self.gains.map
-            added = [self.gains.whole[:, self._where[_name(m)]] for m in members if m.role == "columns"]
-            drawn = [self.gains.whole[:, self._where[_name(m)]] for m in members if m.role == "variance"]
+            added = [self.gains.white(m) for m in members if m.role == "columns"]
+            drawn = [self.gains.white(m) for m in members if m.role == "variance"]
             price = sum(_price(m) for m in members) * float(np.log(self.gains.size))
             own = self._marginal(mapped, added, drawn, left_out)
             self._done[key] = own - self._plain(left_out) - price
@@ -129,10 +129,6 @@ class MarginalLikelihood:
             left_out |= ~self.bank.known[self.bank.inputs.index(member)]
         tried = {key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()}
         return {key: max(found, key=lambda one: one[1]) for key, found in tried.items()}
-
-    @cached_property
-    def _where(self) -> dict[_Name, slice]:
-        return {_name(c): at for c, at in (*self.gains.plain, *self.gains.random)}
 
     def _map(self, candidate: Candidate) -> FloatArray:
         return np.asarray(self.gains.whiten(self.bank.replaced[self.bank.inputs.index(candidate)]))
@@ -192,7 +188,7 @@ def _swaps(near: _Near) -> bool:
 
 def _price(candidate: Candidate) -> int:
     """Parameters that are free: of a cause that changes the input its own alone, for what the map bends is paid for."""
-    return 1 if candidate.role == "input" else searched(candidate.id).price
+    return 1 if candidate.role == "input" else price_of(candidate)
 
 
 def _few(points: Sequence[Point], size: int) -> list[Point]:

@@ -19,7 +19,7 @@ from scipy.special import gammaincc, ndtr
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import main_directions, orthonormal
-from .candidates import searched
+from .candidates import price_of, searched
 from .detection import project
 from .gains import Gains
 from .joined import Held, Projection, ratio_of
@@ -93,7 +93,7 @@ class _NestedModels:
         """Of a set of causes; one with a common variance of many weights is weighed as such."""
         random = [k for k in kept if self.causes[k].candidate.role == "variance"][-1:]
         held = self.held([k for k in kept if k not in random])
-        total = _energy(held, self.y) - self.price * sum(searched(self.causes[k].candidate.id).price for k in kept)
+        total = _energy(held, self.y) - self.price * sum(price_of(self.causes[k].candidate) for k in kept)
         return total + sum(_common(held, self.white[k], self.y) for k in random)
 
     def instead(self, k: int, ids: Sequence[str]) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..causes.base import Cause, History, Scene, Values
+from ..causes.base import OVERTONES, Cause, History, Scene, Values
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average
 from ..recordings.records import Dataset, Run
@@ -95,7 +95,8 @@ class Effect:
     def of(cause: Refined) -> Effect:
         """The effect with the middle of every interval."""
         values = {name: interval.value for name, interval in cause.parameters.items()}
-        return Effect(cause.candidate.id, cause.candidate.values | values, cause.candidate.channel)
+        own = {name: v for name, v in (cause.candidate.values | values).items() if name != OVERTONES}
+        return Effect(cause.candidate.id, own, cause.candidate.channel)
 
     @property
     def term(self) -> Cause:

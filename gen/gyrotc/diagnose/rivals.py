@@ -18,7 +18,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, searched
+from .candidates import Candidate, price_of
 from .gains import Gains, Point
 from .joined import ratio_of
 
@@ -210,31 +210,27 @@ class _Place:
         self.gains = gains
         self.blocks, self.map = [gains.beside], gains.map
         self.price = float(np.log(gains.size))
-        self._where = [*gains.plain, *gains.random]
         for other in others:
             if other.role == "input":
                 self.map = self._input(other)
                 self.blocks += self._edges(other)
             else:
-                self.blocks.append(self._columns(other))
+                self.blocks.append(gains.white(other))
         self.held = orthonormal(*self.blocks, self.map)
 
     def model(self, candidate: Candidate) -> _Model:
         none = np.zeros((self.gains.size, 0))
-        price = self.price * searched(candidate.id).price
+        price = self.price * price_of(candidate)
         if candidate.role == "input":
             blocks = [*self.blocks, *self._edges(candidate)]
             changed = orthonormal(*blocks, self._input(candidate))
             return _Model(none, changed, orthonormal(*blocks, self.map), None, price)
-        columns = self._columns(candidate)
+        columns = self.gains.white(candidate)
         rest = columns - self.held @ (self.held.T @ columns)
         left, size, _ = np.linalg.svd(rest, full_matrices=False)
         own = size**2 > _OWN * np.linalg.norm(columns, axis=0).max() ** 2
         random = candidate.role == "variance" and own.any()
         return _Model(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
-
-    def _columns(self, candidate: Candidate) -> FloatArray:
-        return np.asarray(self.gains.whole[:, next(at for c, at in self._where if c == candidate)])
 
     def _input(self, candidate: Candidate) -> FloatArray:
         bank = self.gains.search.bank

@@ -735,6 +735,26 @@ def recorded(rng: np.random.Generator, wave: object) -> TrainingData:
     return cleaned(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
 
 
+@pytest.mark.parametrize(
+    ("shape", "named"),
+    [
+        (lambda t: airy(t, 4.0), "path_length_periodicity"),
+        (lambda t: np.tanh((t - 3.0) / 1.5) - np.tanh((t - 24.0) / 1.5), "map_too_coarse"),
+    ],
+)
+def test_a_wave_that_is_no_sine_is_told_from_a_finer_map(campaign: Campaign, shape: Any, named: str) -> None:
+    """Of 20 recordings of an etalon's waves 6 were called a map that is too coarse; 2 are, and steps are no wave."""
+    print("seed", SEED_OF_OVERTONES)
+    noise = LEVEL_DPH * np.random.default_rng(SEED_OF_OVERTONES).standard_normal(campaign.records.size)
+    effect = campaign.records.columns(lambda h: shape(h.temperature_c)[:, None])[:, 0]
+    search = campaign.search(1e-4 * campaign.temperature + 6.0 * LEVEL_DPH * effect + noise)
+    found = attribute(search)
+    assert [cause.candidate.id for cause in found.causes] == [named]
+    assert holds(found) and found.left.p_value > 1e-3
+    if named == "path_length_periodicity":
+        assert Effect.of(found.causes[0]).values.keys() == {p.name for p in WAVE.parameters}
+
+
 def test_overtones_have_the_size_and_phase_that_the_wave_has() -> None:
     print("seed", SEED_OF_OVERTONES)
     found = overtones_of(recorded(np.random.default_rng(SEED_OF_OVERTONES), airy), WAVE, {"period_c": PERIOD_C})
