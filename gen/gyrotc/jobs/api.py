@@ -90,13 +90,16 @@ class Dataset(records.Dataset):
             runs |= {exam: runs.pop(exam)}  # the last run is the exam
         stated_units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
         units = {kind: unit for kind, unit in stated_units.items() if unit}
-        chosen = Map.model_validate({"units": units, "columns": _columns(columns or {})} | stated)
+        named = {role: (name,) if role == "time" else name for role, name in (columns or {}).items()}
+        chosen = Map.model_validate({"units": units, "columns": named} | stated)
         with ExitStack() as stack:
             scratch = stack.enter_context(scratch_folder())
             place = Path(folder) if folder is not None else scratch / "data"
             files = [scratch / f"{file_stem(str(name))}.feather" for name in runs]
             for file, frame in zip(files, runs.values(), strict=True):
-                pyarrow.feather.write_feather(_table(frame), file)
+                if type(frame.index).__name__ != "RangeIndex":  # it does not only count: a column
+                    frame = frame.reset_index(names=frame.index.name or "time")  # noqa: PLW2901
+                pyarrow.feather.write_feather(pa.Table.from_pandas(frame, preserve_index=False), file)
             import_files(files, place, chosen, ImportOptions(serial=serial, exam=exam is not None))
             made = load(place, axis=axis)
             weakref.finalize(made, stack.pop_all().close)
@@ -109,17 +112,6 @@ class Dataset(records.Dataset):
         )
         head = "<tr><th>run</th><th>role</th><th>rows</th><th>period, s</th></tr>"
         return f"<table><caption>{escape(self.serial)}</caption>{head}{rows}</table>"
-
-
-def _columns(stated: Mapping[str, str]) -> dict[str, Any]:
-    return {role: (name,) if role == "time" else name for role, name in stated.items()}
-
-
-def _table(frame: Any) -> Any:
-    """Rows of a DataFrame with its index as a column, unless that only counts."""
-    if type(frame.index).__name__ != "RangeIndex":
-        frame = frame.reset_index(names=frame.index.name or "time")
-    return pa.Table.from_pandas(frame, preserve_index=False)
 
 
 def load(folder: _Place, *, axis: str | None = None, trust_units: bool = False) -> Dataset:

@@ -264,7 +264,8 @@ def drawing(
     parts, y = [legend], top
     lefts = [_left(panel, scale, tall[k // columns]) for k, (panel, scale) in enumerate(zip(panels, ys, strict=True))]
     column_left = [8.0 if share_y and column else max(lefts[column::columns], default=0.0) for column in range(columns)]
-    column_right = [max(map(_right, panels[column::columns]), default=0.0) for column in range(columns)]
+    rights = [76.0 if panel.background else 10.0 for panel in panels]
+    column_right = [max(rights[column::columns], default=0.0) for column in range(columns)]
     inner = (width - sum(column_left) - sum(column_right) - _GAP * (columns - 1)) / columns
     for row in range(rows):
         members = range(row * columns, min((row + 1) * columns, len(panels)))
@@ -334,10 +335,6 @@ def _ticks(panel: Panel, scale: AxisScale, axis: str, length: float) -> list[tup
 def _left(panel: Panel, scale: AxisScale, height: float) -> float:
     widest = max((_wide(text) for _, text in _ticks(panel, scale, "y", height)), default=0.0)
     return widest + 10.0 + (_LINE + 2.0 if panel.y else 0.0)
-
-
-def _right(panel: Panel) -> float:
-    return 76.0 if panel.background else 10.0
 
 
 def _foot(panel: Panel, numbered: bool) -> float:

@@ -181,12 +181,8 @@ def _statistics(discrepancies: Sequence[Statistic]) -> Markup:
 def _place(d: ComparedStatistic) -> float:
     """Where the measured value lies in its simulated range: -1 ... 1 inside."""
     half = max(0.5 * (d.simulated_high - d.simulated_low), 1e-300)
-    return _signed_root((d.measured - 0.5 * (d.simulated_high + d.simulated_low)) / half)
-
-
-def _signed_root(x: float) -> float:
-    """The value itself up to 1, its square root beyond."""
-    return float(np.sign(x) * min(abs(x), np.sqrt(abs(x))))
+    x = (d.measured - 0.5 * (d.simulated_high + d.simulated_low)) / half
+    return float(np.sign(x) * min(abs(x), np.sqrt(abs(x))))  # the value itself up to 1, its square root beyond
 
 
 def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
@@ -203,11 +199,7 @@ def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
             _binned(over_t, t[mask], residual[mask], line[mask], color, label)
     over_rate = Panel(x="dT/dt, C/min")
     _binned(over_rate, slope, residual, line, BEFORE, "")
-    over_power_on = Panel(y=words)
-    _over_power_on(over_power_on, runs, width)
-    over_date = Panel()
-    _over_date(over_date, runs)
-    panels = [over_t, over_rate, over_power_on, over_date]
+    panels = [over_t, over_rate, _over_power_on(words, runs, width), _over_date(runs)]
     return drawing(panels, columns=2, height=190.0, share_y=True)
 
 
@@ -228,21 +220,21 @@ def _binned(panel: Panel, x: FloatArray, y: FloatArray, term: FloatArray, color:
         panel.line(place, line, color, width=1.4)
 
 
-def _over_power_on(panel: Panel, runs: Sequence[RunSeries], width: int) -> None:
+def _over_power_on(y: str, runs: Sequence[RunSeries], width: int) -> Panel:
     """Half-hour means of every run, and their mean at equal time since power-on."""
     known = [(np.array(run.on_h), np.array(run.residual_dph)) for run in runs if run.on_h is not None]
-    panel.x = "h since power-on" if known else "power-on is not known"
+    panel = Panel(x="h since power-on" if known else "power-on is not known", y=y)
     for hours, residual in known:
         panel.line(hours, running_mean(residual, width), COVERED, width=0.8)
     if known:
         at, value = (np.concatenate(parts) for parts in zip(*known, strict=True))
         _binned(panel, at, value, np.zeros_like(at), BEFORE, "")
+    return panel
 
 
-def _over_date(panel: Panel, runs: Sequence[RunSeries]) -> None:
+def _over_date(runs: Sequence[RunSeries]) -> Panel:
     dated = all(run.day is not None for run in runs)
-    panel.x = "day" if dated else "number of the run (not all are dated)"
-    panel.whole_x = True
+    panel = Panel(x="day" if dated else "number of the run (not all are dated)", whole_x=True)
     parts = [np.array(run.residual_dph) for run in runs]
     day = [run.day if dated and run.day is not None else float(k) for k, run in enumerate(runs)]
     mean = np.array([part.mean() for part in parts])
@@ -250,6 +242,7 @@ def _over_date(panel: Panel, runs: Sequence[RunSeries]) -> None:
     panel.horizontal(0.0)
     panel.errors(day, mean - error, mean + error, BEFORE)
     panel.dots(day, mean, BEFORE, size=7.0)
+    return panel
 
 
 def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:

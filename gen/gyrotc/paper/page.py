@@ -69,9 +69,10 @@ def parts(record: Mapping[str, Any], bench: Sequence[Mapping[str, Any]]) -> dict
         bench: Whole methods on one gyro of scenario `paper`, as `make bench` leaves them; empty: not measured.
     """
     gyros: Gyros = record["gyros"]
-    first = {noise: next(iter(of.values())) for noise, of in gyros.items()}
+    first, made = {noise: next(iter(of.values())) for noise, of in gyros.items()}, record["made_with"]
     return {
-        "made": _made(record["made_with"]),
+        "made": f"Made with numpy {made['numpy']} and scipy {made['scipy']}, the core compiled by {made['compiler']}, "
+        f"on {made['machine']}.",
         "table-1": _table_1(first["paper"], published=True),
         "table-1-class": _table_1(first["class"], published=False),
         "gyros": _gyros_table(gyros),
@@ -85,13 +86,6 @@ def parts(record: Mapping[str, Any], bench: Sequence[Mapping[str, Any]]) -> dict
 def _markdown(head: _Row, rows: Sequence[_Row]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _made(made: Mapping[str, str]) -> str:
-    return (
-        f"Made with numpy {made['numpy']} and scipy {made['scipy']}, the core compiled by {made['compiler']}, "
-        f"on {made['machine']}."
-    )
 
 
 def _table_1(figures: Figures, *, published: bool) -> str:
@@ -111,15 +105,13 @@ def _table_1(figures: Figures, *, published: bool) -> str:
         if method in theirs:
             rows.append(["*paper*", *(f"*{1e3 * theirs[method][name]:.3f}*" for name in ENVIRONMENTS)])
     for method in _MAIN:
-        of = after[method]
-        gains = (f"{before[name]['rms_dph'] / of[name]['rms_dph']:.1f}" for name in ENVIRONMENTS)
+        gains = (f"{before[name]['rms_dph'] / after[method][name]['rms_dph']:.1f}" for name in ENVIRONMENTS)
         rows.append([f"improvement, {METHODS[method]}", *gains])
         if method in theirs:
             gains = (f"*{BEFORE_DPH[name] / theirs[method][name]:.1f}*" for name in ENVIRONMENTS)
             rows.append(["*paper*", *gains])
     for method in _MAIN:
-        of = after[method]
-        gains = (f"{before[name]['std_dph'] / of[name]['std_dph']:.2f}" for name in ENVIRONMENTS)
+        gains = (f"{before[name]['std_dph'] / after[method][name]['std_dph']:.2f}" for name in ENVIRONMENTS)
         rows.append([f"improvement of σ, {METHODS[method]}", *gains])
     for method, label in METHODS.items():
         centers = [after[method][name]["centers"] for name in ENVIRONMENTS]
@@ -306,11 +298,8 @@ def keep(docs: Path, name: str, record: Any) -> None:
     before = json.loads(path.read_text("utf-8")) if path.exists() else {}
     path.parent.mkdir(parents=True, exist_ok=True)
     whole = dict(sorted({**before, name: record}.items()))
-    write_atomically(path, "{\n" + ",\n".join(_campaign(*one) for one in whole.items()) + "\n}\n")
-
-
-def _campaign(name: str, record: Any) -> str:
-    return "\n".join(_lines(record, " ", f"{json.dumps(name)}: "))
+    entries = ("\n".join(_lines(one, " ", f"{json.dumps(title)}: ")) for title, one in whole.items())
+    write_atomically(path, "{\n" + ",\n".join(entries) + "\n}\n")
 
 
 def shortened(record: Any, section: Callable[[Any], str]) -> Any:

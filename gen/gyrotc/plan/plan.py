@@ -20,7 +20,6 @@ from ..common.errors import InputError
 from ..common.statistics import orthonormal
 from ..diagnose.blocks import Record
 from ..diagnose.candidates import searched
-from ..diagnose.detection import CauseLimit
 from ..diagnose.gains import Gains
 from ..results.recordings import (
     Accuracy,
@@ -68,21 +67,17 @@ def shortest(sensitivity: Sensitivity, required: Mapping[str, float]) -> Shortes
         best = max(range(len(hours)), key=lambda k: ((now - after[k]) / hours[k], -chosen.count(k)))
         chosen.append(best)
         now = after[best]
-    if now > 0.0:
-        reached = _values(sensitivity, chosen, required)
-        return Shortest(required=dict(required), runs=None, hours=None, reached=reached)
-    for k in sorted(chosen, key=lambda k: -hours[k]):
+    for k in sorted(chosen, key=lambda k: -hours[k]) if now <= 0.0 else ():
         rest = [*chosen]
         rest.remove(k)
         if _distance(sensitivity, rest, required) == 0.0:  # what a later run has made needless
             chosen = rest
-    reached = _values(sensitivity, chosen, required)
     names = [run.name for run in sensitivity.programme.records.runs]
     return Shortest(
         required=dict(required),
-        runs=tuple(names[k] for k in chosen),
-        hours=sum(hours[k] for k in chosen),
-        reached=reached,
+        runs=None if now > 0.0 else tuple(names[k] for k in chosen),
+        hours=None if now > 0.0 else sum(hours[k] for k in chosen),
+        reached=_values(sensitivity, chosen, required),
     )
 
 
@@ -202,7 +197,14 @@ def plan(
             PlannedRun(profile=run.name, hours=h, temperature=_temperature(run))
             for run, h in zip(programme.records.runs, programme.hours, strict=True)
         ),
-        limits=_limits(sensitivity),
+        limits=tuple(
+            PlanLimit(
+                id=id,
+                family=CATALOGUE[id].family,
+                detection_limit=DetectionLimit(value=one.value, unit=one.unit, parameter=one.parameter, over=one.at),
+            )
+            for id, one in sensitivity.limits().items()
+        ),
         not_testable=dict(sensitivity.bank.untestable),
         separability=tuple(Separability.of_object(row) for row in rows),
         hard_to_separate=_hard(rows),
@@ -219,16 +221,6 @@ def _temperature(run: Record) -> Temperature:
     return Temperature(
         time_h=tuple(round(float(t) / 3600.0, 4) for t in run.history.time_s[::step]),
         value_c=tuple(round(float(c), 2) for c in run.history.temperature_c[::step]),
-    )
-
-
-def _limits(sensitivity: Sensitivity) -> tuple[PlanLimit, ...]:
-    def shown(limit: CauseLimit) -> DetectionLimit:
-        return DetectionLimit(value=limit.value, unit=limit.unit, parameter=limit.parameter, over=limit.at)
-
-    found = sensitivity.limits()
-    return tuple(
-        PlanLimit(id=id, family=CATALOGUE[id].family, detection_limit=shown(limit)) for id, limit in found.items()
     )
 
 

@@ -24,7 +24,7 @@ from ..diagnose.blocks import Record, Records, block_length, singled_out
 from ..diagnose.candidates import Candidate, columns_of, planned, searched, shape_parameter
 from ..diagnose.detection import CauseLimit, amplitude_energy, limit_of
 from ..diagnose.gains import Gains
-from ..diagnose.noise import COLOURS, Colour, Declared, Whitener
+from ..diagnose.noise import COLOURS, Declared, Whitener
 from ..diagnose.search import Search, open_search
 from ..diagnose.signature_bank import SignatureBank, bank_of
 from ..simulate.campaign import Noise, campaign, with_noise
@@ -178,7 +178,14 @@ class Sensitivity:
         records = programme.records
         colour = programme.declared.colour(records.block_s)
         self.sigma = float(np.sqrt(colour.white))
-        relative = _scaled(colour, 1.0 / colour.white)
+        factor = 1.0 / colour.white
+        relative = replace(
+            colour,
+            white=colour.white * factor,
+            slow=colour.slow * factor,
+            walk=colour.walk * factor,
+            quantum=colour.quantum * factor,
+        )
         self.bank: SignatureBank = bank_of(records, 0)
         search = open_search(records, self.bank, records.target(), declared=relative, colours=(len(COLOURS),))
         self.search = replace(search, views={search.best: replace(search.likeliest, scale=self.sigma)})
@@ -215,16 +222,6 @@ class Sensitivity:
         prior = y.size * float(np.var(y)) / m
         spread = np.linalg.inv(self.grams[list(runs)].sum(axis=0)[:m, :m] + np.eye(m) / prior)
         return float(np.sqrt(np.trace(spread) / y.size))
-
-
-def _scaled(colour: Colour, factor: float) -> Colour:
-    return Colour(
-        white=colour.white * factor,
-        slow=colour.slow * factor,
-        tau_s=colour.tau_s,
-        walk=colour.walk * factor,
-        quantum=colour.quantum * factor,
-    )
 
 
 def _columns(search: Search) -> tuple[list[Candidate], FloatArray, list[slice]]:

@@ -18,10 +18,6 @@ DiagnosisVerdict = Literal[
 _WHOLE = 0.995  # a share of the removable error that shows as 100 %
 
 
-def _amount(share: float) -> str:
-    return "all" if share >= _WHOLE else f"{share:.0%}"
-
-
 class GainOnUnseen(Part):
     """What causes gain on runs that they were not fitted to."""
 
@@ -58,7 +54,8 @@ class GainOnUnseen(Part):
         if self.shown == "undecided":
             return f"On unseen runs no gain is shown: {rms}."
         share = self.share_of_excess_removed
-        amount = "" if share is None else f", {_amount(share)} of the removable error"
+        whole = share is not None and share >= _WHOLE
+        amount = "" if share is None else f", {'all' if whole else f'{share:.0%}'} of the removable error"
         return f"On unseen runs the extension gains: {rms}{amount}."
 
 
