@@ -136,7 +136,7 @@ def departing(rate: FloatArray, rows_per_block: int) -> BoolArray:
         return wild
     around = max(_AROUND, 2 * -(-_TOGETHER // n) + 1)
     level = _running(_medians(lambda a, b: rate[a:b], whole, n), around)
-    slack = _SLACK * _largest_around(np.abs(np.gradient(level)), around)
+    slack = _SLACK * np.asarray(maximum_filter1d(np.abs(np.gradient(level)), around, mode="nearest"))
     sigma, group = _scale(rate, level, n)
 
     def limit(rows: NDArray[np.int64]) -> FloatArray:
@@ -187,11 +187,6 @@ def _running(values: FloatArray, around: int = _AROUND) -> FloatArray:
         return np.asarray(median_filter(values, around, mode="mirror"))
     windows = sliding_window_view(np.pad(values, around // 2, mode="reflect"), around)
     return middle_of_five(*windows.T)
-
-
-def _largest_around(values: FloatArray, around: int) -> FloatArray:
-    """Largest of each value and those around it."""
-    return np.asarray(maximum_filter1d(values, around, mode="nearest"))
 
 
 def _scale(rate: FloatArray, level: FloatArray, n: int) -> tuple[FloatArray, int]:

@@ -365,13 +365,8 @@ def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problem
     for kind, name in (("time", columns.time), ("temperature", columns.temperature)):
         if name not in names:
             found = f"no column {name} among {_list(names)}"
-            problems.add(
-                InputError(
-                    f"{file}, line 1",
-                    found,
-                    f"the {kind} in {name}, or [columns] {kind} = ... (`gyrotc import` finds it)",
-                )
-            )
+            expected = f"the {kind} in {name}, or [columns] {kind} = ... (`gyrotc import` finds it)"
+            problems.add(InputError(f"{file}, line 1", found, expected))
     axes = {axis: name for name, axis in AXES.items() if name in names and name != columns.rate}
     given = [columns.rate] * (columns.rate in names) + [PULSES] * (PULSES in names)
     given += [", ".join(axes.values())] * bool(axes)

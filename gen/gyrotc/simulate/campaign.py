@@ -148,7 +148,7 @@ class SimulatedGyro:
 
 def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, report: Callable[[float], None]) -> None:
     """Writes recordings and truth of one gyro into a folder that is there."""
-    weight = _pulse_weight(gyro.plan.noise) if form.pulses else None
+    weight = (gyro.plan.noise.quantum_arcsec / _PULSES_PER_QUANTUM or _DEFAULT_PULSE_ARCSEC) if form.pulses else None
     runs = _planned(gyro.plan)
     truths = []
     (folder / "truth").mkdir()
@@ -196,11 +196,6 @@ def with_noise(plan: Scenario, noise: Noise) -> Scenario:
         raise InputError("noise", str(noise), ", ".join(NOISE))
     own = {key: getattr(plan.noise, key) for key in plan.noise.model_fields_set}
     return plan.model_copy(update={"noise": NOISE[noise].model_copy(update=own)})
-
-
-def _pulse_weight(levels: NoiseLevels) -> float:
-    """A readout whose rounding adds little to the noise that was asked for, arcsec."""
-    return levels.quantum_arcsec / _PULSES_PER_QUANTUM or _DEFAULT_PULSE_ARCSEC
 
 
 def _planned(plan: Scenario) -> list[dict[str, Any]]:

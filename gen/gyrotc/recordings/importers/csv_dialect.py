@@ -189,14 +189,12 @@ def _is_units(cells: Sequence[str]) -> bool:
     and one of them is of time, temperature or rate.
     """
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
-    known = sum(kind_of(word) is not None or _in_brackets(cells, word) for word in words)
+    known = sum(
+        kind_of(word) is not None or any(cell.strip()[:1] in "[(" and word in cell for cell in cells if cell.strip())
+        for word in words
+    )
     of_kinds = sum(kind_of(word) is not None for word in words)
     return bool(words) and of_kinds > 0 and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
-
-
-def _in_brackets(cells: Sequence[str], word: str) -> bool:
-    """Whether a word stands in brackets of its own."""
-    return any(cell.strip()[:1] in "[(" and word in cell for cell in cells if cell.strip())
 
 
 def _with_group(groups: Sequence[str], names: Sequence[str]) -> list[str]:
@@ -295,7 +293,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     kept = _kept(name, lines, comment)
     delimiter, decimal = _separators(name, [line for _, line in kept], given)
     split = [(k, cells_of(line, delimiter)) for k, line in kept]
-    count = _usual_count(split)
+    count = Counter((len(cells) for _, cells in _last(split))).most_common(1)[0][0]
     first = _first_row(name, split, count, decimal, int(given.get("header_line") or 0))
     above = [(k, cells) for k, cells in split if k < split[first][0]]
     above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
@@ -425,10 +423,6 @@ def _instead(name: str, line: str) -> str:
 def _last(lines: Sequence[T]) -> Sequence[T]:
     """The last lines: rows, however many lines stand above them in a short file."""
     return lines[-min(_LAST, max(len(lines) // 4, _FEWEST)) :]
-
-
-def _usual_count(split: Sequence[tuple[int, list[str]]]) -> int:
-    return Counter(len(cells) for _, cells in _last(split)).most_common(1)[0][0]
 
 
 def _first_row(name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int) -> int:

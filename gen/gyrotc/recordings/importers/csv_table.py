@@ -102,7 +102,11 @@ class CsvTable(LoggerTable):
     def _is_header(self, text: str) -> bool:
         cells = cells_of(text, self.dialect.delimiter)
         names = [name for name in self.dialect.names if name]
-        return bool(self.dialect.header_line) and [c for c in cells if c] == names and not _numeric(names)
+        return (
+            bool(self.dialect.header_line)
+            and [c for c in cells if c] == names
+            and not all(_NUMBER.fullmatch(name) for name in names)
+        )
 
     def _rows(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any] | None:
         plain = self._without_comments(lines)
@@ -240,10 +244,6 @@ def _unique(names: Sequence[str]) -> list[str]:
         seen.add(one)
         result.append(one)
     return result
-
-
-def _numeric(names: Sequence[str]) -> bool:
-    return all(_NUMBER.fullmatch(name) for name in names)
 
 
 def _beginning(row: Sequence[str]) -> str:
