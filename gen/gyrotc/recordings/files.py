@@ -29,7 +29,7 @@ from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from .description import Fault
 
-_BLOCK_BYTES = 2**22  # of a read: bounds memory
+_BLOCK_BYTES = 2**21  # of a read: bounds memory; a table's whole lines are parsed at once
 _KEPT_BYTES = 2**25  # of columns in memory: forty runs of the paper's size
 
 
@@ -164,7 +164,6 @@ class Source(ABC):
         return digest.hexdigest()
 
 
-_BLOCK_BYTES = 2**21  # of a read: bounds memory; its whole lines are parsed at once
 _LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
 _COPIES = 2.0  # of the columns while they are checked
 _IMPORT = "`gyrotc import` reads other forms"

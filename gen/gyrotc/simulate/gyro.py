@@ -142,7 +142,7 @@ def channel_readings(channel: Channel, true: FloatArray, rng: np.random.Generato
     return np.asarray(true + rng.normal(0.0, channel.noise, len(true)))
 
 
-_REFERENCE_C = 20.0  # at which the parameters of a scenario hold
+_REFERENCE_C = 20.0  # room temperature, at which the parameters of a scenario hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +309,6 @@ def internal_readings(
 
 CELL_S = 1.0  # s: noise is drawn once a second and bridged between (docs/simulation.md)
 _SPREAD = 10.0**0.5  # ratio of neighbouring correlation times in the flicker noise
-_REFERENCE_C = 20.0  # room temperature, at which data sheets state a noise
 
 
 @dataclass(frozen=True, slots=True)
