@@ -353,7 +353,7 @@ def _own(entries: Sequence[FleetEntry], ids: Sequence[str]) -> Iterator[Reason]:
 
 def _late(kind: _Kind) -> Iterator[Reason]:
     """The programme is the same for all: a thermometer with a bad contact follows it later."""
-    found = np.array([_lateness(kind.facts, k) for k in range(len(kind.facts))])
+    found = _lateness(kind.facts)
     usual, scatter = _usual(found) if np.isfinite(found).any() else (0.0, 0.0)
     for entry, late in zip(kind.entries, found, strict=True):
         if abs(late - usual) > max(_FAR * scatter, _LEAST_LATE_S):
@@ -362,21 +362,23 @@ def _late(kind: _Kind) -> Iterator[Reason]:
             yield _reason(entry, "thermometer_late", text)
 
 
-def _lateness(facts: Sequence[Facts], number: int) -> float:
-    """By how much a gyro's temperatures follow the median of all, s: median over runs; NaN where nothing changes."""
-    late = []
-    for k, run in enumerate(facts[number].runs):
-        others = [f.runs[k].profile_c for f in facts if k < len(f.runs)]
-        length = min(len(profile) for profile in others)
+def _lateness(facts: Sequence[Facts]) -> FloatArray:
+    """By how much each gyro's temperatures follow the median of all, s: median over runs; NaN where nothing changes."""
+    late: list[list[float]] = [[] for _ in facts]
+    for k in range(max(len(f.runs) for f in facts)):
+        profiles = [(n, f.runs[k].profile_c) for n, f in enumerate(facts) if k < len(f.runs)]
+        length = min(len(profile) for _, profile in profiles)
         if length < _LEAST_PROFILE:
             continue
-        usual = np.median([profile[:length] for profile in others], axis=0)
+        usual = np.median([profile[:length] for _, profile in profiles], axis=0)
+        if float(np.ptp(usual)) <= _LEAST_SHIFT_C:
+            continue
         change = np.gradient(usual) / PROFILE_S
-        difference = np.array(run.profile_c[:length]) - usual
-        lag = lag_of(change, difference)
-        if lag is not None and float(np.ptp(usual)) > _LEAST_SHIFT_C:
-            late.append(-lag[0])
-    return float(np.median(late)) if late else float("nan")
+        for n, profile in profiles:
+            lag = lag_of(change, np.array(profile[:length]) - usual)
+            if lag is not None:
+                late[n].append(-lag[0])
+    return np.array([float(np.median(of_gyro)) if of_gyro else float("nan") for of_gyro in late])
 
 
 def _warm_up(kind: _Kind) -> Iterator[Reason]:
