@@ -332,9 +332,14 @@ def _report(result: Path, folder: Path, name: str) -> Callable[[bytes], None]:
 
 def _series(seeds: Path, folder: Path) -> Callable[[bytes], None]:
     """The page of a diagnosis whose series are damaged."""
-    (folder / "drawn").mkdir(exist_ok=True)
-    shutil.copy(seeds / "diagnose.json", folder / "drawn" / "diagnose.json")
-    return _page(folder / "drawn", "series.json", write_diagnosis_page)
+
+    def read(data: bytes) -> None:
+        work = _fresh(folder, "drawn")
+        shutil.copy(seeds / "diagnose.json", work / "diagnose.json")
+        (work / "series.json").write_bytes(data)
+        write_diagnosis_page(work)
+
+    return read
 
 
 def _page(folder: Path, name: str, write: Callable[[Path], Any]) -> Callable[[bytes], None]:
