@@ -350,7 +350,7 @@ def figure_uncertainties(
     after = np.concatenate([a.after_dph for a in judged]) if judged else np.zeros(0)
     if after.size > 1:
         # Of the largest magnitude of n normal numbers: pi/sqrt(6) times Gumbel's scale sigma/sqrt(2 ln 2n)
-        largest = float(float(after.std()) * np.pi / np.sqrt(6.0) / np.sqrt(2.0 * np.log(2.0 * after.size)))
+        largest = float(after.std() * np.pi / np.sqrt(6.0) / np.sqrt(2.0 * np.log(2.0 * after.size)))
         method = f"extreme-value distribution of {after.size} means"
         found["max_abs_dph"] = FigureUncertainty(standard=largest, freedom=None, method=method)
     if scale != 1.0:

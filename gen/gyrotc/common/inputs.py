@@ -318,8 +318,8 @@ def _look_through(content: Any, where: str, *, finite: bool = False) -> None:
                     _look_at(key, where)
                     below.append(inner)
             elif isinstance(value, list):
-                if set(map(type, value)) != {float} or not all(map(math.isfinite, value)):
-                    below.extend(value)
+                numbers = set(map(type, value)) == {float} and all(map(math.isfinite, value))
+                below.extend(value[:1] if numbers else value)  # one of them says how deep they are
             else:
                 _look_at(value, where)
         levels = below

@@ -94,8 +94,7 @@ def quantile_of_parts(parts: Parts, share: float) -> float:
         fraction, at = math.modf((count - 1) * share)
         return int(at), min(int(at) + 1, count - 1)
 
-    low, high = _middle(parts, ranks)
-    return low + (high - low) * fraction if fraction < 0.5 else high - (high - low) * (1.0 - fraction)
+    return float(np.quantile(_middle(parts, ranks), fraction))
 
 
 def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:

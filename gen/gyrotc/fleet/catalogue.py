@@ -116,9 +116,8 @@ def enter(out: Path, entries: Sequence[FleetEntry], tag: str = "") -> int:
             known.setdefault(tuple(inputs), set()).add(model_hash)
         added = 0
         with base:  # one transaction
-            for (
-                one
-            ) in made:  # what came of it is not in the catalogue: no model of the same inputs, or none but failures
+            for one in made:
+                # What came of it is not in the catalogue: no model of the same inputs, or none but failures
                 of_inputs = known.get((one.serial or "", one.axis or "", one.key or ""), set())
                 if not of_inputs or (one.model_hash is not None and of_inputs == {None}):
                     released = f"{tag}; released: {one.released}".removeprefix("; ")

@@ -200,9 +200,9 @@ class _Search:
     def _apart(self, x: FloatArray, square: float) -> tuple[FloatArray, float]:
         """Refined bumps without those that have moved onto others: the heights of two in one place grow without end."""
         while x.size > 2:
-            columns = self._columns(x)
+            raw = self._raw(*_places(x))
+            columns, energy = self._rest(raw), np.einsum("ij,ij->j", raw, raw)
             own = np.array([_beside(columns, k) for k in range(columns.shape[1])])
-            energy = np.einsum("ij,ij->j", *[self._raw(*_places(x))] * 2)
             if (own > _OWN * energy).all():
                 break
             x, square = self._refined(np.delete(x.reshape(2, -1), int((own / energy).argmin()), axis=1).reshape(-1))

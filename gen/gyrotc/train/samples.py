@@ -174,7 +174,7 @@ def _time_of(samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.fl
     if len(time_s) == 0:
         return np.empty(0)
     after = np.minimum(stream.first_rows(samples), len(time_s) - 1)
-    after = after[np.diff(after, prepend=-1) > 0]
+    after = after[np.diff(after, prepend=-1) > 0]  # both are sorted: without repetitions in one pass
     near = np.stack([np.maximum(after - 1, 0), after], axis=1).reshape(-1)
     near = near[np.diff(near, prepend=-1) > 0]
     return np.asarray(np.interp(samples, stream.samples_of(near), time_s[near]))

@@ -115,6 +115,14 @@ def test_hostile_json(case: str) -> None:
     assert reported in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
 
 
+@pytest.mark.parametrize("number", ["1", "1.5", "1.5, 2.5"])
+def test_the_deepest_json_is_the_same_for_every_number(number: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GYROTC_MAX", "nesting=4")
+    assert parse_json(("[" * 5 + number + "]" * 5).encode(), "a.json", "a file")
+    text = "[" * 6 + number + "]" * 6
+    assert "nested too deep" in refused(lambda: parse_json(text.encode(), "a.json", "a file"))
+
+
 def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     """150 million rows lie in a file of 1 MB; here a twentieth of that, as its metadata alone say."""
     folder = tmp_path / "RLG-1"
