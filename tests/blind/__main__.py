@@ -20,7 +20,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from . import page
 from .both import WORLDS, kept, tables, write_both
 from .grade import Row
 from .other import run as other
@@ -98,16 +97,14 @@ def main() -> None:
     tasks = [(seed, world) for seed in seeds for world in worlds]
     with ThreadPoolExecutor(given.workers) as pool:
         found = list(pool.map(one, tasks))
-    rows = [kept(world, seed, row) for (seed, world), of in zip(tasks, found, strict=True) for row in of]
-    if given.docs is not None:
-        heads = [head_of(given.folder / _FOLDERS[world], seed, given.records) for seed, world in tasks]
-        if given.world is None:
-            write_both(given.docs, {"seeds": seeds, **{name: heads[0][name] for name in ("commit", "code")}}, rows)
-        for (_, world), head, of in zip(tasks, heads, found, strict=True):
-            (page if world == "own" else other).write_page(given.docs, head, of)
+    rows = [(world, seed, row) for (seed, world), of in zip(tasks, found, strict=True) for row in of]
+    if given.docs is not None and given.world is None:
+        head = head_of(given.folder / _FOLDERS["own"], seeds[0], given.records)
+        write_both(given.docs, {"seeds": seeds, **{name: head[name] for name in ("commit", "code")}}, rows)
+    short = [kept(*row) for row in rows]
     missed = 0
     for world in worlds:
-        entries = tables(rows)[world]["all"]
+        entries = tables(short)[world]["all"]
         print(f"\n{WORLDS[world][0]}\n\n{markdown(entries)}")
         missed |= ended(entries)
     sys.exit(missed)

@@ -40,8 +40,6 @@ from bench import (  # noqa: E402  # noqa: E402
 from bench import page as bench_page  # noqa: E402
 from tests import events, invariance  # noqa: E402
 from tests.blind import both  # noqa: E402
-from tests.blind import page as blind  # noqa: E402
-from tests.blind.other import run as other  # noqa: E402
 from tests.evidence import run as evidence  # noqa: E402
 from tests.kills import page as kills  # noqa: E402
 from tests.mutants import page as mutants  # noqa: E402
@@ -60,9 +58,7 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "faults": faults.section,
     "faults-learned": faults_learned.section,
     "service": service.section,
-    "blind": blind.section,
-    "blind-both": both.section,
-    "blind-other": other.section,
+    "blind": both.section,
     "events": events.section,
     "evidence": evidence.section,
     "invariance": invariance.section,

@@ -23,8 +23,6 @@ _MANY = ("gen/core", "gen/gyrotc/fleet", "gen/gyrotc/jobs", "gen/gyrotc/recordin
 CODE: dict[str, tuple[str, ...]] = {
     "bench": _TRAIN,
     "blind": _DIAGNOSE,
-    "blind-both": _DIAGNOSE,
-    "blind-other": _DIAGNOSE,
     "bounds": ("gen/gyrotc/tables",),
     "budget": ("gen/gyrotc/assess", *_TRAIN),
     "catalogue": ("gen/gyrotc/fleet/catalogue.py",),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..effects import FAMILY
 from ..grade import Row, alarmed, family_right, in_set, shipped_worse, wrong_family
 from ..table import proportion, reliability, worse_on_the_exam
 from .record import Recording, reported
@@ -93,15 +92,3 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for name, goal, select, hit, bound, kind in _CHECKS:
         out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
     return out + worse_on_the_exam([row for row in rows if row.get("shipped")]) + reliability(rows)
-
-
-def answers(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
-    """For every hidden effect, how often which answer was given."""
-    found: dict[str, dict[str, int]] = {}
-    for row in rows:
-        hidden = row["truth"][0] if row["truth"] else "nothing"
-        answer = " + ".join(row["named"]) or row["verdict"]
-        of = found.setdefault(hidden, {})
-        of[answer] = of.get(answer, 0) + 1
-    order = ["nothing", "foreign", *FAMILY]
-    return {name: dict(sorted(found[name].items(), key=lambda item: -item[1])) for name in order if name in found}

@@ -8,31 +8,15 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ..grade import Row
-from ..page import answer_lines, run_lines, write_section
 from ..run import Tool, rows_of
-from .grade import answers, graded, table
+from .grade import graded
 from .mechanisms import CATALOGUE
 from .record import draw_recording, reported, write
 
 _SHARES = (("clean", 0.45), ("foreign", 0.30), ("one", 0.25))
-_HEAD = """## Hidden effects in a world that is no sibling (`make blind`)
-
-Gyros of another make (tests/blind/other, which imports nothing of gyrotc): heat by finite volumes through case, glass
-and mirror with properties that depend on temperature, a chamber that switches, relays of Preisach, an etalon's waves,
-noise of 1/f^alpha with alpha from 0.5 to 1.5, converters with steps, rows of 1, 10 or 60 s, the noise declared wrong
-in half, parameters that may lie beyond what is searched, and a campaign of temperatures for each recording. Foreign
-effects are drawn from a grammar of operators (integrate, saturate, threshold, delay, relax, multiply); of none of them
-can one cause of the catalogue imitate more than half of the energy beside the map. Up to seed 1636088912 lags and late
-clocks were held to imitate by polynomials of degree 6 and at six shifts, so that maps of a late temperature passed for
-foreign; now they have the same functions as the plain map, at 36 shifts. That map is finer now: what counts for k lies
-beside lines between nodes 4 C apart, before beside a polynomial of degree 9. k = d / 6 as above. Limits: 95 %, by
-recording (Clopper and Pearson). The detector was not tuned on this world.
-"""
 
 
 def orders(records: int) -> list[tuple[str, str]]:
@@ -92,31 +76,3 @@ def _line(row: Row) -> str:
     hidden = f"{row['name'] or row['kind'] or 'nothing'} {row['k']:.2f}"
     found = ", ".join([*row["named"], *row["noise"]]) or "-"
     return f"{row['number']:4d} {row['row_s']:2d} s {row['declared']:5s} {hidden} -> {row['verdict']}: {found}"
-
-
-def write_page(docs: Path, head: dict[str, Any], rows: Sequence[Row]) -> None:
-    """The section of docs/results.md on the other world: every run that was started."""
-    kept = ("kind", "k", "named")
-    mistaken = [row for row in rows if row["stratum"] == "foreign" and row["named"]]
-    foreign = [{name: row[name] for name in kept} for row in mistaken]
-    reported = {"table": table(rows), "answers": answers(rows), "foreign": foreign}
-    write_section(docs, "blind-other", head | {"done": len(rows)}, reported, section)
-
-
-def section(record: dict[str, Any]) -> str:
-    """The section as text."""
-    return "\n".join([_HEAD, *map(_section, record["runs"])])
-
-
-def _section(run: dict[str, Any]) -> str:
-    lines = [*run_lines(run, "Other world"), *answer_lines(run["answers"], "answers")]
-    if named := run["foreign"]:
-        lines += [
-            "",
-            "Foreign kinds that were given a name:",
-            "",
-            "| kind | k | named |",
-            "| --- | --- | --- |",
-        ]
-        lines += [f"| `{one['kind']}` | {one['k']:.1f} | {' + '.join(one['named'])} |" for one in named]
-    return "\n".join([*lines, "", ""])

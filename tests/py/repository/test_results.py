@@ -26,9 +26,7 @@ from bench.page import AIMS  # noqa: E402
 from bench.runtime import CORES, GRIDS, LEVELS, grid_model  # noqa: E402
 from bench.splits import Judged, Split, counts  # noqa: E402
 from tests.blind import both  # noqa: E402
-from tests.blind import page as blind  # noqa: E402
 from tests.blind.grade import shipped_worse  # noqa: E402
-from tests.blind.other import run as other  # noqa: E402
 from tests.blind.table import _gains, ended  # noqa: E402
 from tests.kills.driver import ACTIONS  # noqa: E402
 
@@ -261,7 +259,7 @@ def test_the_diagram_of_reliability_is_of_the_fresh_seeds() -> None:
 
 
 def test_the_table_of_both_worlds_is_that_of_the_recordings_that_are_kept() -> None:
-    kept = recorded(DOCS, "blind-both")
+    kept = recorded(DOCS, "blind")
     rows = [json.loads(line) for line in (DOCS / both.ROWS).read_text("utf-8").splitlines()]
     assert {row["seed"] for row in rows} == set(kept["seeds"])
     assert both.section({**kept, "worlds": both.tables(rows)}) == both.section(kept)
@@ -292,17 +290,6 @@ def test_what_is_asked_on_fresh_seeds_counts_each_recording_where_it_belongs() -
     assert found["a wrong family named"] == (1, 2, False)
     assert found["stated with 95 % or more and true"] == (1, 2, False)
     assert found["shipped although worse on the exam"] == (1, 1, False)
-
-
-@pytest.mark.parametrize(("world", "name"), [(blind, "blind"), (other, "blind-other")])
-def test_a_blind_run_written_again_takes_the_place_of_itself_alone(world: Any, name: str, tmp_path: Path) -> None:
-    runs = recorded(DOCS, name)["runs"]
-    keep(tmp_path / "docs", name, {"runs": runs})
-    blind.write_section(tmp_path / "docs", name, runs[1], {"written": "in another year"}, world.section)
-    again = recorded(tmp_path / "docs", name)["runs"]
-    assert again[1].pop("written") == "in another year"
-    runs[1].pop("written")
-    assert again == runs
 
 
 def test_a_blind_run_fails_by_its_published_requirements(capsys: pytest.CaptureFixture[str]) -> None:
