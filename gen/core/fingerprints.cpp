@@ -96,7 +96,122 @@ std::vector<double> bits_before(const Words &rate) {
     return sum;
 }
 
+// How many bits are set: sums of neighbours, twice as wide each time.
+std::int64_t ones(std::uint64_t word) {
+    word = word - ((word >> 1) & 0x5555555555555555U);
+    word = (word & 0x3333333333333333U) + ((word >> 2) & 0x3333333333333333U);
+    word = (word + (word >> 4)) & 0x0F0F0F0F0F0F0F0FU;
+    return static_cast<std::int64_t>((word * 0x0101010101010101U) >> 56);
+}
+
+// Windows of signs with their numbers, and what two places of the signs have in common.
+class SignWindows {
+  public:
+    struct Window {
+        std::uint64_t number;
+        std::uint32_t at, run;
+    };
+
+    explicit SignWindows(const SignRuns &runs) : runs_(runs) {}
+
+    // Those of one number stand beside each other, in the order of their places.
+    std::vector<Window> with_numbers(const std::vector<std::int64_t> &offsets) const {
+        constexpr std::uint64_t all = (std::uint64_t{1} << kSignsAtOnce) - 1;
+        std::uint64_t chosen[2] = {0, 0};
+        for (const std::int64_t o : offsets)
+            chosen[o / kSignsAtOnce] |= std::uint64_t{1} << (kSignsAtOnce - 1 - o % kSignsAtOnce);
+        std::vector<Window> found;
+        for (std::size_t run = 0; run < runs_.start.size(); ++run) {
+            const std::int64_t end = runs_.start[run] + runs_.count[run] - offsets.back();
+            for (std::int64_t at = runs_.start[run]; at < end; ++at) {
+                const bool first = sign(at);
+                if (sign(at + offsets[1]) == first || sign(at + offsets[2]) != first) continue;
+                const std::uint64_t turned = first ? all : 0;
+                const std::uint64_t low = (from(at) ^ turned) & chosen[0];
+                const std::uint64_t high = (from(at + kSignsAtOnce) ^ turned) & chosen[1];
+                found.push_back({low * kFirst ^ high, static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(run)});
+            }
+        }
+        return by_number(found);
+    }
+
+    // By how much more of so many signs from two places on agree than differ, or the other way round: 0 to 1.
+    double excess(std::int64_t one, std::int64_t other, std::int64_t count) const {
+        std::int64_t differ = 0;
+        for (std::int64_t done = 0; done < count; done += kSignsAtOnce) {
+            const std::uint64_t words = from(one + done) ^ from(other + done);
+            const std::int64_t beyond = std::max(std::int64_t{0}, kSignsAtOnce - (count - done));
+            differ += ones(words >> beyond);
+        }
+        return std::abs(1.0 - 2.0 * static_cast<double>(differ) / static_cast<double>(count));
+    }
+
+  private:
+    bool sign(std::int64_t at) const { return (runs_.packed[static_cast<std::size_t>(at >> 3)] >> (7 - (at & 7))) & 1; }
+
+    // The signs from a place on, the first one in the highest of kSignsAtOnce bits.
+    std::uint64_t from(std::int64_t at) const {
+        const std::uint8_t *bytes = runs_.packed.data() + (at >> 3);
+        const auto byte = [bytes](int k) { return std::uint64_t{bytes[k]} << (56 - 8 * k); };
+        const std::uint64_t word = byte(0) | byte(1) | byte(2) | byte(3) | byte(4) | byte(5) | byte(6) | byte(7);
+        return (word << (at & 7)) >> (64 - kSignsAtOnce);
+    }
+
+    // Sorted by number and place: distributed by some bits first, for comparing all of them takes longer.
+    static std::vector<Window> by_number(const std::vector<Window> &windows) {
+        int bits = 1;
+        while (bits < 24 && (windows.size() >> bits) > 1) ++bits;
+        const auto bucket = [bits](const Window &w) { return static_cast<std::size_t>(mixed(w.number) >> (64 - bits)); };
+        std::vector<std::uint32_t> next((std::size_t{1} << bits) + 1, 0);
+        for (const Window &w : windows) ++next[bucket(w) + 1];
+        for (std::size_t k = 1; k < next.size(); ++k) next[k] += next[k - 1];
+        const std::vector<std::uint32_t> first = next;
+        std::vector<Window> sorted(windows.size());
+        for (const Window &w : windows) sorted[next[bucket(w)]++] = w;
+        const auto before = [](const Window &a, const Window &b) {
+            return a.number != b.number ? a.number < b.number : a.at < b.at;
+        };
+        for (std::size_t k = 0; k + 1 < first.size(); ++k)
+            std::sort(sorted.begin() + first[k], sorted.begin() + first[k + 1], before);
+        return sorted;
+    }
+
+    const SignRuns &runs_;
+};
+
 }  // namespace
+
+Alike alike_runs(SignRuns runs, const std::vector<std::int64_t> &offsets, const SignRule &rule) {
+    runs.packed.resize(runs.packed.size() + 2 * kSignsAtOnce / 8 + 8, 0);  // words are read beyond the last sign
+    const SignWindows signs(runs);
+    const std::vector<SignWindows::Window> windows = signs.with_numbers(offsets);
+    Alike found;
+    for (std::size_t k = 0; k < windows.size(); ++k) {
+        const std::size_t end = std::min(windows.size(), k + static_cast<std::size_t>(rule.crowd));
+        const std::size_t one = windows[k].run;
+        const std::int64_t at = windows[k].at, place = at - runs.start[one];
+        for (std::size_t j = k + 1; j < end && windows[j].number == windows[k].number; ++j) {
+            const std::size_t other = windows[j].run;
+            if (runs.serial[one] == runs.serial[other]) continue;
+            const std::int64_t other_at = windows[j].at, other_place = other_at - runs.start[other];
+            const std::int64_t before = std::min({place, other_place, kSignsAtOnce});
+            const std::int64_t after = std::min(runs.count[one] - place, runs.count[other] - other_place);
+            const std::int64_t near = std::min(before + after, rule.first_look);
+            if (signs.excess(at - before, other_at - before, near) < rule.least_excess) continue;
+            const std::int64_t lag = other_place - place;
+            const std::int64_t first = std::max(std::int64_t{0}, -lag), other_first = std::max(std::int64_t{0}, lag);
+            const std::int64_t common = std::min(runs.count[one] - first, runs.count[other] - other_first);
+            const double excess = signs.excess(runs.start[one] + first, runs.start[other] + other_first, common);
+            if (excess * std::sqrt(rule.independent * static_cast<double>(common)) < rule.least_sigmas) continue;
+            found.one.push_back(static_cast<std::int64_t>(one));
+            found.other.push_back(static_cast<std::int64_t>(other));
+            found.lag.push_back(lag);
+            found.common.push_back(common);
+            found.excess.push_back(excess);
+        }
+    }
+    return found;
+}
 
 Windows windows_of(const double *temperature, const std::vector<const double *> &rates, std::size_t rows,
                    const WindowRule &rule) {

@@ -163,3 +163,18 @@ def windows_of(
     own: int,
 ) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
     """Hash, first and last row of the windows that are kept; arrays must be contiguous."""
+
+def alike_runs(
+    packed: NDArray[np.uint8],
+    start: Sequence[int],
+    count: Sequence[int],
+    serial: Sequence[int],
+    offsets: Sequence[int],
+    *,
+    crowd: int,
+    first_look: int,
+    least_excess: float,
+    independent: float,
+    least_sigmas: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], _Floats]:
+    """Pairs of runs whose signs agree at a lag: their numbers, the lag, signs in common, excess of those that agree."""
