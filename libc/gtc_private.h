@@ -83,6 +83,8 @@ uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_l
 #define MEMORY_RATE 2U
 #define PLAY_WIDTH 0U
 #define PLAY_AMPLITUDE 1U
+#define PLAY_GROWTH 2U
+#define PLAY_REFERENCE_TEMP 3U
 #define WARM_UP_GAIN 0U
 #define WARM_UP_AMPLITUDE 1U
 #define HARMONIC_FREQUENCY 0U

@@ -106,10 +106,16 @@ const struct FN(term_code) FN(term_memory) = {
     1U, FN(memory_begin), FN(memory_step), FN(memory_apply),
 };
 
+/* A parameter that goes with the temperature: value + growth (T - reference of T). */
+static NUM FN(over_temp)(NUM value, NUM growth, NUM x, NUM middle)
+{
+    return (NUM)FN(factor)(FN(add)(value, FN(scaled_difference)(x, middle, growth)));
+}
+
 /* ---- play operator: hysteresis
  *
- * z <- max(T - width, min(T + width, z)) once a block. Parameters: width; amplitude. Adds
- * amplitude (z - T). */
+ * z <- max(T - width, min(T + width, z)) once a block. Parameters: width; amplitude; growth, by which the amplitude grows
+ * with each C; reference of T. Adds (amplitude + growth (T - reference of T)) (z - T). */
 
 static void FN(play_step)(STATE *state, uint_least32_t i, NUM x)
 {
@@ -137,8 +143,12 @@ static void FN(play_begin)(STATE *state, uint_least32_t i, NUM x)
 
 static void FN(play_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
-    const NUM amplitude = FN(parameter)(state, i, PLAY_AMPLITUDE);
+    const NUM growth = FN(parameter)(state, i, PLAY_GROWTH);
+    NUM amplitude = FN(parameter)(state, i, PLAY_AMPLITUDE);
 
+    if (FN(bits)(growth) != 0U) {
+        amplitude = FN(over_temp)(amplitude, growth, x, FN(parameter)(state, i, PLAY_REFERENCE_TEMP));
+    }
     effect->added = FN(add)(effect->added, FN(scaled_difference)(state->term[i][0], x, amplitude));
 }
 
@@ -292,13 +302,12 @@ const struct FN(term_code) FN(term_curve) = {
 static void FN(product_apply)(const STATE *state, uint_least32_t i, NUM x, EFFECT *effect)
 {
     const NUM reference = FN(parameter)(state, i, PRODUCT_REFERENCE);
-    const NUM growth = FN(parameter)(state, i, PRODUCT_GROWTH);
-    const NUM middle = FN(parameter)(state, i, PRODUCT_REFERENCE_TEMP);
-    const WIDE here = FN(add)(FN(parameter)(state, i, PRODUCT_SLOPE), FN(scaled_difference)(x, middle, growth));
+    const NUM slope = FN(over_temp)(FN(parameter)(state, i, PRODUCT_SLOPE), FN(parameter)(state, i, PRODUCT_GROWTH), x,
+                                    FN(parameter)(state, i, PRODUCT_REFERENCE_TEMP));
     NUM mean = NUM_ZERO;
 
     if (FN(has_mean)(state, i, effect, &mean) != 0) {
-        FN(add_effect)(state, i, effect, FN(scaled_difference)(mean, reference, (NUM)FN(factor)(here)));
+        FN(add_effect)(state, i, effect, FN(scaled_difference)(mean, reference, slope));
     }
 }
 

@@ -158,7 +158,8 @@ class Model:
         if term["id"] == "thermal_gradient":
             return 1, channel, [gain, p["amplitude_dph_per_c"] * half, 0.0]
         if term["id"] == "hysteresis":
-            return 2, channel, [p["width_c"], p["amplitude_dph_per_c"]]
+            growth, middle = (p.get(name, 0.0) for name in ("amplitude_dph_per_c_per_c", "reference_c"))
+            return 2, channel, [p["width_c"], p["amplitude_dph_per_c"], growth, middle]
         if term["id"] == "warm_up":
             return 3, channel, [block / p["tau_s"] * math.log2(math.e), p["amplitude_dph"] / half]
         if term["id"] == "path_length_periodicity":
@@ -452,6 +453,8 @@ def effect_of(model: Model) -> Pair:
         else:
             scale = {1: span, 2: values[0], 3: 1.0, 4: 1.0}[kind]
             size = abs(values[2 if kind == 4 else 1]) * scale
+            if kind == 2:
+                size = scale * max(abs(values[1] + values[2] * (t - values[3])) for t in model.t_range)
             low, high = low - size, high + size
     return wider(low, high)
 
@@ -541,7 +544,7 @@ def check_regions(model: Model, image: Image) -> Iterator[str]:
 def check_terms(model: Model, image: Image) -> Iterator[str]:
     """The records of the extension terms against the model's parameters."""
     unit = 2.0 ** image.one("bias_frac_bits")
-    scales = {1: (2.0**31, unit, 2.0**24), 2: (2.0**16, unit), 3: (2.0**28, unit),
+    scales = {1: (2.0**31, unit, 2.0**24), 2: (2.0**16, unit, unit, 2.0**16), 3: (2.0**28, unit),
               4: (2.0**32, 2.0**32, unit), 5: (unit, 2.0**16),
               6: (unit, 2.0**24, 2.0**16, unit, 2.0**16, unit),
               7: (unit, 2.0**16, unit, 2.0**16)}  # fmt: skip

@@ -270,7 +270,7 @@ class Term(_Frozen):
             held = ", ".join(i for i, c in CATALOGUE.items() if c.table is not None)
             raise ValueError(f"no term {self.id!r}; a table can hold {held}")
         names = {p.name for p in cause.parameters}
-        if set(self.parameters) != names:
+        if not names - set(cause.table.optional) <= set(self.parameters) <= names:
             raise ValueError(f"term {self.id} takes the parameters {', '.join(sorted(names))}")
         for parameter in cause.nonlinear():
             if parameter.low > 0.0 and self.parameters[parameter.name] <= 0.0:

@@ -306,6 +306,9 @@ TEST(parameters_of_terms_keep_to_their_ranges)
     REFUSED(TERMS, of_kind(GTC_TERM_MEMORY, 4U), -1.0F, -1L);
     REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 2U), -1.0F, -1L);
     REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 2U), 1.1e9F, 2130706433L);
+    REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 4U), 1.1e9F, 1073741825L);
+    REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 5U), 400.5F, 26214401L);
+    REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 5U), -200.5F, -13107201L);
     for (i = 0U; i < TERMS.n_terms; i++) {
         REFUSED(TERMS, terms_at(&TERMS) + (i * GTC_TERM_WORDS) + 7U, 1.0F, 1L);
     }

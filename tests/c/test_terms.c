@@ -197,6 +197,43 @@ TEST(a_play_moves_only_when_the_temperature_has_gone_its_way)
     CHECK(a.term[1][0] < C(15.0));
 }
 
+/* The bias with the play's strength, growth and reference of T, after some way down. */
+static num_t played_with(double strength, double growth, double middle, num_t temp)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    gtc_word_t *const play = &terms[GTC_TERM_WORDS];
+    table_t table = TERMS;
+    state_t state;
+    int k;
+
+    memcpy(terms, TERMS.terms, sizeof(gtc_word_t) * table.n_terms * GTC_TERM_WORDS);
+    CHECK_INT((int)GTC_TERM_PLAY, (int)play[0].bits);
+#if TEST_Q31
+    play[3].integer = (int_least32_t)(strength * (double)(1UL << table.bias_frac_bits));
+    play[4].integer = (int_least32_t)(growth * (double)(1UL << table.bias_frac_bits));
+    play[5].integer = C(middle);
+#else
+    play[3].value = (float)strength;
+    play[4].value = (float)growth;
+    play[5].value = (float)middle;
+#endif
+    table.terms = terms;
+    state = started_with(&table);
+    for (k = 256; k > 0; k--) {
+        (void)sample(&state, temp + ((num_t)k * STEP), C(12.0));
+    }
+    (void)samples(&state, temp, C(12.0), 4000);
+    return bias_of(&state);
+}
+
+TEST(a_play_may_have_another_strength_at_another_temperature)
+{
+    CHECK(same(played_with(0.03125, 0.0, 0.0, C(15.0)), played_with(0.03125, 0.0009765625, 15.0, C(15.0))));
+    CHECK(same(played_with(0.0390625, 0.0, 0.0, C(23.0)), played_with(0.03125, 0.0009765625, 15.0, C(23.0))));
+    CHECK(same(played_with(0.0, 0.0, 0.0, C(7.0)), played_with(0.03125, 0.00390625, 15.0, C(7.0))));
+    CHECK(!same(played_with(0.03125, 0.0, 0.0, C(23.0)), played_with(0.03125, 0.0009765625, 15.0, C(23.0))));
+}
+
 TEST(holds_and_fallback_step_the_terms_too)
 {
     state_t a = started_with(&TERMS);
@@ -855,6 +892,7 @@ int main(void)
     RUN(effects_are_bounded_and_that_is_said);
     RUN(a_reading_of_a_channel_that_sticks_or_jumps_is_held);
     RUN(a_play_moves_only_when_the_temperature_has_gone_its_way);
+    RUN(a_play_may_have_another_strength_at_another_temperature);
     RUN(holds_and_fallback_step_the_terms_too);
     RUN(a_harmonic_repeats_itself_after_its_period);
     RUN(narrow_gaussians_are_there_where_they_are);

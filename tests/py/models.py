@@ -141,12 +141,16 @@ def random_terms(seed: int) -> tuple[Term, ...]:
         ),
     )
     chosen = rng.permutation(len(every))[: int(rng.integers(1, 5))]
-    return tuple(_of_channel(every[k], np.random.default_rng([seed, 5, k])) for k in chosen)
+    return tuple(_another_form(every[k], np.random.default_rng([seed, 5, k])) for k in chosen)
 
 
-def _of_channel(term: Term, rng: np.random.Generator) -> Term:
-    """A term of a channel as a line, a curve or a product; others as they are."""
+def _another_form(term: Term, rng: np.random.Generator) -> Term:
+    """A term of a channel as a line, a curve or a product, a play with one strength or over T; others as they are."""
     kind = int(rng.integers(0, 3))
+    if term.id == "hysteresis" and kind != 0:
+        growth = {"amplitude_dph_per_c_per_c": float(rng.normal(0.0, 1e-3))}
+        middle = {"reference_c": float(rng.uniform(-40.0, 60.0))} if kind == 1 else {}
+        return term.model_copy(update={"parameters": term.parameters | growth | middle})
     if term.channel is None or kind == 0:
         return term
     if kind == 1:

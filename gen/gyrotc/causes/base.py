@@ -115,10 +115,12 @@ class Tabled:
         kind: Recursion of the target.
         parameters: Parameters of the record (docs/FORMAT.md, section 3) from those of the cause and the length
             of a block in s.
+        optional: Parameters of the cause that a model may leave out: they are 0 then.
     """
 
     kind: TableKind
     parameters: Callable[[Mapping[str, float], float], list[float]]
+    optional: tuple[str, ...] = ()
 
     def recursion(self, values: Mapping[str, float], block_s: float) -> Recursion:
         """The recursion in float64."""

@@ -1,6 +1,8 @@
 """Rate-independent hysteresis: a play operator, as mounts, glue joints and mirror contacts show.
 
-    z = max(T − w, min(T + w, z)),    bias += a (z − T)
+    z = max(T − w, min(T + w, z)),    bias += (a + b (T − reference)) (z − T)
+
+Diagnosis looks for a loop of one strength, b = 0; a table's may go with T.
 
 Source: the play of Krasnosel'skii and Pokrovskii, Systems with Hysteresis, Springer 1989.
 """
@@ -27,9 +29,15 @@ from .base import (
 )
 
 
+def strength(values: Values, temperature_c: FloatArray) -> FloatArray:
+    """Of the loop at temperatures, deg/h/C."""
+    growth, away = values.get("amplitude_dph_per_c_per_c", 0.0), temperature_c - values.get("reference_c", 0.0)
+    return np.asarray(values["amplitude_dph_per_c"] + growth * away)
+
+
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     z = play(values["width_c"], scene.cavity_c)
-    return np.asarray(values["amplitude_dph_per_c"] * (z - scene.cavity_c))
+    return np.asarray(strength(values, scene.cavity_c) * (z - scene.cavity_c))
 
 
 def _features(history: History, values: Values) -> Features:
@@ -49,7 +57,8 @@ _BOTH_SIDES = "the same hold temperature reached from both sides, at two rates, 
 
 
 def _record(values: Values, block_s: float) -> list[float]:
-    return [values["width_c"], values["amplitude_dph_per_c"]]
+    growth = values.get("amplitude_dph_per_c_per_c", 0.0)
+    return [values["width_c"], values["amplitude_dph_per_c"], growth, values.get("reference_c", 0.0)]
 
 
 CAUSE = Cause(
@@ -57,9 +66,14 @@ CAUSE = Cause(
     family="hysteresis",
     rank=40,
     kind="add",
-    equation="z = max(T - w, min(T + w, z)); bias += amplitude (z - T)",
+    equation="z = max(T - w, min(T + w, z)); bias += (amplitude + growth (T - reference_c)) (z - T)",
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
-    parameters=(_WIDTH, Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True)),
+    parameters=(
+        _WIDTH,
+        Parameter("reference_c", "C", -90.0, 200.0, signed=True, logarithmic=False, default=0.0),
+        Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
+        Parameter("amplitude_dph_per_c_per_c", "deg/h/C/C", 1e-9, 1e-3, linear=True, signed=True, default=0.0),
+    ),
     words=Wording(
         name="The bias remembers the direction of the last temperature change",
         short="hyster.",
@@ -79,7 +93,7 @@ CAUSE = Cause(
         shown=(4.0, 12.0),
         cycle=SingleCycle(points=24, usual=False),
     ),
-    table=Tabled(TableKind.PLAY, _record),
+    table=Tabled(TableKind.PLAY, _record, optional=("reference_c", "amplitude_dph_per_c_per_c")),
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,

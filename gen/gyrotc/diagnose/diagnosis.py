@@ -187,7 +187,7 @@ def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> lis
     for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):
         if effect.term.table is None:
             continue
-        names = [p.name for p in effect.term.parameters]
+        names = [p.name for p in effect.term.parameters if p.name in effect.values]
         entry = {
             "id": effect.id,
             "parameters": {n: effect.values[n] for n in names},

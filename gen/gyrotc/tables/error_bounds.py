@@ -34,7 +34,7 @@ from ..target.history import evaluate_map
 from ..target.q31 import GAUSS_ERROR
 from ..target.recursions import TableKind
 from ..target.table import Numeric, Table, f32_words
-from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient
+from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient, strongest
 
 #: Share of the range of the map, and of the terms, that is granted beyond it at either end.
 MARGIN = 0.25
@@ -145,12 +145,12 @@ def _effect(model: Model, term: Term) -> Range:
     if kind.reads_channel:
         guard = guard_of(model, term.channel)
         return _of_channel(kind, values, (low, high), (guard.low, guard.high))
-    size = {
-        TableKind.MEMORY: abs(values[1]) * (high - low),
-        TableKind.PLAY: abs(values[1]) * values[0],
-        TableKind.WARM_UP: abs(values[1]),
-        TableKind.HARMONIC: abs(values[-1]),
-    }[kind]
+    if kind == TableKind.MEMORY:
+        size = abs(values[1]) * (high - low)
+    elif kind == TableKind.PLAY:
+        size = strongest(values[1:], (low, high)) * values[0]
+    else:  # warm-up, harmonic
+        size = abs(values[-1])
     return -size, size
 
 

@@ -15,6 +15,7 @@ import itertools
 import math
 import re
 import zlib
+from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
@@ -231,8 +232,8 @@ def largest_gradient(
 _PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, section 3
 _LIMIT = 2**30  # of parameters in fixed point that are multiplied
 
-_PER_C = {TableKind.MEMORY: 1, TableKind.PLAY: 1}  # which parameter is an amplitude in deg/h/C
-_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}  # ... in deg/h; the line of a channel has no bound
+_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}
+"""Which parameter is an amplitude in deg/h; the line of a channel has no bound."""
 _BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
 """What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
 
@@ -249,16 +250,24 @@ def term_size_dph(model: Model) -> float:
     low, high = model.envelope.temperature_c
     sizes = []
     for kind, _, values in (_term_record(model, term) for term in model.terms):
-        if kind in _PER_C:
-            sizes.append(abs(values[_PER_C[kind]]) * (high - low))
+        if kind == TableKind.MEMORY:
+            sizes.append(abs(values[1]) * (high - low))
+        elif kind == TableKind.PLAY:
+            sizes.append(max(strongest(values[1:], (low, high)) * (high - low), abs(values[2])))
         elif kind in _ALONE:
             sizes.append(abs(values[_ALONE[kind]]))
         elif kind == TableKind.CURVE:  # each weight has half a word; a slope, whatever the unit, one
             sizes.append(max(2.0 * abs(values[3]), 2.0 * abs(values[5]), abs(values[0])))
         elif kind == TableKind.PRODUCT:
-            slopes = [values[0] + values[2] * (t - values[3]) for t in (low, high)]
-            sizes.append(max(map(abs, (values[0], values[2], *slopes))))
+            slope, _, growth, middle = values
+            sizes.append(max(abs(slope), abs(growth), strongest((slope, growth, middle), (low, high))))
     return math.fsum(sizes)
+
+
+def strongest(parameter: Sequence[float], temperature_c: tuple[float, float]) -> float:
+    """Largest magnitude over a range of temperature of a parameter that goes with it: value, growth, middle of T."""
+    value, growth, middle = parameter
+    return max(abs(value + growth * (t - middle)) for t in temperature_c)
 
 
 def f32_terms(model: Model) -> Words:
@@ -282,7 +291,7 @@ def q31_terms(model: Model, frac_bits: int) -> Words:
     unit = 2.0**frac_bits
     scales = {
         TableKind.MEMORY: (2.0**31, unit, 2.0**24),
-        TableKind.PLAY: (2.0**16, unit),
+        TableKind.PLAY: (2.0**16, unit, unit, 2.0**16),
         TableKind.WARM_UP: (2.0**28, unit),
         TableKind.HARMONIC: (2.0**32, 2.0**32, unit),
         TableKind.AUXILIARY: (unit, 2.0**16),
@@ -304,7 +313,7 @@ def _whole(kind: TableKind, k: int, id: str, value: float) -> int:
         return whole & 0xFFFFFFFF
     if whole == 2**31:  # a gain of 1
         whole -= 1
-    half = kind.reads_channel and (kind, k) != (TableKind.CURVE, 1)
+    half = (kind.reads_channel and (kind, k) != (TableKind.CURVE, 1)) or (kind, k) == (TableKind.PLAY, 2)
     if abs(whole) >= (_LIMIT if half else 2**31):
         raise CheckFailed(f"q31: a parameter of term {id} leaves the range of 32 bits")
     return whole & 0xFFFFFFFF

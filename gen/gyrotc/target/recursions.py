@@ -194,13 +194,19 @@ class _Memory(Recursion):
 
 
 class _Play(Recursion):
-    """z <- max(T - width, min(T + width, z)) once a block, from T at a start; adds amplitude (z - T)."""
+    """z <- max(T - width, min(T + width, z)) once a block, from T at a start.
+
+    Adds (amplitude + growth (T - middle)) (z - T).
+    """
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         starts = np.union1d(np.flatnonzero(~course.closes), [0])[: course.closes.size]
         parts = np.split(course.temperature, starts[1:])
-        z = np.concatenate([play(self.p[0], part) for part in parts])
-        outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, self.p[1])
+        width, amplitude, growth, middle = self.p[:4]
+        z = np.concatenate([play(width, part) for part in parts])
+        if growth != 0:
+            amplitude = self.do.over_temperature(amplitude, growth, course.temperature, middle)
+        outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, amplitude)
 
 
 class _WarmUp(Recursion):
@@ -261,8 +267,7 @@ class _Product(_OfChannel):
 
     def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
         slope, reference, growth, middle = self.p[:4]
-        here = self.do.limited(slope + self.do.scaled_difference(temperature, middle, growth))
-        return self.do.scaled_difference(mean, reference, here)
+        return self.do.scaled_difference(mean, reference, self.do.over_temperature(slope, growth, temperature, middle))
 
 
 _RECURSIONS: dict[TableKind, type[Recursion]] = {
@@ -309,6 +314,10 @@ class Operations:
 
     def scaled_difference(self, a: Numbers, b: Any, factor: Any) -> Numbers:
         return np.asarray(factor * (a - b))
+
+    def over_temperature(self, value: Any, growth: Any, temperature: Numbers, middle: Any) -> Numbers:
+        """A parameter that goes with the temperature: value + growth (T - middle)."""
+        return self.limited(value + self.scaled_difference(temperature, middle, growth))
 
     def slope_of(self, a: Numbers, b: Numbers, rate: Any) -> Numbers:
         """(a - b) rate, per block."""

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..causes.hysteresis import strength
 from ..common.arrays import FloatArray
 from ..target.recursions import play
 from .data import TrainingData, average, cleaned, edges_of
@@ -106,7 +107,9 @@ def start_sigma(
     amplitude = abs(parameters.get("amplitude_dph_per_c", 0.0))
     if id == "hysteresis":
         width = parameters["width_c"]
-        return amplitude * _played(samples, width) / (2.0 * width)
+        growth, seen = parameters.get("amplitude_dph_per_c_per_c", 0.0), samples.temperature_c
+        typical = float(np.hypot(strength(parameters, seen.mean()), growth * seen.std()))  # RMS over T
+        return typical * _played(samples, width) / (2.0 * width)
     if id in ("thermal_gradient", "cavity_lag"):
         left = _warm_up_left(samples, parameters["tau_s"])
         if id == "cavity_lag":

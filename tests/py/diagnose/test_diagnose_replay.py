@@ -46,7 +46,12 @@ Array = NDArray[np.float64]
 VALUES: dict[str, dict[str, float]] = {
     "cavity_lag": {"tau_s": 300.0},
     "thermal_gradient": {"tau_s": 400.0, "amplitude_dph_per_c": 1e-4},
-    "hysteresis": {"width_c": 3.0, "amplitude_dph_per_c": 2e-4},
+    "hysteresis": {
+        "width_c": 3.0,
+        "reference_c": 20.0,
+        "amplitude_dph_per_c": 2e-4,
+        "amplitude_dph_per_c_per_c": 5e-6,
+    },
     "warm_up": {"tau_s": 900.0, "amplitude_dph": 3e-3},
     "path_length_periodicity": {"period_c": 9.0, "amplitude_dph": 5e-4, "phase_rad": 0.4},
     "auxiliary": {"slope_dph_per_unit": 1e-2, "reference": 27.9},
