@@ -325,6 +325,8 @@ class Cause:
         amplitudes: Linear parameters from the fitted weights of the columns.
         mended: For kind "input" without a table: what the map would see had the recording been right, from times
             in s, temperature in C, its rate in C/min and the parameters; not a number where nothing says it.
+        over_temperature: Its parameters where its strength (first) grows (second) with each C from a reference (third)
+            on; a table holds that, too.
         overtone: Nonlinear parameters of its n-th overtone (2: twice as often): a wave that is no sine has some.
         unseen_s: How much of either end of a run the cause puts out of sight, s.
         repair: The line of `dataset.toml` that takes it out of recordings.
@@ -348,6 +350,7 @@ class Cause:
     features: Callable[[History, Values], Features] | None = None
     amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
     mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = None
+    over_temperature: Callable[[Values, float, float, float], Values] | None = None
     overtone: Callable[[Values, int], Values] | None = None
     unseen_s: Callable[[Values], float] | None = None
     repair: Callable[[Values], str] | None = None

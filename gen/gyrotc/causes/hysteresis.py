@@ -61,6 +61,11 @@ def _record(values: Values, block_s: float) -> list[float]:
     return [values["width_c"], values["amplitude_dph_per_c"], growth, values.get("reference_c", 0.0)]
 
 
+def _over_temperature(values: Values, strength: float, growth: float, reference_c: float) -> Values:
+    linear = {"amplitude_dph_per_c": strength, "amplitude_dph_per_c_per_c": growth}
+    return {"width_c": values["width_c"], "reference_c": reference_c, **linear}
+
+
 CAUSE = Cause(
     id="hysteresis",
     family="hysteresis",
@@ -97,4 +102,5 @@ CAUSE = Cause(
     bias=_bias,
     features=_features,
     amplitudes=_amplitudes,
+    over_temperature=_over_temperature,
 )

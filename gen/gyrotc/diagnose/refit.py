@@ -1,7 +1,8 @@
 """The training runs as the target sees them, refitted with causes, with or without some of the samples.
 
-They are looked for beside the wave itself and any smooth map (`train.mrbf`), the second and then the third, each where
-BIC asks for it; nothing of them has a part in naming the cause.
+What a cause may have besides is looked for beside it and any smooth map (`train.mrbf`), each where BIC asks for it:
+overtones of a wave, the second and then the third, and a strength of loops that goes with temperature. Nothing of that
+has a part in naming the cause.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
-from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps
+from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps, smooth_basis
 from ..train.result import Fit, longest_same_s, predict
 from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
+from .candidates import searched
 from .refine import Refined
 
 _NUMBERS = (2, 3)  # of the overtones: with the wave itself they leave a term of four to something else
@@ -220,24 +222,33 @@ def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
     return np.isfinite(samples(run, effects).temperature_c)
 
 
+def _masks(
+    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+) -> list[NDArray[np.bool_]]:
+    """Of the samples of each run: those `kept` (default: all) whose input is known beside the effects."""
+    masks = [known(run, effects) for run in runs]
+    return masks if kept is None else [mask & k for mask, k in zip(masks, kept, strict=True)]
+
+
 def _chosen(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
 ) -> TrainingData:
-    """Samples of all runs beside the effects: those `kept` (default: all) whose input is known."""
-    masks = [known(run, effects) for run in runs]
-    if kept is not None:
-        masks = [mask & k for mask, k in zip(masks, kept, strict=True)]
+    """Samples of all runs beside the effects, as `_masks`."""
+    masks = _masks(runs, effects, kept)
     return joined([samples(run, effects).select(m) for run, m in zip(runs, masks, strict=True) if m.any()])
 
 
 def completed(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
 ) -> list[Effect]:
-    """The effects, with the overtones of a wave and the bumps of a finer map as samples show them.
+    """The effects, with a strength over T, the overtones of a wave and the bumps of a finer map as samples show them.
 
     Each is found beside the other effects, bumps last, on the samples `kept` (default: all).
     """
     out = list(effects)
+    for k, effect in enumerate(out):
+        if effect.term.over_temperature is not None and len(runs) > 1:
+            out[k] = _over_temperature(runs, effect, [e for e in out if e is not effect], kept)
     waves = [k for k, e in enumerate(out) if e.term.overtone is not None]
     finer = [k for k, e in enumerate(out) if e.term.finer_map]
     for k in [*waves, *finer]:
@@ -253,6 +264,76 @@ def completed(
         except TrainingFailed:
             continue
     return out
+
+
+_MEAN_S = 100.0  # independent means for BIC, as for bumps
+_ABOUT = np.geomspace(0.6, 1.0 / 0.6, 15)  # widths about that of a loop of one strength, each 7 % from the next
+_STILL_C_PER_MIN = 0.05  # as the floor of `train.data.scaling_of`
+
+
+class _Loops:
+    """Loops beside other effects and any smooth map, as means of samples over 100 s.
+
+    Attributes:
+        y: What the map leaves of the bias, shape (n,).
+        middle_c: Of the range of temperature.
+    """
+
+    def __init__(
+        self, runs: Sequence[Played], others: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+    ) -> None:
+        data = _chosen(runs, others, kept)
+        self._played = [(run, run.in_force[m]) for run, m in zip(runs, _masks(runs, others, kept), strict=True)]
+        number = data.run * (1 + int(data.time_s.max() / _MEAN_S)) + (data.time_s / _MEAN_S).astype(np.int64)
+        _, self._index = np.unique(number, return_inverse=True)
+        self._of_sample = data.weight
+        weight = np.bincount(self._index, data.weight)
+        self._share, self._root = 1.0 / weight, np.sqrt(weight / np.median(weight))
+        t, rate = self._means(data.temperature_c), self._means(data.slope_c_per_min)
+        span = (float(t.min()), float(t.max()))
+        self.middle_c = 0.5 * sum(span)
+        fastest = max(float(np.abs(rate).max()), _STILL_C_PER_MIN)
+        self._smooth = smooth_basis(t, rate / fastest, span, self._root)
+        self.y = self._rest(data.bias_dph)
+
+    def columns(self, loop: Effect) -> FloatArray:
+        """What the map leaves of the loop, and of the loop times the temperature from the middle on, shape (n, 2)."""
+        added = np.concatenate([run.outcome(loop).added[at] for run, at in self._played])
+        away = np.concatenate([run.course.temperature[at] - self.middle_c for run, at in self._played])
+        return np.column_stack([self._rest(added), self._rest(added * away)])
+
+    def _means(self, x: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(self._index, self._of_sample * x) * self._share)
+
+    def _rest(self, x: FloatArray) -> FloatArray:
+        column = self._means(x) * self._root
+        return np.asarray(column - self._smooth @ (self._smooth.T @ column))
+
+
+def _over_temperature(
+    runs: Sequence[Played], effect: Effect, others: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+) -> Effect:
+    """The effect with a strength that goes with temperature, where BIC asks for that; else as it is.
+
+    The parameter that it is searched over is found anew with it.
+    """
+    over, over_temperature = searched(effect.id).over, effect.term.over_temperature
+    assert over is not None and over_temperature is not None
+    loops = _Loops(runs, others, kept)
+    able = [{**effect.values, over: float(value)} for value in effect.values[over] * _ABOUT]
+    columns = [loops.columns(Effect(effect.id, dict(over_temperature(own, 1.0, 0.0, 0.0)))) for own in able]
+    constant = min(_left(column[:, :1], loops.y) for column in columns)
+    left = [_left(column, loops.y) for column in columns]
+    best, n = int(np.argmin(left)), loops.y.size
+    if n * np.log(constant / left[best]) <= np.log(n):
+        return effect
+    strength, growth = np.linalg.lstsq(columns[best], loops.y, rcond=1e-9)[0].tolist()
+    return replace(effect, values=dict(over_temperature(able[best], strength, growth, loops.middle_c)))
+
+
+def _left(columns: FloatArray, y: FloatArray) -> float:
+    """Sum of squares that columns leave of y."""
+    return float(np.square(y - columns @ np.linalg.lstsq(columns, y, rcond=1e-9)[0]).sum())
 
 
 def terms_of(effects: Sequence[Effect]) -> list[Effect]:

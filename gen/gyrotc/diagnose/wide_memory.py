@@ -81,7 +81,7 @@ class WideMemory:
     def text(self) -> str:
         """How it differs from one play of one strength, in words."""
         if self.varies:
-            return "the strength of its loops goes with temperature, of which a table's play holds the mean"
+            return "the strength of its loops goes with temperature, of which a table's play holds a straight line"
         return "its loops are more than a single play, such as a table has, holds"
 
 

@@ -130,10 +130,7 @@ class BesideSmooth:
         self.range = scaling.temperature_c
         self._seconds = seconds
         r = r / scaling.half_range_c_per_min
-        fine, coarse = (_splines(self.t, self.range, step) for step in _SPLINE_C)
-        columns = np.column_stack([fine, coarse * r[:, None], coarse * r[:, None] ** 2])
-        left, size, _ = np.linalg.svd(columns * self.root[:, None], full_matrices=False)
-        self._smooth = left[:, size > 1e-3 * size[0]]
+        self._smooth = smooth_basis(self.t, r, self.range, self.root)
         self.y = self.rest((y * self.root)[:, None])[:, 0]
 
     def rest(self, columns: FloatArray) -> FloatArray:
@@ -242,6 +239,21 @@ def _beside(columns: FloatArray, k: int) -> float:
     """Energy of a column that is its own beside the others."""
     q = np.linalg.qr(np.delete(columns, k, axis=1))[0]
     return float(np.square(columns[:, k] - q @ (q.T @ columns[:, k])).sum())
+
+
+def smooth_basis(t: FloatArray, rate: FloatArray, span: tuple[float, float], root: FloatArray) -> FloatArray:
+    """Orthonormal columns of any smooth map, shape (n, k).
+
+    Args:
+        t: Temperatures, C, shape (n,).
+        rate: dT/dt in half ranges, the same shape.
+        span: Lowest and highest temperature, C.
+        root: Square roots of weights, the same shape.
+    """
+    fine, coarse = (_splines(t, span, step) for step in _SPLINE_C)
+    columns = np.column_stack([fine, coarse * rate[:, None], coarse * rate[:, None] ** 2])
+    left, size, _ = np.linalg.svd(columns * root[:, None], full_matrices=False)
+    return np.asarray(left[:, size > 1e-3 * size[0]])
 
 
 def _splines(t: FloatArray, span: tuple[float, float], step_c: float) -> FloatArray:

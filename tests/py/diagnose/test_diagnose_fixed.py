@@ -5,20 +5,27 @@ from __future__ import annotations
 import secrets
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.diagnosis import diagnose
+from gyrotc.diagnose.gain import emitted_means
 from gyrotc.diagnose.noise import declared_noise
 from gyrotc.diagnose.pipeline import analyse
 from gyrotc.diagnose.summary import holds
 from gyrotc.recordings.load import load
-from gyrotc.recordings.records import joined_runs
+from gyrotc.recordings.records import Dataset, joined_runs
+from gyrotc.train.fitting import FitOptions, fit_dataset
 
 from tests.blind import fixed
-from tests.blind.effects import FAMILY
+from tests.blind.campaign import ROW_S, draw_recording, mean_of, write
+from tests.blind.draw import campaign_of
+from tests.blind.effects import CATALOGUE, FAMILY, backlash, log_uniform
 from tests.blind.fixed import Drawn, recordings
+from tests.blind.noise import Noise
 
 BLOCK_S = 150.0  # half as many blocks as by default: a quarter of the time
 ALLOWED = {"own world: foreign, a cause named": 2}
@@ -82,3 +89,63 @@ def test_each_hidden_cause_is_named_and_no_other(tmp_path: Path, monkeypatch: py
         answers[folder.name, hidden] = named(folder, BLOCK_S, BLOCK_S)
     assert len(answers) == 12
     assert {key: named for key, named in answers.items() if named != [key[1]]} == {}
+
+
+SEED = 20261126  # of the drawn loops
+GROWTH = "amplitude_dph_per_c_per_c"
+
+
+@dataclass
+class Squares:
+    """Pooled squares on exam runs: as emitted without states and with them, and beside what is hidden taken out."""
+
+    without: float = 0.0
+    shipped: float = 0.0
+    oracle: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Of the oracle's gain."""
+        return (self.without - self.shipped) / (self.without - self.oracle)
+
+
+def hidden_loop(folder: Path, number: int, s: float, patch: pytest.MonkeyPatch) -> tuple[Dataset, Dataset]:
+    """A play whose strength goes from 1 - s to 1 + s over the temperatures of a campaign, and the same without it."""
+    campaign, yardstick = campaign_of(SEED, number)
+    rng = np.random.default_rng([SEED, number])
+    width = log_uniform(rng, 2.0, 18.0)
+    low, high = min(run.block_c.min() for run in campaign.runs), max(run.block_c.max() for run in campaign.runs)
+    loops = [
+        (1.0 + s * (2.0 * (run.block_c - low) / (high - low) - 1.0)) * (backlash(run.block_c, width) - run.block_c)
+        for run in campaign.runs
+    ]
+    patch.setitem(CATALOGUE, "hysteresis", lambda scene, rng: (loops, {"width_c": width}))
+    hidden = draw_recording(campaign, yardstick, [("hysteresis", 4.0)], Noise(7e-4, 3e-5), rng)
+    taken = [rows - hidden.amplitude[0] * mean_of(x, ROW_S) for rows, x in zip(hidden.rows, loops, strict=True)]
+    for name, truth in (("with", hidden), ("out", replace(hidden, rows=taken))):
+        write(campaign, truth, folder / name, declare=True, serial="U-0001")
+    return load(folder / "with"), load(folder / "out")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("s", [0.0, 1.0])
+def test_a_loop_whose_strength_goes_with_temperature_is_removed(
+    s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A play of one strength gets half of what can be had; of a loop of one strength no more is asked than that."""
+    pooled, options = Squares(), FitOptions()
+    for number in (1, 3, 5):
+        dataset, without = hidden_loop(tmp_path / str(number), number, s, monkeypatch)
+        found = diagnose(dataset)
+        assert found.result.extended is not None and found.result.extended.gain is not None
+        assert [c.id for c in found.result.physical] == ["hysteresis"]
+        assert found.model is not None
+        grows = [GROWTH in term.parameters for term in found.model.terms]
+        assert grows == [s > 0.0], number
+        exam = [run for run in without.runs if run.role == "exam"]
+        best = emitted_means((fit_dataset(without, options).model,), exam, options.average_s)[0]
+        pooled.oracle += float(np.mean(np.concatenate([run.after_dph for run in best]) ** 2))
+        pooled.without += found.result.extended.gain.exam_rms_before_dph**2
+        pooled.shipped += found.result.extended.gain.exam_rms_after_dph**2
+    print(f"s = {s:g}: {pooled.share:.3f} of the oracle's gain")
+    assert pooled.share >= 0.85

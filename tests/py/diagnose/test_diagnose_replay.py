@@ -19,14 +19,14 @@ from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.extension import Refitting, stand_ins_of
 from gyrotc.diagnose.gains import Gains
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
-from gyrotc.diagnose.refit import Effect, Played, added_range, play_runs, samples
+from gyrotc.diagnose.refit import Effect, Played, added_range, completed, play_runs, samples
 from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
 from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
 from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Rows, Run, joined_runs
+from gyrotc.recordings.records import Dataset, Rows, Run, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.front_end import missed_before
@@ -255,6 +255,46 @@ def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alon
     low, high = added_range(played, effects[:1], stand_in.added)
     alone = added_range(played, effects[:1])
     assert low >= alone[0] + stand_in.added.min() - 1e-12 and high <= alone[1] + stand_in.added.max() + 1e-12
+
+
+LOOPS = """
+extends = "hysteresis"
+[[cause]]
+id = "hysteresis"
+width_c = 6.0
+reference_c = 15.0
+amplitude_dph_per_c = 2e-4
+amplitude_dph_per_c_per_c = {growth!r}
+"""
+
+
+def _loops(folder: Path, strength: float, seed: int) -> tuple[Dataset, Effect]:
+    """Recordings of a play whose strength goes from 1 - strength to 1 + strength between -40 and 70 C; and the one of
+    one strength that stands for it."""
+    growth = strength * 2e-4 / 55.0
+    (folder / "loops.toml").write_text(LOOPS.format(growth=growth), "utf-8")
+    simulate(folder / "loops.toml", seed=seed, out=folder / "data", row_s=10.0)
+    return load(folder / "data"), Effect("hysteresis", {"width_c": 5.4, "amplitude_dph_per_c": 2e-4})
+
+
+@pytest.mark.parametrize("seed", quick_and_slow([1], [2, 3]))
+def test_a_play_gets_a_strength_over_temperature_where_recordings_ask_for_it(seed: int, tmp_path: Path) -> None:
+    for strength in (0.0, 1.0):
+        (folder := tmp_path / f"{strength:g}").mkdir()
+        dataset, one = _loops(folder, strength, seed)
+        runs = [run for run in dataset.runs if run.role == "train"]
+        played = play_runs(dataset, runs, front_end(runs, 10.0))
+        (found,) = completed(played, [one])
+        if strength == 0.0:
+            assert found == one, "nothing asks for it"
+            continue
+        tabled = CATALOGUE["hysteresis"].table
+        assert tabled is not None
+        width, amplitude, growth, middle = tabled.parameters(found.values, 10.0)
+        assert width == pytest.approx(6.0, rel=0.1)
+        assert amplitude + growth * (15.0 - middle) == pytest.approx(2e-4, rel=0.1)
+        assert growth == pytest.approx(2e-4 / 55.0, rel=0.2)
+        assert completed(played[:1], [one]) == [one], "a single run does not say it"
 
 
 WIDTH_C = 6.0

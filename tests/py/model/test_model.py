@@ -132,6 +132,8 @@ def test_a_bank_is_continuous_over_the_overlap_of_its_regions(model_dict: dict[s
         ("terms", [{"id": "cavity_lag", "parameters": {"tau_s": -1.0}}]),
         ("terms", [{"id": "cavity_lag", "parameters": {"width_c": 1.0}}]),
         ("terms", [{"id": "made_up", "parameters": {}}]),
+        ("terms", [{"id": "hysteresis", "parameters": {"width_c": 1.0, "reference_c": 20.0}}]),
+        ("terms", [{"id": "hysteresis", "parameters": {"width_c": 1.0, "amplitude_dph_per_c": 1e-4, "growth": 1e-6}}]),
         ("data.0.sha256", "abc"),
         ("unknown_field", 1),
     ],

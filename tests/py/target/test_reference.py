@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from conftest import quick_and_slow
 from gyrotc.common.errors import CheckFailed
+from gyrotc.model import Term
 from gyrotc.tables.quantise import NUMERICS, _limits, outside, quantise
 from gyrotc.target import table as layout
-from gyrotc.target.history import evaluate_map, replay
+from gyrotc.target.history import evaluate_map, recursions, replay
 from gyrotc.target.q31 import GAUSS_ERROR, exp2
+from gyrotc.target.recursions import Course, TermOutcome
 from gyrotc.target.table import ARRAYS, HELD, Table, f32_words
 from libc_build import ROOT, UNGUARDED, runtime
 from models import bank_of, bank_with_channels, random_channels, random_history, random_model, random_terms
@@ -82,6 +84,32 @@ def test_terms_agree_bit_for_bit(numeric: str, seed: int) -> None:
     np.testing.assert_array_equal(want.status, status[:, 2])
     np.testing.assert_array_equal(want.bits, bits)
     assert c.out_of_range() == 0
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_a_play_of_one_strength_is_what_it_was(numeric: str) -> None:
+    """Two words of its record, and nothing in a table that has no play over T; at the reference there is no growth."""
+    one = {"width_c": 2.0, "amplitude_dph_per_c": 1e-3}
+    over_t = {**one, "amplitude_dph_per_c_per_c": 2e-5, "reference_c": 12.0}
+    plain, grown = (
+        quantise(random_model(1, terms=(Term(id="hysteresis", parameters=p),)), numeric) for p in (one, over_t)
+    )
+    records = plain.records("terms")[0], grown.records("terms")[0]
+    assert not records[0][4:].any() and np.array_equal(records[0][:4], records[1][:4]), "width and amplitude"
+    at = np.array([12.0, 20.0, 12.0, 4.0, 12.0])
+    x, unit = (
+        (at.astype(np.float32), 1.0)
+        if numeric == "f32"
+        else ((at * 65536.0).astype(np.int64), 2.0**-plain.bias_frac_bits)
+    )
+    added = []
+    for table in (plain, grown):
+        outcome = TermOutcome(x, np.zeros_like(x), np.zeros_like(x), np.zeros(5, dtype=np.int32))
+        recursions(table)[0].apply(Course(x, np.arange(5) > 0, np.arange(5)), None, outcome)
+        added.append(outcome.added * unit)
+    assert added[1][[2, 4]] == pytest.approx(added[0][[2, 4]]), "at the reference"
+    assert added[1][1] == pytest.approx(added[0][1] * (1e-3 + 8.0 * 2e-5) / 1e-3, rel=1e-4)
+    assert added[1][3] == pytest.approx(added[0][3] * (1e-3 - 8.0 * 2e-5) / 1e-3, rel=1e-4)
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
