@@ -106,7 +106,7 @@ def _model(folder: Path, terms: Sequence[Term]) -> Model:
     plain = model_of(dataset, runs, data, found, front, options, np.concatenate(raw) - data.bias_dph)
     content = plain.to_dict()
     rules = content["uncertainty_dph"]["rules"]
-    rules["terms"] = [start_sigma(t.id, t.parameters, rules, data, None) for t in terms]
+    rules["terms"] = [start_sigma(t.id, t.parameters, rules, data) for t in terms]
     return Model.from_dict({**content, "terms": [t.model_dump() for t in terms]})
 
 

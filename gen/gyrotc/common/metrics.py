@@ -69,10 +69,11 @@ def median(values: NDArray[Any], overwrite_input: bool = False) -> float:
 
 
 Parts = Callable[[], Iterable[FloatArray]]
-"""Numbers part by part, each time they are asked for: arrays of float64, none of them negative or NaN."""
+"""Numbers part by part, each time they are asked for: arrays of float64, none of them NaN."""
 
 _TOGETHER = 2**18  # numbers that are put in order at once: 2 MiB
-_DIGIT_BITS = 16  # of a float64: its numbers are in the order of their bits, so four digits find one
+_NOT_SIGN = 2**63 - 1  # every bit of a float64 but its sign
+_DIGIT_BITS = 16  # of a float64: its numbers are in the order of their keys (`_keys`), so four digits find one
 
 
 def median_of_parts(parts: Parts) -> float:
@@ -103,22 +104,26 @@ def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[f
     for part in parts():
         together.append(part)
         if sum(map(len, together)) > _TOGETHER:
-            return _farthest(parts, ranks_of)
-    few = np.concatenate(together)
-    few.partition(ranks := ranks_of(few.size))
-    return float(few[ranks[0]]), float(few[ranks[1]])
+            break
+    else:
+        few = np.concatenate(together)
+        few.partition(ranks := ranks_of(few.size))
+        return float(few[ranks[0]]), float(few[ranks[1]])
+    del together, part  # behind the loop, which holds what the parts come from
+    return _farthest(parts, ranks_of)
 
 
 def _farthest(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
     """As `_middle`, of many: counts their leading digits, goes on with those that have the digits of the ranks."""
-    prefix, below, ranks = 0, 0, None
+    lowest, below, ranks = -(2 ** (_DIGIT_BITS - 1)), 0, None
     for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):
 
-        def digits(shift: int = shift, prefix: int = prefix) -> Iterable[tuple[FloatArray, NDArray[np.int64]]]:
+        def digits(shift: int = shift, lowest: int = lowest) -> Iterable[tuple[FloatArray, NDArray[np.int64]]]:
             for part in parts():
-                known = np.ascontiguousarray(part).view(np.int64) >> shift
-                mine = (known >> _DIGIT_BITS) == prefix
-                yield part[mine], known[mine] & (2**_DIGIT_BITS - 1)
+                digit = _keys(part) >> shift
+                digit -= lowest
+                mine = (digit >= 0) & (digit < 2**_DIGIT_BITS)
+                yield part[mine], digit[mine]
 
         count = np.zeros(2**_DIGIT_BITS, dtype=np.int64)
         for _, digit in digits():
@@ -129,14 +134,23 @@ def _farthest(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple
         below = int(ends[first] - count[first])
         if first != last:  # so the one is the largest with its digit, the other the smallest
             return (
-                max(float(part[digit == first].max(initial=0.0)) for part, digit in digits()),
+                max(float(part[digit == first].max(initial=-np.inf)) for part, digit in digits()),
                 min(float(part[digit == last].min(initial=np.inf)) for part, digit in digits()),
             )
         if count[first] <= _TOGETHER:
             few = np.sort(np.concatenate([part[digit == first] for part, digit in digits()]))
             return float(few[ranks[0] - below]), float(few[ranks[1] - below])
-        prefix = prefix << _DIGIT_BITS | first
-    return (float(np.int64(prefix).view(np.float64)),) * 2
+        lowest = (lowest + first) << _DIGIT_BITS
+    return (float(_keys(np.array([lowest >> _DIGIT_BITS]).view(np.float64)).view(np.float64)[0]),) * 2
+
+
+def _keys(numbers: FloatArray) -> NDArray[np.int64]:
+    """Whole numbers in the order of the numbers: their bits, all but the sign turned over where they are negative.
+
+    The same turns the bits of a key into those of its number.
+    """
+    bits = np.ascontiguousarray(numbers).view(np.int64)
+    return np.asarray(bits ^ ((bits >> 63) & _NOT_SIGN))
 
 
 def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e: FloatArray) -> FloatArray:

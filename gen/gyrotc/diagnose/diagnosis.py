@@ -19,7 +19,7 @@ from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.data import TrainingData, training_spans
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_of, training_of
-from ..train.result import channel_guard, stuck_after_s
+from ..train.result import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .blocks import Records, records_of
 from .extension import Extension, Refitting, extend, stand_ins_of
@@ -121,7 +121,7 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         )
     causes = named if cycle is None else cycle.causes
     extended, training = _extended_model(dataset, refitting, extension, chosen)
-    extension = _as_emitted(dataset, extension, extended, chosen)
+    extension = _as_emitted(dataset, refitting, extension, extended, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
 
@@ -170,12 +170,14 @@ def _extended_model(
     return Model.from_dict({**content, **reported}), training
 
 
-def _as_emitted(dataset: Dataset, extension: Extension, extended: Model | None, options: FitOptions) -> Extension:
+def _as_emitted(
+    dataset: Dataset, refitting: Refitting, extension: Extension, extended: Model | None, options: FitOptions
+) -> Extension:
     """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
     exam = [run for run in dataset.runs if run.role == "exam"]
     if extended is None or not exam:
         return extension
-    plain = fit_dataset(dataset, options).model
+    plain = fit_dataset(dataset, options, read=refitting.read()).model
     before, after = emitted_means((plain, extended), exam, options.average_s)
     total = gain_of(before, after, extension.floor, options.average_s)
     return replace(extension, total=total, before=before, after=after)
@@ -217,12 +219,12 @@ def _with_terms(
     content = {**plain.to_dict(), "terms": entries}
     if content["uncertainty_dph"] is not None:
         rules = content["uncertainty_dph"]["rules"]
-        channels = {
-            e["channel"]: np.concatenate([run.rows().channel(e["channel"]) for run in runs])
+        rules["terms"] = [
+            stand_ins[e["channel"]].sigma_dph
+            if e["channel"] in stand_ins
+            else start_sigma(
+                e["id"], e["parameters"], rules, samples, readings_of(runs if e["channel"] else (), e["channel"])
+            )
             for e in entries
-            if e["channel"] is not None
-        }
-        at_start = [start_sigma(e["id"], e["parameters"], rules, samples, channels.get(e["channel"])) for e in entries]
-        stood = {channel: stand_in.sigma_dph for channel, stand_in in stand_ins.items()}
-        rules["terms"] = [stood.get(e["channel"], s) for e, s in zip(entries, at_start, strict=True)]
+        ]
     return content

@@ -28,7 +28,7 @@ from ..results.fleet import LotUse
 from ..train.channels import StandIn, stand_in_of
 from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process
-from ..train.fitting import FitOptions, front_end, map_method, power_ons
+from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
 from ..train.mrbf import Bumps
 from ..train.result import Fit
 from ..train.selection import CandidateScores, compare_candidates
@@ -97,7 +97,7 @@ class Refitting:
         self.runs = [r for r in dataset.runs if r.role == "train"]
         self.exam_runs = [r for r in dataset.runs if r.role == "exam"]
         self.front = front_end(self.runs, options.block_s)
-        self.train = play_runs(dataset, self.runs, self.front)
+        self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
         self.exam = play_runs(dataset, self.exam_runs, self.front)
         self.average_s = options.average_s
         self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
@@ -112,6 +112,15 @@ class Refitting:
             "prior": None if single_cycle else options.prior,
         }
         self.plain = {"method": options.method, "prior": options.prior}
+
+    def read(self) -> Read:
+        """The training runs as `fit_dataset` reads them."""
+        return Read(
+            joined([run.data for run in self.train]),
+            {name: np.concatenate([run.seen[name] for run in self.train]) for name in self.train[0].seen},
+            [stretch for run in self.train for stretch in run.left_out],
+            max(run.longest_same_s for run in self.train),
+        )
 
     def fit(self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None) -> Fit:
         """The map beside the effects (`beside`: as if there were any), without any what would be emitted.

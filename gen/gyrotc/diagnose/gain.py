@@ -8,19 +8,21 @@ angle: hours) of the scored runs again, a paired bootstrap; where there are few 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..assess.evaluate import replay_run
-from ..common.arrays import FloatArray, those
+from ..common.arrays import FloatArray, parts_of, those
 from ..common.metrics import MAD_TO_SIGMA, Averager, Averages, time_statistics
 from ..model import Model
 from ..recordings.records import Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emit import quantise_all
+from ..target.history import FollowedHistory, followed
+from ..target.table import Table
 from ..train.evidence import steps_of, stretches
+from ..verify.replay import inputs_of
 from .blocks import Records
 
 _PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
@@ -90,23 +92,46 @@ def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
 
 
 def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
-    """What the emitted tables of each model leave on runs, bit for bit, on the rows that all of them correct."""
+    """What the emitted tables of each model leave on runs, bit for bit, on the rows that all of them correct.
+
+    At which temperatures is not asked (NaN): beside the histories they would be what fills memory.
+    """
     tables = [next(iter(quantise_all(model, None).tables.values())) for model in models]
     found: list[list[Averages]] = [[] for _ in models]
     for run in runs:
-        rows = run.rows()
+        histories = [_followed(run, model, table) for model, table in zip(models, tables, strict=True)]
+        rows = replace(run.rows(), temperature_c=np.zeros(0))
         inside = run.in_span(rows.time_s)
         averagers = [Averager(those(rows.time_s, inside), average_s) for _ in models]
-        replayed = (replay_run(rows, run, model, table, None) for model, table in zip(models, tables, strict=True))
-        for parts in zip(*replayed, strict=True):
-            at, span = parts[0].rows, inside[parts[0].rows]
-            scored = np.all([part.scored[span] for part in parts], axis=0)
-            time, temperature, rate = (c[at][span] for c in (rows.time_s, rows.temperature_c, rows.rate_dph))
-            for averager, part in zip(averagers, parts, strict=True):
-                averager.add(time, temperature, rate, rate - part.bias_dph[span], scored)
+        for at in parts_of(len(rows)):
+            span, answers = inside[at], [history.rows(at) for history in histories]
+            scored = np.all([(answer.block_valid & answer.begun)[span] for answer in answers], axis=0)
+            time, rate = rows.time_s[at][span], rows.rate_dph[at][span]
+            unknown = np.full(time.size, np.nan)
+            for averager, answer, table in zip(averagers, answers, tables, strict=True):
+                averager.add(time, unknown, rate, rate - table.decode_bias(answer.bits)[span], scored)
         for means, averager in zip(found, averagers, strict=True):
-            means.append(averager.averages())
+            made = averager.averages()
+            means.append(replace(made, temperature_c=np.full(made.time_s.size, np.nan)))
+        del rows, histories  # before those of the next run are read
     return found
+
+
+def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
+    """A history made when the rows are gone, which take more than it; of its samples nothing is kept.
+
+    So what a call of `sample` returns is not known; corrections, and which blocks are valid, are.
+    """
+    rows = replace(run.rows(), rate_dph=np.zeros(0))
+    channels, missed, per_block = inputs_of(rows, run, model, table)
+    del rows
+    history = followed(table, channels, missed=missed, samples_per_block=per_block)
+    stream, corrections = history.stream, history.corrections
+    return replace(
+        history,
+        stream=replace(stream, samples=np.zeros(0, dtype=stream.samples.dtype)),
+        corrections=replace(corrections, accepted=np.broadcast_to(np.bool_(True), corrections.accepted.shape)),
+    )
 
 
 def floor_of(records: Records, left_dph: FloatArray, average_s: float) -> float:

@@ -26,7 +26,7 @@ from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .gains import Gains
 from .joined import Channels
-from .noise import NOISE_WORDS, Declared
+from .noise import NOISE_WORDS, Colour, Declared
 from .search import Search, open_search
 from .signature_bank import bank_of
 
@@ -38,38 +38,41 @@ _HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything that is known before an extension is made.
+    """Everything that is known before an extension is made: beside the search's inner products, rows need not fit.
 
     Attributes:
         records: Training runs.
-        screened: What the screens found.
-        search: The search of the data, before any cause.
+        static: Block means of the functions of the static map, shape (N, m), orthonormal.
+        untestable: Why a cause cannot be tested, by id.
         attribution: What was found.
         noise: Findings of the family `noise`, from screens and from the declaration.
         limits: Detection limits by cause.
         separations: For every cause found, d from which it can be distinguished from each rival.
         ensemble: Measured against simulated residuals.
-        after: The search with the causes found taken out.
+        colour, scale: The likeliest noise with the causes found taken out, and its factor.
+        freedom: Degrees of freedom that they leave.
         extended: Measured against simulated residuals when the simulation has causes and noise as found; None
             if nothing was.
     """
 
     records: Records
-    screened: Screened
-    search: Search
+    static: FloatArray
+    untestable: dict[str, str]
     attribution: Attribution
     noise: tuple[NoiseFinding, ...]
     limits: dict[str, CauseLimit]
     separations: tuple[dict[str, float], ...]
     ensemble: Ensemble
-    after: Search
+    colour: Colour
+    scale: float
+    freedom: int
     extended: Ensemble | None
 
     @property
     def left_dph(self) -> FloatArray:
         """What map and causes leave, as large as the noise is of which they have taken a part, deg/h, shape (N,)."""
         left = (self.ensemble if self.extended is None else self.extended).residual
-        return np.asarray(left * np.sqrt(left.size / max(self.after.freedom, 1)))
+        return np.asarray(left * np.sqrt(left.size / max(self.freedom, 1)))
 
 
 def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
@@ -91,16 +94,18 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
         for cause in attribution.causes
     )
     return Analysis(
-        records,
-        screened,
-        search,
-        attribution,
-        tuple(noise),
-        detection_limits(search),
-        separations,
-        ensemble_of(search, declared),
-        after,
-        _extended(after, attribution, noise, declared),
+        records=records,
+        static=search.bank.map,
+        untestable=search.bank.untestable,
+        attribution=attribution,
+        noise=tuple(noise),
+        limits=detection_limits(search),
+        separations=separations,
+        ensemble=ensemble_of(search, declared),
+        colour=after.likeliest.colour,
+        scale=after.likeliest.scale,
+        freedom=after.freedom,
+        extended=_extended(after, attribution, noise, declared),
     )
 
 

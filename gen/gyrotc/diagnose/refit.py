@@ -19,9 +19,11 @@ from ..causes import CATALOGUE
 from ..causes.base import OVERTONES, Cause, History, Scene, Values
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average
+from ..quality.outliers import stretches_left_out
 from ..recordings.records import Dataset, Run
+from ..results.training import LeftOutRows
 from ..target.recursions import Course, CourseChannel, TermOutcome
-from ..train.channels import channel_shown
+from ..train.channels import channel_shown, seen_by_target
 from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
@@ -122,6 +124,8 @@ class Played:
         block_s: Length of a block, s.
         environment: Environment as the data set names it.
         longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
+        left_out: Rows that were left out as outliers.
+        seen: Channels and differences at the training samples, where they may be inputs of the map's model.
     """
 
     data: TrainingData
@@ -135,6 +139,8 @@ class Played:
     block_s: float
     environment: str
     longest_same_s: float
+    left_out: list[LeftOutRows]
+    seen: Mapping[str, FloatArray]
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
     def outcome(self, effect: Effect) -> TermOutcome:
@@ -156,17 +162,19 @@ class Played:
 _KEPT = 8  # outcomes of terms for each run: those of two full tables
 
 
-def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd) -> list[Played]:
-    """Front end over all runs."""
+def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd, *, channels: bool = False) -> list[Played]:
+    """Front end over all runs; `channels`: with what training chooses channels by."""
     first = min((r.started for r in dataset.runs if r.started is not None), default=None)
     played = []
     for k, run in enumerate(runs):
-        played.append(_played(dataset, run, k, front, first))
+        played.append(_played(dataset, run, k, front, first, channels=channels))
         give_back()  # what the rows of a whole recording took
     return played
 
 
-def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None) -> Played:
+def _played(
+    dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None, *, channels: bool
+) -> Played:
     rows = run.rows()
     blocks = front.blocks(run, rows)
     data = samples_of(blocks, front.block_s, number)
@@ -186,7 +194,9 @@ def _played(dataset: Dataset, run: Run, number: int, front: FrontEnd, first: dat
         channels={name: channel_shown(blocks, rows.channels[name]) for name in dataset.channels},
         block_s=front.block_s,
         environment=run.environment,
-        longest_same_s=longest_same_s(rows.temperature_c, run.row_period_s),
+        longest_same_s=longest_same_s(blocks.stream.samples, run.row_period_s),
+        left_out=stretches_left_out(run, blocks.left_out_s),
+        seen=seen_by_target(dataset, rows, blocks) if channels else {},
     )
 
 

@@ -47,7 +47,7 @@ def series_of(found: Diagnosis) -> DiagnosisSeries | None:
         low = high = np.zeros(0)
     else:
         residual = analysis.ensemble.residual
-        named = _beyond_the_map(analysis.search.bank.map, causes) if causes else None
+        named = _beyond_the_map(analysis.static, causes) if causes else None
         low, high = _band(records, analysis.ensemble.simulated)
     scored = zip(extension.before, extension.after, strict=True) if extension.steps else ()
     return DiagnosisSeries(

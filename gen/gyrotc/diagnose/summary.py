@@ -306,7 +306,7 @@ def _of_lot(extension: Extension, options: FitOptions, *, single_cycle: bool) ->
 
 def _untestable(analysis: Analysis, cycle: Cycle | None) -> dict[str, str]:
     """Causes that these recordings cannot test, and why."""
-    found = dict(analysis.search.bank.untestable)
+    found = dict(analysis.untestable)
     if cycle is not None and cycle.not_testable:
         found |= dict.fromkeys(memories(), cycle.not_testable)
     return found
@@ -412,8 +412,7 @@ def _extended(extension: Extension) -> ExtendedModel | None:
 
 def _estimated_noise(analysis: Analysis) -> dict[str, float]:
     """Noise at the likeliest colour in the terms of a scenario; a Markov part has no such term."""
-    view, block_s = analysis.after.likeliest, analysis.records.block_s
-    colour = view.colour
+    colour, block_s = analysis.colour, analysis.records.block_s
     flicker = colour.slow if colour.tau_s == 0.0 else 0.0
     levels = {
         "arw_deg_per_sqrt_h": np.sqrt(colour.white * block_s / 3600.0),
@@ -421,7 +420,7 @@ def _estimated_noise(analysis: Analysis) -> dict[str, float]:
         "rate_random_walk_dph_per_sqrt_h": np.sqrt(colour.walk),
         "quantum_arcsec": block_s * np.sqrt(12.0 * colour.quantum),
     }
-    return {name: float(view.scale * value) for name, value in levels.items() if value > 0.0}
+    return {name: float(analysis.scale * value) for name, value in levels.items() if value > 0.0}
 
 
 def _considered(analysis: Analysis, untestable: Mapping[str, str]) -> list[ConsideredCause]:

@@ -263,7 +263,10 @@ def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequenc
             not_finite = np.isnan(np.sum(columns[name]))
         if not_finite:
             known &= ~np.isnan(columns[name])
-    return columns if known.all() else {name: values[known] for name, values in columns.items()}
+    if not known.all():
+        for name in columns:  # one after the other, so that what is replaced goes: a long recording is not held twice
+            columns[name] = columns[name][known]
+    return columns
 
 
 def _converted(columns: dict[str, FloatArray], units: Mapping[str, Conversion]) -> dict[str, FloatArray]:

@@ -39,6 +39,7 @@ __all__ = [
     "HOLD_S",
     "FitOptions",
     "Fitted",
+    "Read",
     "fit_dataset",
     "front_end",
     "map_method",
@@ -144,8 +145,10 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
-def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | None = None) -> Fitted:
-    """Fits a model to the training runs of a data set.
+def fit_dataset(
+    dataset: Dataset, options: FitOptions, *, read: Read | None = None, progress: Progress | None = None
+) -> Fitted:
+    """Fits a model to the training runs of a data set; `read`: what the front end made of them, where it is known.
 
     Raises:
         InputError: No training run, or too few usable samples.
@@ -158,8 +161,14 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
     stretches = joined_runs(runs)
-    read = _read(dataset, stretches, front, say, channels=options.channels)
+    read = read or _read(dataset, stretches, front, say, channels=options.channels)
     data = read.data
+    if data.bias_dph.size < _MIN_SAMPLES:
+        raise InputError(
+            str(dataset.folder),
+            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
+            f"at least {_MIN_SAMPLES}",
+        )
     say("training")
     choice = None
     if options.channels:
@@ -192,7 +201,7 @@ def fit_dataset(dataset: Dataset, options: FitOptions, *, progress: Progress | N
 
 
 @dataclass(frozen=True, slots=True)
-class _Read:
+class Read:
     """What the front end made of the training runs.
 
     Attributes:
@@ -208,8 +217,8 @@ class _Read:
     longest_same_s: float
 
 
-def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool) -> _Read:
-    """Reads the training runs. Raises InputError where too few samples are usable."""
+def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool) -> Read:
+    """Reads the training runs."""
     parts, columns = [], []
     left_out: list[LeftOutRows] = []
     longest_s = 0.0
@@ -222,15 +231,8 @@ def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Prog
         columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
         left_out += stretches_left_out(run, blocks.left_out_s)
         del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
-    data = joined(parts)
-    if data.bias_dph.size < _MIN_SAMPLES:
-        raise InputError(
-            str(dataset.folder),
-            f"{data.bias_dph.size} usable samples of {front.block_s:g} s",
-            f"at least {_MIN_SAMPLES}",
-        )
     whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
-    return _Read(data, whole, left_out, longest_s)
+    return Read(joined(parts), whole, left_out, longest_s)
 
 
 def map_method(method: str) -> str:

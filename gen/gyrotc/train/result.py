@@ -6,7 +6,7 @@ Or known before: what training takes of a unit from units of its type, or from i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,8 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, parts_of
 from ..common.errors import InputError
+from ..common.metrics import median_of_parts
 from ..quality.findings import longest_stretch
 from ..recordings.records import Run
 from ..results.fleet import KnownMap, LotUse
@@ -350,13 +351,16 @@ def stuck_after_s(longest_s: float) -> float:
 
 def channel_guard(runs: Sequence[Run], channel: str, missing_s: float) -> dict[str, float]:
     """The guard of an auxiliary channel as training runs showed it, in the fields of `model.json`."""
-    columns = [np.asarray(run.rows().channel(channel)) for run in runs]
-    longest = max(longest_same_s(c, run.row_period_s) for c, run in zip(columns, runs, strict=True))
-    readings = [column[np.isfinite(column)] for column in columns]
-    every = np.concatenate(readings)
-    low, high = float(every.min()), float(every.max())
+    low, high, step, longest = np.inf, -np.inf, 0.0, 0.0
+    for run in runs:
+        column, last = run.rows().channel(channel), np.zeros(0)
+        longest = max(longest, longest_same_s(column, run.row_period_s))
+        for part in _readings(column):
+            low, high = min(low, float(part.min())), max(high, float(part.max()))
+            step = max(step, float(np.max(np.abs(np.diff(np.append(last, part))), initial=0.0)))
+            last = part[-1:]
+        del column  # before the rows of the next run are read
     margin = max(_MARGIN * (high - low), _LEAST_MARGIN * max(abs(low), abs(high)), 1e-6)
-    step = max(float(np.max(np.abs(np.diff(r)), initial=0.0)) for r in readings)
     width = high - low + 2.0 * margin
     return {
         "low": low - margin,
@@ -366,8 +370,22 @@ def channel_guard(runs: Sequence[Run], channel: str, missing_s: float) -> dict[s
         "agree_s": AGREE_S,
         "stuck_s": stuck_after_s(longest),
         "missing_s": missing_s,
-        "fallback": float(np.median(every)),
+        "fallback": median_of_parts(lambda: readings_of(runs, channel)),
     }
+
+
+def readings_of(runs: Sequence[Run], channel: str) -> Iterator[FloatArray]:
+    """What a channel showed in runs, part by part."""
+    for run in runs:
+        yield from _readings(run.rows().channel(channel))
+
+
+def _readings(column: FloatArray) -> Iterator[FloatArray]:
+    """Those that are not missing, as copies: nobody holds the rows of a run when those of the next are read."""
+    for part in parts_of(len(column)):
+        found = column[part][np.isfinite(column[part])]
+        if found.size:
+            yield found
 
 
 _SPREAD_GRID = 2.0**30  # of a spread: as many digits as a file holds

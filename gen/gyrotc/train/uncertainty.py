@@ -23,7 +23,7 @@ large, and without it sigma may be too small by multiples, with it a little too 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -96,13 +96,17 @@ def rezero_dph(between: float, runs: int) -> float:
 
 
 def start_sigma(
-    id: str, parameters: dict[str, float], rules: dict[str, Any], samples: TrainingData, channel: FloatArray | None
+    id: str,
+    parameters: dict[str, float],
+    rules: dict[str, Any],
+    samples: TrainingData,
+    channel: Iterable[FloatArray] = (),
 ) -> float:
     """What a term does not know of the time before it began, 1 σ: deg/h, for a play deg/h/C.
 
     A memory or a play may have been as far from the temperature as it was on average in training; that of a play
     falls with every degree of its width through which the temperature has moved; a channel that is lost may differ
-    from its reference as it did in training.
+    from its reference as it did in training: `channel`, its readings part by part.
     """
     amplitude = abs(parameters.get("amplitude_dph_per_c", 0.0))
     if id == "hysteresis":
@@ -116,10 +120,10 @@ def start_sigma(
             per_min = 60.0 / parameters["tau_s"]
             amplitude = float(np.hypot(rules["beyond_dph_per_c"], rules["beyond_dph_per_c_per_min"] * per_min))
         return amplitude * left
-    if channel is not None and np.isfinite(channel).any():
-        departure = channel[np.isfinite(channel)] - parameters["reference"]
-        return abs(parameters["slope_dph_per_unit"]) * float(np.sqrt(np.mean(departure**2)))
-    return 0.0
+    squares, count = 0.0, 0
+    for part in channel:
+        squares, count = squares + float(((part - parameters["reference"]) ** 2).sum()), count + part.size
+    return abs(parameters["slope_dph_per_unit"]) * float(np.sqrt(squares / count)) if count else 0.0
 
 
 def _played(samples: TrainingData, width_c: float) -> float:

@@ -101,6 +101,13 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
     Raises:
         InputError: It lacks a channel that a term of the model needs.
     """
+    channels, missed, per_block = inputs_of(rows, run, model, table)
+    answers = followed(table, channels, missed=missed, samples_per_block=per_block)
+    return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
+
+
+def inputs_of(rows: Rows, run: Run, model: Model, table: Table) -> tuple[Words, NDArray[np.int64], int]:
+    """Bits of a recording's channels, samples missed before each row, and samples per block, as of `ReplayCase`."""
     channels = channels_of(rows, model, table)
     missed = missed_before(rows.time_s, run.row_period_s)
     per_block = samples_per_block(model.block_s, run.row_period_s)
@@ -110,8 +117,7 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
             found = f"power-on {before * run.row_period_s:.4g} s before the first row"
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
         missed = np.append(before, missed[1:])
-    answers = followed(table, channels, missed=missed, samples_per_block=per_block)
-    return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
+    return channels, missed, per_block
 
 
 @contextmanager
@@ -226,6 +232,7 @@ def replay_dataset(
                 history = history_of(rows, run, job.model, table)
                 same = [lane for lane in lanes.values() if lane.table is table]
                 list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
+            del rows, history  # before those of the next run are read
     return [_entered(entry, lanes.get(number)) for number, entry in enumerate(entries)]
 
 

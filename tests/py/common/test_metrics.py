@@ -132,13 +132,17 @@ def test_quantiles_are_those_of_their_distributions() -> None:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("together", [10, 2**18])
 def test_the_median_of_parts_is_that_of_the_whole(seed: int, together: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also of numbers that hardly differ, of coarse ones, of an even number, and by digits of their bits."""
+    """Of numbers that hardly differ, of coarse and negative ones, of an even number, and by digits of their bits."""
     rng = np.random.default_rng(seed)
     size = 3001 + seed
     kinds = (
         rng.exponential(size=size),
         np.abs(np.round(rng.normal(size=size))),
         np.abs(np.diff(np.arange(size + 1) / 290.0)),
+        rng.normal(size=size),
+        np.round(rng.normal(-40.0, 3.0, size)),
+        -5.0 - 1e-9 * rng.random(size),
+        np.full(size, -2.5),
     )
     monkeypatch.setattr(metrics, "_TOGETHER", together)
     for values in kinds:

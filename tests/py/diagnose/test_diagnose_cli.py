@@ -33,6 +33,7 @@ from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
 from gyrotc.simulate.scenario import read
 from gyrotc.store import cache
 from gyrotc.target.recursions import first_order
+from gyrotc.train import fitting
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from recordings import ACCEPTED, toml, write_csv
@@ -472,9 +473,9 @@ def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatc
     order = []
     played, searched = extension.play_runs, stages.analyse
 
-    def playing(dataset: Any, runs: Any, front: Any) -> Any:
+    def playing(dataset: Any, runs: Any, front: Any, **options: Any) -> Any:
         order.extend(run.file for run in runs)
-        return played(dataset, runs, front)
+        return played(dataset, runs, front, **options)
 
     def searching(*arguments: Any) -> Any:
         order.append("search")
@@ -482,8 +483,10 @@ def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatc
 
     monkeypatch.setattr(extension, "play_runs", playing)
     monkeypatch.setattr(stages, "analyse", searching)
+    monkeypatch.setattr(fitting, "_read", lambda *_, **__: pytest.fail("the training runs are read again"))
     found = diagnose(case.dataset, options=OPTIONS)
     assert found.extension is not None
+    assert found.extension.shipped
     assert order == ["0.csv", "1.csv", "2.csv", "3.csv", "search"]
 
 

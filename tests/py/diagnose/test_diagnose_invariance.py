@@ -23,7 +23,7 @@ from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.joined import _root
 from gyrotc.diagnose.noise import Declared, declared_noise
-from gyrotc.diagnose.pipeline import Analysis, analyse
+from gyrotc.diagnose.pipeline import Analysis, analyse, search_of
 from gyrotc.diagnose.refit import Effect
 from gyrotc.diagnose.search import open_search
 from gyrotc.diagnose.single_cycle import cycle_of
@@ -167,7 +167,8 @@ def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) 
 def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
     made: Callable[[str], Case],
 ) -> None:
-    search = made("hysteresis").answer.analysis.search
+    case = made("hysteresis")
+    search = search_of(case.records, case.declared)
     weights = np.random.default_rng(4).normal(size=search.bank.map.shape[1]) * 0.01
     moved = open_search(
         search.records,

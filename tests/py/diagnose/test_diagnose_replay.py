@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import weakref
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,8 @@ import pytest
 from conftest import quick_and_slow
 from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History
+from gyrotc.common.metrics import average
+from gyrotc.diagnose import gain
 from gyrotc.diagnose.attribution import Attribution, attribute
 from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.candidates import columns_of
@@ -30,7 +34,7 @@ from gyrotc.recordings.records import Dataset, Rows, Run, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
 from gyrotc.target.front_end import missed_before
-from gyrotc.target.history import evaluate_map
+from gyrotc.target.history import FollowedHistory, evaluate_map, followed
 from gyrotc.target.recursions import first_order, play
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
@@ -59,6 +63,7 @@ VALUES: dict[str, dict[str, float]] = {
 HELD = [id for id, term in CATALOGUE.items() if term.table is not None and term.search is not None]
 BLOCK_S, ROW_S = 40.0, 10.0
 TIME = np.arange(0.0, 8000.0, ROW_S)
+SEED = 31
 ERROR_DPH = 2e-8  # float32 of the target: 2^-23 of 60 C, kept by a memory of 10 blocks, at 2e-4 deg/h/C
 
 
@@ -183,6 +188,58 @@ def test_the_replay_is_what_the_target_does(
     done = table.decode_bias(history.reference.rows(slice(None)).bits[last[there]])
     assert there.sum() > 0.9 * data.bias_dph.size
     assert promised[there] == pytest.approx(done, abs=ERROR_DPH, rel=0.0)
+
+
+def test_what_emitted_tables_leave_is_found_with_rows_or_histories_in_memory(
+    model_dict: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two histories beside the rows that they were made of took 670 MB at 8.6e6 rows a run."""
+    rng, count, alive = np.random.default_rng(SEED), 150_000, list[weakref.ref[Array]]()
+    print("seed", SEED)
+    time = 0.1 * np.arange(count)
+    recorded = [(_wave(time) + k, rng.normal(size=count)) for k in range(2)]
+
+    def read(temperature: Array, rate: Array) -> Rows:
+        assert not any(one() is not None for one in alive), "rows that were read before are still in memory"
+        columns = [time.copy(), temperature.copy(), rate.copy()]
+        alive.extend(map(weakref.ref, columns))
+        return Rows(*columns, {})
+
+    runs = [
+        Run(
+            f"{k}.csv", Path(f"{k}.csv"), "", "exam", "", None, None, 1000.0, None, (), 0.1, count, None, None,
+            reader=partial(read, *columns),
+        )
+        for k, columns in enumerate(recorded)
+    ]  # fmt: skip
+
+    def without_rows(*given: Any, **named: Any) -> FollowedHistory:
+        assert not any(one() is not None for one in alive), "a history is made beside the rows"
+        return followed(*given, **named)
+
+    monkeypatch.setattr(gain, "followed", without_rows)
+    front = front_end(runs, BLOCK_S)
+    terms = [[], [{"id": "thermal_gradient", "parameters": VALUES["thermal_gradient"], "channel": None}]]
+    models = [_model(model_dict, front, one) for one in terms]
+    found = gain.emitted_means(models, runs, 100.0)
+    for model, means in zip(models, found, strict=True):
+        table = quantise(model, "f32")
+        for run, made in zip(runs, means, strict=True):
+            rows = run.rows()
+            answers = history_of(rows, run, model, table).reference.rows(slice(None))
+            inside, rate = run.in_span(rows.time_s), rows.rate_dph
+            whole = average(
+                rows.time_s[inside],
+                rows.temperature_c[inside],
+                rate[inside],
+                (rate - table.decode_bias(answers.bits))[inside],
+                scored=(answers.block_valid & answers.begun)[inside],
+                average_s=100.0,
+            )
+            assert len(made.time_s) == 140
+            for name in ("time_s", "before_dph", "after_dph"):
+                assert np.array_equal(getattr(made, name), getattr(whole, name)), name
+            del rows, rate
 
 
 def _numbers(time_s: Array, first_s: float, front: FrontEnd) -> NDArray[np.int64]:
