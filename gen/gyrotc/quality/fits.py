@@ -15,9 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.linalg import solve_discrete_are
-from scipy.signal import lfilter
 
 from ..common.arrays import FloatArray
 from ..common.metrics import median_step
@@ -92,6 +90,12 @@ def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
     return np.array([1.0, -2.0, 1.0]), np.array([1.0, gain[0] - 2.0, 1.0 - gain[0] + gain[1]]), variance
 
 
+def _filtered(numerator: FloatArray, denominator: FloatArray, columns: FloatArray) -> FloatArray:
+    from scipy.signal import lfilter  # 0.4 s: most recordings have nothing to be looked for with it
+
+    return np.asarray(lfilter(numerator, denominator, columns, axis=0))
+
+
 @dataclass(frozen=True, slots=True)
 class SmoothFit:
     """Runs, made white and fitted.
@@ -134,9 +138,9 @@ class SmoothFit:
             columns += [
                 np.asarray(np.arange(n) >= k, dtype=np.float64) for k, gap in one.behind_gap if gap > LONGEST_GAP_S
             ]
-            q = orthonormal(lfilter(b, a, np.column_stack(columns), axis=0))
+            q = orthonormal(_filtered(b, a, np.column_stack(columns)))
             own.append(q)
-            both = lfilter(b, a, np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]), axis=0)
+            both = _filtered(b, a, np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]))
             both -= q @ (q.T @ both)
             white.append(both[:, :-1])
             rates.append(both[:, -1])
@@ -162,7 +166,7 @@ class SmoothFit:
     def white(self, columns: FloatArray) -> FloatArray:
         """Columns of one run through the filter."""
         b, a, _ = self.noise.filter()
-        return np.asarray(lfilter(b, a, columns, axis=0))
+        return _filtered(b, a, columns)
 
     def amplitudes(self, run: int, columns: FloatArray, beside: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of each column the inner product with the rates and its energy, both beside all else that is fitted.
@@ -189,6 +193,8 @@ LEAST_ENERGY = 1e-3  # of a change's own, below which what is fitted beside it h
 
 def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
     """Columns of a map over temperature and its rate at the cells of each run, shape (n, p)."""
+    from scipy.interpolate import BSpline  # as `_filtered`
+
     low = min(float(one.temperature_c.min()) for one in cells)
     high = max(float(one.temperature_c.max()) for one in cells)
     if high - low < _LEAST_SPAN_C:
