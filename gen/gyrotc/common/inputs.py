@@ -6,6 +6,7 @@ The option writes the environment, so that the processes of a fleet see it too.
 
 from __future__ import annotations
 
+import codecs
 import functools
 import json
 import math
@@ -254,8 +255,11 @@ def parse_json(data: bytes, where: str, expected: str) -> Any:
     return content
 
 
-def checked(kind: type[T], content: Any, where: str) -> T:
+def checked(kind: type[T], content: Any, where: str, text: bytes | None = None) -> T:
     """What JSON content says, as a pydantic model or another type, every field of the type that it should have.
+
+    Args:
+        text: What the content was parsed from, where it is known: it need not be written again.
 
     Raises:
         InputError: A field is missing or of another type; the message names it.
@@ -264,7 +268,8 @@ def checked(kind: type[T], content: Any, where: str) -> T:
 
     try:
         # JSON has no tuples: validated in JSON mode, so that lists pass and texts for numbers do not.
-        found: T = _adapter(cast("Any", kind)).validate_json(json.dumps(content))
+        json_text = json.dumps(content) if text is None else text.removeprefix(codecs.BOM_UTF8)
+        found: T = _adapter(cast("Any", kind)).validate_json(json_text)
         return found
     except ValidationError as error:
         raise refused(error, lambda field: f"{where}, field {field}" if field else where) from error

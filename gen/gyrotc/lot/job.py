@@ -33,12 +33,21 @@ _CURVE = 21  # points of the lot to be read
 
 @dataclass(frozen=True, slots=True)
 class _Calibrated:
-    """A fully calibrated unit of a fleet."""
+    """A fully calibrated unit of a fleet: what a lot needs of its `training.json`, which is large.
+
+    Attributes:
+        model: Its model.
+        where: Its `training.json`.
+        means: From there.
+        mean_s: Their length, s.
+        by_itself: It was calibrated without a lot or an earlier model.
+    """
 
     model: Model
-    training: Training
-    means: UnitMeans
     where: Path
+    means: UnitMeans
+    mean_s: float
+    by_itself: bool
 
 
 def load_lot(path: Path) -> Lot:
@@ -86,7 +95,7 @@ def lot_of(
         found,
         envelope,
         axis=units[0].model.axis,
-        mean_s=float(np.median([u.training.means.mean_s for u in kept if u.training.means])),
+        mean_s=float(np.median([u.mean_s for u in kept])),
         between_dph=float(np.sqrt(np.mean([u.model.between_dph**2 for u in kept]))),
         ageing=ageing,
     )
@@ -103,7 +112,7 @@ def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:
         raise InputError("--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own")
-    chosen = [u for u in units if u.model.axis == axis and u.training.lot is None and u.training.prior is None]
+    chosen = [u for u in units if u.model.axis == axis and u.by_itself]
     distinct = {u.model.serial: u for u in chosen}
     if len(distinct) < LEAST_UNITS:
         others = f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
@@ -116,7 +125,8 @@ def _unit(place: Path) -> _Calibrated:
     check_intact(place, ("training.json", "model.json"), needed=False)
     where, model = place / "training.json", load_model(place / "model.json")
     training = read_result(where, Training)
-    return _Calibrated(model, training, means_of(training.means, where), where)
+    means, by_itself = means_of(training.means, where), training.lot is None and training.prior is None
+    return _Calibrated(model, where, means, training.means.mean_s if training.means else 0.0, by_itself)
 
 
 def _ageing(units: Sequence[_Calibrated], earlier: Sequence[_Calibrated], folder: Path) -> LotAgeing:
@@ -151,7 +161,7 @@ def _moved(old: _Calibrated, new: _Calibrated) -> Moved | None:
         return None
     t, covariance, maps = np.linspace(low, high, KNOTS), np.zeros((KNOTS, KNOTS)), []
     for u in (old, new):
-        known = posterior_of_result(u.training, u.model, u.where)
+        known = posterior_of_result(read_result(u.where, Training), u.model, u.where)
         power_ons = len({one.file for one in u.model.data if one.role == "train"})
         covariance += covariance_at(known, t) + u.model.between_dph**2 / power_ons
         maps.append(u.model.map_dph(t, 0.0))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..common.inputs import checked, read_json
+from ..common.inputs import checked, parse_json, read_input
 
 if TYPE_CHECKING:
     from typing_extensions import Self, Unpack
@@ -84,7 +84,9 @@ def read_result(path: Path, kind: type[R]) -> R:
     Raises:
         InputError: It is missing, is no JSON, has another schema, or a field of it is wrong.
     """
-    return checked_result(read_json(path, f"what gyrotc wrote as {path.name}"), kind, str(path))
+    where, expected = str(path), f"what gyrotc wrote as {path.name}"
+    data = read_input(path, "result_mib", expected)
+    return checked_result(parse_json(data, where, expected), kind, where, data)
 
 
 def read_optional(path: Path, kind: type[R]) -> R | None:
@@ -92,14 +94,14 @@ def read_optional(path: Path, kind: type[R]) -> R | None:
     return read_result(path, kind) if path.exists() or path.is_symlink() else None
 
 
-def checked_result(content: Any, kind: type[R], where: str) -> R:
-    """JSON content as a result. Raises as `read_result`."""
+def checked_result(content: Any, kind: type[R], where: str, text: bytes | None = None) -> R:
+    """JSON content, from `text` where that is known, as a result. Raises as `read_result`."""
     schema = kind.schema_id()
     if not isinstance(content, dict):
         raise InputError(where, "is not a JSON object", f"what gyrotc wrote ({schema})")
     if content.get("schema") != schema:
         raise InputError(f"{where}, field schema", repr(content.get("schema"))[:60], repr(schema))
-    return checked(kind, content, where)
+    return checked(kind, content, where, text)
 
 
 class MapOfAxis(Part):
