@@ -18,6 +18,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent / "py"))
 from results import table, write
 
 SCENARIOS = ("paper", "thermal-gradient", "hysteresis", "cavity-lag", "warm-up", "supply-voltage")
-CYCLE, HEATING, RAMP = "mpu6000-chamber-cycle", "atoms3-mpu6886-heating", "pan-lsm6dsm-cold"
-MEASURED = (*((name, axis) for name in (CYCLE, HEATING) for axis in "xyz"), (RAMP, "x"))
+MEASURED = ("mpu6000-chamber-cycle", "atoms3-mpu6886-heating", "pan-lsm6dsm-cold", "mpu6050-isothermal")
+AXES = "xyz"
 PARAMETERS, OF_BLOCKS, FIGURES = 0.01, 0.05, 0.02
 """Shares by which parameters (with another length of a block) and figures may move."""
 
@@ -273,11 +274,7 @@ def line(record: dict[str, Any]) -> str:
 
 def sets(source: Path, work: Path) -> Iterator[tuple[str, Path, str]]:
     """Label, folder and axis of every set."""
-    for name in SCENARIOS:
-        folder = work / name
-        simulate(name, seed=1, out=folder)
-        yield name, folder, ""
-    for name, axis in MEASURED:
+    for name, axis in product(MEASURED, AXES):
         if not (source / name).is_dir():
             print(f"{name} {axis} is absent in {source}: skipped")
             continue
@@ -290,21 +287,34 @@ def sets(source: Path, work: Path) -> Iterator[tuple[str, Path, str]]:
             run = f'[[run]]\nfile = "{data.name}"\npower_on_s = "unknown"\n'
             (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{run}', "utf-8")
         yield f"{name} {axis}", folder, axis
+    for name in SCENARIOS:
+        folder = work / name
+        simulate(name, seed=1, out=folder)
+        yield name, folder, ""
 
 
-def diagnosed(source: Path, only: Sequence[str], names: tuple[str, ...], workers: int) -> list[dict[str, Any]]:
-    """Records of all sets whose names have one of the parts `only` (none: of all)."""
-    records: list[dict[str, Any]] = []
+def diagnosed(
+    source: Path, only: Sequence[str], names: tuple[str, ...], workers: int, kept: Path | None
+) -> list[dict[str, Any]]:
+    """Records of all sets whose names have one of the parts `only` (none: of all).
+
+    Args:
+        kept: Where they are written as sets are done, and taken from where a call was stopped.
+    """
+    records: list[dict[str, Any]] = json.loads(kept.read_text("utf-8")) if kept and kept.exists() else []
+    known = {record["set"] for record in records}
     with tempfile.TemporaryDirectory() as work, ProcessPoolExecutor(workers) as pool:
         tasks = [
             (label, str(folder), axis, names)
             for label, folder, axis in sets(source, Path(work))
-            if not only or any(part in label for part in only)
+            if label not in known and (not only or any(part in label for part in only))
         ]
         for found in pool.map(of_set, tasks):
             records += found
             for record in found:
                 print(line(record), flush=True)
+            if kept:
+                kept.write_text(json.dumps(records, indent=1), "utf-8")
     return records
 
 
@@ -350,22 +360,15 @@ def main() -> None:
     parser.add_argument("--variations", default="", help="parts of the names of variations")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--docs", type=Path, help="the folder docs, whose record is written")
-    parser.add_argument(
-        "--json", type=Path, help="records of an earlier call in place of diagnoses; else written there"
-    )
+    parser.add_argument("--json", type=Path, help="where records are kept; sets that it holds are not diagnosed again")
     given = parser.parse_args()
     only = [part.strip() for part in given.only.split(",") if part.strip()]
     wanted = [part.strip() for part in given.variations.split(",") if part.strip()]
     names = tuple(n for n in VARIATIONS if not wanted or any(w in n for w in wanted))
-    if given.json and given.json.exists():
-        records = json.loads(given.json.read_text("utf-8"))
-    else:
-        records = diagnosed(given.real, only, names, given.workers)
+    records = diagnosed(given.real, only, names, given.workers, given.json)
     kept, late = ([r for r in records if r.get(key)] for key in ("kept", "late"))
     print(f"{len(kept)} of {len(records)} variations keep verdict, causes, parameters and figures")
     print(f"{len(late)} do so but for what the delay of another block makes of RMS figures")
-    if given.json:
-        given.json.write_text(json.dumps(records, indent=1), "utf-8")
     if given.docs:
         record = {"sets": sorted({r["set"] for r in records}), "rows": rows_of(records)}
         write(given.docs, "invariance", record, section)
