@@ -23,7 +23,7 @@ from ..quality.outliers import stretches_left_out
 from ..recordings.records import Dataset, Run
 from ..results.training import LeftOutRows
 from ..target.recursions import Course, CourseChannel, TermOutcome
-from ..train.channels import channel_shown, seen_by_target
+from ..train.channels import channel_shown, readings_alone, seen_by_target
 from ..train.data import TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
@@ -179,6 +179,7 @@ def _played(
     blocks = front.blocks(run, rows)
     data = samples_of(blocks, front.block_s, number)
     before = blocks_since_power_on(rows, run, front.block_s)
+    rows = readings_alone(rows)
     course = blocks.stream.course(blocks.steps, blocks.settings.samples_per_block, before)
     day = None
     if run.started is not None and first is not None:

@@ -231,6 +231,11 @@ def channel_shown(blocks: Blocks, column: FloatArray) -> CourseChannel:
     return replace(shown, mean=shown.mean.astype(np.float64))
 
 
+def readings_alone(rows: Rows) -> Rows:
+    """Rows without times and rates, which channels need not stand beside: in a long recording they fill memory."""
+    return replace(rows, time_s=np.zeros(0), rate_dph=np.zeros(0))
+
+
 def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, FloatArray]:
     """Recorded channels and differences of thermometers at the training samples of a run, in their units."""
     at = blocks.in_force[blocks.used]

@@ -25,7 +25,7 @@ from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..results.base import Finding
 from ..results.evaluation import Pooled
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
-from .channels import chosen_channels, seen_by_target, with_channels
+from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
 from .data import Span, TrainingData, average, cleaned, joined, scaling_of, training_spans, whole_runs
 from .evidence import MEAN_S, TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
@@ -228,6 +228,7 @@ def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Prog
         blocks = front.blocks(run, rows)
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
+        rows = readings_alone(rows)
         columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
         left_out += stretches_left_out(run, blocks.left_out_s)
         del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
