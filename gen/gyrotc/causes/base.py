@@ -115,7 +115,7 @@ class Tabled:
         kind: Recursion of the target.
         parameters: Parameters of the record (docs/FORMAT.md, section 3) from those of the cause and the length
             of a block in s.
-        optional: Parameters of the cause that a model may leave out: they are 0 then.
+        optional: Parameters of the cause that a model or a scenario may leave out: they are 0 then.
     """
 
     kind: TableKind

@@ -75,9 +75,9 @@ CAUSE = Cause(
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
     parameters=(
         _WIDTH,
-        Parameter("reference_c", "C", -90.0, 200.0, signed=True, logarithmic=False, default=0.0),
+        Parameter("reference_c", "C", -90.0, 200.0, signed=True, logarithmic=False),
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
-        Parameter("amplitude_dph_per_c_per_c", "deg/h/C/C", 1e-9, 1e-3, linear=True, signed=True, default=0.0),
+        Parameter("amplitude_dph_per_c_per_c", "deg/h/C/C", 1e-9, 1e-3, linear=True, signed=True),
     ),
     words=Wording(
         name="The bias remembers the direction of the last temperature change",

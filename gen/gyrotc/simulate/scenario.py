@@ -225,7 +225,8 @@ class ScenarioCause(BaseModel):
         if unknown := set(self.__pydantic_extra__) - set(known):
             raise ValueError(f"{self.id} has no {sorted(unknown)}; it has {', '.join(known)}")
         needed = {name for name, parameter in known.items() if parameter.default is None}
-        if missing := needed - set(self.__pydantic_extra__):
+        spared = set(term.table.optional) if term.table is not None else set()
+        if missing := needed - spared - set(self.__pydantic_extra__):
             raise ValueError(f"{self.id} needs {sorted(missing)}")
         if term.needs.channel != (self.channel is not None):
             raise ValueError(f"{self.id} {'needs a' if term.needs.channel else 'has no'} channel")

@@ -399,10 +399,7 @@ def test_scenarios_that_extend_each_other_are_refused(tmp_path: Path) -> None:
 def test_the_truth_names_the_causes(tmp_path: Path) -> None:
     folder = made("hysteresis", tmp_path / "data", row_s=100.0)
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
-    one_strength = {"reference_c": 0.0, "amplitude_dph_per_c_per_c": 0.0}
-    assert truth["causes"] == [
-        {"id": "hysteresis", "channel": None, "width_c": 4.0, "amplitude_dph_per_c": 1.2e-4, **one_strength}
-    ]
+    assert truth["causes"] == [{"id": "hysteresis", "channel": None, "width_c": 4.0, "amplitude_dph_per_c": 1.2e-4}]
     described = (folder / "dataset.toml").read_text("utf-8")
     assert "truth" not in described and "seed" not in described
 
