@@ -351,7 +351,7 @@ class Cause:
     amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
     mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = None
     over_temperature: Callable[[Values, float, float, float], Values] | None = None
-    overtone: Callable[[Values, int], Values] | None = None
+    overtone: Callable[[Values, float], Values] | None = None
     unseen_s: Callable[[Values], float] | None = None
     repair: Callable[[Values], str] | None = None
 

@@ -64,7 +64,7 @@ def _grid(reach: Reach) -> list[Values]:
     return [{_PERIOD.name: float(1.0 / w)} for w in waves]
 
 
-def _overtone(values: Values, number: int) -> dict[str, float]:
+def _overtone(values: Values, number: float) -> dict[str, float]:
     return {_PERIOD.name: values[_PERIOD.name] / number}
 
 

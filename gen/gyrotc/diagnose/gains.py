@@ -12,6 +12,7 @@ gains nothing.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -210,18 +211,24 @@ class Gains:
         yield from self._on(self.base, ())
 
     def waves(self) -> Iterator[Point]:
-        """Models of one wave that is no sine: its columns with the first overtones."""
+        """Models of one wave that is no sine: its columns with the first overtones.
+
+        Fundamentals lie so near one another that the highest overtone, which turns faster, has the grid's distances.
+        """
         left_out = orthonormal(self.beside, self.map)
         target = self.target - left_out @ (left_out.T @ self.target)
-        for candidate, _ in self.plain:
-            if CATALOGUE[candidate.id].overtone is None:
-                continue
-            for number in _OVERTONES:
-                wave = replace(candidate, values={**candidate.values, OVERTONES: number})
+        grid = [c for c, _ in self.plain if CATALOGUE[c.id].overtone is not None]
+        for candidate, number in itertools.product(grid, _OVERTONES):
+            overtone = CATALOGUE[candidate.id].overtone
+            assert overtone is not None
+            for values in (candidate.values, overtone(candidate.values, 1.0 / (1 + number))):
+                if any(v > max(c.values[name] for c in grid) for name, v in values.items()):
+                    continue  # the map has such a wave
+                wave = replace(candidate, values={**values, OVERTONES: number})
                 columns = columns_of(self.search.records, wave.id, wave.values)
                 white = self.whiten(columns)
                 rest = white - left_out @ (left_out.T @ white)
-                weights = np.linalg.lstsq(rest, target, rcond=_INDEPENDENT)[0]
+                weights = np.linalg.lstsq(rest, target, rcond=_INDEPENDENT**0.5)[0]
                 if float(((self.limit.shares(columns) * weights) ** 2).sum()) <= 1.0:
                     yield Point((wave,), float(target @ (rest @ weights)))
 
