@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from .effects import FAMILY
 Row = dict[str, Any]
 
 _AVERAGE = 10  # rows of 10 s in 100 s
+_UNNAMED = "unnamed"  # in the place of a cause, in stated probabilities
 
 
 def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool) -> Row:
@@ -28,7 +30,7 @@ def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[s
         "named": [c["id"] for c in physical],
         "noise": [c["id"] for c in result["causes"] if c["family"] == "noise"],
         "equivalent": [c["equivalent"] for c in physical],
-        "said": _said(hidden, physical),
+        "said": said(hidden.names, order_stratum, physical),
         "seconds": result.get("seconds"),
     }
     if result["verdict"] == "error":
@@ -40,13 +42,15 @@ def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[s
     return row
 
 
-def _said(hidden: Hidden, physical: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Every cause with a stated probability in the place of a named one, and whether it is hidden.
+def said(names: Sequence[str], stratum: str, physical: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Everything with a stated probability in the place of a named cause, and whether it is hidden.
 
-    In the place of the right cause only one can be true; another one that is hidden beside it is true, too.
+    In the place of the right cause only one can be true; another one that is hidden beside it is true, too, and
+    something unnamed where the effect is foreign.
     """
+    true = {*names, _UNNAMED} if stratum == "foreign" else {*names}
     return [
-        {"id": id, "p": p, "true": id in hidden.names}
+        {"id": id, "p": p, "true": id in true}
         for cause in physical
         for id, p in (cause.get("probabilities") or {}).items()
     ]

@@ -148,8 +148,8 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
     if cause.equivalent:
         channels = f" ({', '.join(cause.equivalent_channels)})" if cause.equivalent_channels else ""
         yield f"  as likely on these runs: {', '.join(cause.equivalent)}{channels}"
-    if cause.equivalent and cause.probabilities:
-        likely = {name: share for name, share in cause.probabilities.items() if share >= _WORTH_A_LINE}
+    likely = {name: share for name, share in (cause.probabilities or {}).items() if share >= _WORTH_A_LINE}
+    if len(likely) > 1:
         odds = ", ".join(f"{name} {share:.0%}" for name, share in likely.items())
         yield f"  probabilities: {odds}"
     if cause.separate_by:

@@ -21,7 +21,7 @@ from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
 from .misfit import Contest, Misfit, contest, explained, misfit
 from .refine import Refined, model_columns, refine, sized
-from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranked_rivals
+from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranked_rivals, unnamed_of
 from .search import Search
 from .wide_memory import WideMemory, outlasts, rate_independent
 
@@ -40,7 +40,7 @@ class Attribution:
         causes: The chosen causes, strongest first.
         p_values: The p-value of each cause, adjusted for the whole search.
         rivals: For each, other causes in its place that explain the recordings as well, nearest first.
-        probabilities: For each, of every cause in its place, itself first, by id.
+        probabilities: For each, of every cause in its place, itself first, and of something unnamed, by id.
         gain: Twice the log-likelihood ratio of all causes together.
         left: What all causes leave.
         last: The search after the last cause.
@@ -119,6 +119,8 @@ def attribute(search: Search) -> Attribution:
     refined = tuple(stage.refined[k] for k in order)
     taken = tuple(stage.chosen[k] for k in order)
     ranked, likely = _rivals(weigher, singles, pairs, taken, _ahead(gains, stage, singles))
+    other = _contest(gains, stage.wide, refined, tuple(map(near_of, ranked)))
+    unnamed = unnamed_of(other.lead)
     return Attribution(
         first=first,
         causes=refined,
@@ -127,8 +129,8 @@ def attribute(search: Search) -> Attribution:
         gain=stage.gain,
         left=stage.left,
         last=stage.found,
-        other=_contest(gains, stage.wide, refined, tuple(map(near_of, ranked))),
-        probabilities=tuple(probabilities_of(c.id, all_) for c, all_ in zip(taken, likely, strict=True)),
+        other=other,
+        probabilities=tuple(probabilities_of(c.id, [*all_, unnamed]) for c, all_ in zip(taken, likely, strict=True)),
         wide=stage.wide,
     )
 

@@ -2,8 +2,10 @@
 
 A flexible cause can imitate much of an effect that is none: a lag of the whole map comes near every memory
 of the temperature, however it acts. So causes have to hold their own against general classes of other
-mechanisms: memory that acts other than in proportion, memory that differs by direction or changes over T,
-switches, creep. Where one of these explains the recordings clearly better, the structure is unexplained.
+mechanisms: memory that acts other than in proportion or differs by direction, switches, any smooth function of T and
+of a state that the temperatures so far have left (a memory, gathered heat, creep, the time since power-on), a course
+of time in each run. The weights of a wide class have one common variance, which is estimated: what the data do not
+ask for costs nothing. Where one of these explains the recordings better, the structure is unexplained.
 """
 
 from __future__ import annotations
@@ -20,15 +22,19 @@ from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .blocks import Records, centred_slope
 
+_LAGS_S = (300.0, 900.0, 2700.0, 8000.0)  # in steps of a factor 3: functions of these hold those between
+_HEATS_S = (2e4, 8e4)  # as long as a day: what heat has done so far
+_TWO_SIDED_S = ((300.0, 1800.0), (1800.0, 300.0), (3000.0, 900.0), (900.0, 5000.0))  # up, down
 _TAUS_S = tuple(np.geomspace(150.0, 4000.0, 8))  # in steps of a factor 1.6: memories nearer than that are alike
 _EDGES = (0.6, 1.3)  # thresholds, in standard deviations of T − z
 _QUICK_S = tuple(np.geomspace(120.0, 1500.0, 7))  # time constant of the quicker direction
 _SLOWER = (3.0, 7.0)  # by which factor the other direction is slower
-_PERIODS_C = (12.0, 18.0, 26.0, 36.0, 50.0)  # in steps of a factor 1.4
-_MODULATING_S = (300.0, 700.0, 1500.0)  # time constants of memories whose strength changes
+_MOVED_S, _RATE_S, _SETTLING_S = (1200.0, 4000.0), 600.0, 600.0  # between those of lags
+_PLACES, _OVER_T = 6, 5  # of smooth functions of a state, and of T
+_COURSES_S = (1800.0, 4500.0)  # distances of smooth functions of time
 _SWITCH_C, _GAPS_C = 6.0, (10.0, 20.0)  # steps of the upper threshold; width between the thresholds
 _HAT_C = 3.5  # width of the local functions of a map that a switch changes
-_GRAINS_S = (100.0, 300.0, 1000.0)  # times after which creep becomes logarithmic
+_GRAIN_S = 200.0  # time after which creep becomes logarithmic
 _TURNING = 0.05  # C/min that count as moving
 
 
@@ -41,33 +47,87 @@ class Shape:
         parameters: Number of nonlinear parameters.
         columns: Block means, shape (N, k).
         common: Whether the weights have one common variance (many columns) or are free (few).
+        texture: Whether functions of T as fine as those of a finer map are among them.
     """
 
     name: str
     parameters: int
     columns: FloatArray
     common: bool = False
+    texture: bool = False
 
 
 def shapes_of(records: Records) -> Iterator[Shape]:
     """All alternatives for these recordings."""
-    late = {tau: [_late(r.history, tau) for r in records.runs] for tau in {*_TAUS_S, *_MODULATING_S}}
-    yield from _nonlinear(records, {tau: late[tau] for tau in _TAUS_S})
+    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    over_t = np.column_stack([np.ones_like(t), _smooth(t, _OVER_T)])
+    for name, values in _states(records):
+        state = records.average([v.reshape(-1, 1) for v in values])[:, 0]
+        spread = float(state.std())
+        if spread > 1e-9 * float(np.abs(state).max() + 1e-300):
+            state = (state - state.mean()) / spread
+            own = np.column_stack([state, _smooth(state, _PLACES)])
+            yield Shape(name, 1, (own[:, :, None] * over_t[:, None, :]).reshape(t.size, -1), common=True)
+    yield from _nonlinear(records)
     yield from _one_sided(records)
-    yield from _modulated(records, {tau: late[tau] for tau in _MODULATING_S})
+    for distance in _COURSES_S:
+        yield Shape("a course of time of each run of its own", 1, _courses(records, distance), common=True)
     yield from _switched(records)
-    for grain in _GRAINS_S:
-        crept = records.average([_creep(r.history, grain) for r in records.runs])
-        yield Shape("creep after turns of the temperature", 1, crept)
+
+
+def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
+    """What temperatures so far may have left, by row of each run; of each any smooth function, at every T another."""
+    runs = [run.history for run in records.runs]
+    rates = [centred_slope(h) for h in runs]
+    low = min(float(h.temperature_c.min()) for h in runs)
+    for tau in _LAGS_S:
+        yield "another memory of the temperature", [_late(h, tau) for h in runs]
+    for up, down in _TWO_SIDED_S:
+        yield "memory that differs between warming and cooling", [_two_sided_lag(h, up, down)[:, 0] for h in runs]
+    yield "a memory of dT/dt", [first_order(_RATE_S, h.time_s, r) for h, r in zip(runs, rates, strict=True)]
+    for tau in _HEATS_S:
+        yield "what heat has done so far", [_gathered(h, h.temperature_c - low, tau) for h in runs]
+    for tau in _MOVED_S:
+        moved = [_gathered(h, np.abs(r), tau) for h, r in zip(runs, rates, strict=True)]
+        yield "what moving has done so far", moved
+    yield "creep after turns of the temperature", [_creep(h, _GRAIN_S)[:, 0] for h in runs]
+    since = [h.time_s - h.time_s[0] if h.on_s is None else np.asarray(h.on_s) for h in runs]
+    yield "a course of time since power-on", [np.log1p(np.maximum(s, 0.0) / _SETTLING_S) for s in since]
 
 
 def _late(history: History, tau: float) -> FloatArray:
     return np.asarray(first_order(tau, history.time_s, history.temperature_c) - history.temperature_c)
 
 
-def _nonlinear(records: Records, late: dict[float, list[FloatArray]]) -> Iterator[Shape]:
+def _gathered(history: History, x: FloatArray, tau: float) -> FloatArray:
+    """What came in since the start, of which a memory loses some."""
+    since = history.time_s - history.time_s[0]
+    return np.asarray(first_order(tau, history.time_s, x) - x[0] * np.exp(-since / tau))
+
+
+def _smooth(x: FloatArray, count: int) -> FloatArray:
+    """Gaussians over the range, shape (N, count)."""
+    places = np.linspace(float(np.quantile(x, 0.01)), float(np.quantile(x, 0.99)), count)
+    width = 0.8 * max(float(places[1] - places[0]), 1e-12)
+    return np.asarray(np.exp(-0.5 * ((x[:, None] - places) / width) ** 2))
+
+
+def _courses(records: Records, distance_s: float) -> FloatArray:
+    """Gaussians over the time of each run, shape (N, k)."""
+    columns = []
+    for number, span in zip(records.kept, records.spans(), strict=True):
+        time = number * records.block_s
+        places = np.arange(time[0], time[-1] + distance_s, distance_s)
+        own = np.zeros((records.size, places.size))
+        own[span] = np.exp(-0.5 * ((time[:, None] - places) / (0.7 * distance_s)) ** 2)
+        columns.append(own)
+    return np.column_stack(columns)
+
+
+def _nonlinear(records: Records) -> Iterator[Shape]:
     """Memory that acts other than in proportion, alone and beside a proportional part."""
-    for lags in late.values():
+    for tau in _TAUS_S:
+        lags = [_late(run.history, tau) for run in records.runs]
         size = float(np.std(np.concatenate(lags))) + 1e-12
         scaled = [d / size for d in lags]
         linear = records.average(scaled)
@@ -104,16 +164,6 @@ def _two_sided_lag(history: History, up: float, down: float) -> FloatArray:
     return out[:, None]
 
 
-def _modulated(records: Records, late: dict[float, list[FloatArray]]) -> Iterator[Shape]:
-    """Memory whose strength changes over T, and changes sign with it or not."""
-    for lags in late.values():
-        for act in (lags, [np.abs(d) for d in lags]):
-            for period in _PERIODS_C:
-                waves = [2.0 * np.pi * r.history.temperature_c / period for r in records.runs]
-                pair = [np.column_stack([d * np.cos(w), d * np.sin(w)]) for d, w in zip(act, waves, strict=True)]
-                yield Shape("memory whose strength changes over temperature", 3, records.average(pair))
-
-
 def _switched(records: Records) -> Iterator[Shape]:
     """A state that switches on when T rises over a threshold and off below a lower one: alone, with a map."""
     joined = np.concatenate([r.history.temperature_c for r in records.runs])
@@ -131,7 +181,7 @@ def _switched(records: Records) -> Iterator[Shape]:
             used = np.linalg.norm(columns, axis=0) > 1e-6
             if used.any():
                 yield Shape("a switch with hysteresis", 2, columns.sum(axis=1)[:, None])
-                yield Shape("a map that a switch changes", 2, columns[:, used], common=True)
+                yield Shape("a map that a switch changes", 2, columns[:, used], common=True, texture=True)
 
 
 def _switch(t: FloatArray, on: float, off: float) -> FloatArray:

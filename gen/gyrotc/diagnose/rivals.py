@@ -33,7 +33,13 @@ _TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
 """How much of a difference of the criterion counts in odds: so that one other explanation at the edge of what counts as
 equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
 
+_SURELY = 300.0  # logarithm of odds beyond which more is no surer
 _SURE = 0.9  # probability from which one cause is reported as the explanation
+
+UNNAMED = "unnamed"
+"""In the place of a cause: something that is not in the catalogue."""
+
+_UNNAMED = 3.0  # its odds before the recordings speak: more kinds of effects have no name than have one
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
 
@@ -66,6 +72,11 @@ def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
 def odds_of(rival: Rival) -> float:
     """Of a rival against the chosen cause."""
     return float(np.exp(-0.5 * _TEMPER * rival.distance)) if rival.odds is None else rival.odds
+
+
+def unnamed_of(lead: float) -> Rival:
+    """Something without a name as a rival of all causes, from the lead of the best shape that no cause has."""
+    return Rival(UNNAMED, -lead, odds=_UNNAMED * float(np.exp(min(0.5 * _TEMPER * lead, _SURELY))))
 
 
 def near_of(ranked: Sequence[Rival]) -> tuple[Rival, ...]:

@@ -57,6 +57,7 @@ class Alternative:
     name: str
     parameters: int
     common: bool
+    texture: bool
     columns: slice
 
 
@@ -162,7 +163,7 @@ def _alternatives(records: Records) -> tuple[FloatArray, tuple[Alternative, ...]
             continue
         columns.append(shape.columns / (size.max() if shape.common else np.maximum(size, 1e-300)))
         end = at + columns[-1].shape[1]
-        groups.append(Alternative(shape.name, shape.parameters, shape.common, slice(at, end)))
+        groups.append(Alternative(shape.name, shape.parameters, shape.common, shape.texture, slice(at, end)))
         at = end
     return np.column_stack(columns), tuple(groups)
 
@@ -251,7 +252,7 @@ def direction_of(records: Records, width_c: float) -> FloatArray:
     return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])
 
 
-_VERSION = 5  # raised with every change of what a bank holds
+_VERSION = 6  # raised with every change of what a bank holds
 _MAKERS = ("causes", "target", "diagnose")  # packages whose code decides what a bank holds
 _CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
 _OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}

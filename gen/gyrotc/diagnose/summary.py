@@ -37,6 +37,7 @@ from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .refine import Interval, Refined
 from .refit import terms_of
+from .rivals import odds_of, unnamed_of
 from .single_cycle import Cycle, memories
 from .wide_memory import WideMemory
 
@@ -158,7 +159,6 @@ form than the catalogue's (relays in place of a play), and the remainder is repo
 
 _REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much
 _SEEN = 0.05  # p-value over the whole search that at least one of the causes has itself
-_LEAD = -2.0  # lead of a shape that no cause has, from which the causes do not hold their own
 
 
 def holds(attribution: Attribution) -> bool:
@@ -171,7 +171,7 @@ def holds(attribution: Attribution) -> bool:
     little = any(left.worst < p and left.share < share for p, share in _MISFITS)
     plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
     seen = min(attribution.p_values, default=1.0) <= _SEEN
-    return plausible and seen and not little and attribution.other.lead < _LEAD
+    return plausible and seen and not little and odds_of(unnamed_of(attribution.other.lead)) < 1.0
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:

@@ -93,7 +93,7 @@ class NamedCause(Part):
     equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
     separate_by: str | None = Field(description="the experiment that would separate them")
     probabilities: dict[str, float] | None = Field(
-        default=None, description="of this cause and of all others in its place, by id"
+        default=None, description="of this cause, of all others in its place, and of something `unnamed`, by id"
     )
     gain: GainOnUnseen | None = Field(description="null for noise")
     signature: str = Field(description="how it shows")

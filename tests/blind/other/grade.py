@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..grade import Row, alarmed, family_right, in_set, shipped_worse, wrong_family
+from ..grade import Row, alarmed, family_right, in_set, said, shipped_worse, wrong_family
 from ..table import proportion, reliability, worse_on_the_exam
 from .record import Recording, reported
 
@@ -22,11 +22,7 @@ def graded(recording: Recording, result: dict[str, Any]) -> Row:
         "named": [c["id"] for c in physical],
         "noise": [c["id"] for c in result["causes"] if c["family"] == "noise"],
         "equivalent": [c["equivalent"] for c in physical],
-        "said": [
-            {"id": id, "p": p, "true": id in names}
-            for c in physical
-            for id, p in (c.get("probabilities") or {}).items()
-        ],
+        "said": said(names, truth.stratum, physical),
         "events": [e["id"] for e in result.get("events", [])],
         **shipped_worse(result),
         "seconds": result.get("seconds"),

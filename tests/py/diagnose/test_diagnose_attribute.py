@@ -33,7 +33,16 @@ from gyrotc.diagnose.misfit import Misfit, contest, misfit
 from gyrotc.diagnose.noise import COLOURS, Colour, Whitener
 from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
 from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
-from gyrotc.diagnose.rivals import EQUIVALENT, Rival, near_of, probabilities_of, ranked_rivals
+from gyrotc.diagnose.rivals import (
+    EQUIVALENT,
+    UNNAMED,
+    Rival,
+    near_of,
+    odds_of,
+    probabilities_of,
+    ranked_rivals,
+    unnamed_of,
+)
 from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.signature_bank import direction_of
 from gyrotc.diagnose.single_cycle import CycleFits
@@ -170,7 +179,8 @@ def test_the_planted_cause_is_named_with_its_parameters(case: Case) -> None:
     assert width.low < WIDTH_C < width.high and width.high - width.low < 0.5 * WIDTH_C
     assert size.low < SIZE < size.high
     assert case.found.left.share > 0.9 and case.found.left.p_value > 0.01
-    assert case.found.other.lead < -2.0, "no shape without a name does better"
+    assert case.found.other.lead < -10.0, "no shape without a name does nearly as well"
+    assert case.found.probabilities[0]["hysteresis"] > 0.95
 
 
 def test_refinement_ends_at_the_maximum_of_the_likelihood(case: Case) -> None:
@@ -220,6 +230,55 @@ def test_a_shape_without_a_name_beats_causes_where_it_was_planted(case: Case) ->
     gains = Gains(search)
     causes = choose(search, 1)
     assert contest(gains, causes, [[] for _ in causes]).lead > 0.0
+
+
+def drift(campaign: Campaign, rng: np.random.Generator) -> Array:
+    """A course of its own in each run, that bends about once an hour."""
+    parts = []
+    for number in campaign.records.kept:
+        hours = number / 36.0
+        knots = np.arange(0.0, hours[-1] + 1.0)
+        parts.append(np.interp(hours, knots, rng.normal(size=knots.size)))
+    return np.concatenate(parts)
+
+
+def heated(campaign: Campaign) -> Array:
+    """What heat has done since power-on, of which the late part acts."""
+    done = campaign.records.columns(lambda h: np.cumsum(np.maximum(h.temperature_c - 10.0, 0.0))[:, None])[:, 0]
+    return np.maximum(done / done.max() - 0.3, 0.0) ** 2
+
+
+def late_twice(campaign: Campaign) -> Array:
+    """A memory that acts by its square, and only in the cold."""
+    late = campaign.records.columns(
+        lambda h: (first_order(1500.0, h.time_s, h.temperature_c) - h.temperature_c)[:, None]
+    )
+    return np.asarray(late[:, 0] ** 2 / (1.0 + np.exp((campaign.temperature - 10.0) / 4.0)))
+
+
+@pytest.mark.parametrize("kind", ["drift", "heated", "late_twice"])
+def test_what_has_no_name_is_the_likelier_explanation_of_it(campaign: Campaign, kind: str) -> None:
+    """None of them is a shape of the bank: 17 of 120 such effects were called a cause, which was said to be sure."""
+    print("seed", SEED + 5)
+    rng = np.random.default_rng(SEED + 5)
+    shape = {"drift": lambda: drift(campaign, rng), "heated": lambda: heated(campaign)}.get(
+        kind, lambda: late_twice(campaign)
+    )()
+    noise = LEVEL_DPH * rng.standard_normal(shape.size)
+    found = attribute(campaign.search(1e-4 * campaign.temperature + 3.0 * LEVEL_DPH * shape / shape.std() + noise))
+    assert found.detected and not holds(found)
+    assert all(place[UNNAMED] > 0.5 for place in found.probabilities)
+
+
+@pytest.mark.parametrize("size", [1.0, 20.0])
+def test_a_cause_that_is_not_quite_the_formula_keeps_its_name_however_clear(campaign: Campaign, size: float) -> None:
+    """A stretched exponential (Kohlrausch 1854) is a warm-up; at 20 times the size the difference shows as well."""
+    print("seed", SEED + 6)
+    noise = LEVEL_DPH * np.random.default_rng(SEED + 6).standard_normal(campaign.records.size)
+    settles = campaign.records.columns(lambda h: np.exp(-((np.asarray(h.on_s) / 2000.0) ** 0.9))[:, None])[:, 0]
+    found = attribute(campaign.search(1e-4 * campaign.temperature + 4.0 * size * LEVEL_DPH * settles + noise))
+    assert [c.candidate.id for c in found.causes] == ["warm_up"]
+    assert odds_of(unnamed_of(found.other.lead)) < 0.1
 
 
 def test_what_a_cause_mimics_itself_cannot_be_reported_apart(case: Case) -> None:
@@ -273,6 +332,10 @@ def test_what_is_called_equal_and_the_probabilities_agree() -> None:
     at_edge = probabilities_of("hysteresis", [Rival("ageing", EQUIVALENT)])
     assert at_edge == pytest.approx({"hysteresis": 0.9, "ageing": 0.1})
     assert probabilities_of("hysteresis", [Rival("ageing", 0.0)])["ageing"] == pytest.approx(0.5)
+    unnamed = probabilities_of("hysteresis", [unnamed_of(0.0)])
+    assert unnamed[UNNAMED] == pytest.approx(0.75), "more kinds of effects have no name than have one"
+    assert probabilities_of("hysteresis", [unnamed_of(-np.inf)]) == {"hysteresis": 1.0, UNNAMED: 0.0}
+    assert probabilities_of("hysteresis", [unnamed_of(1e6)])["hysteresis"] < 1e-100
     far_behind = probabilities_of("hysteresis", [Rival("ageing", 60.0)])
     assert 0.0 < far_behind["ageing"] < 1e-6, "every hypothesis is told, the hopeless ones too"
     same = [Rival("auxiliary", 1.0, "supply_v"), Rival("auxiliary", 2.0, "pressure_hpa")]
@@ -488,7 +551,7 @@ def test_alternatives_are_finite_and_zero_where_the_temperature_stands(campaign:
     for shape in shapes_of(campaign.records):
         assert np.isfinite(shape.columns).all() and len(shape.columns) == campaign.records.size
         names.add(shape.name)
-    assert len(names) == 6
+    assert len(names) == 11
     time = np.arange(0.0, 7200.0, 20.0)
     still = replace(campaign.records.runs[0], history=History(time_s=time, temperature_c=np.full(time.size, 20.0)))
     assert not _two_sided_lag(still.history, 100.0, 900.0).any()
@@ -739,6 +802,7 @@ def recorded(rng: np.random.Generator, wave: object) -> TrainingData:
     ("shape", "named"),
     [
         (lambda t: airy(t, 4.0), "path_length_periodicity"),
+        (lambda t: airy(t * PERIOD_C / 29.0, 4.0), "path_length_periodicity"),  # the map holds all but its overtones
         (lambda t: np.tanh((t - 3.0) / 1.5) - np.tanh((t - 24.0) / 1.5), "map_too_coarse"),
     ],
 )
