@@ -8,6 +8,7 @@ import json
 import random
 import subprocess
 import sys
+import weakref
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
@@ -20,10 +21,11 @@ import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.quality.check import check
 from gyrotc.recordings import files
-from gyrotc.recordings.description import Problems
+from gyrotc.recordings.description import Layout, Problems
 from gyrotc.recordings.files import CsvFile
 from gyrotc.recordings.load import axes_of, load, survey
 from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
+from gyrotc.recordings.reading import known_rows
 from gyrotc.recordings.records import Applied
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -533,3 +535,21 @@ def test_a_damaged_description_of_parquet_never_ends_the_process(tmp_path: Path)
         path.write_bytes(data)
         with contextlib.suppress(InputError):
             load(folder)
+
+
+def test_rows_without_a_temperature_are_left_out_column_by_column() -> None:
+    """Of a long recording all columns were held twice."""
+
+    class Columns(dict[str, np.ndarray]):
+        def __setitem__(self, name: str, values: np.ndarray) -> None:
+            was = weakref.ref(self[name])
+            super().__setitem__(name, values)
+            assert was() is None, f"{name} is still held as it was"
+
+    names = ("time_s", "temperature_c", "rate_dph")
+    columns = Columns({name: np.arange(6.0) + k for k, name in enumerate(names)})
+    dict.__getitem__(columns, "temperature_c")[[1, 4]] = np.nan
+    layout = Layout("time_s", "temperature_c", "rate_dph", pulses=False, axes={}, channels=())
+    found = known_rows(columns, layout, ())
+    assert found is columns
+    assert [list(found[name]) for name in names] == [[0, 2, 3, 5], [1, 3, 4, 6], [2, 4, 5, 7]]

@@ -21,12 +21,14 @@ from gyrotc.recordings.records import Dataset, Rows, Run
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read_truth
 from gyrotc.tables.quantise import applied_of
-from gyrotc.train.channels import SHAPES, chosen_channels, shape_of
+from gyrotc.train import fitting
+from gyrotc.train.channels import SHAPES, chosen_channels, seen_by_target, shape_of
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.methods import fit
 from gyrotc.train.mrbf import Bumps, find_bumps
 from gyrotc.train.result import channel_guard, predict
+from gyrotc.train.samples import Blocks
 from numpy.typing import NDArray
 
 from bench.signals import rms_of, without
@@ -246,6 +248,32 @@ def test_the_guard_of_a_channel_is_found_with_the_rows_of_one_run_in_memory(rng:
         "missing_s": 300.0,
         "fallback": np.median(every),
     }
+
+
+def test_channels_are_looked_at_without_times_and_rates_in_memory(
+    recordings: Path, fitted: Fitted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside them the channels of 8.6e6 rows took 605 MB."""
+    alive: list[weakref.ref[Array]] = []
+
+    def copied(run: Run) -> Run:
+        def read() -> Rows:
+            rows = run.rows()
+            time, rate = rows.time_s.copy(), rows.rate_dph.copy()
+            alive[:] = [weakref.ref(time), weakref.ref(rate)]
+            return replace(rows, time_s=time, rate_dph=rate)
+
+        return replace(run, reader=read)
+
+    def alone(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, Array]:
+        assert alive
+        assert not any(one() is not None for one in alive), "times or rates are still in memory"
+        return seen_by_target(dataset, rows, blocks)
+
+    monkeypatch.setattr(fitting, "seen_by_target", alone)
+    dataset = load(recordings)
+    copies = replace(dataset, runs=tuple(map(copied, dataset.runs)))
+    assert fit_dataset(copies, FitOptions(channels=True)).model.to_dict() == fitted.model.to_dict()
 
 
 def test_a_model_with_channels_leaves_less_on_an_exam_through_the_target_s_own_arithmetic(
