@@ -56,7 +56,10 @@ class Occurrences {
     Occurrences() : counters_(kCounters) {}
 
     void count(const Words &words, std::size_t n) {
-        std::fill(counters_.begin(), counters_.end(), 0U);
+        if (n < kCounters / 8)  // few are asked for: only these need be 0
+            for (std::size_t k = 0; k < n; ++k) counters_[words[k] % kCounters] = 0;
+        else
+            std::fill(counters_.begin(), counters_.end(), 0U);
         for (std::size_t k = 0; k < n; ++k) ++counters_[words[k] % kCounters];
     }
 

@@ -70,6 +70,8 @@ _PAIRS = {"*/", "/*", "??"}
 
 def c_comment(text: str, limit: int = _LINE) -> CText:
     """Text within a line of a C comment: printable ASCII without `*/`, `/*`, `??`, backslash or line breaks."""
+    if len(text) <= limit - len("...") and C_COMMENT.fullmatch(text):
+        return CText(text)
 
     def allowed(char: str, before: str) -> bool:
         return " " <= char <= "~" and char != "\\" and before + char not in _PAIRS
