@@ -4,7 +4,9 @@ The evidence process has 40 functions of T; what is narrower than a fifteenth of
 price of noise everywhere. So bumps are looked for one after the other, beside splines that stand for any smooth map
 (of T every 12 C, and with dT/dt and its square every 30 C): the place and the width that explain most, then all
 places, widths and heights again by least squares with the linear part projected out (Golub and Pereyra 1973). The
-number is that of the smallest BIC, each bump at the price of three parameters. A map of the rest stands beside them.
+number is that of the smallest BIC, each bump at the price of three parameters. Once more they are looked for beside
+steps, each of Gaussians that grow wider in octaves: a step far above the noise would else take many bumps. Steps are
+taken where BIC is smaller by the price of one shape more. A map of the rest stands beside them.
 
 1. Means over 50 s are gathered into bins; a Hilbert-space Gaussian process is fitted by maximum evidence.
 2. A Kohonen network on the bins proposes places; orthogonal least squares picks among them; variable
@@ -18,9 +20,11 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _core
 from ..common.arrays import FloatArray
@@ -32,13 +36,15 @@ from .simple import FLAT, without_rate
 
 _WIDTHS_C = (1.0, 1.4, 2.0)  # tried; one wider bump in the place of two narrow ones would stay there
 _LIMITS_C = (0.6, 3.5)  # refined; blocks of 10 s at 5 C/min are 0.8 C long, wider ones the process follows
+_STEP_WIDTHS_C, _STEP_LIMITS_C = (1.0, 1.5, 2.2, 3.2), (0.6, 5.0)  # the same of steps: of 10 to 90 % in 2.2 widths
+_OCTAVES, _STEP_GAUSSIAN = 4, 1.1  # a step is left 16 times as wide to the map; narrowest Gaussian, in widths of a step
 _BEYOND_C = 5.0  # a bump's middle may lie so far outside the samples
 _MOST = 24  # as many as a map of the evidence process has
 _SPLINE_C = (12.0, 30.0)  # between knots: of T, and of what depends on dT/dt
 _CELL_C, _CELL_C_PER_MIN = (0.25, 0.5)  # of bins: a quarter of the narrowest bump; splines are smooth over dT/dt
 _SLOW_S = 600.0  # noise of gyros is slower than this in part: more samples of one place say no more
 _OUTLIER = 4.5  # robust standard deviations, as in the evidence process
-_PARAMETERS = 3  # of a bump: place, width, height
+_PARAMETERS = 3  # of a bump or a step: place, width, height
 _OWN = 0.02  # share of a bump's energy that must be its own beside splines and other bumps
 _LEAST, _WORSE = 6, 2.0  # bumps that are tried, and prices above the best criterion at which the search ends
 _MEAN_S = 100.0  # independent means for BIC
@@ -87,7 +93,9 @@ def find_bumps(data: TrainingData, scaling: Scaling) -> Bumps:
     beside = beside_smooth(data, scaling)
     if beside is None:
         return Bumps((), (), (), scaling.temperature_c)
-    return _Search(beside).found(beside.price(_PARAMETERS))
+    price = beside.price(_PARAMETERS)
+    (of_bumps, bumps), (with_steps, both) = (_Search(beside, steps=steps).found(price) for steps in (False, True))
+    return both if with_steps + price < of_bumps else bumps
 
 
 def beside_smooth(data: TrainingData, scaling: Scaling) -> BesideSmooth | None:
@@ -143,78 +151,87 @@ class BesideSmooth:
 
 
 class _Search:
-    """Bumps one after the other."""
+    """Shapes one after the other. Those of one array x: centers, logarithms of widths, 1 for a step; shape (3 n,)."""
 
-    def __init__(self, beside: BesideSmooth) -> None:
+    def __init__(self, beside: BesideSmooth, *, steps: bool) -> None:
         self.t, self.root, self.range, self.y = beside.t, beside.root, beside.range, beside.y
         self._rest = beside.rest
-        tried = [(c, w) for w in _WIDTHS_C for c in np.arange(*self.range, 0.5 * w)]
-        self.tried = np.array(tried).reshape(-1, 2).T
-        raw = self._raw(*self.tried)
+        kinds = ((0, _WIDTHS_C), (1, _STEP_WIDTHS_C if steps else ()))
+        tried = [(c, np.log(w), kind) for kind, ws in kinds for w in ws for c in np.arange(*self.range, 0.5 * w)]
+        self.tried = np.array(tried).reshape(-1, 3).T
+        raw = self._raw(self.tried)
         self.energy = np.einsum("ij,ij->j", raw, raw)
         self.candidates = self._rest(raw)
 
-    def found(self, price: float) -> Bumps:
-        """The bumps of the smallest criterion."""
+    def found(self, price: float) -> tuple[float, Bumps]:
+        """The smallest criterion and its Gaussians."""
         x, best, at = np.zeros(0), float(self.y @ self.y), np.zeros(0)
-        for number in range(1, _MOST + 1):
+        while (number := x.size // 3 + 1) <= _MOST:
             x, square = self._apart(*self._refined(self._with_next(x)))
-            count = x.size // 2
+            count = x.size // 3
+            if len(_gaussians(x)[0]) > _MOST:
+                break
             if square + price * count < best:
                 best, at = square + price * count, x
             elif number > _LEAST and square + price * number > best + _WORSE * price:
                 break
             if count < number:
                 break
-        while x.size > 2:  # what was taken first may be needless beside what came later
+        while x.size > 3:  # what was taken first may be needless beside what came later
             x, square = self._apart(*self._refined(self._without_least(x)))
-            if square + price * (x.size // 2) < best:
-                best, at = square + price * (x.size // 2), x
-        centers, widths = _places(at)
-        heights = self._solved(at)[0]
-        return Bumps(tuple(centers.tolist()), tuple(widths.tolist()), tuple(heights.tolist()), self.range)
+            if square + price * (x.size // 3) < best and len(_gaussians(x)[0]) <= _MOST:
+                best, at = square + price * (x.size // 3), x
+        centers, widths, shares, index = _gaussians(at)
+        heights = self._solved(at)[0][index] * shares
+        return best, Bumps(tuple(centers.tolist()), tuple(widths.tolist()), tuple(heights.tolist()), self.range)
 
     def _with_next(self, x: FloatArray) -> FloatArray:
-        """The bump that explains most of what these leave, added to them."""
+        """The shape that explains most of what these leave, added to them."""
         held = np.linalg.qr(self._columns(x))[0]
         own = self.candidates - held @ (held.T @ self.candidates)
         power = np.einsum("ij,ij->j", own, own)
         able = power > _OWN * self.energy
         gain: FloatArray = np.where(able, (own.T @ self._solved(x)[1]) ** 2 / np.where(able, power, 1.0), 0.0)
-        center, width = self.tried[:, int(gain.argmax())]
-        centers, widths = np.split(x, 2)
-        return np.asarray(np.r_[centers, center, widths, np.log(width)])
+        return np.column_stack([x.reshape(3, -1), self.tried[:, int(gain.argmax())]]).reshape(-1)
 
     def _without_least(self, x: FloatArray) -> FloatArray:
-        """These bumps without the one whose loss, with the heights of the others fitted anew, is least."""
+        """These shapes without the one whose loss, with the heights of the others fitted anew, is least."""
         columns = self._columns(x)
         q, r = np.linalg.qr(columns)
         inverse = np.linalg.pinv(r)
         heights = inverse @ (q.T @ self.y)
         loss = heights**2 / np.einsum("ij,ij->i", inverse, inverse)
-        return np.delete(x.reshape(2, -1), int(loss.argmin()), axis=1).reshape(-1)
+        return np.delete(x.reshape(3, -1), int(loss.argmin()), axis=1).reshape(-1)
 
     def _apart(self, x: FloatArray, square: float) -> tuple[FloatArray, float]:
-        """Refined bumps without those that have moved onto others: the heights of two in one place grow without end."""
-        while x.size > 2:
-            raw = self._raw(*_places(x))
+        """Refined shapes without those moved onto others: the heights of two in one place grow without end."""
+        while x.size > 3:
+            raw = self._raw(x)
             columns, energy = self._rest(raw), np.einsum("ij,ij->j", raw, raw)
             own = np.array([_beside(columns, k) for k in range(columns.shape[1])])
             if (own > _OWN * energy).all():
                 break
-            x, square = self._refined(np.delete(x.reshape(2, -1), int((own / energy).argmin()), axis=1).reshape(-1))
+            x, square = self._refined(np.delete(x.reshape(3, -1), int((own / energy).argmin()), axis=1).reshape(-1))
         return x, square
 
     def _refined(self, x: FloatArray) -> tuple[FloatArray, float]:
         """Places and widths by least squares, and the sum of squares that is left."""
         from scipy.optimize import least_squares
 
-        n = x.size // 2
-        low = np.r_[np.full(n, self.range[0] - _BEYOND_C), np.full(n, np.log(_LIMITS_C[0]))]
-        high = np.r_[np.full(n, self.range[1] + _BEYOND_C), np.full(n, np.log(_LIMITS_C[1]))]
-        start = np.clip(x, low + 1e-6, high - 1e-6)
-        solved = least_squares(lambda x: np.asarray(self._solved(x)[1]), start, bounds=(low, high), max_nfev=_ROUNDS)
-        return np.asarray(solved.x), 2.0 * float(solved.cost)
+        places, kinds = np.split(x, [2 * (x.size // 3)])
+        ends = np.log(np.where(kinds[:, None] > 0, _STEP_LIMITS_C, _LIMITS_C)).T
+        low, high = (np.r_[np.full(kinds.size, e), of] for e, of in zip(self._around(), ends, strict=True))
+        start = np.clip(places, low + 1e-6, high - 1e-6)
+        solved = least_squares(
+            lambda moved: np.asarray(self._solved(np.r_[moved, kinds])[1]),
+            start,
+            bounds=(low, high),
+            max_nfev=_ROUNDS,
+        )
+        return np.r_[solved.x, kinds], 2.0 * float(solved.cost)
+
+    def _around(self) -> tuple[float, float]:
+        return self.range[0] - _BEYOND_C, self.range[1] + _BEYOND_C
 
     def _solved(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Heights, and what is left of the data."""
@@ -223,16 +240,34 @@ class _Search:
         return np.asarray(heights, dtype=np.float64), np.asarray(self.y - columns @ heights)
 
     def _columns(self, x: FloatArray) -> FloatArray:
-        return self._rest(self._raw(*_places(x)))
+        return self._rest(self._raw(x))
 
-    def _raw(self, centers: FloatArray, widths: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * self.root[:, None])
+    def _raw(self, x: FloatArray) -> FloatArray:
+        centers, widths, shares, index = _gaussians(x)
+        single = np.exp(-(((self.t[:, None] - centers) / widths) ** 2)) * (shares * self.root[:, None])
+        return np.asarray(np.add.reduceat(single, np.unique(index, return_index=True)[1], axis=1) if x.size else single)
 
 
-def _places(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centers and widths, C."""
-    centers, log_widths = np.split(x, 2)
-    return centers, np.exp(log_widths)
+@cache
+def _step() -> FloatArray:
+    """Gaussians whose sum is tanh(x) − tanh(x/16) to 0.006: places, widths and heights, shape (3, 10)."""
+    widths = _STEP_GAUSSIAN * 2.0 ** np.arange(_OCTAVES + 1)
+    x = np.linspace(0.0, 80.0, 1601)
+    far = 1.0 / np.sqrt(1.0 + x)  # every octave counts alike
+    pairs = [np.exp(-((x / w - 0.5) ** 2)) - np.exp(-((x / w + 0.5) ** 2)) for w in widths]
+    wanted = np.tanh(x) - np.tanh(x / 2.0**_OCTAVES)
+    heights = np.linalg.lstsq(np.stack(pairs, axis=1) * far[:, None], wanted * far, rcond=None)[0]
+    return np.stack([np.r_[0.5 * widths, -0.5 * widths], np.r_[widths, widths], np.r_[heights, -heights]])
+
+
+def _gaussians(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]:
+    """Centers, widths and heights of the Gaussians of shapes of height 1, and the shape to which each belongs."""
+    centers, log_widths, kinds = x.reshape(3, -1)
+    parts = [_step() if kind > 0 else np.array([[0.0], [1.0], [1.0]]) for kind in kinds]
+    index = np.repeat(np.arange(kinds.size), [part.shape[1] for part in parts])
+    places, widths, heights = np.hstack([np.zeros((3, 0)), *parts])
+    scale = np.exp(log_widths)[index]
+    return centers[index] + scale * places, scale * widths, heights, index
 
 
 def _beside(columns: FloatArray, k: int) -> float:

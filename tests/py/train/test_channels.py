@@ -508,6 +508,21 @@ def test_bumps_that_move_onto_each_other_become_one() -> None:
     assert found.centers_c and sum(map(abs, found.heights_dph)) < 10.0 * height, found
 
 
+def test_steps_far_above_the_noise_leave_a_smooth_map_to_the_rest() -> None:
+    """Two of 40 noises: of the rest a polynomial of degree 5 leaves a third of the noise; beside bumps alone, twice."""
+    print("seed", SEED_OF_BUMPS)
+    data = samples(np.random.default_rng(SEED_OF_BUMPS), bumps=False)
+    t = data.temperature_c
+    steps = 0.08 * np.tanh((t + 12.0) / 2.0) - 0.06 * np.tanh((t - 30.0) / 1.5)
+    found = find_bumps(replace(data, bias_dph=data.bias_dph + steps), scaling_of(data))
+    assert len(found.centers_c) == 20, found
+    near = np.abs(t - 8.0) < 40.0
+    left = (steps - found(t))[near]
+    wide = np.vander(t[near] / 40.0, 6)
+    rough = left - wide @ np.linalg.lstsq(wide, left, rcond=None)[0]
+    assert np.std(rough) < 0.3 * NOISE_DPH, np.std(rough)
+
+
 def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
     return found.beside(finer.networks[0], finer.scaling.half_range_c)
 
