@@ -408,8 +408,7 @@ def test_a_lot_leaves_out_a_barred_unit(tmp_path: Path, monkeypatch: pytest.Monk
 
     def unit(place: Path) -> SimpleNamespace:
         read.append(place.name)
-        model = SimpleNamespace(serial=place.name, axis=None)
-        return SimpleNamespace(model=model, training=SimpleNamespace(lot=None, prior=None))
+        return SimpleNamespace(model=SimpleNamespace(serial=place.name, axis=None), by_itself=True)
 
     monkeypatch.setattr(job, "_unit", unit)
     monkeypatch.setattr(job, "LEAST_UNITS", 3)
