@@ -92,7 +92,7 @@ typedef struct {
  *   check           4520    460       3650    480
  *   open            2810    500       2600    520
  *   init             530     60        550     60
- *   sample          6110    310       6720    490
+ *   sample          6060    310       6710    490
  *   bias              90      0         90     10
  *   snapshot        1310     50       2190    150
  *   rezero          1770     50       2990    180

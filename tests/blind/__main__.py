@@ -70,6 +70,8 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=ROOT / "build")
     parser.add_argument("--docs", type=Path, default=None)
     given = parser.parse_args()
+    if given.docs is not None and given.world is not None:
+        parser.error("--docs keeps the recordings of both worlds: leave --world out")
     seeds = given.seed or [secrets.randbits(32) for _ in range(2)]
     worlds = [given.world] if given.world else list(WORLDS)
 
@@ -98,7 +100,7 @@ def main() -> None:
     with ThreadPoolExecutor(given.workers) as pool:
         found = list(pool.map(one, tasks))
     rows = [(world, seed, row) for (seed, world), of in zip(tasks, found, strict=True) for row in of]
-    if given.docs is not None and given.world is None:
+    if given.docs is not None:
         head = head_of(given.folder / _FOLDERS["own"], seeds[0], given.records)
         write_both(given.docs, {"seeds": seeds, **{name: head[name] for name in ("commit", "code")}}, rows)
     short = [kept(*row) for row in rows]

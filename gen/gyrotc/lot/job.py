@@ -125,8 +125,9 @@ def _unit(place: Path) -> _Calibrated:
     check_intact(place, ("training.json", "model.json"), needed=False)
     where, model = place / "training.json", load_model(place / "model.json")
     training = read_result(where, Training)
-    means, by_itself = means_of(training.means, where), training.lot is None and training.prior is None
-    return _Calibrated(model, where, means, training.means.mean_s if training.means else 0.0, by_itself)
+    means = means_of(training.means, where)
+    assert training.means is not None  # else it is refused
+    return _Calibrated(model, where, means, training.means.mean_s, training.lot is None and training.prior is None)
 
 
 def _ageing(units: Sequence[_Calibrated], earlier: Sequence[_Calibrated], folder: Path) -> LotAgeing:
