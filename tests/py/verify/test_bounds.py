@@ -113,8 +113,9 @@ def test_code_without_a_bound_is_refused(rows: tuple[str, ...], why: str) -> Non
 
 @pytest.mark.slow
 def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None:
-    """An increment is divided by libgcc, whose longest way its divisor never takes; how far other bounds are from
-    the counts depends on how a release of the compiler arranges branches."""
+    """An increment is divided by libgcc, whose longest way its divisor never takes; both shares of a rest are shifted
+    as often as the largest squares of any table need; how far other bounds are from the counts depends on how a release
+    of the compiler arranges branches."""
     target = all_targets()["cortex-m4f"]
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
@@ -124,7 +125,8 @@ def test_no_count_exceeds_its_bound_and_no_bound_is_far_from_the_count() -> None
     assert min(quotients.values()) >= 1.0
     print({key: round(quotient, 3) for key, quotient in quotients.items()})
     if measured(target):
-        assert max(quotients.values()) <= 1.3, "1.252 with GCC 12.2, 1.253 with GCC 14.2"
+        assert quotients.pop(("q31", "rezero")) <= 1.45, "1.332 with GCC 12.2, 1.405 with GCC 14.2"
+        assert max(quotients.values()) <= 1.3, "1.252 with GCC 12.2, 1.235 with GCC 14.2"
     page = section({"rows": [r | {"model": "filter", "core": "cortex-m4f"} for r in rows]})
     assert "No count exceeds its bound" in page
 
