@@ -29,7 +29,6 @@ ROOT = Path(__file__).resolve().parents[3]
 FAULTS = faults()
 
 
-@pytest.mark.slow
 def test_there_are_enough_and_no_name_twice() -> None:
     assert len(FAULTS) >= 20
     assert max(Counter(fault.name for fault in FAULTS).values()) == 1
@@ -37,7 +36,6 @@ def test_there_are_enough_and_no_name_twice() -> None:
     assert all((ROOT / path).is_file() for path in MODELS.values())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
 def test_what_it_changes_stands_there_once(fault: Fault) -> None:
     assert (fault.model in MODELS) != bool(fault.tests)
@@ -60,7 +58,6 @@ def test_a_fault_that_changes_nothing_is_seen_by_nobody(tmp_path: Path) -> None:
     assert House(tmp_path).objection("plain", none)["seen_by"] is None
 
 
-@pytest.mark.slow
 def test_the_last_campaign_tried_all_of_them() -> None:
     result = recorded(ROOT / "docs", "mutants")
     assert [m["name"] for m in result["mutants"]] == [fault.name for fault in FAULTS]
