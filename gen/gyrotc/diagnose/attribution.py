@@ -16,10 +16,10 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .candidates import Candidate, searched
 from .detection import Found, detect
-from .gains import Gains, Point, best_of, clear_pair, makes_sense
 from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
 from .misfit import Contest, Misfit, contest, explained, misfit
+from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
 from .refine import Refined, model_columns, refine, sized
 from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranked_rivals, unnamed_of
 from .search import Search

@@ -59,10 +59,10 @@ class Shape:
 
 def shapes_of(records: Records) -> Iterator[Shape]:
     """All alternatives for these recordings."""
-    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    t = records.columns(lambda h: h.temperature_c)
     over_t = np.column_stack([np.ones_like(t), _smooth(t, _OVER_T)])
     for name, values in _states(records):
-        state = records.average([v.reshape(-1, 1) for v in values])[:, 0]
+        state = records.average(values)
         spread = float(state.std())
         if spread > 1e-9 * float(np.abs(state).max() + 1e-300):
             state = (state - state.mean()) / spread
@@ -83,14 +83,14 @@ def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
     for tau in _LAGS_S:
         yield "another memory of the temperature", [_late(h, tau) for h in runs]
     for up, down in _TWO_SIDED_S:
-        yield "memory that differs between warming and cooling", [_two_sided_lag(h, up, down)[:, 0] for h in runs]
+        yield "memory that differs between warming and cooling", [_two_sided_lag(h, up, down) for h in runs]
     yield "a memory of dT/dt", [first_order(_RATE_S, h.time_s, r) for h, r in zip(runs, rates, strict=True)]
     for tau in _HEATS_S:
         yield "what heat has done so far", [_gathered(h, h.temperature_c - low, tau) for h in runs]
     for tau in _MOVED_S:
         moved = [_gathered(h, np.abs(r), tau) for h, r in zip(runs, rates, strict=True)]
         yield "what moving has done so far", moved
-    yield "creep after turns of the temperature", [_creep(h, _GRAIN_S)[:, 0] for h in runs]
+    yield "creep after turns of the temperature", [_creep(h) for h in runs]
     since = [h.time_s - h.time_s[0] if h.on_s is None else np.asarray(h.on_s) for h in runs]
     yield "a course of time since power-on", [np.log1p(np.maximum(s, 0.0) / _SETTLING_S) for s in since]
 
@@ -148,11 +148,11 @@ def _one_sided(records: Records) -> Iterator[Shape]:
         for slower in _SLOWER:
             for up, down in ((quick, slower * quick), (slower * quick, quick)):
                 column = records.average([_two_sided_lag(r.history, up, down) for r in records.runs])
-                yield Shape("memory that differs between warming and cooling", 2, column)
+                yield Shape("memory that differs between warming and cooling", 2, column[:, None])
 
 
 def _two_sided_lag(history: History, up: float, down: float) -> FloatArray:
-    """z − T of a node with one time constant while T > z and another while T < z, shape (n, 1)."""
+    """z − T of a node with one time constant while T > z and another while T < z, shape (n,)."""
     t = history.temperature_c
     step = np.diff(history.time_s, prepend=history.time_s[0])
     warm, cool = (-np.expm1(-step / up)).tolist(), (-np.expm1(-step / down)).tolist()
@@ -161,7 +161,7 @@ def _two_sided_lag(history: History, up: float, down: float) -> FloatArray:
     for k, x in enumerate(t.tolist()):
         z += (x - z) * (warm[k] if x > z else cool[k])
         out[k] = z - x
-    return out[:, None]
+    return out
 
 
 def _switched(records: Records) -> Iterator[Shape]:
@@ -191,8 +191,8 @@ def _switch(t: FloatArray, on: float, off: float) -> FloatArray:
     return np.where(last >= 0, event[np.maximum(last, 0)] > 0, False).astype(float)
 
 
-def _creep(history: History, grain: float) -> FloatArray:
-    """Sign of the last direction times log(1 + time since it changed / grain), shape (n, 1)."""
+def _creep(history: History) -> FloatArray:
+    """Sign of the last direction times log(1 + time since it changed / `_GRAIN_S`), shape (n,)."""
     slope = centred_slope(history)
     sign = np.where(slope > _TURNING, 1, np.where(slope < -_TURNING, -1, 0))
     number = np.arange(len(sign))
@@ -200,7 +200,7 @@ def _creep(history: History, grain: float) -> FloatArray:
     direction = np.where(last >= 0, sign[np.maximum(last, 0)], 0)
     turning = np.maximum.accumulate(np.where(np.diff(direction, prepend=0) != 0, number, 0))
     since = history.time_s - history.time_s[turning]
-    return np.asarray(direction * np.log1p(since / grain))[:, None]
+    return np.asarray(direction * np.log1p(since / _GRAIN_S))
 
 
 Role = Literal["columns", "input", "variance", "structure"]

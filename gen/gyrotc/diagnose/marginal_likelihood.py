@@ -26,7 +26,7 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, diagnosed, price_of
-from .gains import CauseSet, Gains, Point, best_of
+from .profile_likelihood import CauseSet, Gains, Point, best_of
 from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
 
 _Kinds = tuple[Kind, ...]  # of a model, sorted

@@ -21,9 +21,9 @@ from ..common.arrays import FloatArray
 from ..common.statistics import main_directions, orthonormal
 from .candidates import price_of, searched
 from .detection import project
-from .gains import Gains
 from .joined import Held, Projection, ratio_of
 from .noise import Whitener
+from .profile_likelihood import Gains
 from .refine import Refined
 from .search import Search, View
 from .signature_bank import Alternative, direction_of

@@ -24,9 +24,9 @@ from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
-from .gains import Gains
 from .joined import Channels
 from .noise import NOISE_WORDS, Colour, Declared
+from .profile_likelihood import Gains
 from .search import Search, open_search
 from .signature_bank import bank_of
 

@@ -14,7 +14,7 @@ from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, columns_of, reach_of, searched, shape_parameter
-from .gains import Gains
+from .profile_likelihood import Gains
 from .search import Search
 from .static_map import fine_columns, replaced_map
 

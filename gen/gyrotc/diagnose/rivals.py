@@ -19,8 +19,8 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, price_of
-from .gains import Gains, Point
 from .joined import ratio_of
+from .profile_likelihood import INDEPENDENT, Gains, Point
 
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
@@ -133,7 +133,6 @@ _MOST_POINTS, _REACH = 8, 15.0
 """Points of a cause's grid that stand for it: its best ones on these recordings, as far as they explain nearly as much
 (e^-7.5 of the likelihood)."""
 _FINEST = 0.05  # difference of the criterion below which nothing is decided: one part in 40 of the likelihood
-_OWN = 1e-4  # share of a column's energy that must be its own beside the model, as in `gains`
 
 
 def calibrated(
@@ -239,7 +238,7 @@ class _Place:
         columns = self.gains.white(candidate)
         rest = columns - self.held @ (self.held.T @ columns)
         left, size, _ = np.linalg.svd(rest, full_matrices=False)
-        own = size**2 > _OWN * np.linalg.norm(columns, axis=0).max() ** 2
+        own = size**2 > INDEPENDENT * np.linalg.norm(columns, axis=0).max() ** 2
         random = candidate.role == "variance" and own.any()
         return _Model(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
 

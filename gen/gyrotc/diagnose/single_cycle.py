@@ -30,7 +30,7 @@ from ..train.data import turning_points
 from .attribution import Attribution
 from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
-from .gains import SEPARATION
+from .profile_likelihood import SEPARATION
 from .refine import Interval, Refined
 from .rivals import EQUIVALENT, Rival
 
@@ -120,7 +120,7 @@ class CycleFits:
         return np.asarray(np.triu(out, 1) if kinds[0] == kinds[1] else out)
 
     def _separate(self, kind: str) -> NDArray[np.bool_]:
-        """Which two states of a kind are different enough to be two, as in `gains`."""
+        """Which two states of a kind are different enough to be two, as in `profile_likelihood`."""
         logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
         return np.asarray(np.abs(logs[:, None] - logs[None, :]) > SEPARATION)
 

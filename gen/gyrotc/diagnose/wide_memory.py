@@ -27,8 +27,8 @@ from ..common.statistics import orthonormal
 from ..target.recursions import first_order, play
 from .blocks import Record, Records
 from .candidates import reach_of
-from .gains import Gains
 from .joined import ratio_of
+from .profile_likelihood import Gains
 from .rivals import EQUIVALENT
 
 _STEPS, _SOFT = 7, 0.85
@@ -69,7 +69,7 @@ class WideMemory:
     finer: float = 0.0
 
     def criterion(self, blocks: int) -> float:
-        """The evidence less log N for the width and for each variance: as that of causes (`gains`)."""
+        """The evidence less log N for the width and for each variance: as that of causes (`profile_likelihood`)."""
         return self.evidence + self.finer - (3 if self.finer else 2) * float(np.log(blocks))
 
     @property

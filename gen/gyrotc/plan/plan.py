@@ -20,7 +20,7 @@ from ..common.errors import InputError
 from ..common.statistics import orthonormal
 from ..diagnose.blocks import Record
 from ..diagnose.candidates import searched
-from ..diagnose.gains import Gains
+from ..diagnose.profile_likelihood import Gains
 from ..results.recordings import (
     Accuracy,
     Additions,

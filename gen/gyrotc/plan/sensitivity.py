@@ -23,8 +23,8 @@ from ..common.statistics import orthonormal
 from ..diagnose.blocks import Record, Records, block_length, singled_out
 from ..diagnose.candidates import Candidate, columns_of, planned, searched, shape_parameter
 from ..diagnose.detection import CauseLimit, amplitude_energy, limit_of
-from ..diagnose.gains import Gains
 from ..diagnose.noise import COLOURS, Declared, Whitener
+from ..diagnose.profile_likelihood import Gains
 from ..diagnose.search import Search, open_search
 from ..diagnose.signature_bank import SignatureBank, bank_of
 from ..simulate.campaign import Noise, campaign, with_noise

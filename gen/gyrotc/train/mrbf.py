@@ -220,7 +220,8 @@ class _Search:
 
         places, kinds = np.split(x, [2 * (x.size // 3)])
         ends = np.log(np.where(kinds[:, None] > 0, _STEP_LIMITS_C, _LIMITS_C)).T
-        low, high = (np.r_[np.full(kinds.size, e), of] for e, of in zip(self._around(), ends, strict=True))
+        around = self.range[0] - _BEYOND_C, self.range[1] + _BEYOND_C
+        low, high = (np.r_[np.full(kinds.size, e), of] for e, of in zip(around, ends, strict=True))
         start = np.clip(places, low + 1e-6, high - 1e-6)
         solved = least_squares(
             lambda moved: np.asarray(self._solved(np.r_[moved, kinds])[1]),
@@ -229,9 +230,6 @@ class _Search:
             max_nfev=_ROUNDS,
         )
         return np.r_[solved.x, kinds], 2.0 * float(solved.cost)
-
-    def _around(self) -> tuple[float, float]:
-        return self.range[0] - _BEYOND_C, self.range[1] + _BEYOND_C
 
     def _solved(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Heights, and what is left of the data."""

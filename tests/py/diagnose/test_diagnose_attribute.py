@@ -29,9 +29,9 @@ from gyrotc.diagnose.candidates import testable as reason_against
 from gyrotc.diagnose.diagnosis import _entries
 from gyrotc.diagnose.discrepancy import NoiseFinding
 from gyrotc.diagnose.extension import Refitting
-from gyrotc.diagnose.gains import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
 from gyrotc.diagnose.misfit import Misfit, contest, misfit
 from gyrotc.diagnose.noise import COLOURS, Colour, Whitener
+from gyrotc.diagnose.profile_likelihood import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
 from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
 from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
 from gyrotc.diagnose.rivals import (
@@ -537,7 +537,7 @@ def test_a_map_of_hardly_changed_inputs_is_the_map(campaign: Campaign) -> None:
 
 def test_a_one_sided_lag_with_equal_times_is_a_first_order_one(campaign: Campaign) -> None:
     history = campaign.records.runs[0].history
-    both = _two_sided_lag(history, 500.0, 500.0)[:, 0]
+    both = _two_sided_lag(history, 500.0, 500.0)
     plain = first_order(500.0, history.time_s, history.temperature_c) - history.temperature_c
     assert np.abs(both - plain).max() < 0.02 * np.abs(plain).max(), "the two hold T over a row or draw a line"
 

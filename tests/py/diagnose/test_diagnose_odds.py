@@ -13,10 +13,10 @@ from gyrotc.common.statistics import orthonormal
 from gyrotc.diagnose.blocks import Records
 from gyrotc.diagnose.candidates import Candidate, columns_of
 from gyrotc.diagnose.discrepancy import _discrepancy, _two_sided, ensemble_of, noise_findings
-from gyrotc.diagnose.gains import Gains, Point, best_of
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood, _largest
 from gyrotc.diagnose.noise import NOISE_WORDS, Declared
 from gyrotc.diagnose.pipeline import needs_finer, search_of
+from gyrotc.diagnose.profile_likelihood import Gains, Point, best_of
 from gyrotc.diagnose.rivals import (
     LOOKED_AT,
     Rival,

@@ -21,8 +21,8 @@ from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.candidates import columns_of
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.extension import Refitting, stand_ins_of
-from gyrotc.diagnose.gains import Gains
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
+from gyrotc.diagnose.profile_likelihood import Gains
 from gyrotc.diagnose.refit import Effect, Played, added_range, completed, play_runs, samples
 from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle

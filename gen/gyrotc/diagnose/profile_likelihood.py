@@ -61,7 +61,7 @@ class SizeLimit:
 
 
 _OVERTONES = (1, 2)  # as many as a term of four has room for beside other terms (`refit`)
-_INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside another
+INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside the others
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +228,7 @@ class Gains:
                 columns = columns_of(self.search.records, wave.id, wave.values)
                 white = self.whiten(columns)
                 rest = white - left_out @ (left_out.T @ white)
-                weights = np.linalg.lstsq(rest, target, rcond=_INDEPENDENT**0.5)[0]
+                weights = np.linalg.lstsq(rest, target, rcond=INDEPENDENT**0.5)[0]
                 if float(((self.limit.shares(columns) * weights) ** 2).sum()) <= 1.0:
                     yield Point((wave,), float(target @ (rest @ weights)))
 
@@ -252,12 +252,12 @@ class Gains:
         """What one column or two add; 0 where they have nothing of their own, or no size that is accepted."""
         own, a = base.gram[at, at], base.a[at]
         if a.size == 1:
-            if own[0, 0] <= _INDEPENDENT * before[0]:
+            if own[0, 0] <= INDEPENDENT * before[0]:
                 return 0.0
             weights = a / own[0, 0]
         else:
             det = own[0, 0] * own[1, 1] - own[0, 1] ** 2
-            if det <= _INDEPENDENT * before[0] * before[1]:
+            if det <= INDEPENDENT * before[0] * before[1]:
                 return 0.0
             weights = np.array([own[1, 1] * a[0] - own[0, 1] * a[1], own[0, 0] * a[1] - own[0, 1] * a[0]]) / det
         if float(((self._shares[at] * weights) ** 2).sum()) > 1.0:
@@ -281,7 +281,7 @@ def _take(base: _Base, at: slice, shares: FloatArray) -> _Base | None:
     """`base` with further columns projected out; None if they have nothing of their own."""
     own = base.gram[at, at]
     values, vectors = np.linalg.eigh(own)
-    if values[0] <= _INDEPENDENT * max(float(values[-1]), 1e-3):
+    if values[0] <= INDEPENDENT * max(float(values[-1]), 1e-3):
         return None
     half = vectors / np.sqrt(values)
     cross, c = half.T @ base.gram[at], half.T @ base.a[at]
