@@ -11,7 +11,6 @@ import numpy as np
 from gyrotc.causes.base import (
     RATES,
     Cause,
-    Features,
     History,
     Parameter,
     Scene,
@@ -22,6 +21,7 @@ from gyrotc.causes.base import (
     geometric,
     lagged,
     memory_gain,
+    weights_of,
 )
 from gyrotc.common.arrays import FloatArray
 from gyrotc.target.recursions import TableKind, first_order
@@ -34,13 +34,8 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["slope_dph_min_per_c"] * (scene.node_c - z) * 60.0 / values["tau_s"])
 
 
-def _features(history: History, values: Values) -> Features:
-    memory = lagged(history, values["tau_s"])[1]
-    return Features(memory.columns[:, 1:], memory.known)
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"slope_dph_min_per_c": float(weights[0])}
+def _features(history: History, values: Values) -> FloatArray:
+    return lagged(history, values["tau_s"])[:, 1:]
 
 
 def _record(values: Values, block_s: float) -> list[float]:
@@ -70,5 +65,5 @@ CAUSE = Cause(
     table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("slope_dph_min_per_c"),
 )

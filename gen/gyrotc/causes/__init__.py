@@ -8,9 +8,9 @@ from __future__ import annotations
 import pkgutil
 from importlib import import_module
 
-from .base import Cause, Features, History, Needs, Parameter, Scene
+from .base import Cause, History, Needs, Parameter, Scene
 
-__all__ = ["CATALOGUE", "Cause", "Features", "History", "Needs", "Parameter", "Scene", "register", "separate_by"]
+__all__ = ["CATALOGUE", "Cause", "History", "Needs", "Parameter", "Scene", "register", "separate_by"]
 
 
 CATALOGUE: dict[str, Cause] = {}

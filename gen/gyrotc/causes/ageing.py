@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, Features, History, Needs, Parameter, Reach, Scene, SearchRule, Telling, Values, Wording
+from .base import Cause, History, Needs, Parameter, Reach, Scene, SearchRule, Telling, Values, Wording, weights_of
 
 _STRAIGHT = math.inf
 
@@ -25,15 +25,10 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.full(len(scene.time_s), amount)
 
 
-def _features(history: History, values: Values) -> Features:
-    """Nothing is known of a run without a date."""
-    dated = history.day is not None
+def _features(history: History, values: Values) -> FloatArray:
+    """0 for a run without a date: nothing is known of it."""
     amount = _passed(history.day, values.get("d0_day", _STRAIGHT)) if history.day is not None else 0.0
-    return Features(np.full((len(history.time_s), 1), amount), np.full(len(history.time_s), dated))
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"slope_dph_per_day": float(weights[0])}
+    return np.full((len(history.time_s), 1), amount)
 
 
 def _grid(reach: Reach) -> list[Values]:
@@ -65,5 +60,5 @@ CAUSE = Cause(
     needs=Needs(runs=3, dates=3),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("slope_dph_per_day"),
 )

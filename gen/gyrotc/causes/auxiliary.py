@@ -12,7 +12,6 @@ from ..common.errors import InputError
 from ..target.recursions import TableKind
 from .base import (
     Cause,
-    Features,
     History,
     Needs,
     Parameter,
@@ -42,10 +41,9 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["slope_dph_per_unit"] * departure)
 
 
-def _features(history: History, values: Values) -> Features:
+def _features(history: History, values: Values) -> FloatArray:
     """The channel as it is; its reference is a constant that the map holds."""
-    channel = channel_of(history.channel)
-    return Features(channel[:, None], np.isfinite(channel))
+    return channel_of(history.channel)[:, None]
 
 
 def _amplitudes(weights: FloatArray) -> dict[str, float]:
@@ -65,7 +63,7 @@ CAUSE = Cause(
     source="null shift from discharge current, supply, pressure or magnetic field; needs the channel",
     parameters=(
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
-        Parameter("reference", "unit", -1e9, 1e9, linear=True, logarithmic=False, default=0.0),
+        Parameter("reference", "unit", -1e9, 1e9, linear=True, default=0.0),
     ),
     words=Wording(
         name="The bias follows a recorded channel",

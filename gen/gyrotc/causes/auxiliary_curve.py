@@ -15,7 +15,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..target.recursions import TableKind
 from .auxiliary import channel_of
-from .base import Cause, Features, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording
+from .base import Cause, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording, weights_of
 
 _OCTAVES = math.sqrt(math.log2(math.e))  # exp(−x²) = 2^−(this x)²
 
@@ -32,13 +32,8 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(_columns(channel_of(scene.channel), values) @ weights)
 
 
-def _features(history: History, values: Values) -> Features:
-    channel = channel_of(history.channel)
-    return Features(_columns(channel, values), np.isfinite(channel))
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return dict(zip(_LINEAR, weights.tolist(), strict=True))
+def _features(history: History, values: Values) -> FloatArray:
+    return _columns(channel_of(history.channel), values)
 
 
 def _record(values: Values, block_s: float) -> list[float]:
@@ -58,8 +53,8 @@ CAUSE = Cause(
     "+ second exp(-((channel - second_center) / width)^2)",
     source="additive models; losses and Langmuir flow saturate, so the bias bends over the channel; needs the channel",
     parameters=(
-        Parameter("reference", "unit", -1e9, 1e9, signed=True, logarithmic=False),
-        Parameter("second_center", "unit", -1e9, 1e9, signed=True, logarithmic=False),
+        Parameter("reference", "unit", -1e9, 1e9, signed=True),
+        Parameter("second_center", "unit", -1e9, 1e9, signed=True),
         Parameter("width", "unit", 1e-6, 1e9),
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
         Parameter("first_dph", "deg/h", 1e-9, 1e3, linear=True, signed=True),
@@ -77,5 +72,5 @@ CAUSE = Cause(
     needs=Needs(channel=True),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of(*_LINEAR),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..target.recursions import TableKind
 from .auxiliary import channel_of
-from .base import Cause, Features, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording
+from .base import Cause, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording, weights_of
 
 _LINEAR = ("slope_dph_per_unit", "slope_dph_per_unit_per_c")
 
@@ -26,13 +26,8 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(_columns(scene.cavity_c, channel_of(scene.channel), values) @ weights)
 
 
-def _features(history: History, values: Values) -> Features:
-    channel = channel_of(history.channel)
-    return Features(_columns(history.temperature_c, channel, values), np.isfinite(channel))
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return dict(zip(_LINEAR, weights.tolist(), strict=True))
+def _features(history: History, values: Values) -> FloatArray:
+    return _columns(history.temperature_c, channel_of(history.channel), values)
 
 
 def _record(values: Values, block_s: float) -> list[float]:
@@ -49,8 +44,8 @@ CAUSE = Cause(
     source="gain and losses of the laser change with temperature, and with them how the bias follows a channel; "
     "needs the channel",
     parameters=(
-        Parameter("reference", "unit", -1e9, 1e9, signed=True, logarithmic=False),
-        Parameter("reference_c", "C", -90.0, 200.0, signed=True, logarithmic=False),
+        Parameter("reference", "unit", -1e9, 1e9, signed=True),
+        Parameter("reference_c", "C", -90.0, 200.0, signed=True),
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
         Parameter("slope_dph_per_unit_per_c", "deg/h/unit/C", 1e-9, 1e3, linear=True, signed=True),
     ),
@@ -66,5 +61,5 @@ CAUSE = Cause(
     needs=Needs(channel=True),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of(*_LINEAR),
 )

@@ -20,7 +20,6 @@ from enum import IntEnum
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..target.recursions import FLOAT64, Recursion, TableKind, first_order, recursion_of
@@ -221,7 +220,6 @@ class Parameter:
         low, high: Plausible range (prior), of the magnitude where `signed`.
         linear: The effect is proportional to it; `features` does not take it.
         signed: Both signs occur.
-        logarithmic: A grid over it is even in its logarithm (else in the value).
         default: Value where a scenario gives none; None if it must.
     """
 
@@ -231,7 +229,6 @@ class Parameter:
     high: float
     linear: bool = False
     signed: bool = False
-    logarithmic: bool = True
     default: float | None = None
 
 
@@ -266,17 +263,6 @@ class History:
     run: int = 0
     runs: int = 1
     day: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Features:
-    """Columns of one run, shape (n, k), and the rows where they are known: enough of the past was seen.
-
-    For kind "input" the columns are the temperature that the map should see (C) and its rate (C/min).
-    """
-
-    columns: FloatArray
-    known: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,7 +307,8 @@ class Cause:
         cavity: Simulation: temperature that the bias acts on instead of `scene.cavity_c`, C.
         bias: Simulation: what it adds to the bias, deg/h; may draw from the generator (once for each run).
         record: Simulation: what the sensor shows instead of `scene.sensed_c`, C.
-        features: Columns for given nonlinear parameters.
+        features: Columns of one run for given nonlinear parameters, shape (n, k); for kind "input" the temperature that
+            the map should see (C) and its rate (C/min).
         amplitudes: Linear parameters from the fitted weights of the columns.
         mended: For kind "input" without a table: what the map would see had the recording been right, from times
             in s, temperature in C, its rate in C/min and the parameters; not a number where nothing says it.
@@ -347,7 +334,7 @@ class Cause:
     cavity: Callable[[Scene, Values], FloatArray] | None = None
     bias: Callable[[Scene, Values, np.random.Generator], FloatArray] | None = None
     record: Callable[[Scene, Values], FloatArray] | None = None
-    features: Callable[[History, Values], Features] | None = None
+    features: Callable[[History, Values], FloatArray] | None = None
     amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
     mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = None
     over_temperature: Callable[[Values, float, float, float], Values] | None = None
@@ -371,16 +358,17 @@ class Cause:
         return self.table is not None or self.finer_map
 
 
-KNOWN_AFTER = 3.0  # time constants after which a record has forgotten what was before it: e^-3 is 5 %
-
 RATES = "ramps at two more rates with holds of an hour after each; a second thermometer at the cavity"
 CORNERS = "steps or 5 C/min corners recorded with 10-s rows; a synchronisation pulse in both recordings"
 COLD_STARTS = "a cold start at a constant chamber temperature, at two temperatures; a hot restart"
 
 
-def lagged(history: History, tau_s: float) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], Features]:
-    """State z of the recorded temperature and, as columns, (z, dz/dt in C/min)."""
+def lagged(history: History, tau_s: float) -> FloatArray:
+    """State z of the recorded temperature, C, and dz/dt in C/min, shape (n, 2)."""
     z = first_order(tau_s, history.time_s, history.temperature_c)
-    slope = (history.temperature_c - z) * (60.0 / tau_s)
-    known = history.time_s - history.time_s[0] >= KNOWN_AFTER * tau_s
-    return z, Features(np.column_stack((z, slope)), known)
+    return np.column_stack((z, (history.temperature_c - z) * (60.0 / tau_s)))
+
+
+def weights_of(*names: str) -> Callable[[FloatArray], dict[str, float]]:
+    """Amplitudes that are the weights of the columns, in their order."""
+    return lambda weights: dict(zip(names, weights.tolist(), strict=True))

@@ -10,7 +10,6 @@ from ..target.recursions import TableKind, first_order
 from .base import (
     RATES,
     Cause,
-    Features,
     History,
     Parameter,
     Scene,
@@ -29,8 +28,8 @@ def _cavity(scene: Scene, values: Values) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.cavity_c)
 
 
-def _features(history: History, values: Values) -> Features:
-    return lagged(history, values["tau_s"])[1]
+def _features(history: History, values: Values) -> FloatArray:
+    return lagged(history, values["tau_s"])
 
 
 _TAU = Parameter("tau_s", "s", 60.0, 4000.0)

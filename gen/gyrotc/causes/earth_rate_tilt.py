@@ -35,7 +35,7 @@ CAUSE = Cause(
     equation="bias += Omega (cos(lat) twist + sin(lat) tilt) (T_fixture - 20 C)",
     source="Earth rate 15.041 deg/h seen by a misaligned east axis",
     parameters=(
-        Parameter("latitude_deg", "deg", -90.0, 90.0, logarithmic=False, default=45.0),
+        Parameter("latitude_deg", "deg", -90.0, 90.0, default=45.0),
         Parameter("tau_s", "s", 10.0, 4000.0, default=0.0),
         Parameter("twist_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),
         Parameter("tilt_arcsec_per_c", "arcsec/C", 1e-3, 10.0, linear=True, signed=True, default=0.0),

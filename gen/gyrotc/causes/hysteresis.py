@@ -15,7 +15,6 @@ from ..common.arrays import FloatArray
 from ..target.recursions import TableKind, play
 from .base import (
     Cause,
-    Features,
     History,
     Parameter,
     Scene,
@@ -26,6 +25,7 @@ from .base import (
     Values,
     Wording,
     geometric,
+    weights_of,
 )
 
 
@@ -40,16 +40,8 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(strength(values, scene.cavity_c) * (z - scene.cavity_c))
 
 
-def _features(history: History, values: Values) -> Features:
-    """z starts at T; known from the first excursion over the whole width 2w on."""
-    temperature = history.temperature_c
-    z = play(values["width_c"], temperature)
-    span = np.maximum.accumulate(temperature) - np.minimum.accumulate(temperature)
-    return Features((z - temperature)[:, None], span >= 2.0 * values["width_c"])
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"amplitude_dph_per_c": float(weights[0])}
+def _features(history: History, values: Values) -> FloatArray:
+    return (play(values["width_c"], history.temperature_c) - history.temperature_c)[:, None]
 
 
 _WIDTH = Parameter("width_c", "C", 0.5, 40.0)
@@ -75,7 +67,7 @@ CAUSE = Cause(
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
     parameters=(
         _WIDTH,
-        Parameter("reference_c", "C", -90.0, 200.0, signed=True, logarithmic=False),
+        Parameter("reference_c", "C", -90.0, 200.0, signed=True),
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
         Parameter("amplitude_dph_per_c_per_c", "deg/h/C/C", 1e-9, 1e-3, linear=True, signed=True),
     ),
@@ -101,6 +93,6 @@ CAUSE = Cause(
     table=Tabled(TableKind.PLAY, _record, optional=("reference_c", "amplitude_dph_per_c_per_c")),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("amplitude_dph_per_c"),
     over_temperature=_over_temperature,
 )

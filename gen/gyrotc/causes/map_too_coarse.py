@@ -8,18 +8,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, Features, History, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
+from .base import Cause, History, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"]))
 
 
-def _features(history: History, values: Values) -> Features:
+def _features(history: History, values: Values) -> FloatArray:
     """Hat functions of T, one each `width_c` over −60 ... 100 C: any shape of that fineness is in their span."""
     nodes = np.arange(-60.0, 100.0, values["width_c"])
     distance = np.abs(history.temperature_c[:, None] - nodes) / values["width_c"]
-    return Features(np.maximum(0.0, 1.0 - distance), np.ones(len(history.time_s), dtype=bool))
+    return np.asarray(np.maximum(0.0, 1.0 - distance))
 
 
 CAUSE = Cause(
@@ -31,7 +31,7 @@ CAUSE = Cause(
     source="a steep place in the static map",
     parameters=(
         Parameter("width_c", "C", 2.0, 10.0, default=3.0),
-        Parameter("at_c", "C", -40.0, 70.0, logarithmic=False, default=20.0),
+        Parameter("at_c", "C", -40.0, 70.0, default=20.0),
         Parameter("amplitude_dph", "deg/h", 1e-5, 1e-2, linear=True, signed=True),
     ),
     words=Wording(

@@ -18,7 +18,6 @@ from ..target.recursions import TableKind
 from .base import (
     OVERTONES,
     Cause,
-    Features,
     History,
     Parameter,
     Reach,
@@ -37,11 +36,11 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * np.cos(phase))
 
 
-def _features(history: History, values: Values) -> Features:
+def _features(history: History, values: Values) -> FloatArray:
     angle = 2.0 * math.pi * history.temperature_c / values["period_c"]
     numbers = range(1, 2 + int(values.get(OVERTONES, 0)))
     columns = [wave(number * angle) for number in numbers for wave in (np.cos, np.sin)]
-    return Features(np.column_stack(columns), np.ones(len(angle), dtype=bool))
+    return np.column_stack(columns)
 
 
 def _amplitudes(weights: FloatArray) -> dict[str, float]:

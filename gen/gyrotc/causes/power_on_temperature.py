@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, Features, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
+from .base import Cause, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere, weights_of
 
 _REPEATED = "the same hold after power-ons at three temperatures, each twice"
 _REFERENCE_C = 20.0  # room temperature: where the offset counts as none
@@ -19,15 +19,10 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.full(len(scene.time_s), values["slope_dph_per_c"] * (found_c - _REFERENCE_C))
 
 
-def _features(history: History, values: Values) -> Features:
+def _features(history: History, values: Values) -> FloatArray:
     """The first reading stands for the temperature at power-on: a run that was soaked before it had the same."""
     found_c = float(history.temperature_c[0])
-    n = len(history.time_s)
-    return Features(np.full((n, 1), found_c - _REFERENCE_C), np.ones(n, dtype=bool))
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"slope_dph_per_c": float(weights[0])}
+    return np.full((len(history.time_s), 1), found_c - _REFERENCE_C)
 
 
 CAUSE = Cause(
@@ -52,5 +47,5 @@ CAUSE = Cause(
     needs=Needs(runs=3, power_on=True),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("slope_dph_per_c"),
 )

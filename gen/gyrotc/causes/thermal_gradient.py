@@ -16,7 +16,6 @@ from ..target.recursions import TableKind, first_order
 from .base import (
     RATES,
     Cause,
-    Features,
     History,
     Parameter,
     Scene,
@@ -29,6 +28,7 @@ from .base import (
     half_block_before,
     lagged,
     memory_gain,
+    weights_of,
 )
 
 
@@ -37,13 +37,8 @@ def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph_per_c"] * (second_c - scene.node_c))
 
 
-def _features(history: History, values: Values) -> Features:
-    z, memory = lagged(history, values["tau_s"])
-    return Features((z - history.temperature_c)[:, None], memory.known)
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"amplitude_dph_per_c": float(weights[0])}
+def _features(history: History, values: Values) -> FloatArray:
+    return lagged(history, values["tau_s"])[:, :1] - history.temperature_c[:, None]
 
 
 _TAU = Parameter("tau_s", "s", 60.0, 8000.0)
@@ -85,5 +80,5 @@ CAUSE = Cause(
     table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("amplitude_dph_per_c"),
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..target.recursions import delayed
-from .base import CORNERS, RATES, Cause, Features, History, Parameter, Reach, Scene, SearchRule, Values, Wording
+from .base import CORNERS, RATES, Cause, History, Parameter, Reach, Scene, SearchRule, Values, Wording
 
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
 _FAR_S = np.arange(700.0, 1201.0, 100.0)
@@ -22,12 +22,9 @@ def _record(scene: Scene, values: Values) -> FloatArray:
     return delayed(values["shift_s"], scene.time_s, scene.sensed_c)
 
 
-def _features(history: History, values: Values) -> Features:
-    shift = values["shift_s"]
-    true_c = delayed(-shift, history.time_s, history.temperature_c)
-    then = history.time_s + shift
-    known = (then >= history.time_s[0]) & (then <= history.time_s[-1])
-    return Features(np.column_stack((true_c, 60.0 * np.gradient(true_c, history.time_s))), known)
+def _features(history: History, values: Values) -> FloatArray:
+    true_c = delayed(-values["shift_s"], history.time_s, history.temperature_c)
+    return np.column_stack((true_c, 60.0 * np.gradient(true_c, history.time_s)))
 
 
 def _grid(reach: Reach) -> list[Values]:

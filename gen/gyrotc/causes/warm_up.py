@@ -12,7 +12,6 @@ from ..target.recursions import TableKind
 from .base import (
     COLD_STARTS,
     Cause,
-    Features,
     History,
     Needs,
     Parameter,
@@ -25,6 +24,7 @@ from .base import (
     geometric,
     half_block_before,
     octaves_per_block,
+    weights_of,
 )
 
 
@@ -36,16 +36,10 @@ def _fading(on_s: FloatArray, tau_s: float) -> FloatArray:
     return np.where(on_s >= 0.0, np.exp(-np.maximum(on_s, 0.0) / tau_s), 0.0)
 
 
-def _features(history: History, values: Values) -> Features:
-    """Nothing is known where the time of power-on is not."""
-    if history.on_s is None:
-        none = np.zeros(len(history.time_s))
-        return Features(none[:, None], none.astype(bool))
-    return Features(_fading(history.on_s, values["tau_s"])[:, None], history.on_s >= 0.0)
-
-
-def _amplitudes(weights: FloatArray) -> dict[str, float]:
-    return {"amplitude_dph": float(weights[0])}
+def _features(history: History, values: Values) -> FloatArray:
+    """0 where the time of power-on is not known."""
+    on_s = np.full(len(history.time_s), -1.0) if history.on_s is None else history.on_s
+    return _fading(on_s, values["tau_s"])[:, None]
 
 
 _TAU = Parameter("tau_s", "s", 200.0, 8000.0)
@@ -80,5 +74,5 @@ CAUSE = Cause(
     needs=Needs(power_on=True),
     bias=_bias,
     features=_features,
-    amplitudes=_amplitudes,
+    amplitudes=weights_of("amplitude_dph"),
 )

@@ -204,6 +204,7 @@ def _creep(history: History) -> FloatArray:
 
 
 Role = Literal["columns", "input", "variance", "structure"]
+CandidateKey = tuple[str, tuple[tuple[str, float], ...], str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +223,11 @@ class Candidate:
     values: dict[str, float]
     role: Role
     channel: str | None = None
+
+    @property
+    def key(self) -> CandidateKey:
+        """What tells it from all others, for sets and dictionaries."""
+        return self.id, tuple(sorted(self.values.items())), self.channel
 
 
 def diagnosed() -> dict[str, Cause]:
@@ -262,11 +268,7 @@ def columns_of(records: Records, cause: str, values: Values) -> FloatArray:
     """Block means of the columns that a cause adds, shape (N, k)."""
     features = CATALOGUE[cause].features
     assert features is not None
-
-    def rows(history: History) -> FloatArray:
-        return features(history, values).columns
-
-    return records.columns(rows)
+    return records.columns(lambda history: features(history, values))
 
 
 def testable(records: Records, cause: str) -> str:

@@ -72,7 +72,7 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
 def _columns(beside: BesideSmooth, term: Cause, values: Values) -> FloatArray:
     assert term.features is not None
     history = History(time_s=np.arange(beside.t.size, dtype=np.float64), temperature_c=beside.t)
-    return beside.rest(term.features(history, values).columns * beside.root[:, None])
+    return beside.rest(term.features(history, values) * beside.root[:, None])
 
 
 def _energy(beside: BesideSmooth, columns: list[FloatArray]) -> float:

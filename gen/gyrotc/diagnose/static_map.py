@@ -142,15 +142,15 @@ def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | N
 
 def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
     """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
-    features = CATALOGUE[candidate.id].features
-    assert features is not None
+    term = CATALOGUE[candidate.id]
+    assert term.features is not None
     out = []
     for k, run in enumerate(records.runs):
-        seen = features(run.history, candidate.values)
-        temperature, slope = seen.columns[:, 0], seen.columns[:, 1]
+        temperature, slope = term.features(run.history, candidate.values).T
         known = np.ones(records.kept[k].size, dtype=bool)
-        if CATALOGUE[candidate.id].unseen_s is not None:
+        if term.mended is not None:
+            mended = term.mended(run.history.time_s, run.history.temperature_c, slope, candidate.values)[0]
             slope = centred_slope(replace(run.history, temperature_c=temperature))
-            known = records.average_run(k, seen.known.astype(float)) > _WHOLE
+            known = records.average_run(k, np.isfinite(mended).astype(float)) > _WHOLE
         out.append((temperature, slope, known))
     return out

@@ -112,7 +112,7 @@ def shape_of(id: ShapeId, values: FloatArray, reference: float, samples: Trainin
 
 def _columns(cause: Cause, fixed: Mapping[str, float], samples: TrainingData, channel: FloatArray) -> FloatArray:
     assert cause.features is not None
-    found = cause.features(History(samples.time_s, samples.temperature_c, channel=channel), fixed).columns
+    found = cause.features(History(samples.time_s, samples.temperature_c, channel=channel), fixed)
     # Of a line alone the reference is no parameter of its column: the constant is the map's.
     return found - fixed["reference"] if found.shape[1] == 1 else found
 

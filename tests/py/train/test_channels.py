@@ -133,7 +133,7 @@ def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, seed: int) -> 
     low, high = np.quantile(u[seen], [0.01, 0.99])
     there = ~seen & (low < u) & (u < high)
     record = History(made.time_s[there], made.temperature_c[there], channel=supply[there])
-    left = form.cause.features(record, form.values).columns @ weights - effect[there]
+    left = form.cause.features(record, form.values) @ weights - effect[there]
     assert np.var(left) < 0.1 * np.var(effect[there])
 
 
