@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_TWO
 from .candidates import Candidate, searched, shape_parameter
-from .joined import Held, Projection, ScoredColumns, draw_null, score
+from .joined import Held, Projection, ScoredColumns, p_values, score
 from .search import Search, View, residual_log_likelihood
 
 _RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
@@ -28,25 +27,10 @@ def project(search: Search, view: View, held: Held) -> Projection:
     Where the map itself is not among them (its input is replaced), candidates get back what the map had taken of
     them, and other inputs are no candidates any more.
     """
-    out = search.joined.layout.held(held)
-    if held != "beside":
-        return _project(search, view, view.gram, view.b, out)
-    mix = _without_map(search, len(view.gram))
-    return _project(search, view, mix.T @ view.gram @ mix, mix.T @ view.b, out)
-
-
-def _without_map(search: Search, total: int) -> FloatArray:
-    """From the joined columns to those of a model without the map, shape (P, P)."""
-    joined = search.joined
-    layout = joined.layout
-    mix = np.eye(total)
-    mix[layout.static, layout.signatures] = search.bank.on_map
-    mix[layout.static, layout.channels] = joined.on_map[:, : joined.channels.shape[1]]
-    mix[layout.inputs, layout.inputs] = 0.0
-    return mix
-
-
-def _project(search: Search, view: View, full: FloatArray, b: FloatArray, out: NDArray[np.int64]) -> Projection:
+    out, full, b = search.joined.layout.held(held), view.gram, view.b
+    if held == "beside":
+        mix = _without_map(search)
+        full, b = mix.T @ full @ mix, mix.T @ b
     size, vectors = np.linalg.eigh(full[np.ix_(out, out)])
     keep = size > _RANK * size[-1]
     half = vectors[:, keep] / np.sqrt(size[keep])
@@ -63,6 +47,17 @@ def _project(search: Search, view: View, full: FloatArray, b: FloatArray, out: N
         log_det=view.log_det + float(np.log(size[keep]).sum()),
         rank=int(keep.sum()),
     )
+
+
+def _without_map(search: Search) -> FloatArray:
+    """From the joined columns to those of a model without the map, shape (P, P)."""
+    joined = search.joined
+    layout = joined.layout
+    mix = np.eye(layout.total)
+    mix[layout.static, layout.signatures] = search.bank.on_map
+    mix[layout.static, layout.channels] = joined.on_map[:, : joined.channels.shape[1]]
+    mix[layout.inputs, layout.inputs] = 0.0
+    return mix
 
 
 _SEED = 20140916  # any: it fixes the draws, so that a diagnosis repeats to the last digit
@@ -88,21 +83,16 @@ def detect(search: Search, held: Held) -> list[Found]:
     by less than 0.2 in ln p.
     """
     columns = search.joined.columns
-    projections = [project(search, search.views[k], held) for k in search.allowed]
+    views = [search.views[k] for k in search.allowed]
+    projections = [project(search, view, held) for view in views]
     own = np.array([score(p, columns, p.a).joined() for p in projections])
-    fits = np.array(
-        [
-            _refitted(p, columns, search.views[k], search.y.size)
-            for k, p in zip(search.allowed, projections, strict=True)
-        ]
-    )
+    fits = np.array([_refitted(p, columns, v, search.y.size) for p, v in zip(projections, views, strict=True)])
     exhausted = np.isnan(fits).any(axis=0)
     fits[:, exhausted] = 0.0
     behind = fits.max(axis=0) - fits
     weight = np.exp(-behind)
     weight /= weight.sum(axis=0)
-    null = np.sort(draw_null(projections[search.allowed.index(search.best)], columns, _SEED))
-    tail = (null.size - np.searchsorted(null, own) + 1.0) / (null.size + 1.0)
+    tail = p_values(own, projections[search.allowed.index(search.best)], columns, _SEED)
     adjusted = (weight * tail).sum(axis=0)
     log_p = -logsumexp(np.log(weight + 1e-300) - own, axis=0)
     if search.cautious:

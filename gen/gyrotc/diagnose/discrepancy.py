@@ -18,7 +18,7 @@ from ..common.arrays import BoolArray, FloatArray
 from ..common.statistics import orthonormal
 from .blocks import Records, centred_slope
 from .detection import project
-from .joined import draw_null, score
+from .joined import ROUNDING, p_values, score
 from .noise import COLOURS, Declared, Whitener
 from .search import Search, View
 
@@ -82,9 +82,7 @@ def _hidden(search: Search, view: View) -> list[NoiseFinding]:
     """Structure that stands out of the declared noise but not of the noise that the data may have."""
     projection = project(search, replace(view, scale=1.0), "map and beside")
     columns = search.joined.columns
-    own = float(score(projection, columns, projection.a).joined().max())
-    null = np.sort(draw_null(projection, columns, _SEED))
-    p = (null.size - np.searchsorted(null, own) + 1.0) / (null.size + 1.0)
+    p = p_values(score(projection, columns, projection.a).joined().max(), projection, columns, _SEED)
     if p > _HIDDEN_P:
         return []
     text = "slow changes that the declared noise does not explain and no cause repeats"
@@ -99,7 +97,6 @@ _SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
 _CELL_C = 8.0  # C: a dozen cells over the range of a product
 _FEWEST = 3  # blocks of either direction in a cell, for a mean
 _DATES = 3  # days: two give a line in any case
-_ROUNDING = 1e-9  # share of the residuals' RMS below which a statistic is made of rounding errors
 
 
 @dataclass(frozen=True)
@@ -158,7 +155,7 @@ def ensemble_of(
     model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))
     both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
-    rounding = _ROUNDING * float(np.sqrt((both**2).mean()))
+    rounding = ROUNDING * float(np.sqrt((both**2).mean()))
     found = []
     for name, statistic in _statistics(search).items():
         values = statistic(both)

@@ -25,7 +25,7 @@ from .signature_bank import SignatureBank
 
 _DRAWS = 4000  # 40 draws lie beyond the 1 % point: it is known to one sixth of itself
 _WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
-_RANK = 1e-9  # eigenvalues of an inner-product matrix below this share are rounding
+ROUNDING = 1e-9  # what is below this share of a norm, of an energy or of a size is made of rounding errors
 _LEAST_LEFT = 1e-6  # of a column's energy: what survives less has no signature left
 _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units of the noise of its weights
 
@@ -130,20 +130,21 @@ def _pair_energy(projection: Projection, pairs: IntArray, a: FloatArray) -> Floa
 
 def _variance(projection: Projection, index: IntArray, a: FloatArray) -> FloatArray:
     """−log p of the likelihood ratio of one common variance against none (half a chi-square)."""
-    ratio = variance_ratio(projection, index, a)[0]
-    return np.asarray(-log_ndtr(-np.sqrt(np.maximum(ratio, 0.0))))
-
-
-def variance_ratio(projection: Projection, index: IntArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Likelihood ratio 2 Δ log L and the variance (in the unit of the columns' weights) that gives it."""
     gram = projection.gram[np.ix_(index, index)]
-    return variance_ratio_of(gram, a[..., index], float(projection.before[index].max()))
+    ratio = variance_ratio_of(gram, a[..., index], float(projection.before[index].max()))[0]
+    return np.asarray(-log_ndtr(-np.sqrt(ratio)))
 
 
 def variance_ratio_of(gram: FloatArray, a: FloatArray, before: float) -> tuple[FloatArray, FloatArray]:
-    """The same from inner products of the columns, shape (k, k), and with the data, shape (..., k)."""
+    """Likelihood ratio 2 Δ log L and the variance (in the unit of the columns' weights) that gives it.
+
+    Args:
+        gram: Inner products of the columns, shape (k, k).
+        a: Those with the data, shape (..., k).
+        before: Largest norm² that a column had.
+    """
     size, vectors = np.linalg.eigh(gram)
-    keep = size > _RANK * max(before, 1e-300)
+    keep = size > ROUNDING * max(before, 1e-300)
     if not keep.any():
         none = np.zeros(a.shape[:-1])
         return none, none
@@ -164,6 +165,12 @@ def _structure(projection: Projection, a: FloatArray) -> FloatArray:
     directions, size = projection.structure
     ratio = ratio_of((a @ directions) ** 2, size)[0]
     return np.asarray(-log_ndtr(-np.sqrt(ratio)))
+
+
+def p_values(scores: FloatArray, projection: Projection, columns: ScoredColumns, seed: int) -> FloatArray:
+    """How often the largest score in data without effect is above each of some scores; shape as theirs."""
+    null = np.sort(draw_null(projection, columns, seed))
+    return np.asarray((null.size - np.searchsorted(null, scores) + 1.0) / (null.size + 1.0))
 
 
 def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: int = _DRAWS) -> FloatArray:
@@ -192,8 +199,6 @@ Channels = tuple[FloatArray, list[Candidate]]
 
 Held = Literal["map", "map and beside", "beside"]
 """What a model holds before any candidate is added; "beside" alone where the map's input is replaced."""
-
-_GONE = 1e-9  # share of a column's norm that the map must leave: less is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +272,7 @@ def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: 
     on_map = bank.map.T @ columns
     rest = columns - bank.map @ on_map
     norm = np.linalg.norm(rest, axis=0)
-    norm = np.where(norm > _GONE * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
+    norm = np.where(norm > ROUNDING * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
     length = np.linalg.norm(held, axis=0)
     layout = JoinedLayout.of(bank.map.shape[1], bank.signatures.shape[1], own.shape[1], len(bank.inputs), held.shape[1])
     added = (*names, *bank.inputs)

@@ -25,13 +25,11 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, diagnosed, price_of
+from .candidates import Candidate, CandidateKey, diagnosed, price_of
 from .profile_likelihood import CauseSet, Gains, Point, best_of
-from .rivals import LOOKED_AT, Kind, Rival, kind_of, odds_of
+from .rivals import LOOKED_AT, Kinds, Rival, kind_of, kinds_of, odds_of
 
-_Kinds = tuple[Kind, ...]  # of a model, sorted
-_Near = dict[_Kinds, list[Point]]
-_Name = tuple[str, str, str]  # of a candidate
+_Near = dict[Kinds, list[Point]]
 
 _POINTS = 3  # of each kind's grid, its best: the optimum of the evidence lies beside that of the likelihood
 _MOST_KINDS = 8  # the nearest: whoever comes after them is no rival in practice, and each costs 20 ms
@@ -52,8 +50,7 @@ class MarginalLikelihood:
     def __init__(self, gains: Gains) -> None:
         self.gains = gains
         self.bank = gains.search.bank
-        self._done: dict[tuple[frozenset[_Name], bytes], float] = {}
-        self._alone: dict[bytes, float] = {}
+        self._done: dict[tuple[frozenset[CandidateKey], bytes], float] = {}
 
     def preferred(self, points: Sequence[Point]) -> Point:
         """The best of all models; where a cause that changes the map's input is near, by the evidence."""
@@ -68,17 +65,17 @@ class MarginalLikelihood:
         Rivals that are too far behind to be asked keep their distance to the best of all.
         """
         near = self._near(points)
-        own = _key(chosen)
+        own = kinds_of(chosen)
         if not _swaps(near) or own not in near:
             return tuple(ranked)
         size = self.gains.size
-        same = [p for p in points if _key(p.members) == own]
+        same = [p for p in points if kinds_of(p.members) == own]
         shift = best_of(points, size).criterion(size) - best_of(same, size).criterion(size)
         weighed = self._weighed(near)
         reported = []
         for rival in ranked:
             place = (rival.id, rival.channel or "")
-            found = weighed.get(_sorted([*map(kind_of, chosen[:k]), place, *map(kind_of, chosen[k + 1 :])]))
+            found = weighed.get(tuple(sorted([*map(kind_of, chosen[:k]), place, *map(kind_of, chosen[k + 1 :])])))
             if found is None:
                 reported.append(replace(rival, distance=rival.distance + shift))
                 continue
@@ -93,45 +90,37 @@ class MarginalLikelihood:
             members: Its causes; at most one changes the map's input.
             left_out: Blocks that say nothing, for they cannot in one of the models that are compared, shape (N,).
         """
-        key = frozenset(map(_name, members)), left_out.tobytes()
+        price = sum(map(_price, members)) * float(np.log(self.gains.size))
+        return self._evidence(members, left_out) - self._evidence((), left_out) - price
+
+    def _evidence(self, members: CauseSet, left_out: NDArray[np.bool_]) -> float:
+        key = frozenset(m.key for m in members), left_out.tobytes()
         if key not in self._done:
-            swapped = [m for m in members if m.role == "input"]
-            mapped = self._map(swapped[0]) if swapped else self.gains.map
+            mapped = next((self.gains.replaced(m) for m in members if m.role == "input"), self.gains.map)
             added = [self.gains.white(m) for m in members if m.role == "columns"]
             drawn = [self.gains.white(m) for m in members if m.role == "variance"]
-            price = sum(_price(m) for m in members) * float(np.log(self.gains.size))
-            own = self._marginal(mapped, added, drawn, left_out)
-            self._done[key] = own - self._plain(left_out) - price
+            self._done[key] = self._marginal(mapped, added, drawn, left_out)
         return self._done[key]
-
-    def _plain(self, left_out: NDArray[np.bool_]) -> float:
-        key = left_out.tobytes()
-        if key not in self._alone:
-            self._alone[key] = self._marginal(self.gains.map, [], [], left_out)
-        return self._alone[key]
 
     def _near(self, points: Sequence[Point]) -> _Near:
         """The best points of the kinds that come near the best of all, and of those that may hide behind blocks."""
         size = self.gains.size
         ranked: _Near = {}
         for point in sorted(points, key=lambda p: -p.criterion(size)):
-            ranked.setdefault(_key(point.members), []).append(point)
+            ranked.setdefault(kinds_of(point.members), []).append(point)
         best = {key: found[0].criterion(size) for key, found in ranked.items()}
         least = max(best.values(), default=0.0) - LOOKED_AT
         keys = [key for key, value in best.items() if value >= least][:_MOST_KINDS]
         behind = [other for key in keys[:_MOST_BEHIND] for other in _behind(key) if best.get(other, 0.0) > 0.0]
         return {key: _few(ranked[key], size) for key in dict.fromkeys([*keys, *behind])}
 
-    def _weighed(self, near: _Near) -> dict[_Kinds, tuple[Point, float]]:
+    def _weighed(self, near: _Near) -> dict[Kinds, tuple[Point, float]]:
         """Of each kind its best point and criterion, all on the blocks that each of them knows."""
         left_out = np.zeros(self.gains.size, dtype=bool)
         for member in (m for points in near.values() for p in points for m in p.members if m.role == "input"):
             left_out |= ~self.bank.known[self.bank.inputs.index(member)]
         tried = {key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()}
         return {key: max(found, key=lambda one: one[1]) for key, found in tried.items()}
-
-    def _map(self, candidate: Candidate) -> FloatArray:
-        return np.asarray(self.gains.whiten(self.bank.replaced[self.bank.inputs.index(candidate)]))
 
     def _marginal(
         self,
@@ -214,20 +203,8 @@ def _hides(cause: str) -> bool:
     return CATALOGUE[cause].unseen_s is not None
 
 
-def _behind(kinds: _Kinds) -> list[_Kinds]:
+def _behind(kinds: Kinds) -> list[Kinds]:
     """A model with one of its memories replaced by each cause that hides blocks, and so gained nothing on these."""
     hiding = [(id, "") for id in diagnosed() if _hides(id)]
     memories = [k for k, (id, _) in enumerate(kinds) if CATALOGUE[id].family == "thermal_memory"]
-    return [_sorted([*kinds[:k], other, *kinds[k + 1 :]]) for k in memories for other in hiding]
-
-
-def _sorted(kinds: Sequence[Kind]) -> _Kinds:
-    return tuple(sorted(kinds))
-
-
-def _key(members: CauseSet) -> _Kinds:
-    return _sorted([kind_of(m) for m in members])
-
-
-def _name(candidate: Candidate) -> _Name:
-    return candidate.id, candidate.channel or "", repr(sorted(candidate.values.items()))
+    return [tuple(sorted([*kinds[:k], other, *kinds[k + 1 :]])) for k in memories for other in hiding]

@@ -152,14 +152,16 @@ class Whitener:
         sigma: FloatArray | None = None,
     ) -> None:
         self._sigma = sigma
-        self._blocks = blocks
-        factors: dict[bytes, FloatArray] = {}
+        made: dict[bytes, FloatArray] = {}
+        self._factors: list[tuple[slice, FloatArray]] = []
+        at = 0
         for number in blocks:
-            key = (number - number[0]).tobytes() if not colour.walk else number.tobytes()
-            if key not in factors:
-                factors[key] = cholesky(colour.matrix(number, block_s), lower=True, check_finite=False)
-        self._factor = [factors[(n - n[0]).tobytes() if not colour.walk else n.tobytes()] for n in blocks]
-        self.log_det = 2.0 * sum(float(np.log(np.diag(f)).sum()) for f in self._factor)
+            key = (number if colour.walk else number - number[0]).tobytes()
+            if key not in made:
+                made[key] = cholesky(colour.matrix(number, block_s), lower=True, check_finite=False)
+            self._factors.append((slice(at, at + number.size), made[key]))
+            at += number.size
+        self.log_det = 2.0 * sum(float(np.log(np.diag(f)).sum()) for _, f in self._factors)
         if sigma is not None:
             self.log_det += 2.0 * float(np.log(sigma).sum())
 
@@ -174,11 +176,8 @@ class Whitener:
     def colour(self, white: FloatArray) -> FloatArray:
         """L w: noise with this covariance from white noise, shape (N, k)."""
         out = np.empty_like(white)
-        at = 0
-        for factor in self._factor:
-            part = slice(at, at + len(factor))
+        for part, factor in self._factors:
             out[part] = factor @ white[part]
-            at += len(factor)
         return out if self._sigma is None else np.asarray(out * self._sigma[:, None])
 
     def _scaled(self, data: FloatArray) -> FloatArray:
@@ -188,9 +187,6 @@ class Whitener:
 
     def _solve(self, data: FloatArray, transposed: int) -> FloatArray:
         out = np.empty_like(data)
-        at = 0
-        for factor in self._factor:
-            part = slice(at, at + len(factor))
+        for part, factor in self._factors:
             out[part] = solve_triangular(factor, data[part], lower=True, trans=transposed, check_finite=False)
-            at += len(factor)
         return out

@@ -24,7 +24,7 @@ from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
-from .joined import Channels
+from .joined import ROUNDING, Channels
 from .noise import NOISE_WORDS, Colour, Declared
 from .profile_likelihood import Gains
 from .search import Search, open_search
@@ -32,7 +32,6 @@ from .signature_bank import bank_of
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
-_STILL = 1e-9  # change of a channel, of its size, that is rounding
 _HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
 
 
@@ -152,7 +151,7 @@ def _channels(records: Records) -> Channels | None:
     columns, candidates = [], []
     for name in names:
         column = records.average([r.channels[name] for r in records.runs])
-        if np.ptp(column) > _STILL * (1.0 + np.abs(column).max()):
+        if np.ptp(column) > ROUNDING * (1.0 + np.abs(column).max()):
             for cause in (id for id, term in diagnosed().items() if term.needs.channel):
                 columns.append(column - column.mean())
                 candidates.append(Candidate(cause, {}, "columns", name))

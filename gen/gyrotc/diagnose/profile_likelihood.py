@@ -159,12 +159,20 @@ class Gains:
         columns = self._columns[:, at]
         return np.asarray(columns - self.map_q @ (self.map_q.T @ columns))
 
+    def replaced(self, candidate: Candidate) -> FloatArray:
+        """Whitened map of a changed input."""
+        return self.whiten(self.search.bank.replaced[self.search.bank.inputs.index(candidate)])
+
+    def edges(self, candidate: Candidate) -> list[FloatArray]:
+        """Whitened columns of the blocks where a changed input is not known; none where there is no such block."""
+        return self._unknown(self.search.bank.known[self.search.bank.inputs.index(candidate)])
+
+    def _unknown(self, known: NDArray[np.bool_]) -> list[FloatArray]:
+        return [] if known.all() else [self.whiten(singled_out(~known))]
+
     def rest_after(self, candidate: Candidate, white: FloatArray) -> float:
         """Energy of whitened data that the map of another input leaves on the blocks where it is known."""
-        i = self.search.bank.inputs.index(candidate)
-        known = self.search.bank.known[i]
-        design = self.whiten(self.search.bank.replaced[i])
-        q = orthonormal(design, *([] if known.all() else [self.whiten(singled_out(~known))]))
+        q = orthonormal(self.replaced(candidate), *self.edges(candidate))
         return float(white @ white - ((q.T @ white) ** 2).sum())
 
     def bases(self) -> list[_Base]:
@@ -177,9 +185,7 @@ class Gains:
         return self._bases
 
     def _project(self, candidate: Candidate | None, design: FloatArray, known: NDArray[np.bool_] | None) -> _Base:
-        blocks = [self.beside]
-        if known is not None and not known.all():
-            blocks.append(self.whiten(singled_out(~known)))
+        blocks = [self.beside, *([] if known is None else self._unknown(known))]
         q = orthonormal(*blocks, design)
         columns = self._columns if candidate is None else self.whole
         cross, c = q.T @ columns, q.T @ self.target

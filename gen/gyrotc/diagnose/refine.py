@@ -13,7 +13,7 @@ from .. import causes as terms
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, columns_of, reach_of, searched, shape_parameter
+from .candidates import Candidate, CandidateKey, columns_of, reach_of, searched, shape_parameter
 from .profile_likelihood import Gains
 from .search import Search
 from .static_map import fine_columns, replaced_map
@@ -136,13 +136,6 @@ def _moved(candidate: Candidate, value: float) -> Candidate:
     return replace(candidate, values={**candidate.values, parameter.name: value})
 
 
-_Key = tuple[str, tuple[tuple[str, float], ...], str | None]
-
-
-def _key(candidate: Candidate) -> _Key:
-    return candidate.id, tuple(sorted(candidate.values.items())), candidate.channel
-
-
 def sized(candidate: Candidate) -> bool:
     """Whether a cause has amplitudes, which are accepted up to a size."""
     return candidate.role == "columns" and terms.CATALOGUE[candidate.id].kind != "static"
@@ -157,18 +150,15 @@ class _Fit:
         known = np.concatenate([_inside(search, k, unseen) for k in range(len(search.records.runs))])
         edges = singled_out(~known) if unseen else np.zeros((search.y.size, 0))
         self.edges = edges
-        held = [gains.whiten(edges)] + (
-            [] if any(m.role == "input" for m in members) else [gains.whiten(search.bank.map)]
-        )
-        self.q = orthonormal(*held)
-        y = gains.whiten(search.y) / gains.scale
-        self.y = y - self.q @ (self.q.T @ y)
-        self._cache: dict[_Key, FloatArray] = {}
-        self._shares: dict[_Key, FloatArray] = {}
+        static = [] if any(m.role == "input" for m in members) else [gains.map]
+        self.q = orthonormal(gains.whiten(edges), *static)
+        self.y = gains.target - self.q @ (self.q.T @ gains.target)
+        self._cache: dict[CandidateKey, FloatArray] = {}
+        self._shares: dict[CandidateKey, FloatArray] = {}
 
     def white(self, candidate: Candidate) -> FloatArray:
         """Whitened columns of a candidate less what the map (or the masked edges) explain."""
-        key = _key(candidate)
+        key = candidate.key
         if key not in self._cache:
             plain = _columns(self.search, candidate)
             self._shares[key] = self.gains.limit.shares(plain)
@@ -190,7 +180,7 @@ class _Fit:
         for member, own in zip(members, white, strict=True):
             part = weights[at : at + own.shape[1]]
             at += own.shape[1]
-            if sized(member) and np.linalg.norm(self._shares[_key(member)] * part) > 1.0:
+            if sized(member) and np.linalg.norm(self._shares[member.key] * part) > 1.0:
                 return False
         return True
 
@@ -230,6 +220,7 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[FloatArray, f
     """
     parameter = shape_parameter(members[k].id)
     assert parameter is not None
+    rule, shown = searched(members[k].id), reach_of(fit.search.records)
     points: dict[float, float] = {}
 
     def energy(value: float) -> float:
@@ -239,10 +230,10 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[FloatArray, f
 
     energy(members[k].values[parameter.name])
     if members[k].role == "columns":
-        for values in searched(members[k].id).grid(reach_of(fit.search.records)):
+        for values in rule.grid(shown):
             energy(values[parameter.name])
     here = max(points, key=lambda v: points[v])
-    width = _local_width(fit, members[k], here)
+    width = rule.width(here, shown.span_c)  # about one point of the search's grid
     low = -np.inf if parameter.signed else 0.05 * here
     for shrink in (1.0, 0.35):
         here, curve = parabola_top(energy, here, shrink * width, low)
@@ -254,11 +245,6 @@ def _profile(fit: _Fit, members: list[Candidate], k: int) -> tuple[FloatArray, f
                 break
     best = max(points, key=lambda v: points[v])
     return np.array(sorted(points.items())).T, best
-
-
-def _local_width(fit: _Fit, member: Candidate, here: float) -> float:
-    """About one point of the search's grid."""
-    return searched(member.id).width(here, reach_of(fit.search.records).span_c)
 
 
 def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile: FloatArray | None) -> Refined:

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
-from .blocks import singled_out
 from .candidates import Candidate, price_of
 from .joined import ratio_of
 from .profile_likelihood import INDEPENDENT, Gains, Point
@@ -42,6 +42,8 @@ UNNAMED = "unnamed"
 _UNNAMED = 3.0  # its odds before the recordings speak: more kinds of effects have no name than have one
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
+Kinds = tuple[Kind, ...]  # of a model, sorted
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -97,25 +99,18 @@ def ranked_rivals(
     pool = singles if len(chosen) == 1 else pairs
     if len(chosen) > 2:
         return tuple(() for _ in chosen)
-    best: dict[tuple[Kind, ...], float] = {}
+    best: dict[Kinds, float] = {}
     for p in pool:
-        key = tuple(sorted(kind_of(m) for m in p.members))
-        value = p.criterion(size)
-        if value > best.get(key, -np.inf):
-            best[key] = value
-    own = best[tuple(sorted(kinds))]
+        key = kinds_of(p.members)
+        best[key] = max(best.get(key, -np.inf), p.criterion(size))
+    own = best[kinds_of(chosen)]
     out = []
     for k in range(len(kinds)):
-        others = kinds[:k] + kinds[k + 1 :]
         near: dict[Kind, float] = {}
         for key, value in best.items():
-            rest = list(key)
-            if any(o not in rest for o in others):
-                continue
-            for o in others:
-                rest.remove(o)
-            if rest != [kinds[k]]:
-                near[rest[0]] = max(near.get(rest[0], -np.inf), value)
+            kind = _beside(key, kinds[:k] + kinds[k + 1 :])
+            if kind is not None and kind != kinds[k]:
+                near[kind] = max(near.get(kind, -np.inf), value)
         ranked = sorted(near.items(), key=lambda item: -item[1])
         out.append(tuple(Rival(id, own - v, channel or None) for (id, channel), v in ranked))
     return tuple(out)
@@ -124,6 +119,21 @@ def ranked_rivals(
 def kind_of(candidate: Candidate) -> Kind:
     """Cause and channel."""
     return candidate.id, candidate.channel or ""
+
+
+def kinds_of(members: Sequence[Candidate]) -> Kinds:
+    """Of a model, sorted."""
+    return tuple(sorted(map(kind_of, members)))
+
+
+def _beside(members: Sequence[_T], others: Sequence[_T]) -> _T | None:
+    """The one member of a model besides the others; None where the model lacks one of these."""
+    rest = list(members)
+    for other in others:
+        if other not in rest:
+            return None
+        rest.remove(other)
+    return rest[0]
 
 
 _DRAWS = 300  # of each cause: odds of 9 to 1 are then known to about a third
@@ -167,13 +177,9 @@ def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: Kind) ->
     """The best points of a cause's grid beside the others."""
     found: list[tuple[float, Candidate]] = []
     for point in pool:
-        members = list(point.members)
-        if any(o not in members for o in others):
-            continue
-        for o in others:
-            members.remove(o)
-        if kind_of(members[0]) == kind and all(members[0] != c for _, c in found):
-            found.append((point.gain, members[0]))
+        own = _beside(point.members, others)
+        if own is not None and kind_of(own) == kind and all(own != c for _, c in found):
+            found.append((point.gain, own))
     found.sort(key=lambda entry: -entry[0])
     return [c for gain, c in found[:_MOST_POINTS] if gain >= found[0][0] - _REACH]
 
@@ -222,8 +228,8 @@ class _Place:
         self.price = float(np.log(gains.size))
         for other in others:
             if other.role == "input":
-                self.map = self._input(other)
-                self.blocks += self._edges(other)
+                self.map = self.gains.replaced(other)
+                self.blocks += self.gains.edges(other)
             else:
                 self.blocks.append(gains.white(other))
         self.held = orthonormal(*self.blocks, self.map)
@@ -232,8 +238,8 @@ class _Place:
         none = np.zeros((self.gains.size, 0))
         price = self.price * price_of(candidate)
         if candidate.role == "input":
-            blocks = [*self.blocks, *self._edges(candidate)]
-            changed = orthonormal(*blocks, self._input(candidate))
+            blocks = [*self.blocks, *self.gains.edges(candidate)]
+            changed = orthonormal(*blocks, self.gains.replaced(candidate))
             return _Model(none, changed, orthonormal(*blocks, self.map), None, price)
         columns = self.gains.white(candidate)
         rest = columns - self.held @ (self.held.T @ columns)
@@ -241,15 +247,6 @@ class _Place:
         own = size**2 > INDEPENDENT * np.linalg.norm(columns, axis=0).max() ** 2
         random = candidate.role == "variance" and own.any()
         return _Model(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
-
-    def _input(self, candidate: Candidate) -> FloatArray:
-        bank = self.gains.search.bank
-        return np.asarray(self.gains.whiten(bank.replaced[bank.inputs.index(candidate)]))
-
-    def _edges(self, candidate: Candidate) -> list[FloatArray]:
-        bank = self.gains.search.bank
-        known = bank.known[bank.inputs.index(candidate)]
-        return [] if known.all() else [self.gains.whiten(singled_out(~known))]
 
 
 class _Simulated:

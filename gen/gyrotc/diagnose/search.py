@@ -153,11 +153,10 @@ _COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour a
 
 
 @dataclass(frozen=True)
-class Search:
+class Search(Question):
     """A data set, the signatures it is held against, and its views.
 
     Attributes:
-        question: Data, columns, and what may be an effect.
         channels: Columns of the auxiliary channels, as they were given.
         beside: Columns that are in every model beside the map (blocks left out, causes found), shape (N, b).
         declared: Covariance of block means that is declared, (deg/h)²; None: nothing is.
@@ -167,7 +166,6 @@ class Search:
         cautious: Whether a cause must be significant under every colour, not on their average.
     """
 
-    question: Question
     channels: Channels | None
     beside: FloatArray | None
     declared: Colour | None
@@ -177,31 +175,6 @@ class Search:
     cautious: bool = False
 
     @property
-    def records(self) -> Records:
-        """The runs."""
-        return self.question.records
-
-    @property
-    def bank(self) -> SignatureBank:
-        """Signatures of all candidates on the temperatures of these runs."""
-        return self.question.bank
-
-    @property
-    def y(self) -> FloatArray:
-        """Block means of the rate, deg/h, shape (N,)."""
-        return self.question.y
-
-    @property
-    def sigma(self) -> FloatArray | None:
-        """Factor of the noise of every block, shape (N,); None: even."""
-        return self.question.sigma
-
-    @property
-    def joined(self) -> Joined:
-        """All columns."""
-        return self.question.joined
-
-    @property
     def likeliest(self) -> View:
         """The view under the likeliest colour."""
         return self.views[self.best]
@@ -209,11 +182,11 @@ class Search:
     @property
     def freedom(self) -> int:
         """Degrees of freedom of the residual likelihood."""
-        return int(self.y.size - self.question.effects.shape[1])
+        return int(self.y.size - self.effects.shape[1])
 
     def view_of(self, colour: Colour) -> View:
         """The view under any colour."""
-        return view_of(self.question, colour)
+        return view_of(self, colour)
 
     def contradicts(self, view: View) -> bool:
         """Whether the data are so much likelier under another colour that that of the view cannot be theirs."""
@@ -269,14 +242,13 @@ def open_search(
     question = Question(records, bank, y, sigma, joined, possible_effects(bank, joined, records.size))
     count = len(COLOURS)
     numbers = range(count + (declared is not None)) if colours is None else colours
-    views = {}
-    for k in numbers:
-        if k < count or declared is None:
-            views[k] = view_of_bank(question, k)
-        else:
-            views[k] = view_of(question, declared)
+    views = {
+        k: view_of_bank(question, k) if k < count or declared is None else view_of(question, declared) for k in numbers
+    }
     top = max(view.log_likelihood for view in views.values())
     best = next(k for k, view in views.items() if view.log_likelihood == top)
     allowed = tuple(k for k, view in views.items() if 2.0 * (top - view.log_likelihood) <= CHI2_95_TWO)
     kept = {k: views[k] for k in allowed}  # each holds the inner products of all columns
-    return Search(question, channels, beside, declared, kept, best, allowed)
+    return Search(
+        **vars(question), channels=channels, beside=beside, declared=declared, views=kept, best=best, allowed=allowed
+    )

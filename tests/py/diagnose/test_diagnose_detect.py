@@ -91,12 +91,12 @@ def test_a_layout_counts_every_column_once() -> None:
 
 def test_the_likelihood_of_a_colour_is_that_of_a_dense_normal_distribution(quiet: Search) -> None:
     """Of the part of the data that no effect reaches, with the noise's scale at its best."""
-    free = null_space((all_columns(quiet) @ quiet.question.effects).T, rcond=1e-9)
+    free = null_space((all_columns(quiet) @ quiet.effects).T, rcond=1e-9)
     assert free.shape[1] == quiet.freedom
     numbers = [0, 3, TRUE_COLOUR, 14, 20]
     own, expected = [], []
     for number in numbers:
-        view, inner = view_of_bank(quiet.question, number), free.T @ dense(quiet, number) @ free
+        view, inner = view_of_bank(quiet, number), free.T @ dense(quiet, number) @ free
         normal = stats.multivariate_normal(np.zeros(len(inner)), view.scale**2 * inner)
         best = np.sqrt(free.T @ quiet.y @ np.linalg.solve(inner, free.T @ quiet.y) / quiet.freedom)
         assert view.scale == pytest.approx(best, rel=1e-6)
@@ -128,7 +128,7 @@ def test_a_projection_is_that_of_whitened_columns(quiet: Search) -> None:
 def test_without_the_map_a_candidate_is_its_whole_column_again(planted: Search) -> None:
     """The plain map stands beside as if a cause had brought it: then nothing may change but inputs, which go."""
     moved = planted.extended(planted.bank.map)
-    views = [view_of_bank(s.question, planted.best) for s in (planted, moved)]
+    views = [view_of_bank(s, planted.best) for s in (planted, moved)]
     was, now = project(planted, views[0], "map"), project(moved, views[1], "beside")
     at = planted.joined.layout.signatures
     a, b = (p.a[at] * v.scale for p, v in zip((was, now), views, strict=True))
