@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -20,8 +21,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.common.metrics import average
 from gyrotc.diagnose import signature_bank
 from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.series import series_of
+from gyrotc.diagnose.diagnosis import diagnose, series_of
 from gyrotc.diagnose.signature_bank import build
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
@@ -407,7 +407,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         bank = build(records, 0)
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
         small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
-        content = signature_bank._content(replace(bank, **small))
+        content = pickle.dumps(replace(bank, **small), protocol=5)
         path.write_bytes(kept._head("a.bank", content) + content)
     return path.read_bytes()
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from .. import __version__
 from ..common.arrays import FloatArray
-from ..common.metrics import Averages
+from ..common.metrics import FIRST_S, HALF_HOUR_S, HOUR_S, Averages
 from ..model import Model
 from ..results.evaluation import PARTS, Calibration, Changes, EvaluatedRun, Evaluation, FigureUncertainty
 from ..results.release import Budget, Contribution, Instrument, Verification
@@ -324,7 +324,6 @@ def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Con
 _BLOCK_S = 7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
 _LEAST_BLOCKS = 8  # shorter ones where an hour would give fewer: fewer squares hardly tell a variance
 _LEAST_MEANS = 4  # in a block
-_HALF_HOUR_S, _HOUR_S, _FIRST_S = 1800.0, 3600.0, 600.0  # the names of the figures say it
 
 
 def figure_uncertainties(
@@ -418,8 +417,8 @@ def _of_windows(
 ) -> Iterable[tuple[str, FigureUncertainty]]:
     """Of the worst run's figure: RMS of m normal numbers, of which sqrt(1/2m) is unknown."""
     names: tuple[tuple[Literal["rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph"], float], ...] = (
-        ("rms_30min_dph", _HALF_HOUR_S),
-        ("angle_1h_arcsec", _HOUR_S),
+        ("rms_30min_dph", HALF_HOUR_S),
+        ("angle_1h_arcsec", HOUR_S),
         ("first_10min_rms_dph", average_s),
     )
     for name, window_s in names:
@@ -427,7 +426,7 @@ def _of_windows(
         if not known:
             continue
         value, a = max(known, key=lambda pair: pair[0])
-        length_s = _FIRST_S if name.startswith("first") else a.after_dph.size * average_s
+        length_s = FIRST_S if name.startswith("first") else a.after_dph.size * average_s
         windows = max(1, int(length_s / window_s))
         standard, method = value / np.sqrt(2.0 * windows), f"{windows} windows of the worst run, taken as normal"
         yield name, FigureUncertainty(standard=standard, freedom=float(windows), method=method)

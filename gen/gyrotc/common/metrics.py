@@ -19,6 +19,9 @@ from .arrays import FloatArray, parts_of
 from .inputs import need_memory
 
 __all__ = [
+    "FIRST_S",
+    "HALF_HOUR_S",
+    "HOUR_S",
     "LEAST_SPAN_C",
     "MAD_TO_SIGMA",
     "Averager",
@@ -32,6 +35,7 @@ __all__ = [
     "quantile_of_parts",
     "statistics",
     "time_statistics",
+    "window_means",
 ]
 
 
@@ -41,9 +45,9 @@ MAD_TO_SIGMA = 1.0 / NormalDist().inv_cdf(0.75)
 LEAST_SPAN_C = 2.0
 """A smaller span of temperature says nothing about temperature (finding `no_temperature_information`)."""
 
-_HALF_HOUR_S = 1800.0  # the name of the figure says it
-_HOUR_S = 3600.0  # the name of the figure says it
-_FIRST_S = 600.0  # ten minutes: the name of the figure says it
+HALF_HOUR_S = 1800.0  # the name of the figure says it
+HOUR_S = 3600.0  # the name of the figure says it
+FIRST_S = 600.0  # ten minutes: the name of the figure says it
 _BIN_BYTES = 40  # of a mean while it is made: its count and four sums
 
 
@@ -251,10 +255,10 @@ def time_statistics(a: Averages, average_s: float) -> dict[str, float | None]:
     RMS of 30-minute means; RMS of the angle that one hour adds up to (1 deg/h is 1 arcsec/s);
     RMS of the first 10 minutes. None where the run is too short.
     """
-    first = a.after_dph[a.time_s < a.time_s[0] - average_s / 2 + _FIRST_S] if a.time_s.size else a.after_dph
+    first = a.after_dph[a.time_s < a.time_s[0] - average_s / 2 + FIRST_S] if a.time_s.size else a.after_dph
     return {
-        "rms_30min_dph": _rms_of_windows(a, _HALF_HOUR_S, average_s),
-        "angle_1h_arcsec": _scaled(_rms_of_windows(a, _HOUR_S, average_s), _HOUR_S),
+        "rms_30min_dph": _rms_of_windows(a, HALF_HOUR_S, average_s),
+        "angle_1h_arcsec": _scaled(_rms_of_windows(a, HOUR_S, average_s), HOUR_S),
         "first_10min_rms_dph": float(np.sqrt(np.mean(first**2))) if first.size else None,
     }
 
@@ -264,11 +268,15 @@ def _scaled(value: float | None, factor: float) -> float | None:
 
 
 def _rms_of_windows(a: Averages, window_s: float, average_s: float) -> float | None:
-    """RMS of the means over windows that are at least 90 % full."""
+    means = window_means(a, window_s, average_s)
+    return float(np.sqrt(np.mean(means**2))) if means.size else None
+
+
+def window_means(a: Averages, window_s: float, average_s: float) -> FloatArray:
+    """Means after compensation over windows that are at least 90 % full, deg/h, shape (windows,)."""
     if a.time_s.size == 0:
-        return None
+        return np.zeros(0)
     number = np.floor((a.time_s - a.time_s[0]) / window_s + 1e-9).astype(np.int64)
     count = np.bincount(number)
     means = np.bincount(number, weights=a.after_dph) / np.maximum(count, 1)
-    full = means[count >= 0.9 * window_s / average_s]
-    return float(np.sqrt(np.mean(full**2))) if full.size else None
+    return np.asarray(means[count >= 0.9 * window_s / average_s])

@@ -15,7 +15,9 @@ import numpy as np
 from scipy.special import chdtr, chdtrc
 
 from ..common.arrays import BoolArray, FloatArray
+from ..common.metrics import HALF_HOUR_S
 from ..common.statistics import orthonormal
+from ..results.diagnosed import ComparedStatistic
 from .blocks import Records, centred_slope
 from .detection import project
 from .joined import ROUNDING, p_values, score
@@ -93,22 +95,9 @@ OfResiduals = Callable[[FloatArray], FloatArray]
 
 _MEMBERS = 499  # p-values in steps of 0.004: a rank of the measured campaign among 500
 _MOVING = 0.1  # C/min, above which a block counts as heating or cooling
-_SLOW_S = 1800.0  # half an hour, as `rms_30min_dph` of `metrics`
 _CELL_C = 8.0  # C: a dozen cells over the range of a product
 _FEWEST = 3  # blocks of either direction in a cell, for a mean
 _DATES = 3  # days: two give a line in any case
-
-
-@dataclass(frozen=True)
-class Discrepancy:
-    """One statistic: measured, the middle 95 % of the simulated ones, and how rare the measured one is."""
-
-    statistic: str
-    measured: float
-    simulated_mean: float
-    simulated_low: float
-    simulated_high: float
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -123,7 +112,7 @@ class Ensemble:
 
     residual: FloatArray
     simulated: FloatArray
-    discrepancies: tuple[Discrepancy, ...]
+    discrepancies: tuple[ComparedStatistic, ...]
 
 
 def ensemble_of(
@@ -165,7 +154,7 @@ def ensemble_of(
     return Ensemble(measured, simulated[:, :100], tuple(found))
 
 
-def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: float) -> Discrepancy:
+def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: float) -> ComparedStatistic:
     """The rank of the measured value; where the model takes a statistic away wholly, none is rare."""
     n = simulated.size
     above = float(np.count_nonzero(simulated >= measured))
@@ -174,14 +163,21 @@ def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: fl
     if max(abs(measured), float(np.abs(simulated).max())) <= rounding:
         p = 1.0
     low, high = np.quantile(simulated, [0.025, 0.975])
-    return Discrepancy(name, measured, float(simulated.mean()), float(low), float(high), p)
+    return ComparedStatistic(
+        statistic=name,
+        measured=measured,
+        simulated_mean=float(simulated.mean()),
+        simulated_low=float(low),
+        simulated_high=float(high),
+        p_value=p,
+    )
 
 
 def _statistics(search: Search) -> dict[str, OfResiduals]:
     """Statistics of residuals, shape (N, members), by name: each gives one number for each member."""
     records = search.records
     spans = records.spans()
-    slow = max(round(_SLOW_S / records.block_s), 2)
+    slow = max(round(HALF_HOUR_S / records.block_s), 2)
     found: dict[str, OfResiduals] = {
         "residual_rms_dph": _rms,
         "residual_autocorrelation": partial(_autocorrelation, spans=spans),
@@ -233,8 +229,8 @@ def _loop(e: FloatArray, branches: Sequence[tuple[BoolArray, BoolArray]]) -> Flo
 
 def _branches(records: Records) -> list[tuple[BoolArray, BoolArray]]:
     """Blocks that heat and that cool, shape (N,) each, for every cell of temperature that has enough of both."""
-    slope = records.average([centred_slope(r.history) for r in records.runs])
-    temperature = records.average([r.history.temperature_c for r in records.runs])
+    slope = records.columns(centred_slope)
+    temperature = records.columns(lambda h: h.temperature_c)
     cells = np.floor(temperature / _CELL_C).astype(np.int64)
     pairs = [((slope > _MOVING) & (cells == c), (slope < -_MOVING) & (cells == c)) for c in np.unique(cells)]
     return [(up, down) for up, down in pairs if min(up.sum(), down.sum()) >= _FEWEST]

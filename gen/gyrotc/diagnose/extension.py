@@ -80,8 +80,7 @@ def stand_ins_of(
 Chain = list[list[Averages]]
 """Residuals of the scored runs for every set of causes, from none to all."""
 
-FEW_RUNS = 3  # fewer cannot be left out whole: two thirds must remain to learn from
-_FOLDS = 3  # two thirds remain to learn from, at the cost of three fits
+_FOLDS = 3  # two thirds remain to learn from, at the cost of three fits; fewer runs cannot be left out whole
 _ROUNDING_S = 1e-6  # of times that are compared
 
 
@@ -95,10 +94,9 @@ class Refitting:
         self.records = records
         self.single_cycle = single_cycle
         self.runs = [r for r in dataset.runs if r.role == "train"]
-        self.exam_runs = [r for r in dataset.runs if r.role == "exam"]
         self.front = front_end(self.runs, options.block_s)
         self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
-        self.exam = play_runs(dataset, self.exam_runs, self.front)
+        self.exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
         self.average_s = options.average_s
         self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
         self.arguments: dict[str, Any] = {
@@ -191,7 +189,7 @@ class Refitting:
 def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
     """Held-out masks: groups of runs, or spans of few runs."""
     sizes = [len(run.data.bias_dph) for run in refitting.train]
-    if len(refitting.train) >= FEW_RUNS:
+    if len(refitting.train) >= _FOLDS:
         return [[np.full(n, k % _FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)] for fold in range(_FOLDS)]
     data = joined([run.data for run in refitting.train])
     return [
@@ -399,7 +397,7 @@ def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Ga
     """Later runs from earlier ones: the exam where it came last, else the last third of the training runs."""
     days = [run.day for run in refitting.train]
     later = [run.day for run in refitting.exam]
-    if any(d is None for d in (*days, *later)) or len(days) < FEW_RUNS:
+    if any(d is None for d in (*days, *later)) or len(days) < _FOLDS:
         return None
     known = [float(d) for d in days if d is not None]
     if later and min(float(d) for d in later if d is not None) > max(known):

@@ -2,7 +2,8 @@
 
 Share of removable excess: (before² − after²)/(without any cause² − floor²), RMS of means over `average_s`, so that
 shares of causes that were added one after the other have one total. Intervals come from drawing half-hours (for the
-angle: hours) of the scored runs again, a paired bootstrap; where there are few half-hours, twelfths of all.
+angle: hours) of the scored runs again, a paired bootstrap; half an hour is longer than what a map leaves stays alike.
+Where there are few half-hours, twelfths of all.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..common.arrays import FloatArray, parts_of, those
-from ..common.metrics import MAD_TO_SIGMA, Averager, Averages, time_statistics
+from ..common.metrics import HALF_HOUR_S, HOUR_S, MAD_TO_SIGMA, Averager, Averages, time_statistics, window_means
 from ..model import Model
 from ..recordings.records import Run
 from ..results.base import Estimate
@@ -25,9 +26,7 @@ from ..train.evidence import steps_of, stretches
 from ..verify.replay import inputs_of
 from .blocks import Records
 
-_PIECE_S = 1800.0  # half an hour: longer than what a map leaves stays alike
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
-_HOUR_S = 3600.0  # the angle after one hour is a figure of merit
 _SEED = 1  # of the draws
 _DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
 _FAR = 4.0  # robust standard deviations: a difference beyond says no more of the floor than one of as much
@@ -195,7 +194,7 @@ def _pieces(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Sums of squares before and after, and number of samples, of half-hour pieces."""
     most = sum(x.after_dph.size for x in before) // _FEWEST_PIECES
-    size = max(min(round(_PIECE_S / average_s), most), 1)
+    size = max(min(round(HALF_HOUR_S / average_s), most), 1)
     b2, a2, weight = [], [], []
     for x, y in zip(before, after, strict=True):
         cuts = np.arange(0, x.after_dph.size, size)
@@ -214,23 +213,13 @@ def _angle_removed(
     before: Sequence[Averages], after: Sequence[Averages], average_s: float, rng: np.random.Generator
 ) -> tuple[float, float] | None:
     """Limits of the difference of the RMS angles after one hour, arcsec (1 deg/h is 1 arcsec/s)."""
-    b, a = (np.concatenate([_hours(r, average_s) for r in runs]) for runs in (before, after))
+    b, a = (np.concatenate([window_means(r, HOUR_S, average_s) for r in runs]) for runs in (before, after))
     if b.size < 2:
         return None
     drawn = rng.integers(0, b.size, (_DRAWS, b.size))
     rms = [np.sqrt((x[drawn] ** 2).mean(axis=1)) for x in (b, a)]
     low, high = _middle_95(rms[0] - rms[1])
-    return _HOUR_S * low, _HOUR_S * high
-
-
-def _hours(run: Averages, average_s: float) -> FloatArray:
-    """Means over full hours of one run, deg/h."""
-    if run.time_s.size == 0:
-        return np.zeros(0)
-    number = np.floor((run.time_s - run.time_s[0]) / _HOUR_S + 1e-9).astype(np.int64)
-    count = np.bincount(number)
-    means = np.bincount(number, weights=run.after_dph) / np.maximum(count, 1)
-    return np.asarray(means[count >= 0.9 * _HOUR_S / average_s])
+    return HOUR_S * low, HOUR_S * high
 
 
 def _pooled(runs: Sequence[Averages], average_s: float, name: str) -> float | None:

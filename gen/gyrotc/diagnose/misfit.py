@@ -26,7 +26,7 @@ from .noise import Whitener
 from .profile_likelihood import Gains
 from .refine import Refined
 from .search import Search, View
-from .signature_bank import Alternative, direction_of
+from .signature_bank import DIRECTION_C, Alternative, direction_of
 from .static_map import proportional_map
 from .wide_memory import WideMemory
 
@@ -173,7 +173,6 @@ def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatA
     return float(ratio_of(energy, size[keep])[0]) if other.common else float(energy.sum())
 
 
-_DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
 _MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
 _TESTS = 3  # of which the smallest p-value counts
 
@@ -222,15 +221,12 @@ def _reported(
     current: Search, views: Sequence[View], weight: FloatArray, held: Held, changed: FloatArray, chance: int
 ) -> tuple[float, float]:
     """The same where the noise has one of some colours, each as likely as its weight says."""
-    tests = np.array([_tests(current, view, held, changed) for view in views])
+    tests = np.array(
+        [[*_dictionary(project(current, v, held)), _changes(current, v, held, changed)] for v in views]
+    )  # p-value and energy left of each, shape (views, tests, 2)
     p_values, left = np.einsum("v,vtk->kt", weight, tests)
     gain = max(float(weight @ [explained(current, view, held) for view in views]) - chance, 0.0)
     return min(1.0, _TESTS * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
-
-
-def _tests(current: Search, view: View, held: Held, changed: FloatArray) -> list[tuple[float, float]]:
-    """p-value and energy left of every test under one colour."""
-    return [*_dictionary(project(current, view, held)), _changes(current, view, held, changed)]
 
 
 def explained(current: Search, view: View, held: Held) -> float:
@@ -260,8 +256,8 @@ def _dictionary(projection: Projection) -> list[tuple[float, float]]:
 def _changed(current: Search, causes: Sequence[Refined]) -> FloatArray:
     """Every cause with an amplitude that differs by run, temperature and direction, shape (N, k)."""
     records = current.records
-    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
-    direction = direction_of(records, _DIRECTION_C)[:, 0] / _DIRECTION_C
+    t = records.columns(lambda h: h.temperature_c)
+    direction = direction_of(records)[:, 0] / DIRECTION_C
     t = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     columns = []
     for cause in causes:

@@ -27,6 +27,7 @@ from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .joined import ROUNDING, Channels
 from .noise import NOISE_WORDS, Colour, Declared
 from .profile_likelihood import Gains
+from .refine import Refined
 from .search import Search, open_search
 from .signature_bank import bank_of
 
@@ -83,23 +84,17 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
     say("searching for causes")
     attribution = attribute(search)
     say("comparing with the simulation")
-    after = _after(search, attribution)
-    noise = [
-        NoiseFinding(name, p, values, NOISE_WORDS[name]) for name, p, values in screened.findings
-    ] + noise_findings(after, declared, causes=bool(attribution.causes) or attribution.detected)
-    gains = Gains(search) if attribution.causes else None
-    separations = tuple(
-        overlap(gains, cause, _imitators(cause.candidate.id)) if gains is not None else {}
-        for cause in attribution.causes
-    )
+    after = search.extended(attribution.columns) if attribution.causes else search
+    causes = bool(attribution.causes) or attribution.detected
+    noise = (*screened.findings, *noise_findings(after, declared, causes=causes))
     return Analysis(
         records=records,
         static=search.bank.map,
         untestable=search.bank.untestable,
         attribution=attribution,
-        noise=tuple(noise),
+        noise=noise,
         limits=detection_limits(search),
-        separations=separations,
+        separations=_separations(search, attribution.causes),
         ensemble=ensemble_of(search, declared),
         colour=after.likeliest.colour,
         scale=after.likeliest.scale,
@@ -119,8 +114,12 @@ def _extended(
     return ensemble_of(after, declared, beside=beside, estimated=refuted)
 
 
-def _imitators(cause: str) -> list[str]:
-    return [id for id in diagnosed() if searched(id).imitates and id != cause]
+def _separations(search: Search, causes: Sequence[Refined]) -> tuple[dict[str, float], ...]:
+    """For every cause, d from which it can be distinguished from each that imitates it."""
+    if not causes:
+        return ()
+    gains, imitators = Gains(search), [id for id in diagnosed() if searched(id).imitates]
+    return tuple(overlap(gains, cause, [id for id in imitators if id != cause.candidate.id]) for cause in causes)
 
 
 def search_of(
@@ -189,11 +188,6 @@ def _of_map(candidate: Candidate) -> bool:
     return CATALOGUE[candidate.id].family == "static_map"
 
 
-def _after(search: Search, attribution: Attribution) -> Search:
-    """The search with the causes found taken out."""
-    return search.extended(attribution.columns) if attribution.causes else search
-
-
 _MANY = 8  # single outliers are left out in silence
 _P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
@@ -206,15 +200,13 @@ class Screened:
 
     Attributes:
         masks: Per run, rows that are kept, shape (n,).
-        n_outliers: Rows left out.
         sigma: Factor of the noise of every block, median 1, shape (N,); None: even.
-        findings: Causes of the family `noise` found here: id, p-value, parameters.
+        findings: Causes of the family `noise` found here.
     """
 
     masks: tuple[NDArray[np.bool_], ...]
-    n_outliers: int
     sigma: FloatArray | None
-    findings: tuple[tuple[str, float, dict[str, float]], ...]
+    findings: tuple[NoiseFinding, ...]
 
 
 def screen(records: Records) -> Screened:
@@ -232,7 +224,7 @@ def screen(records: Records) -> Screened:
     step = _temperature_step(records)
     if step is not None:
         findings.append(("temperature_quantisation", 0.0, {"step_c": step}))
-    return Screened(masks, found, sigma, tuple(findings))
+    return Screened(masks, sigma, tuple(NoiseFinding(id, p, values, NOISE_WORDS[id]) for id, p, values in findings))
 
 
 def _without_outliers(run: Record) -> NDArray[np.bool_]:
@@ -295,8 +287,8 @@ def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[
 
 def _variance_design(records: Records) -> FloatArray:
     """Constant, |dT/dt|, its square, hats over T, and a fading with time since power-on, shape (N, k)."""
-    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
-    r = np.abs(records.average([centred_slope(run.history) for run in records.runs]))
+    t = records.columns(lambda h: h.temperature_c)
+    r = np.abs(records.columns(centred_slope))
     r = r / max(float(r.max()), 1e-9)
     columns = [np.ones_like(t), r, r**2]
     span = float(np.ptp(t))
@@ -332,11 +324,8 @@ def cleaned(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[n
 
     The blocks themselves stay the same, so that a bank of the temperature records stays valid.
     """
-    y = np.zeros(records.size)
     empty = []
-    for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
-        keep = screened.masks[k]
-        y[span] = records.average_run(k, np.where(keep, run.rate_dph, 0.0), keep)
-        count = np.bincount(records.index[k], weights=keep, minlength=int(records.index[k][-1]) + 1)
+    for k, (keep, span) in enumerate(zip(screened.masks, records.spans(), strict=True)):
+        count = np.bincount(records.index[k], weights=keep)
         empty.append(np.flatnonzero(count[records.kept[k]] == 0) + span.start)
-    return y, np.concatenate(empty)
+    return records.target(screened.masks), np.concatenate(empty)

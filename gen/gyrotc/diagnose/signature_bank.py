@@ -36,8 +36,8 @@ _DICTIONARY_LAGS_S = (
     2500.0,
     6000.0,
 )  # in steps of a factor 2.5, over what a day of recordings shows
-# Of the texture; of the play that tells the direction; of its memory.
-_TEXTURE_C, _DIRECTION_C, _MODULATING_S = 8.0, 3.0, 700.0
+_TEXTURE_C, _MODULATING_S = 8.0, 700.0  # of the texture; of the memory that modulates it
+DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
 _COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
 _SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
 
@@ -227,14 +227,14 @@ def _dictionary(records: Records) -> FloatArray:
 
     Memories times T and rectified; texture over T that differs by direction, or that a memory modulates.
     """
-    t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+    t = records.columns(lambda h: h.temperature_c)
     out = []
     for tau in _DICTIONARY_LAGS_S:
         late = _late(records, tau)[:, 0]
         out += [late * (t - t.mean()), np.abs(late)]
     nodes = np.arange(t.min(), t.max() + _TEXTURE_C, _TEXTURE_C)
     texture = np.maximum(0.0, 1.0 - np.abs(t[:, None] - nodes) / _TEXTURE_C)
-    direction = direction_of(records, _DIRECTION_C)
+    direction = direction_of(records)
     memory = _late(records, _MODULATING_S)
     out += list((texture * direction).T) + list((texture * memory).T)
     if len(records.runs) < 3:
@@ -247,12 +247,11 @@ def _late(records: Records, tau_s: float) -> FloatArray:
     return records.columns(lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None])
 
 
-def direction_of(records: Records, width_c: float) -> FloatArray:
+def direction_of(records: Records) -> FloatArray:
     """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
-    return records.columns(lambda h: (play(width_c, h.temperature_c) - h.temperature_c)[:, None])
+    return records.columns(lambda h: (play(DIRECTION_C, h.temperature_c) - h.temperature_c)[:, None])
 
 
-_VERSION = 6  # raised with every change of what a bank holds
 _MAKERS = ("causes", "target", "diagnose")  # packages whose code decides what a bank holds
 _CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
 _OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}
@@ -267,17 +266,13 @@ _NUMPY = {
 
 def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _: None) -> SignatureBank:
     """The bank of these temperature records, from disk or made and kept."""
-    digest = hashlib.sha256(f"{_VERSION} {level} {_code()} {records.key()}".encode()).hexdigest()
+    digest = hashlib.sha256(f"{level} {_code()} {records.key()}".encode()).hexdigest()
     bank = cache.kept(f"{digest}.bank", _bank)
     if bank is None:
         say("computing the signatures of all causes")
         bank = build(records, level)
-        cache.keep(f"{digest}.bank", _content(bank))
+        cache.keep(f"{digest}.bank", pickle.dumps(bank, protocol=5))
     return bank
-
-
-def _content(bank: SignatureBank) -> bytes:
-    return pickle.dumps(bank, protocol=5)
 
 
 def _bank(content: bytes) -> SignatureBank | None:

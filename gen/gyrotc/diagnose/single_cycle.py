@@ -28,8 +28,8 @@ from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
 from ..train.data import turning_points
 from .attribution import Attribution
-from .blocks import Record, Records, centred_slope
-from .candidates import Candidate, columns_of, diagnosed, searched, shape_parameter
+from .blocks import Records, centred_slope
+from .candidates import Candidate, columns_of, diagnosed, price_of, searched, shape_parameter
 from .profile_likelihood import SEPARATION
 from .refine import Interval, Refined
 from .rivals import EQUIVALENT, Rival
@@ -62,7 +62,7 @@ class CycleFits:
 
     def __init__(self, records: Records) -> None:
         self.records = records
-        t = records.columns(lambda h: h.temperature_c[:, None])[:, 0]
+        t = records.columns(lambda h: h.temperature_c)
         nodes = np.linspace(t.min(), t.max(), _GAUSSIANS)
         width = _WIDTH * (nodes[1] - nodes[0])
         static = records.columns(
@@ -136,9 +136,7 @@ class CycleFits:
     @cached_property
     def _inputs(self) -> tuple[FloatArray, FloatArray]:
         """Block means of T and centred dT/dt, scaled to -1 ... 1."""
-        runs = self.records.runs
-        t = self.records.average([run.history.temperature_c for run in runs])
-        r = self.records.average([centred_slope(run.history) for run in runs])
+        t, r = self.records.columns(lambda h: h.temperature_c), self.records.columns(centred_slope)
         return 2.0 * (t - t.min()) / float(np.ptp(t)) - 1.0, r / float(np.abs(r).max())
 
     def _without(self, columns: FloatArray) -> FloatArray:
@@ -196,7 +194,6 @@ def _shared(here: list[float], low: float, high: float, grid: FloatArray) -> tup
 
 _FEW_PASSES = 3  # of any temperature, in all runs together
 _UNCORRELATED = 0.05  # about what chance makes of a few hundred blocks
-_PRICE = 2  # parameters of a state: time constant (or width) and amplitude
 
 
 @dataclass(frozen=True)
@@ -338,7 +335,8 @@ def cycle_of(records: Records) -> Cycle:
     effective = _effective_size(records, min(left, key=lambda e: float(e @ e)))
     tried = tuple(sorted((_tried(fits, m, effective) for m in best), key=lambda t: t.criterion))
     static = tuple(sorted((_static(fits, p, effective) for p in RATES), key=lambda t: t.criterion))
-    turns = sum(len(_turns(run)) for run in records.runs)
+    rows = [(r.history.time_s[r.usable], r.history.temperature_c[r.usable]) for r in records.runs]
+    turns = sum(len(turning_points(*of_run)) for of_run in rows)
     rms = float(np.sqrt(np.mean(fits.rest**2)))
     if tried[0].criterion >= 0.0 or turns == 0:
         return Cycle(tried, static, turns, None, (), (), rms, 1.0, fits.rest, np.zeros_like(fits.rest))
@@ -348,15 +346,10 @@ def cycle_of(records: Records) -> Cycle:
     rivals = (Rival(_rare(others[0])[0], others[0].criterion - chosen.criterion),) if others else ()
     chosen = _averaged(fits, chosen, effective) if chosen.resolved else chosen
     ratio = effective * 2.0 * float(np.log(rms / chosen.rms_dph))
-    p_value = max(float(chdtrc(_PRICE * len(chosen.members), max(ratio, 0.0))), 1e-300)
+    p_value = max(float(chdtrc(sum(map(price_of, chosen.members)), max(ratio, 0.0))), 1e-300)
     refined = tuple(_refined(fits, chosen, effective))
     explained = fits.rest - fits.left(chosen.members)
     return Cycle(tried, static, turns, chosen, refined, rivals, rms, p_value, fits.rest, explained)
-
-
-def _turns(run: Record) -> list[float]:
-    """Times at which the temperature of the rows that count turns, s."""
-    return turning_points(run.history.time_s[run.usable], run.history.temperature_c[run.usable])
 
 
 def _static(fits: CycleFits, powers: tuple[tuple[int, int], ...], effective: float) -> Static:
@@ -411,7 +404,7 @@ def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) ->
         values = [c.values[name] for c in fits.grid[member.id]]
         value = member.values[name]
         intervals.append(Interval(value, min(values[inside[0]], value), max(values[inside[-1]], value)))
-    price = _PRICE * len(members) * float(np.log(effective))
+    price = sum(map(price_of, members)) * float(np.log(effective))
     criterion = effective * float(np.log(least / total)) + price
     return Tried(members, float(np.sqrt(least / fits.rest.size)), criterion, tuple(intervals), resolved)
 

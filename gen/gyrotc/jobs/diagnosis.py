@@ -42,7 +42,7 @@ _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
 def _saved(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
-    from ..diagnose.series import series_of
+    from ..diagnose.diagnosis import series_of
     from ..pages.diagnosis import PICTURES, SERIES, draw, write_diagnosis_page
 
     if progress:

@@ -12,6 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ..common.arrays import FloatArray
+from ..common.metrics import HALF_HOUR_S
 from ..common.statistics import CHI2_95_ONE, running_mean
 from ..results.base import Finding, read_optional, read_result
 from ..results.diagnosed import (
@@ -77,7 +78,6 @@ def _gains(result: Diagnosed) -> list[tuple[str, GainOnUnseen]]:
     return rows
 
 
-_SMOOTH_S = 1800.0  # half an hour, as the simulated band of `series.json`
 _LEAST_SHOWN = 20  # blocks at a kind of rate: fewer give no mean to speak of
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
@@ -87,7 +87,7 @@ _MOST_PANELS = 6  # runs with events that are drawn
 def draw(result: Diagnosed, series: DiagnosisSeries) -> dict[str, Markup]:
     """All pictures of a diagnosis by name."""
     cycle = result.single_cycle is not None
-    width = max(round(_SMOOTH_S / series.block_s), 1)
+    width = max(round(HALF_HOUR_S / series.block_s), 1)
     made: dict[str, Markup | None] = {
         "residual": _cycle_over_time(series.runs) if cycle else _residual_over_time(series.runs, width),
         "statistics": _statistics(result.discrepancies),
@@ -247,7 +247,7 @@ def _over_date(runs: Sequence[RunSeries]) -> Panel:
 
 def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:
     """Half-hour means on the scored runs: model without the causes, and with them."""
-    smooth_s = min(_SMOOTH_S, min(len(run.hours) for run in scored) * average_s / 16.0)
+    smooth_s = min(HALF_HOUR_S, min(len(run.hours) for run in scored) * average_s / 16.0)
     width = max(round(smooth_s / average_s), 1)
     panels = _panels(len(scored), "time, h", f"remains, {rate_unit()}")
     for panel, run in zip(panels, scored, strict=True):

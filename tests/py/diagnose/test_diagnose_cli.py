@@ -422,7 +422,7 @@ LEVEL = 1e-3 / np.sqrt(10.0)  # of 100-s means of the noise
 def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     """An effect that is there is shipped, a wrong one and one that no table holds are not; the exam is not asked."""
     blind = Refitting(case.dataset, case.refitting.records, OPTIONS, single_cycle=False)
-    blind.exam, blind.exam_runs = [], []
+    blind.exam = []
     found = shipping(blind, [GRADIENT_TO_REMOVE])
     assert found.shipped == [GRADIENT_TO_REMOVE]
     assert found.before_dph is not None and found.after_dph is not None
