@@ -200,6 +200,8 @@ class Wording:
 OVERTONES = "overtones"
 """Beside the parameters of a wave that is no sine: how many overtones its columns have."""
 
+MOST_OVERTONES = 2  # with the wave itself they leave one of the four terms of a table to something else
+
 Values = Mapping[str, float]
 
 Kind = Literal["input", "add", "random", "static", "record"]

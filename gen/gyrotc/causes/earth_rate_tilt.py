@@ -14,16 +14,16 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..target.recursions import first_order
 from .base import Cause, Parameter, Scene, Telling, Values, Wording
+from .power_on_temperature import ROOM_C
 
 EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
-_REFERENCE_C = 20.0  # room temperature, at which a fixture is aligned
 
 
 def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
     fixture_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     latitude = math.radians(values["latitude_deg"])
     arcsec_per_c = math.cos(latitude) * values["twist_arcsec_per_c"] + math.sin(latitude) * values["tilt_arcsec_per_c"]
-    angle = math.radians(arcsec_per_c / 3600.0) * (fixture_c - _REFERENCE_C)
+    angle = math.radians(arcsec_per_c / 3600.0) * (fixture_c - ROOM_C)
     return np.asarray(EARTH_RATE_DPH * angle)
 
 

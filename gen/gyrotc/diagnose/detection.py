@@ -15,7 +15,7 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_TWO
 from .candidates import Candidate, searched, shape_parameter
-from .joined import Held, Projection, ScoredColumns, p_values, score
+from .joined import INDEPENDENT, Held, Projection, ScoredColumns, p_values, score
 from .search import Search, View, residual_log_likelihood
 
 _RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
@@ -62,7 +62,6 @@ def _without_map(search: Search) -> FloatArray:
 
 _SEED = 20140916  # any: it fixes the draws, so that a diagnosis repeats to the last digit
 _PLACES = 9  # of an adjusted p-value: below every draw all are alike, and the sum's rounding is no order
-_DEPENDENT = 1e-4  # eigenvalues of a group's inner products below this share of the largest add no parameter
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: 
     ]
     for group in (*columns.pairs, *columns.variance):
         values, vectors = np.linalg.eigh(gram[np.ix_(group, group)])
-        keep = values > _DEPENDENT * values[-1]
+        keep = values > INDEPENDENT * values[-1]  # the others add no parameter
         c = vectors[:, keep].T @ a[group]
         left = projection.rest - float((c**2 / values[keep]).sum())
         log_det = projection.log_det + float(np.log(values[keep]).sum())
@@ -131,9 +130,6 @@ def _refitted(projection: Projection, columns: ScoredColumns, view: View, size: 
         parts.append(np.array([likelihood]))
     parts.append(np.array([view.log_likelihood]))
     return np.concatenate(parts)
-
-
-_LARGEST = 1e150  # a norm whose square is finite stands for an infinite one
 
 
 @dataclass(frozen=True)
@@ -171,7 +167,7 @@ def detection_limits(search: Search) -> dict[str, CauseLimit]:
     outside = size[joined.layout.channels.start : joined.layout.inputs.stop]
     for candidate, energy, norm in zip(joined.added, outside, joined.norm, strict=True):
         key = candidate.id if candidate.channel is None else f"{candidate.id}:{candidate.channel}"
-        found.setdefault(key, []).append((candidate, float(energy) * min(norm, _LARGEST) ** 2))
+        found.setdefault(key, []).append((candidate, float(energy) * norm**2 if np.isfinite(norm) else 0.0))
     return {key: limit_of(key.split(":")[0], points) for key, points in found.items()}
 
 

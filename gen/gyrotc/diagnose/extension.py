@@ -25,7 +25,7 @@ from ..model import Model
 from ..recordings.records import Dataset
 from ..results.diagnosed import ShippingTrial
 from ..results.fleet import LotUse
-from ..train.channels import StandIn, stand_in_of
+from ..train.channels import MOST_TERMS, StandIn, stand_in_of
 from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
@@ -38,7 +38,6 @@ from .gain import Gain, gain_of
 from .pipeline import search_of
 from .refine import Refined
 from .refit import (
-    MOST_TERMS,
     Effect,
     Played,
     completed,

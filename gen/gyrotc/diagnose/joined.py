@@ -26,6 +26,7 @@ from .signature_bank import SignatureBank
 _DRAWS = 4000  # 40 draws lie beyond the 1 % point: it is known to one sixth of itself
 _WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
 ROUNDING = 1e-9  # what is below this share of a norm, of an energy or of a size is made of rounding errors
+INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside the others
 _LEAST_LEFT = 1e-6  # of a column's energy: what survives less has no signature left
 _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units of the noise of its weights
 
@@ -122,7 +123,7 @@ def _pair_energy(projection: Projection, pairs: IntArray, a: FloatArray) -> Floa
     p, q = pairs[:, 0], pairs[:, 1]
     gpp, gqq, gpq = g[p, p], g[q, q], g[p, q]
     det = gpp * gqq - gpq**2
-    ok = (det > 1e-4 * gpp * gqq) & projection.alive[p] & projection.alive[q]
+    ok = (det > INDEPENDENT * gpp * gqq) & projection.alive[p] & projection.alive[q]
     ap, aq = a[..., p], a[..., q]
     energy = (gqq * ap**2 - 2.0 * gpq * ap * aq + gpp * aq**2) / np.where(ok, det, np.inf)
     return np.asarray(energy)

@@ -174,7 +174,6 @@ def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatA
 
 
 _MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
-_TESTS = 3  # of which the smallest p-value counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +225,7 @@ def _reported(
     )  # p-value and energy left of each, shape (views, tests, 2)
     p_values, left = np.einsum("v,vtk->kt", weight, tests)
     gain = max(float(weight @ [explained(current, view, held) for view in views]) - chance, 0.0)
-    return min(1.0, _TESTS * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
+    return min(1.0, p_values.size * float(p_values.min())), gain / max(gain + max(float(left.max()), 0.0), 1e-300)
 
 
 def explained(current: Search, view: View, held: Held) -> float:

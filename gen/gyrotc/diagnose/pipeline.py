@@ -30,10 +30,10 @@ from .profile_likelihood import Gains
 from .refine import Refined
 from .search import Search, open_search
 from .signature_bank import bank_of
+from .static_map import LEVELS
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
-_HIGHEST_LEVEL = 1  # finer maps than this are named, not taken in silence
 
 
 @dataclass(frozen=True)
@@ -133,13 +133,13 @@ def search_of(
     y, empty = cleaned(records, checked)
     left_out = np.eye(records.size)[:, empty] if empty.size else None
     channels = _channels(records)
-    for level in range(_HIGHEST_LEVEL + 1):
+    for level in range(len(LEVELS)):
         bank = bank_of(records, level, say)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
         search = open_search(records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour)
-        if level == _HIGHEST_LEVEL or not needs_finer(search):
+        if level + 1 == len(LEVELS) or not needs_finer(search):
             break
     return search
 

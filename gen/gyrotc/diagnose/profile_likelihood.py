@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..causes.base import OVERTONES
+from ..causes.base import MOST_OVERTONES, OVERTONES
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, columns_of, price_of, searched
-from .joined import variance_ratio_of
+from .joined import INDEPENDENT, variance_ratio_of
 from .noise import Whitener
 from .search import Search
 
@@ -58,10 +58,6 @@ class SizeLimit:
     def allows(self, contribution: FloatArray) -> bool:
         """Whether a fitted effect, deg/h, shape (N,), is accepted."""
         return bool(contribution.std() <= self.spread_dph)
-
-
-_OVERTONES = (1, 2)  # as many as a term of four has room for beside other terms (`refit`)
-INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside the others
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +220,7 @@ class Gains:
         left_out = orthonormal(self.beside, self.map)
         target = self.target - left_out @ (left_out.T @ self.target)
         grid = [c for c, _ in self.plain if CATALOGUE[c.id].overtone is not None]
-        for candidate, number in itertools.product(grid, _OVERTONES):
+        for candidate, number in itertools.product(grid, range(1, MOST_OVERTONES + 1)):
             overtone = CATALOGUE[candidate.id].overtone
             assert overtone is not None
             for values in (candidate.values, overtone(candidate.values, 1.0 / (1 + number))):

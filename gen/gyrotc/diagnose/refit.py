@@ -16,27 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..causes.base import OVERTONES, Cause, History, Scene, Values
+from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, History, Scene, Values
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average
 from ..quality.outliers import stretches_left_out
 from ..recordings.records import Dataset, Run
 from ..results.training import LeftOutRows
 from ..target.recursions import Course, CourseChannel, TermOutcome
-from ..train.channels import channel_shown, readings_alone, seen_by_target
-from ..train.data import TrainingData, cleaned, joined, scaling_of
+from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
+from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
-from ..train.mrbf import BesideSmooth, Bumps, beside_smooth, find_bumps, smooth_basis
+from ..train.mrbf import MEAN_S, BesideSmooth, Bumps, beside_smooth, find_bumps, smooth_basis
 from ..train.result import Fit, longest_same_s, predict
 from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
 from .candidates import searched
 from .refine import Refined
-
-_NUMBERS = (2, 3)  # of the overtones: with the wave itself they leave a term of four to something else
-_PARAMETERS = 2  # of an overtone: sine and cosine
 
 
 def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[str, float], ...]:
@@ -53,12 +50,12 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
     beside = None if term.overtone is None else beside_smooth(data, scaling_of(data))
     if beside is None or term.overtone is None or term.amplitudes is None:
         return ()
-    able = [dict(term.overtone(values, number)) for number in _NUMBERS]
+    able = [dict(term.overtone(values, number)) for number in range(2, MOST_OVERTONES + 2)]
     columns = [_columns(beside, term, values)]
     taken: list[dict[str, float]] = []
     for own in able:
         more = _columns(beside, term, own)
-        if _energy(beside, [*columns, more]) - _energy(beside, columns) > beside.price(_PARAMETERS):
+        if _energy(beside, [*columns, more]) - _energy(beside, columns) > beside.price(more.shape[1]):
             columns.append(more)
             taken.append(own)
     weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), beside.y, rcond=1e-9)[0], dtype=np.float64)
@@ -80,7 +77,6 @@ def _energy(beside: BesideSmooth, columns: list[FloatArray]) -> float:
     return float(((q.T @ beside.y) ** 2).sum())
 
 
-MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 _LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
 _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
@@ -159,7 +155,7 @@ class Played:
         return made
 
 
-_KEPT = 8  # outcomes of terms for each run: those of two full tables
+_KEPT = 2 * MOST_TERMS  # outcomes of terms for each run: those of two full tables
 
 
 def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd, *, channels: bool = False) -> list[Played]:
@@ -277,9 +273,7 @@ def completed(
     return out
 
 
-_MEAN_S = 100.0  # independent means for BIC, as for bumps
 _ABOUT = np.geomspace(0.6, 1.0 / 0.6, 15)  # widths about that of a loop of one strength, each 7 % from the next
-_STILL_C_PER_MIN = 0.05  # as the floor of `train.data.scaling_of`
 
 
 class _Loops:
@@ -295,7 +289,7 @@ class _Loops:
     ) -> None:
         data = _chosen(runs, others, kept)
         self._played = [(run, run.in_force[m]) for run, m in zip(runs, _masks(runs, others, kept), strict=True)]
-        number = data.run * (1 + int(data.time_s.max() / _MEAN_S)) + (data.time_s / _MEAN_S).astype(np.int64)
+        number = data.run * (1 + int(data.time_s.max() / MEAN_S)) + (data.time_s / MEAN_S).astype(np.int64)
         _, self._index = np.unique(number, return_inverse=True)
         self._of_sample = data.weight
         weight = np.bincount(self._index, data.weight)
@@ -303,7 +297,7 @@ class _Loops:
         t, rate = self._means(data.temperature_c), self._means(data.slope_c_per_min)
         span = (float(t.min()), float(t.max()))
         self.middle_c = 0.5 * sum(span)
-        fastest = max(float(np.abs(rate).max()), _STILL_C_PER_MIN)
+        fastest = max(float(np.abs(rate).max()), MIN_HALF_RANGE_C_PER_MIN)
         self._smooth = smooth_basis(t, rate / fastest, span, self._root)
         self.y = self._rest(data.bias_dph)
 

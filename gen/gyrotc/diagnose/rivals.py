@@ -19,8 +19,8 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .candidates import Candidate, price_of
-from .joined import ratio_of
-from .profile_likelihood import INDEPENDENT, Gains, Point
+from .joined import INDEPENDENT, ratio_of
+from .profile_likelihood import Gains, Point
 
 EQUIVALENT = 8.0
 """Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds

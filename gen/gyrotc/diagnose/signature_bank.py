@@ -107,7 +107,7 @@ class SignatureBank:
 
 
 def build(records: Records, level: int) -> SignatureBank:
-    """Computes the bank of the map of a level (`baseline.LEVELS`)."""
+    """Computes the bank of the map of a level (`static_map.LEVELS`)."""
     basis, static = make_basis(records, level)
     groups, columns, untestable = _columns(records)
     raw = np.column_stack(columns)

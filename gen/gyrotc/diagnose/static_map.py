@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
+from ..train.data import MIN_HALF_RANGE_C, MIN_HALF_RANGE_C_PER_MIN
 from .blocks import Records, centred_slope
 from .candidates import Candidate, diagnosed, reach_of, searched
 
-LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3), (19, 8, 5), (28, 10, 5))
-"""Gaussians over T alone, and over T × dT/dt, from coarse to fine."""
+LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3))
+"""Gaussians over T alone, and over T × dT/dt, from coarse to fine: finer maps are named, not taken in silence."""
 
 _KEEP = 3e-4  # singular values of the averaged basis below this share of the largest are dropped
-_FINE_C = 2.5  # spacing of the local functions that say whether the map is too coarse
+FINE_C = 2.5  # spacing of the local functions that say whether the map is too coarse
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,14 @@ class MapBasis:
     """Functions of (T, dT/dt), orthonormal over the recordings.
 
     Attributes:
-        middle, half: Normalisation of T and dT/dt, C and C/min.
+        middle_c: Of the range of T, C.
+        half: Half ranges of T and of dT/dt about 0, C and C/min.
         along: Centers over T, normalised, shape (a,), and their common width.
         across: Centers over (T, dT/dt), shape (b, 2), and their widths.
         mix: From raw functions to the basis, shape (3 + a + b, m).
     """
 
-    middle: tuple[float, float]
+    middle_c: float
     half: tuple[float, float]
     along: FloatArray
     along_width: float
@@ -44,9 +46,7 @@ class MapBasis:
 
     def raw(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Constant, linear and Gaussian functions, shape (n, 3 + a + b)."""
-        t = (temperature_c - self.middle[0]) / self.half[0]
-        r = (slope_c_per_min - self.middle[1]) / self.half[1]
-        along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
+        t, r, along = self._alone(temperature_c, slope_c_per_min)
         across = np.exp(
             -(((t[:, None] - self.across[:, 0]) / self.across_width[0]) ** 2)
             - ((r[:, None] - self.across[:, 1]) / self.across_width[1]) ** 2
@@ -55,10 +55,14 @@ class MapBasis:
 
     def proportional(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Functions of which dT/dt is a factor at most once, shape (n, 5 + a): no more of the rate than that."""
-        t = (temperature_c - self.middle[0]) / self.half[0]
-        r = (slope_c_per_min - self.middle[1]) / self.half[1]
-        along = np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2))
+        t, r, along = self._alone(temperature_c, slope_c_per_min)
         return np.column_stack([np.ones_like(t), t, r, t * r, t * t * r, along])
+
+    def _alone(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> tuple[FloatArray, ...]:
+        """Normalised T and dT/dt, and the Gaussians over T alone."""
+        t = np.asarray((temperature_c - self.middle_c) / self.half[0])
+        r = np.asarray(slope_c_per_min / self.half[1])
+        return t, r, np.asarray(np.exp(-(((t[:, None] - self.along) / self.along_width) ** 2)))
 
     def __call__(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """The basis at rows, shape (n, m)."""
@@ -71,15 +75,11 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
     slopes = [centred_slope(run.history) for run in records.runs]
     t = records.average([run.history.temperature_c for run in records.runs])
     r = records.average(slopes)
-    middle, half = (
-        (0.5 * (t.min() + t.max()), 0.0),
-        (max(0.5 * float(np.ptp(t)), 1.0), max(float(abs(r).max()), 0.05)),
-    )
     grid_t, grid_a, grid_r = np.linspace(-1, 1, n_t), np.linspace(-1, 1, n_a), np.linspace(-1, 1, n_r)
     across = np.array([(a, b) for a in grid_a for b in grid_r])
     raw = MapBasis(
-        middle=(float(middle[0]), 0.0),
-        half=half,
+        middle_c=float(0.5 * (t.min() + t.max())),
+        half=(max(0.5 * float(np.ptp(t)), MIN_HALF_RANGE_C), max(float(abs(r).max()), MIN_HALF_RANGE_C_PER_MIN)),
         along=grid_t,
         along_width=1.5 * 2.0 / (n_t - 1),
         across=across,
@@ -89,8 +89,7 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
     mean = records.average([raw(run.history.temperature_c, s) for run, s in zip(records.runs, slopes, strict=True)])
     left, size, right = np.linalg.svd(mean, full_matrices=False)
     keep = size > _KEEP * size[0]
-    mix = right[keep].T / size[keep]
-    return MapBasis(raw.middle, raw.half, raw.along, raw.along_width, across, raw.across_width, mix), left[:, keep]
+    return replace(raw, mix=right[keep].T / size[keep]), left[:, keep]
 
 
 def fits_exactly(records: Records) -> bool:
@@ -99,16 +98,13 @@ def fits_exactly(records: Records) -> bool:
     return records.size <= 3 + n_t + n_a * n_r and make_basis(records, 0)[1].shape[1] >= records.size
 
 
-def fine_columns(records: Records, spacing_c: float = _FINE_C) -> FloatArray:
+def fine_columns(records: Records, spacing_c: float = FINE_C) -> FloatArray:
     """Local functions of T over the recorded range, as block means, shape (N, k); none that is zero."""
     low = min(float(r.history.temperature_c.min()) for r in records.runs)
     high = max(float(r.history.temperature_c.max()) for r in records.runs)
     nodes = np.arange(low, high + spacing_c, spacing_c)
     columns = records.columns(lambda h: np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / spacing_c))
     return columns[:, columns.max(axis=0) > 0.0]
-
-
-_WHOLE = 0.999  # share of a block's rows that must know their input: all, up to the rounding of the mean
 
 
 def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], FloatArray, NDArray[np.bool_]]:
@@ -151,6 +147,6 @@ def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[FloatArr
         if term.mended is not None:
             mended = term.mended(run.history.time_s, run.history.temperature_c, slope, candidate.values)[0]
             slope = centred_slope(replace(run.history, temperature_c=temperature))
-            known = records.average_run(k, np.isfinite(mended).astype(float)) > _WHOLE
+            known = records.average_run(k, np.isnan(mended).astype(float)) == 0.0
         out.append((temperature, slope, known))
     return out

@@ -21,24 +21,23 @@ from functools import partial
 import numpy as np
 from scipy.special import ndtr
 
-from ..causes.base import History
+from ..causes.base import History, Parameter, SearchRule
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from ..target.recursions import first_order, play
 from .blocks import Record, Records
-from .candidates import reach_of
+from .candidates import diagnosed, reach_of, searched, shape_parameter
 from .joined import ratio_of
 from .profile_likelihood import Gains
 from .rivals import EQUIVALENT
+from .static_map import FINE_C
 
 _STEPS, _SOFT = 7, 0.85
 """Steps of the strength over the envelope, and the width of each in distances: 14 C over an envelope of 100 C. That is
 as fine as the coarsest static map, beside which a loop is seen."""
 
-_NODE_C = 2.5  # distance of the finest functions: as of the map's, once it is named too coarse (`static_map`)
 _POINTS = 12  # widths (time constants) that are tried: in steps of a factor 1.4 (1.6)
 _NEAR = (0.3, 0.7, 1.0, 0.7, 0.3)  # weights of the widths about one: a factor of two to either side
-_NARROWEST_C, _QUICKEST_S, _SLOWEST_S = 0.5, 60.0, 8000.0  # what is searched for plays and lags (`causes`)
 _ROW_S = 10.0  # rows that are nearer than that are thinned: nothing here is as quick
 
 _OWN = 1e-6  # of the strongest direction: what is less is rounding
@@ -117,10 +116,17 @@ def outlasts(gains: Gains, behind: float, rival: float) -> bool:
 
 
 def _families(gains: Gains, beside: Sequence[FloatArray]) -> tuple[_Family, _Family]:
-    widest = max(reach_of(gains.search.records).most("C"), 2.0 * _NARROWEST_C)
+    width = _parameter(lambda rule: rule.loops)
+    tau = _parameter(lambda rule: rule.cycle is not None and rule.cycle.usual)
+    widest = max(reach_of(gains.search.records).most(width.unit), 2.0 * width.low)
     held = orthonormal(gains.beside, gains.map, *(gains.whiten(b) for b in beside))
-    plays = _Family(gains, held, np.geomspace(_NARROWEST_C, widest, _POINTS), _play)
-    return plays, _Family(gains, held, np.geomspace(_QUICKEST_S, _SLOWEST_S, _POINTS), _lag)
+    plays = _Family(gains, held, np.geomspace(width.low, widest, _POINTS), _play)
+    return plays, _Family(gains, held, np.geomspace(tau.low, tau.high, _POINTS), _lag)
+
+
+def _parameter(looked_for: Callable[[SearchRule], bool]) -> Parameter:
+    """The parameter of the first cause that is so looked for."""
+    return next(p for id in diagnosed() if looked_for(searched(id)) and (p := shape_parameter(id)) is not None)
 
 
 def _play(history: History, size: float) -> FloatArray:
@@ -189,7 +195,7 @@ def _nodes(records: Records) -> FloatArray:
     """Temperatures over the envelope, C, at equal distances."""
     ends = [(float(h.min()), float(h.max())) for h in (r.history.temperature_c for r in records.runs)]
     low, high = min(a for a, _ in ends), max(b for _, b in ends)
-    return np.linspace(low, high, max(round((high - low) / _NODE_C), _STEPS) + 1)
+    return np.linspace(low, high, max(round((high - low) / FINE_C), _STEPS) + 1)
 
 
 def _steps(count: int) -> FloatArray:

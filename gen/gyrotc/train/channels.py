@@ -182,7 +182,7 @@ def _next_rms(left: FloatArray, run: NDArray[np.int64]) -> float:
     return float(np.sqrt(within + between))
 
 
-_MOST = 4  # terms of a table: GTC_MAX_TERMS of gtc.h
+MOST_TERMS = 4  # of a table: GTC_MAX_TERMS of gtc.h
 _MOST_MISSING = 0.1  # a channel that is away for longer has not been seen beside what it should explain
 _STILL = 1e-9  # change of a channel, of its size, that is rounding
 _OWN = 1e-3  # share of its spread: noise and steps of a sensor alone are more
@@ -275,7 +275,7 @@ def chosen_channels(
     seen, of = {n: line.columns[known] for n, line in lines.items()}, samples.select(known)
     alike = _alike(seen, of, process, scaling)
     part = Parts(seen, rivals={n: frozenset(others) for n, others in alike.items()})
-    trial = chosen_parts(of, scaling, part, average_s, _MOST)
+    trial = chosen_parts(of, scaling, part, average_s, MOST_TERMS)
     trial, shapes = _bent(trial, {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}, of, known,
                           scaling, average_s)  # fmt: skip
     parts = {n: shapes[n].columns @ trial.weights[n] for n in trial.chosen}

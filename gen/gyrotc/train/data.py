@@ -27,8 +27,8 @@ from ..recordings.records import Run
 from ..results.training import SpanLeftOut
 
 # Floors of the scale, so that a constant input is not divided by 0.
-_MIN_HALF_RANGE_C = 1.0
-_MIN_HALF_RANGE_C_PER_MIN = 0.05  # rates of a chamber at rest must not be blown up to a whole range
+MIN_HALF_RANGE_C = 1.0
+MIN_HALF_RANGE_C_PER_MIN = 0.05  # rates of a chamber at rest must not be blown up to a whole range
 _MOST_PLACES = 2**16  # of a table by cell: more, of inputs far beyond the range, are sorted instead
 _BINS_PER_HALF_RANGE = 50  # 1 C x 0.1 C/min over the paper's envelope
 
@@ -140,8 +140,8 @@ def scaling_of(data: TrainingData) -> Scaling:
     r0, r1 = float(data.slope_c_per_min.min()), float(data.slope_c_per_min.max())
     return Scaling(
         center_c=0.5 * (t0 + t1),
-        half_range_c=max(0.5 * (t1 - t0), _MIN_HALF_RANGE_C),
-        half_range_c_per_min=max(-r0, r1, _MIN_HALF_RANGE_C_PER_MIN),
+        half_range_c=max(0.5 * (t1 - t0), MIN_HALF_RANGE_C),
+        half_range_c_per_min=max(-r0, r1, MIN_HALF_RANGE_C_PER_MIN),
         temperature_c=(t0, t1),
         slope_c_per_min=(r0, r1),
     )

@@ -47,7 +47,7 @@ _OUTLIER = 4.5  # robust standard deviations, as in the evidence process
 _PARAMETERS = 3  # of a bump or a step: place, width, height
 _OWN = 0.02  # share of a bump's energy that must be its own beside splines and other bumps
 _LEAST, _WORSE = 6, 2.0  # bumps that are tried, and prices above the best criterion at which the search ends
-_MEAN_S = 100.0  # independent means for BIC
+MEAN_S = 100.0  # independent means for BIC
 _ROUNDS = 12  # of refinement: the next bump moves all of them again
 
 
@@ -147,7 +147,7 @@ class BesideSmooth:
 
     def price(self, parameters: int) -> float:
         """Energy that so many parameters must explain by BIC."""
-        return parameters * float(np.log(max(self._seconds / _MEAN_S, 2.0)))
+        return parameters * float(np.log(max(self._seconds / MEAN_S, 2.0)))
 
 
 class _Search:
