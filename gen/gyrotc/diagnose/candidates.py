@@ -81,7 +81,7 @@ def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
     rates = [centred_slope(h) for h in runs]
     low = min(float(h.temperature_c.min()) for h in runs)
     for tau in _LAGS_S:
-        yield "another memory of the temperature", [_late(h, tau) for h in runs]
+        yield "another memory of the temperature", [late(h, tau) for h in runs]
     for up, down in _TWO_SIDED_S:
         yield "memory that differs between warming and cooling", [_two_sided_lag(h, up, down) for h in runs]
     yield "a memory of dT/dt", [first_order(_RATE_S, h.time_s, r) for h, r in zip(runs, rates, strict=True)]
@@ -95,7 +95,8 @@ def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
     yield "a course of time since power-on", [np.log1p(np.maximum(s, 0.0) / _SETTLING_S) for s in since]
 
 
-def _late(history: History, tau: float) -> FloatArray:
+def late(history: History, tau: float) -> FloatArray:
+    """How much a first-order memory of the temperature differs from it, C, shape (n,)."""
     return np.asarray(first_order(tau, history.time_s, history.temperature_c) - history.temperature_c)
 
 
@@ -127,7 +128,7 @@ def _courses(records: Records, distance_s: float) -> FloatArray:
 def _nonlinear(records: Records) -> Iterator[Shape]:
     """Memory that acts other than in proportion, alone and beside a proportional part."""
     for tau in _TAUS_S:
-        lags = [_late(run.history, tau) for run in records.runs]
+        lags = [late(run.history, tau) for run in records.runs]
         size = float(np.std(np.concatenate(lags))) + 1e-12
         scaled = [d / size for d in lags]
         linear = records.average(scaled)

@@ -97,7 +97,7 @@ class Refitting:
         self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
         self.exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
         self.average_s = options.average_s
-        self._fits: list[tuple[list[Effect], bool, bool, Fit]] = []
+        self._fits: list[tuple[list[Effect], bool, Fit]] = []
         self.arguments: dict[str, Any] = {
             "method": map_method(options.method),
             "power_on": power_ons(self.runs),
@@ -126,14 +126,14 @@ class Refitting:
         """
         whole = kept is None or all(m.all() for m in kept)
         with_map = bool(effects) if beside is None else beside
-        rate = not (self.single_cycle and with_map)
-        for fitted_beside, with_rate, of_map, fitted in self._fits:
-            if whole and fitted_beside == list(effects) and (with_rate, of_map) == (rate, with_map):
+        for fitted_beside, of_map, fitted in self._fits:
+            if whole and fitted_beside == list(effects) and of_map == with_map:
                 return fitted
         arguments = self.arguments if with_map else self.arguments | self.plain
+        rate = not (self.single_cycle and with_map)
         fitted = fit_extended(self.train, effects, arguments, None if whole else kept, rate=rate)
         if whole:
-            self._fits.append((list(effects), rate, with_map, fitted))
+            self._fits.append((list(effects), with_map, fitted))
         return fitted
 
     def takes(self, causes: Sequence[Refined]) -> bool:
@@ -388,8 +388,7 @@ def _rate_left_out(refitting: Refitting, count: int, floor: float) -> tuple[str,
         return None
     fastest = max(moving, key=lambda e: speeds[e])
     held = [np.full(len(r.data.bias_dph), r.environment == fastest, dtype=bool) for r in refitting.train]
-    chain = refitting.left_out(held, count)
-    return fastest, gain_of(chain[0], chain[-1], floor, refitting.average_s)
+    return fastest, _gain_without(refitting, held, count, floor)
 
 
 def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Gain | None:
@@ -405,5 +404,10 @@ def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Ga
     held = [np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(refitting.train, known, strict=True)]
     if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
         return None
-    ends = refitting.left_out(held, count)
-    return gain_of(ends[0], ends[-1], floor, refitting.average_s)
+    return _gain_without(refitting, held, count, floor)
+
+
+def _gain_without(refitting: Refitting, held: list[BoolArray], count: int, floor: float) -> Gain:
+    """Gain of all causes on held-out training samples."""
+    chain = refitting.left_out(held, count)
+    return gain_of(chain[0], chain[-1], floor, refitting.average_s)

@@ -256,7 +256,7 @@ def _changed(current: Search, causes: Sequence[Refined]) -> FloatArray:
     """Every cause with an amplitude that differs by run, temperature and direction, shape (N, k)."""
     records = current.records
     t = records.columns(lambda h: h.temperature_c)
-    direction = direction_of(records)[:, 0] / DIRECTION_C
+    direction = direction_of(records) / DIRECTION_C
     t = (t - t.mean()) / max(float(np.ptp(t)), 1e-9)
     columns = []
     for cause in causes:

@@ -153,36 +153,26 @@ class _Fit:
         static = [] if any(m.role == "input" for m in members) else [gains.map]
         self.q = orthonormal(gains.whiten(edges), *static)
         self.y = gains.target - self.q @ (self.q.T @ gains.target)
-        self._cache: dict[CandidateKey, FloatArray] = {}
-        self._shares: dict[CandidateKey, FloatArray] = {}
+        self._made: dict[CandidateKey, tuple[FloatArray, FloatArray]] = {}
 
-    def white(self, candidate: Candidate) -> FloatArray:
-        """Whitened columns of a candidate less what the map (or the masked edges) explain."""
-        key = candidate.key
-        if key not in self._cache:
+    def made(self, candidate: Candidate) -> tuple[FloatArray, FloatArray]:
+        """Whitened columns of a candidate less what the map (or the masked edges) explain, and their `shares`."""
+        if candidate.key not in self._made:
             plain = _columns(self.search, candidate)
-            self._shares[key] = self.gains.limit.shares(plain)
             columns = self.gains.whiten(plain)
-            self._cache[key] = columns - self.q @ (self.q.T @ columns)
-        return self._cache[key]
+            rest = columns - self.q @ (self.q.T @ columns)
+            self._made[candidate.key] = rest, self.gains.limit.shares(plain)
+        return self._made[candidate.key]
 
     def energy(self, members: list[Candidate]) -> float:
         """Energy of the data that the members explain beyond the map; 0 where one would be larger than is accepted."""
-        white = [self.white(m) for m in members]
-        q = orthonormal(*white)
-        if not self._plausible(members, white):
-            return 0.0
-        return float(((q.T @ self.y) ** 2).sum())
-
-    def _plausible(self, members: list[Candidate], white: list[FloatArray]) -> bool:
+        white = [self.made(m)[0] for m in members]
         weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=1e-10)[0]
-        at = 0
-        for member, own in zip(members, white, strict=True):
-            part = weights[at : at + own.shape[1]]
-            at += own.shape[1]
-            if sized(member) and np.linalg.norm(self._shares[member.key] * part) > 1.0:
-                return False
-        return True
+        parts = np.split(weights, np.cumsum([own.shape[1] for own in white])[:-1])
+        for member, part in zip(members, parts, strict=True):
+            if sized(member) and np.linalg.norm(self.made(member)[1] * part) > 1.0:
+                return 0.0
+        return float(((orthonormal(*white).T @ self.y) ** 2).sum())
 
 
 def _unseen_s(candidate: Candidate) -> float:

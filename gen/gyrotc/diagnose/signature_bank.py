@@ -15,6 +15,7 @@ import io
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,19 +24,14 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..store import cache
-from ..target.recursions import first_order, play
+from ..target.recursions import play
 from .blocks import Records
-from .candidates import Candidate, Role, columns_of, diagnosed, reach_of, searched, shapes_of, testable
+from .candidates import Candidate, Role, columns_of, diagnosed, late, reach_of, searched, shapes_of, testable
 from .noise import COLOURS, Whitener
 from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
 
-_DICTIONARY_LAGS_S = (
-    150.0,
-    400.0,
-    1000.0,
-    2500.0,
-    6000.0,
-)  # in steps of a factor 2.5, over what a day of recordings shows
+# In steps of a factor 2.5, over what a day of recordings shows.
+_DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
 _TEXTURE_C, _MODULATING_S = 8.0, 700.0  # of the texture; of the memory that modulates it
 DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
 _COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
@@ -230,26 +226,20 @@ def _dictionary(records: Records) -> FloatArray:
     t = records.columns(lambda h: h.temperature_c)
     out = []
     for tau in _DICTIONARY_LAGS_S:
-        late = _late(records, tau)[:, 0]
-        out += [late * (t - t.mean()), np.abs(late)]
+        lag = records.columns(partial(late, tau=tau))
+        out += [lag * (t - t.mean()), np.abs(lag)]
     nodes = np.arange(t.min(), t.max() + _TEXTURE_C, _TEXTURE_C)
     texture = np.maximum(0.0, 1.0 - np.abs(t[:, None] - nodes) / _TEXTURE_C)
-    direction = direction_of(records)
-    memory = _late(records, _MODULATING_S)
-    out += list((texture * direction).T) + list((texture * memory).T)
+    memory = records.columns(partial(late, tau=_MODULATING_S))
+    out += [*(texture * direction_of(records)[:, None]).T, *(texture * memory[:, None]).T]
     if len(records.runs) < 3:
         out += list(np.eye(len(records.runs)).repeat([k.size for k in records.kept], axis=1))
     return np.column_stack(out)
 
 
-def _late(records: Records, tau_s: float) -> FloatArray:
-    """How much a first-order memory of the temperature differs from it, C, shape (N, 1)."""
-    return records.columns(lambda h: (first_order(tau_s, h.time_s, h.temperature_c) - h.temperature_c)[:, None])
-
-
 def direction_of(records: Records) -> FloatArray:
-    """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N, 1)."""
-    return records.columns(lambda h: (play(DIRECTION_C, h.temperature_c) - h.temperature_c)[:, None])
+    """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N,)."""
+    return records.columns(lambda h: play(DIRECTION_C, h.temperature_c) - h.temperature_c)
 
 
 _MAKERS = ("causes", "target", "diagnose")  # packages whose code decides what a bank holds

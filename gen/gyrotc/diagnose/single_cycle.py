@@ -36,18 +36,9 @@ from .rivals import EQUIVALENT, Rival
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
-_ROUNDS, _AROUND, _FINE = (
-    4,
-    1.5,
-    1e-4,
-)  # of a walk to the optimum: steps of the grid to either side, end in logarithms
-RATES: tuple[tuple[tuple[int, int], ...], ...] = (
-    ((0, 1),),
-    ((0, 1), (1, 1)),
-    ((0, 1), (1, 1), (2, 1)),
-    ((0, 1), (1, 1), (2, 1), (0, 2)),
-    ((0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (0, 3)),
-)
+_ROUNDS, _AROUND, _FINE = 4, 1.5, 1e-4  # of a walk to the optimum: steps of the grid to either side, end in logarithms
+_POWERS = ((0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (0, 3))  # of (T, dT/dt): of each set the first ones
+RATES: tuple[tuple[tuple[int, int], ...], ...] = tuple(_POWERS[:count] for count in (1, 2, 3, 4, 6))
 """Powers of (T, dT/dt) beside a map of T: g(T) dT/dt, and flows that saturate or have no sign (docs/simulation.md)."""
 
 

@@ -120,21 +120,14 @@ def _families(gains: Gains, beside: Sequence[FloatArray]) -> tuple[_Family, _Fam
     tau = _parameter(lambda rule: rule.cycle is not None and rule.cycle.usual)
     widest = max(reach_of(gains.search.records).most(width.unit), 2.0 * width.low)
     held = orthonormal(gains.beside, gains.map, *(gains.whiten(b) for b in beside))
-    plays = _Family(gains, held, np.geomspace(width.low, widest, _POINTS), _play)
-    return plays, _Family(gains, held, np.geomspace(tau.low, tau.high, _POINTS), _lag)
+    widths, taus = np.geomspace(width.low, widest, _POINTS), np.geomspace(tau.low, tau.high, _POINTS)
+    plays = _Family(gains, held, widths, lambda h, size: play(size, h.temperature_c))
+    return plays, _Family(gains, held, taus, lambda h, size: first_order(size, h.time_s, h.temperature_c))
 
 
 def _parameter(looked_for: Callable[[SearchRule], bool]) -> Parameter:
     """The parameter of the first cause that is so looked for."""
     return next(p for id in diagnosed() if looked_for(searched(id)) and (p := shape_parameter(id)) is not None)
-
-
-def _play(history: History, size: float) -> FloatArray:
-    return play(size, history.temperature_c)
-
-
-def _lag(history: History, size: float) -> FloatArray:
-    return first_order(size, history.time_s, history.temperature_c)
 
 
 class _Family:

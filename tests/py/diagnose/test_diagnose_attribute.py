@@ -485,7 +485,7 @@ def test_signatures_are_columns_less_what_the_map_explains(campaign: Campaign) -
 
 def test_the_direction_is_that_of_the_last_change(campaign: Campaign) -> None:
     """A play of 3 C stands 3 C behind: below T after warming, above it after cooling."""
-    direction = direction_of(campaign.records)[:, 0]
+    direction = direction_of(campaign.records)
     slope = campaign.records.average([centred_slope(r.history) for r in campaign.records.runs])
     start = campaign.records.spans()[0].start
     for k in range(start + 12, start + 140):
