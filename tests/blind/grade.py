@@ -13,7 +13,7 @@ from .effects import FAMILY
 Row = dict[str, Any]
 
 _AVERAGE = 10  # rows of 10 s in 100 s
-_UNNAMED = "unnamed"  # in the place of a cause, in stated probabilities
+_NO_CAUSE = {"foreign": "unnamed", "clean": "nothing"}  # true in the place of a cause, among stated probabilities
 
 
 def grade(hidden: Hidden, order_stratum: str, campaign: Campaign, result: dict[str, Any], declared: bool) -> Row:
@@ -46,9 +46,9 @@ def said(names: Sequence[str], stratum: str, physical: list[dict[str, Any]]) -> 
     """Everything with a stated probability in the place of a named cause, and whether it is hidden.
 
     In the place of the right cause only one can be true; another one that is hidden beside it is true, too, and
-    something unnamed where the effect is foreign.
+    something unnamed where the effect is foreign, and nothing where none is hidden.
     """
-    true = {*names, _UNNAMED} if stratum == "foreign" else {*names}
+    true = {*names, _NO_CAUSE.get(stratum)}
     return [
         {"id": id, "p": p, "true": id in true}
         for cause in physical

@@ -121,6 +121,8 @@ def _not_shipped(result: Diagnosed) -> str:
     gains = [cause.gain.shown for cause in result.physical if cause.gain is not None]
     if not gains:
         return "no extension is shipped: no cause was named"
+    if not any(cause.sure for cause in result.physical):
+        return "no extension is shipped: no cause is likelier than all others together"
     if "gain" in gains:
         return (
             "no extension is shipped: the runs above gain, but pieces of the training history left out in turn do not "

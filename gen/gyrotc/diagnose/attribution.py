@@ -14,6 +14,7 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
+from ..results.diagnosed import LIKELIER
 from .candidates import Candidate, searched
 from .detection import Found, detect
 from .joined import Held
@@ -21,7 +22,7 @@ from .marginal_likelihood import MarginalLikelihood
 from .misfit import Contest, Misfit, contest, explained, misfit
 from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
 from .refine import Refined, model_columns, refine, sized
-from .rivals import Rival, calibrated, near_of, odds_of, probabilities_of, ranked_rivals, unnamed_of
+from .rivals import NOTHING, UNNAMED, Rival, calibrated, near_of, no_cause, odds_of, probabilities_of, ranked_rivals
 from .search import Search
 from .wide_memory import WideMemory, outlasts, rate_independent
 
@@ -37,10 +38,12 @@ class Attribution:
 
     Attributes:
         first: The search before any cause is taken, best first.
+        detected: Whether it found anything that is likelier than nothing.
         causes: The chosen causes, strongest first.
         p_values: The p-value of each cause, adjusted for the whole search.
         rivals: For each, other causes in its place that explain the recordings as well, nearest first.
-        probabilities: For each, of every cause in its place, itself first, and of something unnamed, by id.
+        probabilities: For each, of every cause in its place, itself first, of something unnamed and, where there is
+            one cause, of nothing, by id.
         gain: Twice the log-likelihood ratio of all causes together.
         left: What all causes leave.
         last: The search after the last cause.
@@ -49,6 +52,7 @@ class Attribution:
     """
 
     first: list[Found]
+    detected: bool
     causes: tuple[Refined, ...]
     p_values: tuple[float, ...]
     rivals: tuple[tuple[Rival, ...], ...]
@@ -64,13 +68,14 @@ class Attribution:
         return replace(self, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
 
     @property
+    def sure(self) -> list[bool]:
+        """Whether each cause is likelier than all else in its place."""
+        return [place[c.candidate.id] > LIKELIER for c, place in zip(self.causes, self.probabilities, strict=True)]
+
+    @property
     def columns(self) -> FloatArray:
         """All columns that stand in the model when the causes are named, shape (N, k)."""
         return _columns(self.causes, self.wide)
-
-    @property
-    def detected(self) -> bool:
-        return bool(self.first) and self.first[0].p_value <= LEVEL
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,7 @@ class _Stage:
 def attribute(search: Search) -> Attribution:
     """Runs the search to its end."""
     first = detect(search, "map and beside")
-    nothing = Attribution(first, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
+    nothing = Attribution(first, False, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
     if first[0].p_value > LEVEL:
         return nothing
     gains = Gains(search)
@@ -105,9 +110,10 @@ def attribute(search: Search) -> Attribution:
     if CATALOGUE[best_of(singles, gains.size).members[0].id].family == "static_map":
         singles += gains.waves()
     weigher = MarginalLikelihood(gains)
-    stage = _stage(search, gains, _single(gains, singles, weigher).members)
+    single = _single(gains, singles, weigher)
+    stage = _stage(search, gains, single.members)
     if stage is None:
-        return nothing
+        return replace(nothing, detected=True)
     pairs: list[Point] = []
     if stage.remains:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
@@ -118,11 +124,17 @@ def attribute(search: Search) -> Attribution:
     order = _by_strength(singles, stage.chosen)
     refined = tuple(stage.refined[k] for k in order)
     taken = tuple(stage.chosen[k] for k in order)
-    ranked, likely = _rivals(weigher, singles, pairs, taken, _ahead(gains, stage, singles))
+    ahead = _ahead(gains, stage, singles)
+    ranked, likely = _rivals(weigher, singles, pairs, taken, ahead)
     other = _contest(gains, stage.wide, refined, tuple(map(near_of, ranked)))
-    unnamed = unnamed_of(other.lead)
+    others = [no_cause(UNNAMED, -other.lead)]
+    if len(taken) == 1:
+        others.append(no_cause(NOTHING, weigher.over_nothing(singles, single) + ahead))
+        if odds_of(others[-1]) > max(odds_of(others[0]), 1.0):
+            return nothing
     return Attribution(
         first=first,
+        detected=True,
         causes=refined,
         p_values=tuple(_p_value(first, r.candidate) for r in refined),
         rivals=tuple(map(near_of, likely)),
@@ -130,7 +142,7 @@ def attribute(search: Search) -> Attribution:
         left=stage.left,
         last=stage.found,
         other=other,
-        probabilities=tuple(probabilities_of(c.id, [*all_, unnamed]) for c, all_ in zip(taken, likely, strict=True)),
+        probabilities=tuple(probabilities_of(c.id, [*all_, *others]) for c, all_ in zip(taken, likely, strict=True)),
         wide=stage.wide,
     )
 

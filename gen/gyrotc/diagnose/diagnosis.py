@@ -126,7 +126,8 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
     named = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = named if cycle is None else cycle.able
     left_dph = analysis.left_dph if cycle is None else cycle.residual - cycle.explained
-    extension = extend(refitting, states, floor_of(records, left_dph, chosen.average_s), say)
+    sure = analysis.attribution.sure if cycle is None and named else [True] * len(states)
+    extension = extend(refitting, states, sure, floor_of(records, left_dph, chosen.average_s), say)
     if cycle is not None:
         cycle = replace(cycle, preferred=bool(extension.shipped))
         analysis = replace(

@@ -310,8 +310,10 @@ class Extension:
         return next((e.bumps for e in self.shipped if e.bumps is not None), None)
 
 
-def extend(refitting: Refitting, causes: Sequence[Refined], floor: float, say: Progress) -> Extension:
-    """Refits the model with the causes and measures the gain over a noise floor, deg/h."""
+def extend(
+    refitting: Refitting, causes: Sequence[Refined], sure: Sequence[bool], floor: float, say: Progress
+) -> Extension:
+    """Refits the model with the causes that are sure, and measures the gain of all over a noise floor, deg/h."""
     say("measuring the gain")
     single_cycle, average_s = refitting.single_cycle, refitting.average_s
     effects = completed(refitting.train, [Effect.of(c) for c in causes])
@@ -321,7 +323,7 @@ def extend(refitting: Refitting, causes: Sequence[Refined], floor: float, say: P
         chain = [chain[0], *(chain[-1] for _ in effects)]
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
     steps = [gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
-    crossed = shipping(refitting, effects)
+    crossed = shipping(refitting, list(itertools.compress(effects, sure)))
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     return Extension(
         steps=tuple(steps),

@@ -59,6 +59,13 @@ class MarginalLikelihood:
             return best_of(points, self.gains.size)
         return max(self._weighed(near).values(), key=lambda found: found[1])[0]
 
+    def over_nothing(self, points: Sequence[Point], best: Point) -> float:
+        """Criterion of the preferred model over the map alone: by the evidence where that has chosen it."""
+        near, own = self._near(points), _key(best.members)
+        if not _swaps(near) or own not in near:
+            return best.criterion(self.gains.size)
+        return self._weighed(near)[own][1]
+
     def judged(self, points: Sequence[Point], chosen: CauseSet, k: int, ranked: Sequence[Rival]) -> tuple[Rival, ...]:
         """Rivals of the k-th cause with distances and odds by the evidence, where that has chosen it; nearest first.
 

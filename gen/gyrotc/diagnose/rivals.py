@@ -36,10 +36,10 @@ equal has 1 in 10. Map, noise colour and grid are known less well than the likel
 _SURELY = 300.0  # logarithm of odds beyond which more is no surer
 _SURE = 0.9  # probability from which one cause is reported as the explanation
 
-UNNAMED = "unnamed"
-"""In the place of a cause: something that is not in the catalogue."""
+UNNAMED, NOTHING = "unnamed", "nothing"
+"""In the place of a cause: something that is not in the catalogue; the map and the noise alone."""
 
-_UNNAMED = 3.0  # its odds before the recordings speak: more kinds of effects have no name than have one
+_BEFOREHAND = 3.0  # odds of either before the recordings speak: each is more common than any one cause
 
 Kind = tuple[str, str]  # cause and channel ("" for none)
 Kinds = tuple[Kind, ...]  # of a model, sorted
@@ -76,9 +76,9 @@ def odds_of(rival: Rival) -> float:
     return float(np.exp(-0.5 * _TEMPER * rival.distance)) if rival.odds is None else rival.odds
 
 
-def unnamed_of(lead: float) -> Rival:
-    """Something without a name as a rival of all causes, from the lead of the best shape that no cause has."""
-    return Rival(UNNAMED, -lead, odds=_UNNAMED * float(np.exp(min(0.5 * _TEMPER * lead, _SURELY))))
+def no_cause(id: str, distance: float) -> Rival:
+    """`UNNAMED` or `NOTHING` as a rival of all causes, from how far its criterion is behind theirs."""
+    return Rival(id, distance, odds=_BEFOREHAND * float(np.exp(min(-0.5 * _TEMPER * distance, _SURELY))))
 
 
 def near_of(ranked: Sequence[Rival]) -> tuple[Rival, ...]:

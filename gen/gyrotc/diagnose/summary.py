@@ -11,6 +11,7 @@ from ..causes import CATALOGUE, separate_by
 from ..recordings.records import Dataset
 from ..results.base import Estimate
 from ..results.diagnosed import (
+    LIKELIER,
     Baseline,
     ComparedStatistic,
     ConsideredCause,
@@ -37,7 +38,7 @@ from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .refine import Interval, Refined
 from .refit import terms_of
-from .rivals import odds_of, unnamed_of
+from .rivals import UNNAMED
 from .single_cycle import Cycle, memories
 from .wide_memory import WideMemory
 
@@ -164,14 +165,22 @@ _SEEN = 0.05  # p-value over the whole search that at least one of the causes ha
 def holds(attribution: Attribution) -> bool:
     """Whether causes are given at all.
 
-    Not where most of the structure is none of them, where it has another shape or a parameter that no gyro has, and
-    not where the search sees none of them: something else was detected then, in the place of which they came.
+    Not where most of the structure is none of them, where their families are not likelier than all else, where a
+    parameter is one that no gyro has, and not where the search sees none of them: something else was detected then.
     """
     left = attribution.left
     little = any(left.worst < p and left.share < share for p, share in _MISFITS)
     plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
     seen = min(attribution.p_values, default=1.0) <= _SEEN
-    return plausible and seen and not little and odds_of(unnamed_of(attribution.other.lead)) < 1.0
+    return plausible and seen and not little and all(map(_likely, attribution.probabilities))
+
+
+def _likely(probabilities: Mapping[str, float]) -> bool:
+    """Whether a cause is likelier than something unnamed, and its family likelier than all else together."""
+    named, *others = probabilities
+    family = [id for id in others if id in CATALOGUE and CATALOGUE[id].family == CATALOGUE[named].family]
+    share = sum(probabilities[id] for id in (named, *family))
+    return probabilities[named] > probabilities[UNNAMED] and share > LIKELIER
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:

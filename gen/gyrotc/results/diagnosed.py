@@ -82,6 +82,9 @@ class Statistic(ComparedStatistic):
     extended: ComparedStatistic | None = Field(description="null where nothing was found")
 
 
+LIKELIER = 0.5  # probability above which something is likelier than all else together
+
+
 class NamedCause(Part):
     """A cause, or a kind of noise, that was found."""
 
@@ -93,7 +96,8 @@ class NamedCause(Part):
     equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
     separate_by: str | None = Field(description="the experiment that would separate them")
     probabilities: dict[str, float] | None = Field(
-        default=None, description="of this cause, of all others in its place, and of something `unnamed`, by id"
+        default=None,
+        description="of this cause, of all others in its place, of something `unnamed` and of `nothing`, by id",
     )
     gain: GainOnUnseen | None = Field(description="null for noise")
     signature: str = Field(description="how it shows")
@@ -106,6 +110,11 @@ class NamedCause(Part):
     equivalent_channels: tuple[str, ...] | None = Field(
         default=None, description="channels that explain the runs as well"
     )
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is likelier than all else in its place, where probabilities are stated."""
+        return self.probabilities is None or self.probabilities[self.id] > LIKELIER
 
 
 class Baseline(Part):

@@ -18,6 +18,7 @@ from conftest import HOST, Command, packed
 from gyrotc.causes import CATALOGUE
 from gyrotc.diagnose import diagnosis as stages
 from gyrotc.diagnose import extension
+from gyrotc.diagnose.attribution import Attribution
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
@@ -463,9 +464,18 @@ def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_
 
 
 def test_without_causes_there_is_no_extension(case: Case) -> None:
-    found = extend(case.refitting, (), 1.0, lambda _: None)
+    found = extend(case.refitting, (), (), 1.0, lambda _: None)
     assert found.extended is None and found.steps == () and found.measured_on == "exam"
     assert found.baseline_rms > 2.0 * LEVEL, "the plain map leaves the gradient"
+
+
+def test_a_cause_that_is_not_likelier_than_all_others_is_measured_and_not_shipped(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Attribution, "sure", property(lambda found: [False] * len(found.causes)))
+    found = diagnose(case.dataset, options=OPTIONS)
+    assert found.extension is not None and found.model is None
+    assert [step.positive for step in found.extension.steps] == [True]
 
 
 def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
