@@ -61,7 +61,7 @@ class MarginalLikelihood:
 
     def over_nothing(self, points: Sequence[Point], best: Point) -> float:
         """Criterion of the preferred model over the map alone: by the evidence where that has chosen it."""
-        near, own = self._near(points), _key(best.members)
+        near, own = self._near(points), kinds_of(best.members)
         if not _swaps(near) or own not in near:
             return best.criterion(self.gains.size)
         return self._weighed(near)[own][1]
