@@ -175,12 +175,9 @@ class Refitting:
         """Best `count` causes on the records without the held-out samples."""
         masks = []
         for run, played, out in zip(self.records.runs, self.train, held, strict=True):
-            times = played.data.time_s[out]
-            hidden = np.zeros(len(run.history.time_s), dtype=bool)
-            if times.size:
-                end = times[-1] + played.block_s
-                hidden = (run.history.time_s >= times[0] - _ROUNDING_S) & (run.history.time_s < end)
-            masks.append(run.usable & ~hidden)
+            # A row that is no sample's, as before the first, goes with the sample before it, or with the first.
+            of = np.searchsorted(played.data.time_s[1:], run.history.time_s + _ROUNDING_S, side="right")
+            masks.append(np.asarray(run.usable & ~np.append(out, False)[of], dtype=bool))
         rest = self.records.without_rows(masks)
         return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
 

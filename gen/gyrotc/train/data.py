@@ -448,12 +448,15 @@ def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -
 
 
 def turning_points(time_s: FloatArray, temperature_c: FloatArray) -> list[float]:
-    """Times at which the smoothed temperature turns by more than noise and control make it, s; arrays of shape (n,)."""
-    cell = np.floor((time_s - time_s[0]) / _SMOOTHING_S).astype(np.int64)
-    _, index = np.unique(cell, return_inverse=True)
-    count = np.bincount(index)
-    t = np.bincount(index, time_s) / count
-    smooth = np.bincount(index, temperature_c) / count
+    """Times at which the smoothed temperature turns by more than noise and control make it, s; arrays of shape (n,).
+
+    Means over time about each sample smooth it, so that turns hang neither on where a record begins nor on its samples.
+    """
+    edges = np.append(time_s, time_s[-1] + _SMOOTHING_S)
+    area = np.append(0.0, np.cumsum(temperature_c * np.diff(edges)))
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * _SMOOTHING_S
+    span = np.clip([middle - half, middle + half], edges[0], edges[-1])
+    smooth = np.diff(np.interp(span, edges, area), axis=0)[0] / np.diff(span, axis=0)[0]
     swing = max(_SMALLEST_TURN_C, _SMALLEST_TURN_SHARE * float(np.ptp(smooth)))
     turns: list[float] = []
     high = low = 0
@@ -462,10 +465,10 @@ def turning_points(time_s: FloatArray, temperature_c: FloatArray) -> list[float]
         high = k if value > smooth[high] else high
         low = k if value < smooth[low] else low
         if going >= 0 and value < smooth[high] - swing:
-            turns += [float(t[high])] * (going > 0)
+            turns += [float(time_s[high])] * (going > 0)
             going, low = -1, k
         elif going <= 0 and value > smooth[low] + swing:
-            turns += [float(t[low])] * (going < 0)
+            turns += [float(time_s[low])] * (going < 0)
             going, high = 1, k
     return turns
 

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -19,7 +20,7 @@ from gyrotc.causes import CATALOGUE
 from gyrotc.diagnose import diagnosis as stages
 from gyrotc.diagnose import extension
 from gyrotc.diagnose.attribution import Attribution
-from gyrotc.diagnose.blocks import records_of
+from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
 from gyrotc.diagnose.gain import gain_of
@@ -404,6 +405,26 @@ def test_every_training_sample_is_left_out_once(case: Case) -> None:
         count = np.sum([fold[k] for fold in folds], axis=0)
         assert (count == 1).all() and count.size == run.data.bias_dph.size
     assert all(any(not m.any() for m in fold) for fold in folds), "each fold leaves something to learn from"
+
+
+def test_rows_that_are_no_samples_are_left_out_with_the_stretch_beside_them(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A first row of which no sample was made stayed, alone, while the rest of its branch was left out."""
+    late = copy(case.refitting)
+    late.train = [replace(run, data=run.data.select(np.arange(3, len(run.data) - 2))) for run in late.train]
+    seen: list[Records] = []
+
+    def searched(records: Records) -> None:
+        seen.append(records)
+
+    monkeypatch.setattr(extension, "search_of", searched)
+    monkeypatch.setattr(extension, "choose", lambda search, count: ())
+    for early in (True, False):
+        held = [(run.data.time_s < 1800.0) == early for run in late.train]
+        late._chosen(held, 1)
+        times = np.concatenate([run.history.time_s[run.usable] for run in seen[-1].runs])
+        assert times.size and ((times >= 1800.0) == early).all()
 
 
 def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:

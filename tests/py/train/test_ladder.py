@@ -24,6 +24,7 @@ from gyrotc.train.data import (
     pieces,
     scaling_of,
     training_spans,
+    turning_points,
     weighted_mean,
 )
 from gyrotc.train.evidence import conditioned, fit_process
@@ -446,6 +447,18 @@ def test_a_cycle_is_cut_at_its_turning_points() -> None:
     spans = training_spans(runs(1), profile((20, -60.0), (30, 90.0), (20, -40.0)))
     assert [s.kind for s in spans] == ["branch"] * 3
     assert edges_of(spans) == pytest.approx([0.0, 1200.0, 3000.0, 4200.0], abs=60.0)
+
+
+def test_turning_points_depend_neither_on_where_a_record_begins_nor_on_its_samples() -> None:
+    """They followed the phase of cells of 60 s, and samples near an end moved to the next branch."""
+    cut = profile((20, -60.0), (30, 90.0), (20, -40.0))
+    whole = turning_points(cut.time_s, cut.temperature_c)
+    assert len(whole) == 2
+    for first in range(1, 12):
+        assert turning_points(cut.time_s[first:], cut.temperature_c[first:]) == whole
+    time, temperature = (values.reshape(-1, 3).mean(axis=1) for values in (cut.time_s, cut.temperature_c))
+    for first in range(3):
+        assert turning_points(time[first:], temperature[first:]) == pytest.approx(whole, abs=15.0)
 
 
 def test_holds_and_steps_on_the_way_are_no_turning_points() -> None:
