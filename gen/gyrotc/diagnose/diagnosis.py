@@ -125,7 +125,7 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
         analysis = replace(analysis, attribution=analysis.attribution.without_causes(), separations=())
     named = analysis.attribution.causes if holds(analysis.attribution) else ()
     states = named if cycle is None else cycle.able
-    left_dph = analysis.left_dph if cycle is None else cycle.residual - cycle.explained
+    left_dph = analysis.left_dph(named=bool(named)) if cycle is None else cycle.residual - cycle.explained
     sure = analysis.attribution.sure if cycle is None and named else [True] * len(states)
     extension = extend(refitting, states, sure, floor_of(records, left_dph, chosen.average_s), say)
     if cycle is not None:

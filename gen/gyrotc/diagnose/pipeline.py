@@ -68,11 +68,17 @@ class Analysis:
     freedom: int
     extended: Ensemble | None
 
-    @property
-    def left_dph(self) -> FloatArray:
-        """What map and causes leave, as large as the noise is of which they have taken a part, deg/h, shape (N,)."""
-        left = (self.ensemble if self.extended is None else self.extended).residual
-        return np.asarray(left * np.sqrt(left.size / max(self.freedom, 1)))
+    def left_dph(self, *, named: bool) -> FloatArray:
+        """What the map leaves, and with the causes beside it if they are `named`, deg/h, shape (N,).
+
+        As large as the noise is of which they have taken a part. Causes without a name are no finding: another length
+        of a block finds others, which take a quarter more or less.
+        """
+        if named and self.extended is not None:
+            left, freedom = self.extended.residual, self.freedom
+        else:
+            left, freedom = self.ensemble.residual, self.static.shape[0] - self.static.shape[1]
+        return np.asarray(left * np.sqrt(left.size / max(freedom, 1)))
 
 
 def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
