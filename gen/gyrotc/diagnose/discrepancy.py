@@ -106,11 +106,13 @@ class Ensemble:
 
     Attributes:
         residual: Measured rate less the map, deg/h, shape (N,).
+        freedom: Its degrees of freedom.
         simulated: The same of every simulated campaign, shape (N, members).
         discrepancies: All statistics, rarest first.
     """
 
     residual: FloatArray
+    freedom: int
     simulated: FloatArray
     discrepancies: tuple[ComparedStatistic, ...]
 
@@ -151,7 +153,7 @@ def ensemble_of(
         if np.all(np.isfinite(values)):
             found.append(_discrepancy(name, float(values[0]), values[1:], rounding))
     found.sort(key=lambda d: d.p_value)
-    return Ensemble(measured, simulated[:, :100], tuple(found))
+    return Ensemble(measured, records.size - model.shape[1], simulated[:, :100], tuple(found))
 
 
 def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: float) -> ComparedStatistic:

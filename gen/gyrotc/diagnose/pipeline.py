@@ -50,7 +50,6 @@ class Analysis:
         separations: For every cause found, d from which it can be distinguished from each rival.
         ensemble: Measured against simulated residuals.
         colour, scale: The likeliest noise with the causes found taken out, and its factor.
-        freedom: Degrees of freedom that they leave.
         extended: Measured against simulated residuals when the simulation has causes and noise as found; None
             if nothing was.
     """
@@ -65,7 +64,6 @@ class Analysis:
     ensemble: Ensemble
     colour: Colour
     scale: float
-    freedom: int
     extended: Ensemble | None
 
     def left_dph(self, *, named: bool) -> FloatArray:
@@ -74,11 +72,8 @@ class Analysis:
         As large as the noise is of which they have taken a part. Causes without a name are no finding: another length
         of a block finds others, which take a quarter more or less.
         """
-        if named and self.extended is not None:
-            left, freedom = self.extended.residual, self.freedom
-        else:
-            left, freedom = self.ensemble.residual, self.static.shape[0] - self.static.shape[1]
-        return np.asarray(left * np.sqrt(left.size / max(freedom, 1)))
+        fitted = self.extended if named and self.extended is not None else self.ensemble
+        return np.asarray(fitted.residual * np.sqrt(fitted.residual.size / max(fitted.freedom, 1)))
 
 
 def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
@@ -104,7 +99,6 @@ def analyse(records: Records, declared: Declared | None, say: Progress = lambda 
         ensemble=ensemble_of(search, declared),
         colour=after.likeliest.colour,
         scale=after.likeliest.scale,
-        freedom=after.freedom,
         extended=_extended(after, attribution, noise, declared),
     )
 

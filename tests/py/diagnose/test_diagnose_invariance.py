@@ -21,6 +21,7 @@ from gyrotc.diagnose.blocks import Record, Records, records_of
 from gyrotc.diagnose.detection import project
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.extension import Refitting
+from gyrotc.diagnose.gain import floor_of
 from gyrotc.diagnose.joined import _root
 from gyrotc.diagnose.noise import Declared, declared_noise
 from gyrotc.diagnose.pipeline import Analysis, analyse, search_of
@@ -120,6 +121,15 @@ def test_what_is_hidden_is_named_in_the_first_place(made: Callable[[str], Case])
     assert made("hysteresis").answer.causes == ["hysteresis"]
     assert made("auxiliary").answer.causes == ["auxiliary"]
     assert made("").answer.verdict == "consistent"
+
+
+def test_the_floor_is_the_noise_whatever_is_taken_off(made: Callable[[str], Case]) -> None:
+    """Freedom of all signatures together, of which the causes are a few, made it 5 % larger where they were named."""
+    case = made("hysteresis")
+    analysis = case.answer.analysis
+    named, unnamed = (floor_of(case.records, analysis.left_dph(named=n), 100.0) for n in (True, False))
+    assert named == pytest.approx(unnamed, rel=0.01)
+    assert named == pytest.approx(LEVEL.white_dph, rel=0.05)
 
 
 def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[str], Case]) -> None:
