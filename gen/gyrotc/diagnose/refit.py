@@ -299,7 +299,7 @@ class _Loops:
         self.middle_c = 0.5 * sum(span)
         fastest = max(float(np.abs(rate).max()), MIN_HALF_RANGE_C_PER_MIN)
         self._smooth = smooth_basis(t, rate / fastest, span, self._root)
-        self.y = self._rest(data.bias_dph)
+        self.y = self._rest(data.bias_dph - data.bias_dph.mean())  # see `smooth_basis`
 
     def columns(self, loop: Effect) -> FloatArray:
         """What the map leaves of the loop, and of the loop times the temperature from the middle on, shape (n, 2)."""

@@ -139,7 +139,7 @@ class BesideSmooth:
         self._seconds = seconds
         r = r / scaling.half_range_c_per_min
         self._smooth = smooth_basis(self.t, r, self.range, self.root)
-        self.y = self.rest((y * self.root)[:, None])[:, 0]
+        self.y = self.rest(((y - y.mean()) * self.root)[:, None])[:, 0]  # see `smooth_basis`
 
     def rest(self, columns: FloatArray) -> FloatArray:
         """What the splines do not hold of weighted columns, shape (n, k)."""
@@ -276,6 +276,8 @@ def _beside(columns: FloatArray, k: int) -> float:
 
 def smooth_basis(t: FloatArray, rate: FloatArray, span: tuple[float, float], root: FloatArray) -> FloatArray:
     """Orthonormal columns of any smooth map, shape (n, k).
+
+    Weak directions are left out: of a constant far above the noise a part would stay, so it is taken off before.
 
     Args:
         t: Temperatures, C, shape (n,).

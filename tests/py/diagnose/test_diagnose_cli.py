@@ -24,7 +24,7 @@ from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.diagnosis import Diagnosis, diagnose
 from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
 from gyrotc.diagnose.gain import gain_of
-from gyrotc.diagnose.refit import Effect, known, samples
+from gyrotc.diagnose.refit import Effect, completed, known, samples
 from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
 from gyrotc.jobs import diagnosis
 from gyrotc.jobs.build import build
@@ -32,6 +32,7 @@ from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
 from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
+from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
 from gyrotc.store import cache
 from gyrotc.target.recursions import first_order
@@ -425,6 +426,17 @@ def test_rows_that_are_no_samples_are_left_out_with_the_stretch_beside_them(
         late._chosen(held, 1)
         times = np.concatenate([run.history.time_s[run.usable] for run in seen[-1].runs])
         assert times.size and ((times >= 1800.0) == early).all()
+
+
+def test_a_play_has_one_strength_whatever_constant_the_rate_has(tmp_path: Path) -> None:
+    """A part of 1000 deg/h remained beside the smooth map, and gave it a strength that goes with temperature."""
+    simulate("hysteresis", seed=1, out=tmp_path)
+    dataset = load(tmp_path)
+    records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
+    runs = Refitting(dataset, records, FitOptions(), single_cycle=False).train
+    raised = [replace(run, data=replace(run.data, bias_dph=run.data.bias_dph + 1000.0)) for run in runs]
+    play = Effect("hysteresis", {"width_c": 3.05, "amplitude_dph_per_c": 1.8e-4})
+    assert completed(runs, [play]) == completed(raised, [play]) == [play]
 
 
 def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:
