@@ -450,7 +450,7 @@ def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -
 def turning_points(time_s: FloatArray, temperature_c: FloatArray) -> list[float]:
     """Times at which the smoothed temperature turns by more than noise and control make it, s; arrays of shape (n,).
 
-    Means over time about each sample smooth it, so that turns hang neither on where a record begins nor on its samples.
+    Means over time about each sample smooth it, so that turns depend neither on where a record begins nor on its rows.
     """
     edges = np.append(time_s, time_s[-1] + _SMOOTHING_S)
     area = np.append(0.0, np.cumsum(temperature_c * np.diff(edges)))
