@@ -1,4 +1,4 @@
-"""`python -m bench docs --only formats`: from a file of ten formats to the report, as a user types it, with the seconds."""
+"""`python -m bench docs --only formats`: from a file of eight formats to the report, as a user types it, with the seconds."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ _CASES = {
     "CSV, gzip": "CSV packed by gzip, decimal commas",
     "Excel": "Excel, a sheet of stamps behind one of notes",
     "Parquet": "Parquet, units in names",
-    "Feather": "Feather, stamps of UTC",
-    "NumPy": "NumPy records",
     "MATLAB": "MATLAB 5, vectors",
     "HDF5": "HDF5, a table",
     "NetCDF": "NetCDF 3, milliseconds of CF",

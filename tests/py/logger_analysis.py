@@ -6,9 +6,6 @@ import gzip
 from datetime import timedelta
 from pathlib import Path
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.feather
 from logger_files import START, Case, Truth
 
 
@@ -32,33 +29,6 @@ def csv_gz(path: Path, t: Truth) -> None:
         file.write("time_s;temperature_degC;rate_dps\n")
         for s, c, r in zip(t.time_s, t.temperature_c, t.rate_dps[:, 0], strict=True):
             file.write(f"{float(s)!r};{float(c)!r};{float(r)!r}\n".replace(".", ","))
-
-
-def npz(path: Path, t: Truth) -> None:
-    np.savez_compressed(
-        path, time_ms=t.time_s * 1e3, temperature=t.temperature_c, temperature_unit="degC", gyro=t.rate_dps,
-        gyro_unit="deg/s",
-    )  # fmt: skip
-
-
-def npy_records(path: Path, t: Truth) -> None:
-    record = [("time_s", "f8"), ("temp_degC", "f8"), ("rate_dph", "f8")]
-    rows = np.zeros(len(t.time_s), dtype=record)
-    rows["time_s"], rows["temp_degC"], rows["rate_dph"] = t.time_s, t.temperature_c, t.rate_dph[:, 0]
-    np.save(path, rows)
-
-
-def feather(path: Path, t: Truth) -> None:
-    start = np.datetime64(START.replace(tzinfo=None), "ns")
-    times = start + np.round(t.time_s * 1e9).astype("m8[ns]")
-    table = pa.table(
-        {
-            "time": pa.array(times, pa.timestamp("ns", tz="UTC")),
-            "temperature_degC": t.temperature_c,
-            "rate_dps": t.rate_dps[:, 0],
-        }
-    )
-    pyarrow.feather.write_feather(table, path)
 
 
 def netcdf(path: Path, t: Truth) -> None:
@@ -93,9 +63,6 @@ def netcdf_3(path: Path, t: Truth) -> None:
 ANALYSIS_CASES = [
     Case("Excel, a sheet of stamps behind one of notes", "book.xlsx", excel, needs="openpyxl", time_tolerance=1e-3),
     Case("CSV packed by gzip, decimal commas", "log.csv.gz", csv_gz),
-    Case("NumPy arrays, units beside", "arrays.npz", npz, axes=True),
-    Case("NumPy records", "rows.npy", npy_records),
-    Case("Feather, stamps of UTC", "table.feather", feather, started=True),
     Case(
         "NetCDF 4, times and packing of CF", "run.nc", netcdf, axes=True, needs="h5netcdf", started=True,
         temperature_tolerance=1e-6,

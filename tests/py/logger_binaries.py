@@ -1,8 +1,7 @@
-"""Binary files of loggers: written by the libraries of their formats, flight logs byte by byte as autopilots do."""
+"""Binary files of loggers, written by the libraries of their formats."""
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -110,113 +109,32 @@ def tdms_stamps(path: Path, t: Truth) -> None:
     )
 
 
-def _ulog(path: Path, formats: dict[str, str], topics: list[tuple[int, str]], data: list[bytes]) -> None:
-    def message(kind: str, body: bytes) -> bytes:
-        return struct.pack("<HB", len(body), ord(kind)) + body
+def hdf5_two_gyros(path: Path, t: Truth) -> None:
+    """Two groups that both hold a gyro, of which the second is wanted."""
+    import h5py
 
-    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message("B", bytes(40))
-    out += b"".join(message("F", f"{name}:{fields}".encode()) for name, fields in formats.items())
-    out += b"".join(
-        message("A", struct.pack("<BH", multi, k) + name.encode()) for k, (multi, name) in enumerate(topics)
-    )
-    path.write_bytes(out + b"".join(message("D", one) for one in data))
-
-
-def px4(path: Path, t: Truth) -> None:
-    """sensor_gyro with its own temperature, microseconds since boot, float32."""
-    fields = "uint64_t timestamp;uint64_t timestamp_sample;uint32_t device_id;"
-    fields += "float x;float y;float z;float temperature;"
-    rows = zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True)
-    data = [struct.pack("<HQQI4f", 0, round(s * 1e6) + 5_000_000, round(s * 1e6), 1, *r, c) for s, r, c in rows]
-    _ulog(path, {"sensor_gyro": fields}, [(0, "sensor_gyro")], data)
+    with h5py.File(path, "w") as file:
+        for name, rate_dps, temperature_c in (
+            ("gyro_1", 2.0 * t.rate_dps, t.temperature_c + 3.0),
+            ("gyro_2", t.rate_dps, t.temperature_c),
+        ):
+            for column, values, unit in (("time", t.time_s, "s"), ("rate", rate_dps, "deg/s")):
+                file.create_dataset(f"{name}/{column}", data=values).attrs["units"] = unit
+            file.create_dataset(f"{name}/temperature", data=temperature_c).attrs["units"] = "degC"
 
 
-def px4_two(path: Path, t: Truth) -> None:
-    """Two gyros: the second is the one that is asked for; a topic that nobody needs."""
-    fields = "uint64_t timestamp;float x;float y;float z;float temperature;"
-    data = []
-    for s, r, c in zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True):
-        data.append(struct.pack("<HQ4f", 0, round(s * 1e6), *(2 * r), c + 3))
-        data.append(struct.pack("<HQ4f", 1, round(s * 1e6), *r, c))
-        data.append(struct.pack("<HQf", 2, round(s * 1e6), 11.1))
-    formats = {"sensor_gyro": fields, "battery_status": "uint64_t timestamp;float voltage_v;"}
-    _ulog(path, formats, [(0, "sensor_gyro"), (1, "sensor_gyro"), (0, "battery_status")], data)
+def hdf5_thermometer(path: Path, t: Truth) -> None:
+    """The temperature in a group of its own, with its own times."""
+    import h5py
 
-
-def _dataflash(path: Path, formats: list[tuple[int, str, str, str]], data: list[bytes]) -> None:
-    sizes = {"Q": 8, "B": 1, "f": 4, "I": 4, "H": 2, "n": 4, "N": 16, "Z": 64, "d": 8}
-    out = b""
-    for kind, name, form, labels in [(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), *formats]:
-        length = 3 + sum(sizes[mark] for mark in form)
-        out += b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, length, name.encode(), form.encode(), labels.encode())
-    path.write_bytes(out + b"".join(data))
-
-
-def ardupilot(path: Path, t: Truth) -> None:
-    labels = "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz"
-    rows = zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True)
-    data = [
-        b"\xa3\x95\x81" + struct.pack("<QB6fIIfBBHH", round(s * 1e6), 0, *r, 0.0, 0.0, -9.8, 0, 0, c, 1, 1, 1000, 1000)
-        for s, r, c in rows
-    ]
-    _dataflash(path, [(129, "IMU", "QBffffffIIfBBHH", labels)], data)
-
-
-def _bag(writer: Any, store: Any, t: Truth, imu_type: str, ros1: bool) -> None:
-    imu = writer.add_connection("/imu/data_raw", imu_type, typestore=store)
-    kinds = store.types
-    warm = writer.add_connection("/imu/temperature", "sensor_msgs/msg/Temperature", typestore=store)
-
-    def header(ns: int) -> Any:
-        stamp = kinds["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
-        extra = {"seq": 0} if "seq" in kinds["std_msgs/msg/Header"].__dataclass_fields__ else {}
-        return kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="imu", **extra)
-
-    vector, quaternion = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Quaternion"]
-    encode = store.serialize_ros1 if ros1 else store.serialize_cdr
-    for s, r, c in zip(t.time_s, np.radians(t.rate_dps), t.temperature_c, strict=True):
-        ns = _EPOCH_NS + round(s * 1e9)
-        warmth = kinds["sensor_msgs/msg/Temperature"](header=header(ns), temperature=float(c), variance=0.0)
-        writer.write(warm, ns, encode(warmth, "sensor_msgs/msg/Temperature"))
-        message = kinds["sensor_msgs/msg/Imu"](
-            header=header(ns),
-            orientation=quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-            orientation_covariance=np.zeros(9),
-            angular_velocity=vector(x=float(r[0]), y=float(r[1]), z=float(r[2])),
-            angular_velocity_covariance=np.zeros(9),
-            linear_acceleration=vector(x=0.0, y=0.0, z=9.8),
-            linear_acceleration_covariance=np.zeros(9),
-        )
-        writer.write(imu, ns, encode(message, "sensor_msgs/msg/Imu"))
-
-
-def ros1(path: Path, t: Truth) -> None:
-    from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    with Writer(path) as writer:
-        _bag(writer, get_typestore(Stores.ROS1_NOETIC), t, "sensor_msgs/msg/Imu", True)
-
-
-def ros2(path: Path, t: Truth) -> None:
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    with Writer(path, version=9) as writer:
-        _bag(writer, get_typestore(Stores.ROS2_HUMBLE), t, "sensor_msgs/msg/Imu", False)
-
-
-def mdf4(path: Path, t: Truth) -> None:
-    from asammdf import MDF, Signal
-
-    file = MDF(version="4.10")
-    signals = [
-        Signal(t.rate_dps[:, 0], t.time_s, name="GyroRate", unit="deg/s"),
-        Signal(t.temperature_c, t.time_s, name="GyroTemp", unit="°C"),
-    ]
-    file.append(signals)
-    file.save(path)
-    file.close()
+    with h5py.File(path, "w") as file:
+        for name, values, unit in (
+            ("imu/time", t.time_s, "s"),
+            ("imu/rate", t.rate_dps, "deg/s"),
+            ("thermometer/time", t.time_s, "s"),
+            ("thermometer/temperature", t.temperature_c, "degC"),
+        ):
+            file.create_dataset(name, data=values).attrs["units"] = unit
 
 
 BINARY_CASES = [
@@ -225,6 +143,8 @@ BINARY_CASES = [
     Case("MATLAB 7.3", "new.mat", mat_73, needs="h5py"),
     Case("HDF5, units as attributes", "imu.h5", hdf5_attributes, axes=True, needs="h5py"),
     Case("HDF5, a table", "table.h5", hdf5_table, needs="h5py"),
+    Case("HDF5, one of two gyros", "two.h5", hdf5_two_gyros, ("--table", "gyro_2"), axes=True, needs="h5py"),
+    Case("HDF5, temperature of another group", "apart.h5", hdf5_thermometer, axes=True, needs="h5py"),
     Case(
         "Parquet, stamps, units as metadata",
         "stamps.parquet",
@@ -235,36 +155,4 @@ BINARY_CASES = [
     Case("Parquet, units in names", "names.parquet", parquet_names, axes=True),
     Case("TDMS, waveforms", "wave.tdms", tdms_waveform, needs="nptdms", started=True),
     Case("TDMS, a channel of stamps", "stamps.tdms", tdms_stamps, needs="nptdms", started=True),
-    Case(
-        "PX4 ULog",
-        "flight.ulg",
-        px4,
-        axes=True,
-        needs="pyulog",
-        starts_at=5.0,
-        tolerance=1e-4,
-        temperature_tolerance=1e-5,
-    ),
-    Case(
-        "PX4 ULog, one of two gyros",
-        "two.ulg",
-        px4_two,
-        ("--table", "sensor_gyro[1]"),
-        axes=True,
-        needs="pyulog",
-        tolerance=1e-4,
-        temperature_tolerance=1e-5,
-    ),
-    Case(
-        "ArduPilot DataFlash",
-        "log.bin",
-        ardupilot,
-        axes=True,
-        needs="pymavlink",
-        tolerance=1e-4,
-        temperature_tolerance=1e-5,
-    ),
-    Case("ROS 1 bag, temperature of another topic", "ros1.bag", ros1, axes=True, needs="rosbags", started=True),
-    Case("ROS 2 bag", "ros2", ros2, axes=True, needs="rosbags", started=True),
-    Case("MDF 4", "car.mf4", mdf4, needs="asammdf"),
 ]

@@ -63,7 +63,7 @@ def import_(
         typer.Option("--column", help="What a column is, e.g. rate=G1, temperature=T2, time=t; may be repeated."),
     ] = None,
     table: Annotated[
-        str | None, typer.Option("--table", help="Which of several tables (topics, groups) of a file.")
+        str | None, typer.Option("--table", help="Which of several tables (sheets, groups) of a file.")
     ] = None,
     rate_hz: Annotated[
         float | None, typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times.")
@@ -95,7 +95,7 @@ def import_(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show how the files would be read.")] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Make a data set of files of loggers: CSV, Excel, Parquet, NumPy, MATLAB, HDF5, NetCDF, TDMS, PX4, ROS, MDF, ...
+    """Make a data set of files of loggers: CSV, Excel, Parquet, MATLAB, HDF5, NetCDF or TDMS.
 
     Example: gyrotc import chamber.csv --out RLG-0042 --rate-unit deg/s
     """

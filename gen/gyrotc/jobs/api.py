@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.feather
+import pyarrow.parquet as pq
 
 from ..common.errors import InputError, install_command
 from ..common.texts import file_stem
@@ -95,11 +95,11 @@ class Dataset(records.Dataset):
         with ExitStack() as stack:
             scratch = stack.enter_context(scratch_folder())
             place = Path(folder) if folder is not None else scratch / "data"
-            files = [scratch / f"{file_stem(str(name))}.feather" for name in runs]
+            files = [scratch / f"{file_stem(str(name))}.parquet" for name in runs]
             for file, frame in zip(files, runs.values(), strict=True):
                 if type(frame.index).__name__ != "RangeIndex":  # it does not only count: a column
                     frame = frame.reset_index(names=frame.index.name or "time")  # noqa: PLW2901
-                pyarrow.feather.write_feather(pa.Table.from_pandas(frame, preserve_index=False), file)
+                pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), file)
             import_files(files, place, chosen, ImportOptions(serial=serial, exam=exam is not None))
             made = load(place, axis=axis)
             weakref.finalize(made, stack.pop_all().close)

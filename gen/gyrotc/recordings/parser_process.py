@@ -65,15 +65,13 @@ class Parser:
         module: Module of this package that has it.
         function: Opens a path, gives a `LoggerFile`.
         library: Module that it needs, loaded before the fork.
-        unpacks: Whether the library needs a folder to unpack or to take notes in.
-        beside: Whether the files in the same folder belong to it where a metadata.yaml says so.
+        unpacks: Whether the reader needs a folder to unpack into.
     """
 
     module: str
     function: str
     library: str
     unpacks: bool = False
-    beside: bool = False
 
 
 def open_confined(parser: Parser, path: Path) -> LoggerFile:
@@ -95,7 +93,6 @@ def open_confined(parser: Parser, path: Path) -> LoggerFile:
             content["format"],
             tables,
             content["facts"],
-            since_power_on=content["since_power_on"],
             close=worker.close,
         )
     except BaseException:
@@ -150,7 +147,7 @@ class _Worker:
         with ExitStack() as stack:
             notes = stack.enter_context(scratch_folder()) if parser.unpacks else None
             request = {
-                "parser": [parser.module, parser.function, parser.library, parser.unpacks, parser.beside],
+                "parser": [parser.module, parser.function, parser.library, parser.unpacks],
                 "path": str(path.absolute()),
                 "cpu_s": self._seconds,
                 "notes": str(notes) if notes else None,
@@ -364,7 +361,7 @@ def _work(channel: socket.socket, parser: Parser, request: dict[str, Any]) -> No
         memory_bytes=max(memory, _LEAST_MEMORY),
         cpu_s=request["cpu_s"],
         file_bytes=memory if notes else 0,
-        readable=[path.parent if parser.beside and (path.parent / "metadata.yaml").is_file() else path],
+        readable=[path],
         writable=notes,
     )
     reading = _Reading(parser, path)
@@ -418,7 +415,6 @@ class _Reading:
         return {
             "format": file.format,
             "facts": file.facts,
-            "since_power_on": file.since_power_on,
             "tables": [_stated(table) for table in file.tables],
         }
 
@@ -459,7 +455,7 @@ _PATH_BENEATH = 1  # kind of a rule: what lies in a folder, or is a file
 _NO_NEW_PRIVILEGES, _DEATH_SIGNAL = 38, 1  # PR_SET_NO_NEW_PRIVS, PR_SET_PDEATHSIG of prctl
 _READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3  # LANDLOCK_ACCESS_FS_READ_FILE, READ_DIR
 _RIGHTS = {1: 13, 2: 14, 3: 15, 5: 16}  # rights to files that a version knows: bits 0 to n - 1
-_OPEN_FILES = 64  # a bag of several files has a few open at once
+_OPEN_FILES = 64
 
 
 def confine(

@@ -1,6 +1,6 @@
 """What every format of a logger becomes: tables of named columns, read in chunks or whole.
 
-A file holds one table (CSV) or many (the topics of a flight log, the groups of a measurement file). Columns are named
+A file holds one table (CSV) or many (the sheets of a spreadsheet, the groups of a measurement file). Columns are named
 `table/column` where there are many. An importer knows what its format says of units and of time; it guesses nothing.
 """
 
@@ -111,7 +111,6 @@ class LoggerFile:
         tables: What it holds.
         facts: Facts about the recording that the file states, such as a serial.
         csv: How a CSV file is read, as keys of `[csv]` of a map; empty for other formats.
-        since_power_on: Whether its clock starts when the unit is switched on.
         close: Ends the reading: after it no chunk comes.
     """
 
@@ -120,7 +119,6 @@ class LoggerFile:
     tables: tuple[LoggerTable, ...]
     facts: dict[str, str] = field(default_factory=dict)
     csv: dict[str, Any] = field(default_factory=dict)
-    since_power_on: bool = False
     close: Callable[[], object] = lambda: None
 
 

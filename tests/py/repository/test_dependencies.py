@@ -77,8 +77,6 @@ def test_the_main_job_loads_no_extra() -> None:
         "distributed",
         "h5py",
         "nptdms",
-        "pyulog",
-        "rosbags",
     }
     program = (
         "import sys, gyrotc.jobs.build, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.short\n"

@@ -219,6 +219,8 @@ def _fact_pairs(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 _DELIMITERS = (";", "\t", ",", "|", "whitespace")
 _COMMENTS = ("#", "%", "//", "!", "*")
+# Found and expected, for a file that is no text.
+_BINARY = ("binary data of no known format", "CSV from the program that wrote it, or a format of docs/import.md")
 _ENOUGH = 0.8  # share of the rows below a header that must be numbers: loggers leave cells empty
 _LAST, _FEWEST = 60, 5  # lines that are looked at, at most and at least
 T = TypeVar("T")
@@ -366,7 +368,7 @@ def _encoding(head: bytes) -> str:
 def _text(name: str, head: bytes, encoding: str) -> str:
     strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
     if strange > 0.01 * len(head) or (b"\x00" in head and not encoding.startswith("utf-16")):
-        raise InputError(name, "binary data of no known format", "text, or a format that docs/import.md lists")
+        raise InputError(name, *_BINARY)
     try:
         text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
     except LookupError as error:
@@ -376,6 +378,8 @@ def _text(name: str, head: bytes, encoding: str) -> str:
         found = f"bytes that are no {encoding}"
         choices = "--csv encoding=... with cp932 (Japanese), gb18030 (Chinese), cp1251 (Cyrillic) or latin-1"
         raise InputError(f"{name}, line {line}", found, choices) from error
+    if "\x00" in text:
+        raise InputError(name, *_BINARY)
     return text
 
 

@@ -106,22 +106,16 @@ def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         yield "role", "exam"
     if entry["started"] is not None:
         yield "started", entry["started"]
-    if not entry["since_power_on"]:
-        yield "power_on_s", "unknown"
+    yield "power_on_s", "unknown"
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, or of the files of a folder one after the other in the order of their names."""
+    """Return the SHA-256 of a file."""
     digest = hashlib.sha256()
-    for one in sorted(path.iterdir()) if path.is_dir() else [path]:
-        with one.open("rb") as file:
-            while block := file.read(_BLOCK_BYTES):
-                digest.update(block)
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK_BYTES):
+            digest.update(block)
     return digest.hexdigest()
-
-
-def size_of(path: Path) -> int:
-    return sum(one.stat().st_size for one in path.iterdir()) if path.is_dir() else path.stat().st_size
 
 
 _NATIVE = {"time": "s", "temperature": "C", "rate": "deg/h"}
@@ -402,7 +396,6 @@ def _run(
     return {
         "file": target.name,
         "started": started,
-        "since_power_on": file.since_power_on,
         "pulses": layout.pulses,
         "rows": rows.count,
         "left_out": dict(rows.left_out)
@@ -413,7 +406,7 @@ def _run(
         "source": {
             "file": file.path.name,
             "sha256": sha256_of(file.path),
-            "bytes": size_of(file.path),
+            "bytes": file.path.stat().st_size,
             "imported_by": f"gyrotc {__version__}",
             "map": MAP_FILE,
             "run": target.name,
@@ -443,20 +436,10 @@ _MAGIC = (
     (b"MATLAB 7.3", "hdf5"),
     (b"\x89HDF\r\n\x1a\n", "hdf5"),
     (b"PAR1", "parquet"),
-    (b"ARROW1", "feather"),
-    (b"FEA1", "feather"),
-    (b"\x93NUMPY", "numpy"),
     (b"CDF\x01", "netcdf"),
     (b"CDF\x02", "netcdf"),
     (b"CDF\x05", "netcdf"),
     (b"TDSm", "tdms"),
-    (b"ULog\x01\x12\x35", "ulog"),
-    (b"\xa3\x95", "dataflash"),
-    (b"#ROSBAG V2.0", "rosbag"),
-    (b"\x89MCAP0\r\n", "rosbag"),
-    (b"SQLite format 3\x00", "rosbag"),
-    (b"MDF     ", "mdf"),
-    (b"UnFinMF ", "mdf"),
 )
 _NAMED = {".mat": "mat"}
 _SHEETS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
@@ -465,15 +448,9 @@ _PARSERS = {
     "mat": Parser(".importers.matfile", "open_mat", "scipy.io"),
     "hdf5": Parser(".importers.matfile", "open_hdf5", "h5py"),
     "parquet": Parser(".importers.parquet", "open_parquet", "pyarrow.parquet"),
-    "feather": Parser(".importers.parquet", "open_feather", "pyarrow.feather"),
-    "numpy": Parser(".importers.numpy_file", "open_numpy", "numpy"),
     "spreadsheet": Parser(".importers.csv_table", "open_spreadsheet", "openpyxl", unpacks=True),
     "netcdf": Parser(".importers.netcdf", "open_netcdf", "xarray"),
     "tdms": Parser(".importers.tdms", "open_tdms", "nptdms"),
-    "ulog": Parser(".importers.ulog", "open_ulog", "pyulog"),
-    "dataflash": Parser(".importers.dataflash", "open_dataflash", "pymavlink.DFReader"),
-    "rosbag": Parser(".importers.rosbag", "open_rosbag", "rosbags.highlevel", unpacks=True, beside=True),
-    "mdf": Parser(".importers.mdf", "open_mdf", "asammdf", unpacks=True),
 }
 """Formats that a library reads: each in a process of its own. CSV is split into lines and cells here."""
 _GZIP, _ZIP, _ZIP_NAME = b"\x1f\x8b", b"PK\x03\x04", 30  # 30: where a name begins (APPNOTE.TXT, 4.3.7)
@@ -491,9 +468,7 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
         InputError: It is of none, damaged, or its library is missing; the message says what goes on.
     """
     if path.is_dir():
-        if (path / "metadata.yaml").is_file():
-            return open_confined(_PARSERS["rosbag"], path)
-        raise InputError(str(path), "is a folder", "files of a logger, or the folder of a ROS 2 bag")
+        raise InputError(str(path), "is a folder", "files of a logger")
     opened, _ = open_input(path, path.name, "a file of a logger")
     with opened as file:
         head = file.read(1024)
@@ -510,7 +485,7 @@ def _kind(path: Path, head: bytes) -> str | None:
     """The parser of a file by its first bytes, then by its name; None: text."""
     if head.startswith(_ZIP):
         first = head[_ZIP_NAME : _ZIP_NAME + int.from_bytes(head[26:28], "little")]
-        return "spreadsheet" if first.startswith(_SHEETS) else "numpy" if first.endswith(b".npy") else None
+        return "spreadsheet" if first.startswith(_SHEETS) else None
     kind = next((kind for magic, kind in _MAGIC if head.startswith(magic)), _NAMED.get(path.suffix.lower()))
     return "netcdf" if kind == "hdf5" and path.suffix.lower() in (".nc", ".nc4", ".cdf") else kind
 

@@ -1,14 +1,13 @@
-"""Parquet, Feather and other files of Arrow: units from the metadata of columns, stamps as they are typed."""
+"""Parquet files: units from the metadata of columns, stamps as they are typed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.feather
 import pyarrow.parquet as pq
 
 from ...common.arrays import numpy_of
@@ -172,39 +171,3 @@ def _values_of(column: Any) -> Any:
     if pa.types.is_decimal(column.type):
         return column.cast(pa.float64()).to_numpy(zero_copy_only=False)
     return numbers(numpy_of(column))
-
-
-def open_feather(path: Path) -> LoggerFile:
-    """A Feather file of version 1 or 2, which is a file of Arrow.
-
-    Raises:
-        InputError: It is damaged.
-    """
-    try:
-        table = pyarrow.feather.read_table(path, memory_map=False)
-        table.validate(full=True)
-    except (pa.ArrowException, OSError, ValueError) as error:
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as Feather ({what})", "a whole Feather file") from error
-    sample = table.slice(0, _SAMPLE_ROWS)
-    columns = tuple(one for typed in table.schema if (one := _column_of(typed, sample)) is not None)
-    return LoggerFile(path, "Feather file", (ArrowTable("", columns, table=table, rows=len(table)),))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ArrowTable(LoggerTable):
-    """Rows of Arrow in memory."""
-
-    table: pa.Table = field(default_factory=lambda: pa.table({}))
-
-    def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """As `Table.chunks`."""
-        wanted = list(names) or [self.columns[0].name]
-        for first in range(0, self.rows, CHUNK_ROWS):
-            part = self.table.select(wanted).slice(first, CHUNK_ROWS).combine_chunks()
-            values = {name: _values_of(_flat(part.column(name))) for name in wanted}
-            yield Chunk(values, first, (first + len(part)) / self.rows)
-
-
-def _flat(column: pa.ChunkedArray) -> pa.Array:
-    return column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
