@@ -14,7 +14,7 @@ from typing import Any
 from gyrotc.model import Coverage, Model, load_model
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.table import Table
+from gyrotc.mirror.table import Table
 from gyrotc.verify.bounds import instruction_bounds
 from gyrotc.verify.toolchain import Target, all_targets, compile_c, disassembly, run_program, runtime_object
 from results import table

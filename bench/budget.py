@@ -23,7 +23,7 @@ from gyrotc.results.base import read_result
 from gyrotc.results.release import Budget
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.history import replay
+from gyrotc.mirror.history import replay
 from gyrotc.train.fitting import FitOptions
 
 from .sigma import CAMPAIGNS, exam_of

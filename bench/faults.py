@@ -19,7 +19,7 @@ from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.table import Numeric, Table
+from gyrotc.mirror.table import Numeric, Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from libc_build import runtime
 from numpy.typing import NDArray

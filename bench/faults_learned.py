@@ -19,7 +19,7 @@ from gyrotc.assess.product_guards import BuiltUnit, ServiceLearning
 from gyrotc.simulate.campaign import campaign, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.emit import service_prior
-from gyrotc.target.learning import Learner, Stop
+from gyrotc.mirror.learning import Learner, Stop
 from numpy.typing import NDArray
 from results import table as markdown
 

@@ -21,7 +21,7 @@ from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.page import summary_of
 from gyrotc.fleet.run import run_fleet
 from gyrotc.model import load_model
-from gyrotc.store.folder import kept_by_hash
+from gyrotc.results.folder import kept_by_hash
 from gyrotc.tables.emit import image_of
 from gyrotc.tables.quantise import quantise
 from lot import FAULTS, Lot

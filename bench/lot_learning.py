@@ -2,7 +2,7 @@
 
 Unrelated units: lots as in `bench.lot_prior` (60 units teach, family 0.93), each with 40 unseen units of its own and 40 gyros
 whose physical parameters (`gyrotc.simulate.lot`) share nothing with the lot but the scenario. All are held against the
-lot by one run of 2.5 h. Beside the test of `gyrotc.lot.learn` stand two that no product can have: one that
+lot by one run of 2.5 h. Beside the test of `gyrotc.train.prior.learn` stand two that no product can have: one that
 knows from what distribution unrelated units are drawn (the likelihood ratio of that against the lot's; the distribution is
 taken from the whole calibrations of the foreign units of all other draws), and one that knows each such unit's map.
 
@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.lot.learn import FALSE_ALARM, UnitSums, sums_of
-from gyrotc.lot.use import LotPrior
+from gyrotc.train.prior.learn import FALSE_ALARM, UnitSums, sums_of
+from gyrotc.train.prior.use import LotPrior
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.fleet import Lot as LearnedLot
@@ -30,7 +30,7 @@ from gyrotc.results.training import MapMeans, Training
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
-from gyrotc.store.files import json_text
+from gyrotc.results.files import json_text
 from gyrotc.train.data import cleaned, scaling_of
 from gyrotc.train.result import UnitMeans, unit_means
 from numpy.typing import NDArray

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from .lot_prior import Exam
-from gyrotc.lot.learn import FALSE_ALARM, sums_of
-from gyrotc.lot.use import LotPrior
+from gyrotc.train.prior.learn import FALSE_ALARM, sums_of
+from gyrotc.train.prior.use import LotPrior
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.evidence import fit_process
 from gyrotc.train.result import unit_means

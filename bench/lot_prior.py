@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.lot.learn import learn
-from gyrotc.lot.use import LotPrior
+from gyrotc.train.prior.learn import learn
+from gyrotc.train.prior.use import LotPrior
 from gyrotc.recordings.load import load
 from gyrotc.results.fleet import Lot
 from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
@@ -142,8 +142,8 @@ def ordered(case: Case) -> LotOrder:
 
 def learnt(units: list[UnitMeans]) -> LotPrior:
     """A lot as `gyrotc lot` makes it, without the way over files."""
-    from gyrotc.lot.job import lot_from
-    from gyrotc.lot.use import prior_of
+    from gyrotc.jobs.lot import lot_from
+    from gyrotc.train.prior.use import prior_of
 
     t = [float(f(u.temperature_c)) for u in units for f in (np.min, np.max)]
     r = [float(f(u.slope_c_per_min)) for u in units for f in (np.min, np.max)]

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.lot.earlier import (
+from gyrotc.train.prior.earlier import (
     EarlierPrior,
     posterior_of_means,
     stated_sigma_dph,

@@ -19,9 +19,9 @@ from gyrotc.model import Coverage, Envelope, Model, Network, Scale
 from gyrotc.tables import vectors
 from gyrotc.tables.emit import emit, emitted_tables
 from gyrotc.tables.vectors import make_vectors
-from gyrotc.target.history import answers
-from gyrotc.target.history import evaluate_map
-from gyrotc.target.table import Table
+from gyrotc.mirror.history import answers
+from gyrotc.mirror.history import evaluate_map
+from gyrotc.mirror.table import Table
 from gyrotc.verify.emitted import Job
 from gyrotc.verify.board import board_entries
 from gyrotc.verify.job import visit_all

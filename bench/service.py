@@ -18,7 +18,7 @@ import numpy as np
 from gyrotc.lot.service import Corrector, LearningUnit, PowerOn, Service, Spoil, fitted_spread, missions, served
 from gyrotc.model import BiasSpread, Learning
 from gyrotc.tables.emit import MONTH_H, data_sheet_spread, service_prior
-from gyrotc.target.learning import ServicePrior
+from gyrotc.mirror.learning import ServicePrior
 from numpy.typing import NDArray
 from results import recorded, write
 from results import table as markdown

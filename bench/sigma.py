@@ -1,7 +1,7 @@
 """Does the uncertainty of a correction hold? True bias less correction, in units of the sigma of its snapshot.
 
 Gyros that nothing was tuned on; the table's answers are those of the reference, which are those of the compiled code
-bit for bit (tests/py/target/test_sigma.py).
+bit for bit (tests/py/mirror/test_sigma.py).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.recursions import FLOAT64
-from gyrotc.target.history import replay
-from gyrotc.target.recursions import TermOutcome, recursion_of
-from gyrotc.target.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
+from gyrotc.mirror.recursions import FLOAT64
+from gyrotc.mirror.history import replay
+from gyrotc.mirror.recursions import TermOutcome, recursion_of
+from gyrotc.mirror.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
 from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
 from gyrotc.train.methods import fit

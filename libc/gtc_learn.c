@@ -1,6 +1,6 @@
 /* gtc_learn.c - learning in service, see gtc_learn.h.
  *
- * A Kalman filter of 13 states in covariance form. docs/numerics.md, section 9, gives the equations; gen/gyrotc/target/learning.py
+ * A Kalman filter of 13 states in covariance form. docs/numerics.md, section 9, gives the equations; gen/gyrotc/mirror/learning.py
  * is the mirror. Every operation is rounded to float by a statement of its own, in the order written, so that the bits
  * are the same on every target.
  *

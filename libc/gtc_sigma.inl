@@ -1,6 +1,6 @@
 /* gtc_sigma.inl - how uncertain a correction is, in the numbers included before.
  *
- * docs/design.md (How uncertain a correction is) gives the rules with their reasons; gen/gyrotc/target/sigma.py is
+ * docs/design.md (How uncertain a correction is) gives the rules with their reasons; gen/gyrotc/mirror/sigma.py is
  * the mirror. All of it is a function of a state: whoever does not ask for a snapshot pays a few words at the end
  * of a block.
  *

@@ -14,7 +14,7 @@ from typing import Any
 
 from gyrotc.pages.chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from gyrotc.paper.page import rounded
-from gyrotc.store.files import write_atomically
+from gyrotc.results.files import write_atomically
 from results import recorded, write
 
 from . import table as own

@@ -1,6 +1,6 @@
 /* test_learn.c - learning in service: arguments, gates, agreement, kept words, authority.
  *
- * The numbers are compared with the mirror in tests/py/target/test_learning.py; here every line and branch runs. */
+ * The numbers are compared with the mirror in tests/py/mirror/test_learning.py; here every line and branch runs. */
 #include <math.h>
 #include <string.h>
 

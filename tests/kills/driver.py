@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gyrotc.common.errors import GyrotcError
-from gyrotc.store.files import Interrupted, die_of, raise_on_signals
+from gyrotc.results.files import Interrupted, die_of, raise_on_signals
 
 ACTIONS = {
     "KILL": int(signal.SIGKILL),

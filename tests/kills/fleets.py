@@ -13,9 +13,9 @@ from typing import Any
 
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.unit import Task, do_unit
+from gyrotc.results.cache import program_of
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.cache import program_of
-from gyrotc.store.marker import faults
+from gyrotc.results.marker import faults
 
 from .driver import run
 from .jobs import GYROTC, Case, command

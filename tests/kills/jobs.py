@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gyrotc.store.files import write_atomically
-from gyrotc.store.folder import result_folder, write_result
-from gyrotc.store.marker import MARKER, faults, read_marker
+from gyrotc.results.files import write_atomically
+from gyrotc.results.folder import result_folder, write_result
+from gyrotc.results.marker import MARKER, faults, read_marker
 
 from .driver import Job
 

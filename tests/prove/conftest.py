@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/target"))]
+sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/mirror"))]
 
 from prove_page import section  # noqa: E402
 from results import Results, machine, write  # noqa: E402

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from emitted import GOLDEN
+from gyrotc.mirror.front_end import Settings, follow
+from gyrotc.mirror.recursions import F32, Q31
+from gyrotc.mirror.samples import Guarded
 from gyrotc.model import Model, load_model
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.front_end import Settings, follow
-from gyrotc.target.recursions import F32, Q31
-from gyrotc.target.samples import Guarded
 from numpy.typing import NDArray
 from results import Results
 

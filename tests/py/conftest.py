@@ -100,7 +100,7 @@ def run_here(*args: str | Path) -> str:
 
 def packed(name: str, content: bytes) -> bytes:
     """A file of what is kept, as gyrotc writes it under a name."""
-    from gyrotc.store.cache import _head
+    from gyrotc.results.cache import _head
 
     return _head(name, content) + content
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from gyrotc.mirror.history import evaluate_map
+from gyrotc.mirror.table import Table, f32_words
 from gyrotc.model import Envelope, Model, Network, Scale
-from gyrotc.target.history import evaluate_map
-from gyrotc.target.table import Table, f32_words
 from models import random_model
 from numpy.typing import NDArray
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gyrotc.mirror.history import answers
 from gyrotc.model import load_model
 from gyrotc.tables.emit import emitted_tables
 from gyrotc.tables.vectors import make_vectors
-from gyrotc.target.history import answers
 from gyrotc.verify.emitted import Job
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from conftest import ROOT
+from gyrotc.mirror.front_end import period_us
+from gyrotc.mirror.table import Table, Words
 from gyrotc.model import Model
-from gyrotc.target.front_end import period_us
-from gyrotc.target.table import Table, Words
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 

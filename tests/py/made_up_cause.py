@@ -24,7 +24,7 @@ from gyrotc.causes.base import (
     weights_of,
 )
 from gyrotc.common.arrays import FloatArray
-from gyrotc.target.recursions import TableKind, first_order
+from gyrotc.mirror.recursions import TableKind, first_order
 
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 

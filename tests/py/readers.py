@@ -30,6 +30,7 @@ from gyrotc.pages.short import write_plan_page
 from gyrotc.plan.plan import plan
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
+from gyrotc.results import cache as kept
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.recordings import Plan
@@ -37,7 +38,6 @@ from gyrotc.results.training import DeclaredUnits, Manifest
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read as read_scenario
 from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.store import cache as kept
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
 from gyrotc.tables.record import RECORD, read_options

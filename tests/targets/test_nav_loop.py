@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emitted import GOLDEN, emitted
+from gyrotc.mirror.history import replay
 from gyrotc.model import load_model
 from gyrotc.tables.emit import quantise_all
-from gyrotc.target.history import replay
 from gyrotc.verify.toolchain import all_targets, compile_c, run_program
 from results import Results
 

@@ -23,6 +23,8 @@ from ..common.arrays import FloatArray, Progress
 from ..common.errors import CheckFailed, GyrotcError
 from ..common.metrics import Averager, Averages, statistics, time_statistics
 from ..common.texts import file_stem
+from ..mirror.history import Replay
+from ..mirror.table import Table, Words
 from ..model import Model, load_model
 from ..quality.check import findings_of_run
 from ..quality.findings import RunFacts, facts_of
@@ -40,12 +42,10 @@ from ..results.evaluation import (
     RunStatistics,
     Statistics,
 )
+from ..results.files import create
 from ..results.training import Training
 from ..simulate.scenario import simulated_floor
-from ..store.files import create
 from ..tables.emit import emitted_tables
-from ..target.history import Replay
-from ..target.table import Table, Words
 from ..verify.replay import history_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets

@@ -15,14 +15,14 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..lot.earlier import posterior_of_known
 from ..lot.service import spread_of_lot, spread_of_power_ons
+from ..mirror.samples import PLAUSIBLE_C
 from ..model import BiasSpread, Celsius, Guard, Learning, Model
 from ..results.fleet import KnownMap, Lot
 from ..tables.emit import data_sheet_spread
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
-from ..target.samples import PLAUSIBLE_C
 from ..train.data import TrainingData
+from ..train.prior.earlier import posterior_of_known
 
 _MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 

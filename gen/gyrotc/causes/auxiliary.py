@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..target.recursions import TableKind
+from ..mirror.recursions import TableKind
 from .base import (
     Cause,
     History,

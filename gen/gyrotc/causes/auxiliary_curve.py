@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import TableKind
+from ..mirror.recursions import TableKind
 from .auxiliary import channel_of
 from .base import Cause, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording, weights_of
 

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import FLOAT64, Recursion, TableKind, first_order, recursion_of
+from ..mirror.recursions import FLOAT64, Recursion, TableKind, first_order, recursion_of
 
 
 @dataclass(frozen=True, slots=True)

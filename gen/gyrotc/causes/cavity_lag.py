@@ -6,7 +6,7 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 from __future__ import annotations
 
 from ..common.arrays import FloatArray
-from ..target.recursions import TableKind, first_order
+from ..mirror.recursions import TableKind, first_order
 from .base import (
     RATES,
     Cause,

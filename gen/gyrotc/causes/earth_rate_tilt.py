@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import first_order
+from ..mirror.recursions import first_order
 from .base import Cause, Parameter, Scene, Telling, Values, Wording
 from .power_on_temperature import ROOM_C
 

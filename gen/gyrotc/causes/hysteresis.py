@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import TableKind, play
+from ..mirror.recursions import TableKind, play
 from .base import (
     Cause,
     History,

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import TableKind
+from ..mirror.recursions import TableKind
 from .base import (
     OVERTONES,
     Cause,

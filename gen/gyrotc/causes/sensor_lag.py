@@ -8,7 +8,7 @@ a static map absorbs it and nothing in its residual can show it. There is nothin
 from __future__ import annotations
 
 from ..common.arrays import FloatArray
-from ..target.recursions import first_order
+from ..mirror.recursions import first_order
 from .base import RATES, Cause, Parameter, Scene, Values, Wording
 
 

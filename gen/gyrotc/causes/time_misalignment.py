@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import delayed
+from ..mirror.recursions import delayed
 from .base import CORNERS, RATES, Cause, History, Parameter, Reach, Scene, SearchRule, Values, Wording
 
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..target.recursions import TableKind
+from ..mirror.recursions import TableKind
 from .base import (
     COLD_STARTS,
     Cause,

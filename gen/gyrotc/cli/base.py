@@ -25,8 +25,8 @@ from ..common.texts import terminal_line, terminal_text
 from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
 
 if TYPE_CHECKING:
-    from ..lot.use import LotPrior
     from ..recordings.records import Applied
+    from ..train.prior.use import LotPrior
 
 
 # Words of options repeat literal types of modules that are too slow to import for `--help`; a test compares both.
@@ -205,7 +205,7 @@ OutOption = Annotated[Path, typer.Option("--out", help="Folder for the result.")
 
 def written_place(path: Path | None) -> Path | None:
     """Checks, before the work begins, that gyrotc wrote what stands in the place of the result."""
-    from ..store.files import check_replaceable
+    from ..results.files import check_replaceable
 
     if path is not None:
         check_replaceable(path)
@@ -430,8 +430,8 @@ def show(table: Table) -> None:
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
-    from ..store.files import json_text
-    from ..store.folder import write_result
+    from ..results.files import json_text
+    from ..results.folder import write_result
 
     if path == _STANDARD_OUTPUT:
         print(json_text(result), end="")
@@ -476,8 +476,8 @@ def lot_in(path: Path | None) -> LotPrior | None:
     """The lot of `--lot` as what is known of a unit. Raises as `load_lot`."""
     if path is None:
         return None
-    from ..lot.job import load_lot  # with what learns one: not for who has none
-    from ..lot.use import prior_of
+    from ..jobs.lot import load_lot  # with what learns one: not for who has none
+    from ..train.prior.use import prior_of
 
     return prior_of(load_lot(path))
 

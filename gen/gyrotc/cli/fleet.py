@@ -259,9 +259,9 @@ def lot(
 
     Example: gyrotc lot fleet --out lot.json
     """
-    from ..lot.job import lot_of
-    from ..store.files import json_text
-    from ..store.folder import write_result
+    from ..jobs.lot import lot_of
+    from ..results.files import json_text
+    from ..results.folder import write_result
 
     with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, earlier=earlier, progress=say)
@@ -387,8 +387,8 @@ def sign(
     Example: gyrotc sign result --key lab.pem
     """
     from ..jobs.release import check_emitted, release_of
-    from ..store.files import json_text, write_own
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_own
+    from ..results.folder import result_folder
     from ..tables.record import RELEASE, SIGNATURE, load_private_key, sign_record
 
     private = load_private_key(key, lambda: _passphrase(key, passphrase_file)) if key else None

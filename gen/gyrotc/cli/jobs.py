@@ -274,8 +274,8 @@ def recalibrate(
     from ..assess.limits import load_limits
     from ..jobs.recalibration import learned_in_service
     from ..pages.short import write_service_page
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
     from ..tables.emit import emit
 
     product = load_limits(limits) if limits else None
@@ -353,8 +353,8 @@ def compare(
     from ..jobs.build import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.load import load
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
 
     trained = BuildOptions(**options)
     with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
@@ -405,7 +405,7 @@ def diagnose(
     from ..model import load_model
     from ..recordings.load import asked_axes, load
     from ..recordings.records import Dataset
-    from ..store.folder import result_folder
+    from ..results.folder import result_folder
     from ..train.fitting import FitOptions
 
     if lot is not None and model is not None:

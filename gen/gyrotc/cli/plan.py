@@ -237,7 +237,7 @@ def plan(
     Example: gyrotc plan paper --lot lot.json --require accuracy=2e-4 --out programme
     Example: gyrotc plan paper --unit build/RLG-0042 --price-per-hour 90 --price-per-run 150
     """
-    from ..store.folder import result_folder
+    from ..results.folder import result_folder
 
     if unit is not None:
         if require:
@@ -281,11 +281,11 @@ def _next_run(
     json_file: Path | None,
 ) -> None:
     """`gyrotc plan --unit`: the run that tells most of a unit for its price, as a file and in words."""
+    from ..jobs.lot import load_lot
     from ..jobs.recalibration import unit_in
-    from ..lot.job import load_lot
     from ..lot.planning import Price, next_run, programme_csv, programme_text
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
 
     with result_folder(out, "plan") if out else nullcontext() as stage:
         model, known, means = unit_in(unit, load_lot(lot) if lot else None)
@@ -314,10 +314,10 @@ def _next_run(
 
 def _plan_with_lot(scenario: str, path: Path, require: Sequence[str], out: Path | None, json_file: Path | None) -> None:
     """`gyrotc plan --lot`: the shortest chamber programme of an accuracy, as a file and in words."""
-    from ..lot.job import load_lot
+    from ..jobs.lot import load_lot
     from ..lot.planning import plan_with_lot, programme_csv, programme_text
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
 
     required = limits_of(require)
     if set(required) != {"accuracy"}:

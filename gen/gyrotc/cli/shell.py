@@ -72,7 +72,7 @@ def cache(
 
     Example: gyrotc cache --limit 0.5
     """
-    from ..store import cache as kept
+    from ..results import cache as kept
 
     if limit_gb is not None:
         kept.set_limit(round(limit_gb * 1e9))

@@ -65,7 +65,7 @@ def evaluation_folders(folder: Path, trace: Path | None, recordings: Path) -> It
     Raises:
         InputError: As `result_folder`; or the traces would take the place of another part of the result.
     """
-    from ..store.folder import result_folder
+    from ..results.folder import result_folder
 
     inside = _inside(folder, trace)
     entries = ("evaluate.json", *([inside.parts[0]] if inside else []))
@@ -80,7 +80,7 @@ def evaluation_folders(folder: Path, trace: Path | None, recordings: Path) -> It
 
 def _inside(folder: Path, trace: Path | None) -> Path | None:
     """The folder of traces by its path in the result folder; None where it lies elsewhere."""
-    from ..store.marker import MARKER
+    from ..results.marker import MARKER
 
     if trace is None or folder.resolve() not in (trace.resolve(), *trace.resolve().parents):
         return None
@@ -113,8 +113,8 @@ def fit(
     from ..jobs.recalibration import with_prior
     from ..pages.display import shown
     from ..recordings.load import load
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
     from ..train.fitting import FitOptions, fit_dataset
 
     fitting = FitOptions(**options, prior=lot_in(lot))
@@ -151,8 +151,8 @@ def emit(
     Example: gyrotc emit result/model.json --out result
     """
     from ..model import load_model
+    from ..results.folder import result_folder
     from ..results.release import Emitted, EmittedTable
-    from ..store.folder import result_folder
     from ..tables.emit import emit as run
 
     loaded = load_model(model)
@@ -218,9 +218,9 @@ def verify(
     from ..jobs.release import axes_in, verify_axes
     from ..model import load_model
     from ..recordings.load import load
+    from ..results.files import json_text, write_atomically
+    from ..results.folder import result_folder
     from ..results.release import JointVerification, Verification
-    from ..store.files import json_text, write_atomically
-    from ..store.folder import result_folder
     from ..verify.job import verify as run
 
     if replaces is not None and signature is None:
@@ -286,7 +286,7 @@ def evaluate(
     from ..model import load_model
     from ..pages.display import shown
     from ..recordings.load import load
-    from ..store.files import json_text, write_atomically
+    from ..results.files import json_text, write_atomically
 
     if average_s is not None:
         BuildOptions(average_s=average_s)

@@ -28,10 +28,10 @@ from ..jobs.release import accepted, axes_in, unit_of
 from ..pages.display import bound_words, digits_of, limit_words, measured_words, rounded
 from ..pages.report import page_environment, thermal_picture
 from ..pages.unit import UnitResults
+from ..results.files import write_atomically, write_own
+from ..results.folder import result_folder, scratch_folder
+from ..results.marker import read_marker, sha256
 from ..results.release import Limit
-from ..store.files import write_atomically, write_own
-from ..store.folder import result_folder, scratch_folder
-from ..store.marker import read_marker, sha256
 
 _CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
 _UNITS = (

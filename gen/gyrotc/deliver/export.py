@@ -28,9 +28,9 @@ from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_code, c_environment, toml_comment
 from ..jobs.release import axes_in, check_emitted
 from ..model import Model, load_model, table_id
-from ..store.files import check_replaceable, json_text, write_atomically, write_own
-from ..store.folder import scratch_folder
-from ..store.marker import check_intact
+from ..results.files import check_replaceable, json_text, write_atomically, write_own
+from ..results.folder import scratch_folder
+from ..results.marker import check_intact
 from ..tables.record import RECORD, read_options
 from ..tables.rounding import channel_names, guard_of, sigma_cells
 from ..tables.text import example_period_us
@@ -406,7 +406,7 @@ def _xml(root: Element) -> bytes:
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:
-    """The description comes first, and as it is: so it can be determined who wrote the file (`store/files.py`)."""
+    """The description comes first, and as it is: so it can be determined who wrote the file (`results/files.py`)."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for k, (name, data) in enumerate(files.items()):

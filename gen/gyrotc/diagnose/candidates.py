@@ -19,7 +19,7 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..causes.base import OVERTONES, Cause, History, Parameter, Reach, SearchRule, Values
 from ..common.arrays import FloatArray
-from ..target.recursions import first_order
+from ..mirror.recursions import first_order
 from .blocks import Records, centred_slope
 
 _LAGS_S = (300.0, 900.0, 2700.0, 8000.0)  # in steps of a factor 3: functions of these hold those between

@@ -15,13 +15,13 @@ import numpy as np
 
 from ..common.arrays import FloatArray, parts_of, those
 from ..common.metrics import HALF_HOUR_S, HOUR_S, MAD_TO_SIGMA, Averager, Averages, time_statistics, window_means
+from ..mirror.history import FollowedHistory, followed
+from ..mirror.table import Table
 from ..model import Model
 from ..recordings.records import Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emit import quantise_all
-from ..target.history import FollowedHistory, followed
-from ..target.table import Table
 from ..train.evidence import steps_of, stretches
 from ..verify.replay import inputs_of
 from .blocks import Records

@@ -16,9 +16,9 @@ from scipy.special import chdtrc, fdtrc, ndtr, pdtrc
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray, Progress
 from ..common.statistics import main_directions, orthonormal
+from ..mirror.front_end import samples_per_block
 from ..quality.findings import SPIKE_SIGMAS
 from ..quality.outliers import BLOCK_S, departing
-from ..target.front_end import samples_per_block
 from .attribution import Attribution, attribute, overlap
 from .blocks import Record, Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosed, searched

@@ -19,10 +19,11 @@ from ..causes import CATALOGUE
 from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, History, Scene, Values
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average
+from ..mirror.front_end import blocks_since_power_on
+from ..mirror.recursions import Course, CourseChannel, TermOutcome
 from ..quality.outliers import stretches_left_out
 from ..recordings.records import Dataset, Run
 from ..results.training import LeftOutRows
-from ..target.recursions import Course, CourseChannel, TermOutcome
 from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
 from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned, joined, scaling_of
 from ..train.evidence import TrainingFailed, fit_process
@@ -30,7 +31,6 @@ from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
 from ..train.mrbf import MEAN_S, BesideSmooth, Bumps, beside_smooth, find_bumps, smooth_basis
 from ..train.result import Fit, longest_same_s, predict
-from ..train.samples import blocks_since_power_on
 from ..train.simple import without_rate
 from .candidates import searched
 from .refine import Refined

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..store import cache
-from ..target.recursions import play
+from ..mirror.recursions import play
+from ..results import cache
 from .blocks import Records
 from .candidates import Candidate, Role, columns_of, diagnosed, late, reach_of, searched, shapes_of, testable
 from .noise import COLOURS, Whitener

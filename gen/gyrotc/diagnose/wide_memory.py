@@ -24,7 +24,7 @@ from scipy.special import ndtr
 from ..causes.base import History, Parameter, SearchRule
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
-from ..target.recursions import first_order, play
+from ..mirror.recursions import first_order, play
 from .blocks import Record, Records
 from .candidates import diagnosed, reach_of, searched, shape_parameter
 from .joined import ratio_of

@@ -19,10 +19,10 @@ from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..jobs.release import unit_of
 from ..model import DataFile, Model, load_model
 from ..results.base import read_optional
+from ..results.files import check_own, digest_of, open_or_create, write_own
 from ..results.fleet import CatalogueAnswer, Catalogued, CataloguedFile, FleetEntry, FleetSummary
-from ..store.files import check_own, digest_of, open_or_create, write_own
-from ..store.folder import result_folder, share_by_hash
-from ..store.marker import KINDS, faults, marker_of, read_marker, sha256
+from ..results.folder import result_folder, share_by_hash
+from ..results.marker import KINDS, faults, marker_of, read_marker, sha256
 from ..tables.emit import image_of
 from ..tables.quantise import NUMERICS, quantise
 from ..verify.emitted import left_out_of, made_again, texts_again

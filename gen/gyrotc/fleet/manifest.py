@@ -17,7 +17,7 @@ from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
 from ..pages.display import NATIVE
 from ..recordings.load import asked_axes
-from ..store.marker import KINDS, read_marker
+from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.options import options_in
 

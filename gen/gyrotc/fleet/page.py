@@ -26,9 +26,9 @@ from ..pages.chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, 
 from ..pages.display import NATIVE, displayed, in_unit, rate_unit, shown
 from ..pages.report import page_environment
 from ..quality.thermometers import lag_of
+from ..results.files import json_text, write_atomically
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, FleetSummary, Reason, ResidualSeries
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder
+from ..results.folder import result_folder
 from .manifest import SUMMARY
 from .outliers import (
     BIN_C,

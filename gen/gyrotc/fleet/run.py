@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError, install_command
+from ..results.cache import program_of
+from ..results.files import Lock, deferred
 from ..results.fleet import FleetEntry
-from ..store.cache import program_of
-from ..store.files import Lock, deferred
-from ..store.folder import result_folder
-from ..store.marker import KINDS, check_contents, check_separate, final_place
+from ..results.folder import result_folder
+from ..results.marker import KINDS, check_contents, check_separate, final_place
 from .catalogue import enter
 from .manifest import SUMMARY, Fleet, Share, mine, printable
 from .page import write_summary

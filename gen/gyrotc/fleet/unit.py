@@ -22,11 +22,11 @@ from ..quality.events import found_events
 from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
+from ..results.cache import inputs_of, program_of
+from ..results.files import Lock, digest_of, json_text, write_atomically
 from ..results.fleet import Facts, FleetEntry
-from ..store.cache import inputs_of, program_of
-from ..store.files import Lock, digest_of, json_text, write_atomically
-from ..store.folder import clean, leftovers, result_folder, share_by_hash
-from ..store.marker import KINDS, faults, read_marker, survey
+from ..results.folder import clean, leftovers, result_folder, share_by_hash
+from ..results.marker import KINDS, faults, read_marker, survey
 from .manifest import Fleet, Unit, printable
 from .outliers import facts_of
 

@@ -35,7 +35,7 @@ from ..recordings.importers.job import ImportOptions, import_files
 from ..recordings.importers.map_file import Map
 from ..recordings.load import load as _load
 from ..results.evaluation import Evaluation
-from ..store.folder import scratch_folder
+from ..results.folder import scratch_folder
 from ..train.fitting import FitOptions
 from .build import Built
 from .build import build as _build

@@ -28,7 +28,6 @@ from ..assess.product_guards import BuiltUnit, guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average
-from ..lot.use import LotPrior
 from ..model import Model, load_model
 from ..pages.display import check_display
 from ..pages.report import write_report
@@ -37,17 +36,18 @@ from ..recordings.load import asked_axes, load
 from ..recordings.records import Dataset, Run
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Comparison, Evaluation, Group, Method, Pooled
+from ..results.files import json_text, write_atomically
+from ..results.folder import result_folder
+from ..results.marker import MARKER, sha256
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder
-from ..store.marker import MARKER, sha256
 from ..tables.emit import emit
 from ..tables.quantise import applied_of
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit
 from ..train.options import DEFAULTS, METHODS, BuildOptions
+from ..train.prior.use import LotPrior
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify
@@ -292,7 +292,7 @@ def _versions() -> dict[str, str]:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
-    from ..store.cache import program_of  # the package of fleets imports this module
+    from ..results.cache import program_of  # the package of fleets imports this module
 
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return Manifest(

@@ -26,12 +26,12 @@ from ..common.texts import toml_comment, toml_key, toml_value
 from ..model import Model
 from ..recordings.description import FILE
 from ..recordings.records import Dataset
+from ..results import cache
 from ..results.base import checked_result
 from ..results.diagnosed import Diagnosed, NamedCause
+from ..results.files import digest_of, json_text, write_atomically
+from ..results.folder import result_folder
 from ..results.training import Training
-from ..store import cache
-from ..store.files import digest_of, json_text, write_atomically
-from ..store.folder import result_folder
 from ..train.fitting import FitOptions
 
 if TYPE_CHECKING:

@@ -19,18 +19,18 @@ from ..assess.limits import Limits
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import MOST_CENTERS, checked, read_input
-from ..lot.earlier import EarlierPrior, posterior_of_result, widened
-from ..lot.learn import FALSE_ALARM
 from ..lot.service import learning_in, words_in
-from ..lot.use import MapPosterior, prior_of
+from ..mirror.learning import E_ID, KNOTS, OK, Learner, full
 from ..model import Model, Network, load_model
 from ..recordings.records import Dataset
 from ..results.base import Finding, Size, read_result
 from ..results.evaluation import InService, LearnedKnot, ServedStops
 from ..results.fleet import Lot
 from ..results.training import MapMeans, Training
-from ..target.learning import E_ID, KNOTS, OK, Learner, full
 from ..train.fitting import FitOptions
+from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
+from ..train.prior.learn import FALSE_ALARM
+from ..train.prior.use import MapPosterior, prior_of
 from ..train.result import means_of
 
 

@@ -27,6 +27,9 @@ from ..model import Model, load_model
 from ..pages.report import axes_page
 from ..pages.unit import UnitResults, unit_in
 from ..results.evaluation import Changes, Evaluation, Pooled
+from ..results.files import write_atomically, write_own
+from ..results.folder import scratch_folder
+from ..results.marker import check_intact, sha256
 from ..results.release import (
     NEED_REASON,
     RELEASED,
@@ -40,9 +43,6 @@ from ..results.release import (
     VerifiedTarget,
 )
 from ..results.training import Training
-from ..store.files import write_atomically, write_own
-from ..store.folder import scratch_folder
-from ..store.marker import check_intact, sha256
 from ..tables.emit import config_text, emitted_tables, runtime_texts
 from ..tables.record import RECORD, check_signature, joint_record_text, load_public_key
 from ..tables.text import ARITHMETICS, example_period_us, example_samples

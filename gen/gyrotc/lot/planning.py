@@ -22,9 +22,9 @@ from ..results.recordings import ChamberStep, LotPlan, LotProgramme, NextRun, Pr
 from ..simulate.instrument import chamber_air, thermal_network
 from ..simulate.profile import corners
 from ..simulate.scenario import Scenario, read
-from .basis import CONSTANT, PRIOR_LOG, LotBasis
+from ..train.prior.basis import CONSTANT, PRIOR_LOG, LotBasis
+from ..train.prior.use import LotPrior, MapPosterior, prior_of
 from .service import parkings
-from .use import LotPrior, MapPosterior, prior_of
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end

@@ -15,18 +15,18 @@ from scipy.optimize import minimize, nnls
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import read_input
+from ..mirror.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
 from ..model import BiasSpread, Learning, Model, load_model
+from ..results.files import write_atomically
 from ..results.fleet import LotAgeing
+from ..results.folder import result_folder
 from ..results.recordings import Parking
-from ..store.files import write_atomically
-from ..store.folder import result_folder
 from ..tables.emit import MONTH_H, emitted_tables, prior_of, service_prior, walk
-from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop, full
 from ..train.data import TrainingData, scaling_of
 from ..train.evidence import TrainingFailed
 from ..train.methods import fit
+from ..train.prior.use import MapPosterior
 from ..train.result import predict, unit_means
-from .use import MapPosterior
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -29,9 +29,9 @@ from ..common.texts import file_stem, html_environment
 from ..model import Model
 from ..recordings.description import exclude_line
 from ..results.evaluation import Calibration, EvaluatedRun
+from ..results.files import write_atomically
+from ..results.folder import result_folder
 from ..results.training import LeftOutRows, NoiseTerms, Training
-from ..store.files import write_atomically
-from ..store.folder import result_folder
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import (
     COVERAGE,

@@ -14,9 +14,9 @@ from ..quality.check import Columned, Compared, Covered, Picture, Seen, Strip
 from ..recordings.records import Curve
 from ..results.base import read_result
 from ..results.evaluation import InService, ServedStops
+from ..results.files import json_text, write_atomically
+from ..results.folder import result_folder, write_result
 from ..results.recordings import Checked, Plan
-from ..store.files import json_text, write_atomically
-from ..store.folder import result_folder, write_result
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
 from .display import NATIVE, displayed, in_unit, rate_unit, shown, with_unit
 from .report import page_environment, page_from, write_page

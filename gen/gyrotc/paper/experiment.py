@@ -27,11 +27,11 @@ from ..common.metrics import average, statistics
 from ..pages.chart import COLOURS
 from ..pages.comparison import ENVIRONMENTS, NEURONS
 from ..recordings.load import load
+from ..results.files import write_atomically
 from ..simulate.campaign import Noise, simulate
 from ..simulate.gyro import CELL_S
 from ..simulate.instrument import SimulatedRecord
 from ..simulate.scenario import simulated_floor
-from ..store.files import write_atomically
 from ..train.data import TrainingData, joined, scaling_of
 from ..train.fitting import front_end, samples_of
 from ..train.methods import fit, trained

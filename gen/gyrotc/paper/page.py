@@ -23,9 +23,9 @@ import scipy
 from .. import _core
 from ..common.errors import InputError
 from ..pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
+from ..results.files import write_atomically
 from ..simulate.campaign import Noise, campaign, with_noise
 from ..simulate.scenario import read
-from ..store.files import write_atomically
 from .experiment import FIGURES, METHODS, Experiment, Series, checksum, draw, draw_run, experiment
 
 Figures = Mapping[str, Any]

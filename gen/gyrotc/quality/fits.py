@@ -20,7 +20,7 @@ from scipy.linalg import solve_discrete_are
 from ..common.arrays import FloatArray
 from ..common.metrics import median_step
 from ..common.statistics import cell_means, orthonormal, running_mean
-from ..target.recursions import first_order, play
+from ..mirror.recursions import first_order, play
 
 Rows = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""

@@ -19,10 +19,10 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..common.arrays import BoolArray, FloatArray, those
 from ..common.metrics import MAD_TO_SIGMA, median_of_parts, middle_of_five, quantile_of_parts
+from ..mirror.front_end import samples_per_block
 from ..recordings.records import Run
 from ..results.base import Finding
 from ..results.training import LeftOutRows, Outliers
-from ..target.front_end import samples_per_block
 from .findings import SPIKE_SIGMAS, finding, mark_of
 
 if TYPE_CHECKING:

@@ -42,7 +42,7 @@ import pyarrow as pa
 from ..common.arrays import numpy_of
 from ..common.errors import InputError
 from ..common.inputs import ENVIRONMENT, ceiling, refuse_above
-from ..store.folder import scratch_folder
+from ..results.folder import scratch_folder
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
 _HEAD = struct.Struct(">cQ")  # kind and length of a message

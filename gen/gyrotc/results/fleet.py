@@ -349,7 +349,7 @@ class AtRest(Part):
 class Lot(Result):
     """What units of one type share (`gyrotc lot`)."""
 
-    schema_: Annotated[Literal["gyrotc.lot/1"], Field(alias="schema")] = "gyrotc.lot/1"
+    schema_: Annotated[Literal["gyrotc.train.prior/1"], Field(alias="schema")] = "gyrotc.train.prior/1"
     axis: Axis = Field(description="of the gyros; null where their recordings have one axis")
     units: tuple[LotUnit, ...] = Field(description="fully calibrated units, in the order of their folders")
     text: str = Field(description="in words: how much is shared, clusters, outliers")

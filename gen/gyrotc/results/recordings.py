@@ -151,7 +151,7 @@ class LotProgramme(Part):
 class LotPlan(Result):
     """The shortest programme with a lot, and without."""
 
-    schema_: Annotated[Literal["gyrotc.lot-plan/1"], Field(alias="schema")] = "gyrotc.lot-plan/1"
+    schema_: Annotated[Literal["gyrotc.train.prior-plan/1"], Field(alias="schema")] = "gyrotc.train.prior-plan/1"
     lot: str = Field(description="checksum of the lot")
     scenario: str = Field(description="whose chamber and instrument are assumed")
     accuracy_dph: Amount = Field(description="required, deg/h")

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.description import dataset_toml
+from ..results.files import create, json_text, write_own
+from ..results.folder import result_folder
 from ..results.recordings import SimulatedTruth, TrueLot, TrueRun
-from ..store.files import create, json_text, write_own
-from ..store.folder import result_folder
 from .gyro import CELL_S, BiasMap, bridge_arcsec, draw, quantised
 from .instrument import SimulatedRecord, record
 from .scenario import TRUTH_FILE, NoiseLevels, Scenario, read

@@ -36,7 +36,7 @@ from scipy.signal import lfilter
 
 from ..causes.base import Scene
 from ..common.arrays import FloatArray
-from ..target.recursions import first_order
+from ..mirror.recursions import first_order
 from .scenario import Channel, Laser, Scenario, Thermometer
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from ..causes import CATALOGUE
 from ..causes.base import Scene
 from ..common.arrays import FloatArray
 from ..common.inputs import need_memory
-from ..target.recursions import first_order
+from ..mirror.recursions import first_order
 from . import profile
 from .gyro import (
     CELL_S,

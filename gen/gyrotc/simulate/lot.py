@@ -16,8 +16,8 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..results.folder import result_folder
 from ..results.recordings import TrueLot
-from ..store.folder import result_folder
 from .campaign import Noise, RowForm, SimulatedGyro, with_noise, write_gyro
 from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .scenario import Gyro, Scenario, read

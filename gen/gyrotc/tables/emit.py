@@ -26,12 +26,12 @@ from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
 from ..common.texts import CText, c_code, c_environment, c_literal
+from ..mirror.history import answers
+from ..mirror.learning import KNOTS, ServicePrior, packed
+from ..mirror.table import LAYOUT, Table
 from ..model import BiasSpread, Learning, Model, RuntimePart
-from ..store.files import write_own
-from ..store.folder import result_folder
-from ..target.history import answers
-from ..target.learning import KNOTS, ServicePrior, packed
-from ..target.table import LAYOUT, Table
+from ..results.files import write_own
+from ..results.folder import result_folder
 from .error_bounds import MARGIN, channel_error_dph
 from .quantise import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text

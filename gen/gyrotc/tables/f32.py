@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
+from ..mirror.table import Table, Words, f32_words
 from ..model import Envelope, Model, Network
-from ..target.table import Table, Words, f32_words
 from .error_bounds import Axis, handover_error_dph, regions, unbounded
 from .rounding import STEEPEST, f32_terms, guard_words, largest_gradient, shared, sigma_values
 

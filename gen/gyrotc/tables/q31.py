@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
+from ..mirror.q31 import GAUSS_ERROR
+from ..mirror.table import Table
 from ..model import Envelope, Model, Network, Scale
-from ..target.q31 import GAUSS_ERROR
-from ..target.table import Table
 from .error_bounds import Axis, handover_error_dph, regions, unbounded
 from .rounding import (
     STEEPEST,

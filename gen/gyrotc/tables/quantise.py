@@ -2,7 +2,7 @@
 
 The ranges are read from the runtime's own text, libc/gtc_limits.inl, so that the generator cannot emit what
 `gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_table.inl;
-tests/py/target/test_reference.py holds both sides against each other.
+tests/py/mirror/test_reference.py holds both sides against each other.
 
 In float32 they are chosen, among many, to come out otherwise where a compiler fuses a product into a sum, whichever
 sum it is: the self-test of the target must not pass by luck.
@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
+from ..mirror.f32 import FUSIBLE
+from ..mirror.front_end import missed_before, samples_per_block
+from ..mirror.history import evaluate_map, replay
+from ..mirror.recursions import TableKind
+from ..mirror.sigma import RULES
+from ..mirror.table import ARRAYS, Numeric, Table, Words
 from ..model import Model, load_model
 from ..recordings.records import Applied, Rows
-from ..target.f32 import FUSIBLE
-from ..target.front_end import missed_before, samples_per_block
-from ..target.history import evaluate_map, replay
-from ..target.recursions import TableKind
-from ..target.sigma import RULES
-from ..target.table import ARRAYS, Numeric, Table, Words
 from . import f32, q31
 from .error_bounds import channel_error_dph, with_authority
 

@@ -19,12 +19,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import InputError, install_command
 from ..common.inputs import parse_json, read_input
+from ..mirror.table import Numeric
 from ..model import Model
 from ..results.base import Axis, Numbered, checked_result
+from ..results.files import json_text, write_atomically
+from ..results.marker import sha256
 from ..results.release import RELEASED, Release, SignatureCheck
-from ..store.files import json_text, write_atomically
-from ..store.marker import sha256
-from ..target.table import Numeric
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
+from ..mirror.recursions import TableKind
+from ..mirror.samples import PLAUSIBLE_C
+from ..mirror.table import SERIAL_WORDS, Numeric, Words, f32_words
 from ..model import Guard, Model, Rules, Term, Uncertainty
-from ..target.recursions import TableKind
-from ..target.samples import PLAUSIBLE_C
-from ..target.table import SERIAL_WORDS, Numeric, Words, f32_words
 
 _S_PER_MIN = 60.0  # a minute
 _S_PER_H = 3600.0  # an hour

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from ..common.texts import CText, c_code
+from ..mirror.front_end import period_us
+from ..mirror.recursions import TableKind
+from ..mirror.table import LAYOUT, SERIAL_WORDS, Table
 from ..model import Model
-from ..target.front_end import period_us
-from ..target.recursions import TableKind
-from ..target.table import LAYOUT, SERIAL_WORDS, Table
 from .rounding import channel_names, guard_of
 
 _EXAMPLE_US = 10000  # 100 samples a second

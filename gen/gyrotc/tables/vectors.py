@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mirror.front_end import period_us
+from ..mirror.history import Calls
 from ..model import Model
-from ..target.front_end import period_us
-from ..target.history import Calls
 from .rounding import channel_names, guard_of
 
 N_RANDOM = 20000  # a fault that shows in one input of a thousand is missed with a chance of 2e-9

@@ -29,14 +29,14 @@ from numpy.typing import NDArray
 from ..causes import CATALOGUE
 from ..causes.base import Cause, History
 from ..common.arrays import FloatArray
+from ..mirror.front_end import with_missing
+from ..mirror.history import channel_at
+from ..mirror.recursions import F32, CourseChannel, TableKind
+from ..mirror.samples import Guarded
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
-from ..target.front_end import with_missing
-from ..target.history import channel_at
-from ..target.recursions import F32, CourseChannel, TableKind
-from ..target.samples import Guarded
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, TrainingFailed, conditioned, fit_process
 from .methods import fit

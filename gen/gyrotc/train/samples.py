@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quality.outliers import departing_rows
-from ..target import table as status_bits
-from ..target.front_end import (
+from ..mirror import table as status_bits
+from ..mirror.front_end import (
     FALLBACK,
     KEEP,
     MAP,
@@ -22,8 +21,9 @@ from ..target.front_end import (
     period_us,
     samples_per_block,
 )
-from ..target.recursions import F32
-from ..target.samples import PLAUSIBLE_C, Guarded
+from ..mirror.recursions import F32
+from ..mirror.samples import PLAUSIBLE_C, Guarded
+from ..quality.outliers import departing_rows
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
@@ -63,13 +63,6 @@ class Blocks:
     def used(self) -> NDArray[np.bool_]:
         """Which blocks are training samples."""
         return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
-
-
-def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
-    """Whole blocks between power-on and the first row; 0 where power-on is not known or came later."""
-    if run.power_on_s is None:
-        return 0
-    return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
 
 
 def run_blocks(

@@ -34,7 +34,7 @@ from scipy.special import stdtrit
 
 from ..causes.hysteresis import strength
 from ..common.arrays import FloatArray
-from ..target.recursions import play
+from ..mirror.recursions import play
 from .data import TrainingData, average, cleaned, edges_of
 from .evidence import MEAN_S, Process, fit_process
 from .result import Fit, predict

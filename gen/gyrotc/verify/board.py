@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
 from ..common.inputs import read_input
+from ..mirror.history import answers
+from ..results.folder import scratch_folder
 from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
-from ..store.folder import scratch_folder
 from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
-from ..target.history import answers
 from .bounds import instruction_bounds
 from .emitted import Job, board_files, checked_sources
 from .replay import learned_on

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import CheckFailed
-from ..store import cache
-from ..store.files import canonical_json, digest_of, write_own
-from ..target.table import Table
+from ..mirror.table import Table
+from ..results import cache
+from ..results.files import canonical_json, digest_of, write_own
 from .flow import MEMORY, POWER, SHORT_QUOTIENTS, Block, Counts, Flow, Loop, LoopText, counts_of, parse_flows, totals
 from .sizes import TERM_CODES, functions_of, linked_name
 from .toolchain import Object, Target, compile_objects, disassembly, link, symbols

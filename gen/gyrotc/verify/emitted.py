@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
 from ..common.texts import C_COMMENT, C_INITIALISER
+from ..mirror.table import Table
 from ..model import SERIAL, Model
+from ..results.files import write_own
+from ..results.marker import read_marker
 from ..results.release import VerifiedFile
-from ..store.files import write_own
-from ..store.marker import read_marker
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import BESIDES, Options, read_options
 from ..tables.text import ARITHMETICS, LEARNING, amalgamate
-from ..target.table import Table
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})

@@ -23,9 +23,13 @@ import numpy as np
 from .. import __version__
 from ..common.arrays import Progress
 from ..common.errors import CheckFailed, GyrotcError, InputError
+from ..mirror.q31 import exp2_table
+from ..mirror.table import Table
 from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
+from ..results.folder import scratch_folder
+from ..results.marker import check_intact
 from ..results.release import (
     STATED,
     EmittedWith,
@@ -36,13 +40,9 @@ from ..results.release import (
     VerifiedTarget,
     WorstError,
 )
-from ..store.folder import scratch_folder
-from ..store.marker import check_intact
 from ..tables.emit import expected_answers
 from ..tables.record import check_signature, load_public_key
 from ..tables.vectors import Vectors, make_vectors
-from ..target.q31 import exp2_table
-from ..target.table import Table
 from .board import board_entries, log_entries
 from .emitted import (
     EDITABLE,

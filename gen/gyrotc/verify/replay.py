@@ -23,17 +23,16 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
+from ..mirror.front_end import blocks_since_power_on, missed_before, period_us, samples_per_block
+from ..mirror.history import FollowedHistory, Replay, followed
+from ..mirror.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop
+from ..mirror.table import Table, Words
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
+from ..results.files import write_own
+from ..results.folder import scratch_folder
 from ..results.release import LearnedCalls, ReplayedRows, VerifiedTarget
-from ..store.files import write_own
-from ..store.folder import scratch_folder
 from ..tables.quantise import channels_of
-from ..target.front_end import missed_before, period_us, samples_per_block
-from ..target.history import FollowedHistory, Replay, followed
-from ..target.learning import KEPT_WORDS, KNOTS, Learner, ServicePrior, Stop
-from ..target.table import Table, Words
-from ..train.samples import blocks_since_power_on
 from .emitted import Job, checked_sources, table_files
 from .toolchain import Target, compile_objects, link, run_program, runtime_object
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 from ..common.errors import CheckFailed
 from ..common.texts import c_environment
+from ..mirror.table import Table
 from ..model import Model
+from ..results.files import write_own
+from ..results.folder import scratch_folder
 from ..results.release import FunctionCost
-from ..store.files import write_own
-from ..store.folder import scratch_folder
 from ..tables.text import example_period_us
-from ..target.table import Table
 from .emitted import checked_sources, table_files
 from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
 

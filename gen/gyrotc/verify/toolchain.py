@@ -32,9 +32,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import read_toml
-from ..store import cache
-from ..store.files import canonical_json, digest_of, write_own
-from ..store.folder import scratch_folder
+from ..results import cache
+from ..results.files import canonical_json, digest_of, write_own
+from ..results.folder import scratch_folder
 
 LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).

@@ -12,14 +12,14 @@ from conftest import HOST, Command
 from gyrotc.assess.limits import AtLeast, AtMost, held_against, load_limits
 from gyrotc.assess.product_guards import guarded
 from gyrotc.common.errors import InputError
+from gyrotc.mirror.history import replay
+from gyrotc.mirror.table import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
 from gyrotc.model import Guard, Model, Term
 from gyrotc.results.base import Finding
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics, Statistics
 from gyrotc.results.release import MapError, Verification, VerifiedTarget, WorstError
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.history import replay
-from gyrotc.target.table import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
 from models import random_model
 from recordings import columns, described, write_csv
 

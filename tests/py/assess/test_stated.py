@@ -21,12 +21,12 @@ from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate
 from gyrotc.deliver.export import export
 from gyrotc.jobs.build import build_into
+from gyrotc.jobs.lot import _unit
 from gyrotc.jobs.release import release_of, unit_of
-from gyrotc.lot.job import _unit
 from gyrotc.recordings.load import load
+from gyrotc.results.folder import result_folder
+from gyrotc.results.marker import MARKER
 from gyrotc.results.release import RELEASED
-from gyrotc.store.folder import result_folder
-from gyrotc.store.marker import MARKER
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 

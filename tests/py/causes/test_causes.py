@@ -14,11 +14,11 @@ from gyrotc.causes import CATALOGUE, register, separate_by
 from gyrotc.causes.base import Cause, History, Parameter, Reach, Scene
 from gyrotc.cli.plan import plan_parts
 from gyrotc.jobs.build import build
+from gyrotc.mirror.recursions import Course, CourseChannel, TermOutcome
 from gyrotc.model import load_model
 from gyrotc.pages.short import write_plan
 from gyrotc.plan.plan import plan
 from gyrotc.simulate.campaign import simulate
-from gyrotc.target.recursions import Course, CourseChannel, TermOutcome
 from gyrotc.train.fitting import FitOptions
 
 PACKAGE = Path(__file__).resolve().parents[3] / "gen" / "gyrotc"

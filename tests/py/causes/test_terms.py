@@ -11,8 +11,8 @@ import pytest
 from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History, Scene
 from gyrotc.common.errors import InputError
+from gyrotc.mirror.recursions import Course, CourseChannel, TermOutcome, delayed, first_order, play
 from gyrotc.simulate.gyro import draw
-from gyrotc.target.recursions import Course, CourseChannel, TermOutcome, delayed, first_order, play
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -30,9 +30,9 @@ from gyrotc.cli.shell import Shell
 from gyrotc.deliver import export
 from gyrotc.model import Model
 from gyrotc.recordings.importers import rows
+from gyrotc.results import cache
+from gyrotc.results.marker import MARKER
 from gyrotc.simulate import campaign
-from gyrotc.store import cache
-from gyrotc.store.marker import MARKER
 from gyrotc.tables.emit import emit
 from recordings import described
 

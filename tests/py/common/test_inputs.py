@@ -28,12 +28,12 @@ from gyrotc.fleet.run import Cluster, _connected
 from gyrotc.model import load_model
 from gyrotc.pages import report
 from gyrotc.recordings.load import load
+from gyrotc.results import cache as kept
 from gyrotc.results.base import checked_result, read_result
 from gyrotc.results.evaluation import EvaluatedRun, Evaluation
 from gyrotc.results.release import Verification
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read, simulated_floor
-from gyrotc.store import cache as kept
 from gyrotc.tables.record import _serialization
 from gyrotc.train.samples import run_blocks
 from gyrotc.verify.board import log_parts

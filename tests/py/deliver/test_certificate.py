@@ -17,8 +17,8 @@ from gyrotc.pages.display import digits_of
 from gyrotc.pages.unit import unit_in
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
+from gyrotc.results.folder import result_folder
 from gyrotc.results.training import Manifest
-from gyrotc.store.folder import result_folder
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 

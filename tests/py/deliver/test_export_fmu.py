@@ -20,13 +20,13 @@ from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.deliver.export import export
 from gyrotc.jobs.release import joint_texts
+from gyrotc.mirror.front_end import samples_per_block
+from gyrotc.mirror.history import Replay, replay
 from gyrotc.model import Model, load_model
-from gyrotc.store.marker import MARKER
+from gyrotc.results.marker import MARKER
 from gyrotc.tables.quantise import quantise
 from gyrotc.tables.rounding import channel_names
 from gyrotc.tables.text import example_period_us
-from gyrotc.target.front_end import samples_per_block
-from gyrotc.target.history import Replay, replay
 from models import bank_with_channels, random_channels, random_history
 from numpy.typing import NDArray
 

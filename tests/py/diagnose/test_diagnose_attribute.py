@@ -50,6 +50,7 @@ from gyrotc.diagnose.signature_bank import direction_of
 from gyrotc.diagnose.single_cycle import CycleFits
 from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis, proportional_map, replaced_map
 from gyrotc.diagnose.summary import VERDICTS, holds, looks_like, next_steps, sentence_of, verdict_of
+from gyrotc.mirror.recursions import first_order
 from gyrotc.recordings.load import load
 from gyrotc.results.diagnosed import (
     ConsideredCause,
@@ -62,7 +63,6 @@ from gyrotc.results.diagnosed import (
     Unexplained,
 )
 from gyrotc.results.recordings import DetectionLimit
-from gyrotc.target.recursions import first_order
 from gyrotc.train.data import TrainingData, cleaned
 from gyrotc.train.fitting import FitOptions
 from numpy.typing import NDArray

@@ -28,14 +28,14 @@ from gyrotc.diagnose.refit import Effect, completed, known, samples
 from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
 from gyrotc.jobs import diagnosis
 from gyrotc.jobs.build import build
+from gyrotc.mirror.recursions import first_order
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset
+from gyrotc.results import cache
 from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read
-from gyrotc.store import cache
-from gyrotc.target.recursions import first_order
 from gyrotc.train import fitting
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions

@@ -30,7 +30,7 @@ from gyrotc.diagnose.rivals import (
     probabilities_of,
     ranked_rivals,
 )
-from gyrotc.target.recursions import delayed, first_order
+from gyrotc.mirror.recursions import delayed, first_order
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign

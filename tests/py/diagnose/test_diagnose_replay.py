@@ -28,14 +28,14 @@ from gyrotc.diagnose.search import Search
 from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
 from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
 from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
+from gyrotc.mirror.front_end import missed_before
+from gyrotc.mirror.history import FollowedHistory, evaluate_map, followed
+from gyrotc.mirror.recursions import first_order, play
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows, Run, joined_runs
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.front_end import missed_before
-from gyrotc.target.history import FollowedHistory, evaluate_map, followed
-from gyrotc.target.recursions import first_order, play
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
 from gyrotc.verify.replay import history_of

@@ -18,14 +18,14 @@ from gyrotc.fleet.catalogue import SCHEMA, catalogued, enter, export, hash_rows,
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.page import write_summary
 from gyrotc.fleet.run import run_fleet
-from gyrotc.lot import job
+from gyrotc.jobs import lot as job
 from gyrotc.results.base import read_result
+from gyrotc.results.files import json_text, write_atomically
 from gyrotc.results.fleet import FleetEntry, FleetSummary, FleetUnit
+from gyrotc.results.folder import result_folder, share_by_hash
+from gyrotc.results.marker import MARKER, faults, read_marker, sha256
 from gyrotc.results.release import Verification
 from gyrotc.results.training import Manifest
-from gyrotc.store.files import json_text, write_atomically
-from gyrotc.store.folder import result_folder, share_by_hash
-from gyrotc.store.marker import MARKER, faults, read_marker, sha256
 from gyrotc.verify.job import verify
 from recordings import columns, toml, write_csv
 

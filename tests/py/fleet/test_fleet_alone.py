@@ -26,10 +26,10 @@ from gyrotc.fleet import unit as units
 from gyrotc.fleet.manifest import SUMMARY, Fleet, Unit, load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.fleet.unit import Task, do_unit
+from gyrotc.results.cache import inputs_of, program_of
+from gyrotc.results.files import Lock
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.cache import inputs_of, program_of
-from gyrotc.store.files import Lock
-from gyrotc.store.marker import MARKER, faults
+from gyrotc.results.marker import MARKER, faults
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 

@@ -22,7 +22,7 @@ from gyrotc.fleet import run as running
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.run import Cluster, run_fleet
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.marker import MARKER
+from gyrotc.results.marker import MARKER
 from recordings import columns, toml, write_csv
 from results import write
 

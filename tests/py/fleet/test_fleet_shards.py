@@ -19,7 +19,7 @@ from gyrotc.fleet.manifest import Fleet, Share, Unit, load_manifest, mine, share
 from gyrotc.fleet.run import Cluster, gather, run_fleet, run_share, tasks_of
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.store.marker import MARKER
+from gyrotc.results.marker import MARKER
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 

@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
-from gyrotc.lot.departures import Departures, Hypothesis, revised, updated, within
-from gyrotc.lot.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
 from gyrotc.model import load_model
 from gyrotc.results.base import read_result
 from gyrotc.results.evaluation import Evaluation
@@ -23,6 +21,8 @@ from gyrotc.results.training import Training
 from gyrotc.tables.emit import emitted_tables
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.methods import fit
+from gyrotc.train.prior.departures import Departures, Hypothesis, revised, updated, within
+from gyrotc.train.prior.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
 from gyrotc.train.result import UnitMeans, predict, unit_means
 from numpy.typing import NDArray
 from recordings import write_csv

@@ -11,16 +11,16 @@ from conftest import HOST, run_here
 from gyrotc.common.errors import InputError
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.extension import Refitting
-from gyrotc.lot.job import load_lot, lot_of
+from gyrotc.jobs.lot import load_lot, lot_of
 from gyrotc.lot.planning import plan_with_lot
-from gyrotc.lot.use import prior_of
 from gyrotc.model import BiasSpread, load_model
 from gyrotc.recordings.load import load
+from gyrotc.results.files import json_text
 from gyrotc.results.recordings import LotPlan, NextRun
-from gyrotc.store.files import json_text
 from gyrotc.tables.emit import MONTH_H
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
+from gyrotc.train.prior.use import prior_of
 from gyrotc.train.result import predict
 
 RUNS = """

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from gyrotc._core import posteriors
 from gyrotc.common.errors import InputError
-from gyrotc.lot import basis as lot_basis
-from gyrotc.lot.basis import PRIOR_LOG, LotBasis
-from gyrotc.lot.earlier import widened
-from gyrotc.lot.job import checksum_of, lot_from
-from gyrotc.lot.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
+from gyrotc.jobs.lot import checksum_of, lot_from
 from gyrotc.lot.planning import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
-from gyrotc.lot.use import LotPrior, MapPosterior, MapPrior, prior_of
 from gyrotc.results.fleet import Lot, LotCluster
 from gyrotc.results.recordings import ChamberStep
 from gyrotc.simulate.scenario import read
 from gyrotc.train.data import TrainingData
 from gyrotc.train.evidence import Asked
 from gyrotc.train.methods import fit
+from gyrotc.train.prior import basis as lot_basis
+from gyrotc.train.prior.basis import PRIOR_LOG, LotBasis
+from gyrotc.train.prior.earlier import widened
+from gyrotc.train.prior.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
+from gyrotc.train.prior.use import LotPrior, MapPosterior, MapPrior, prior_of
 from gyrotc.train.result import UnitMeans, predict
 from gyrotc.train.uncertainty import coverage, uncertainty
 from models import random_model

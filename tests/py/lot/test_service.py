@@ -10,7 +10,6 @@ from conftest import run_here
 from gyrotc.assess.limits import Limits, Recalibration
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.jobs.recalibration import learned_in_service
-from gyrotc.lot.earlier import posterior_of_means
 from gyrotc.lot.service import (
     Moved,
     covariance_at,
@@ -21,12 +20,13 @@ from gyrotc.lot.service import (
     spread_of_power_ons,
     words_text,
 )  # fmt: skip
+from gyrotc.mirror.learning import KNOTS, Learner, full
 from gyrotc.model import Learning, Model, Uncertainty, load_model
 from gyrotc.results.evaluation import InService
 from gyrotc.results.fleet import LotAgeing
 from gyrotc.tables.emit import MONTH_H, data_sheet_spread, emit, service_prior, walk
-from gyrotc.target.learning import KNOTS, Learner, full
 from gyrotc.train.data import TrainingData
+from gyrotc.train.prior.earlier import posterior_of_means
 from gyrotc.train.result import UnitMeans
 
 GOLDEN = Path(__file__).resolve().parents[2] / "c" / "model.json"

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gyrotc.mirror.recursions import first_order
 from gyrotc.quality import changes as changes_module
 from gyrotc.quality.changes import Change, changes_of
 from gyrotc.quality.check import check
@@ -23,7 +24,6 @@ from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows
 from gyrotc.results.base import Finding
 from gyrotc.simulate.campaign import simulate
-from gyrotc.target.recursions import first_order
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
 from recordings import Columns, toml, write_csv

@@ -11,8 +11,8 @@ import pytest
 from conftest import HOST, Command
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build
+from gyrotc.mirror.recursions import first_order, play
 from gyrotc.quality.fits import evidence_beside_memories
-from gyrotc.target.recursions import first_order, play
 from gyrotc.train.fitting import FitOptions
 from numpy.typing import NDArray
 from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv

@@ -14,10 +14,10 @@ from pathlib import Path
 import gyrotc
 import numpy as np
 import pytest
+from gyrotc.mirror.history import evaluate_map
 from gyrotc.model import Model, load_model
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.target.history import evaluate_map
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"

@@ -44,7 +44,7 @@ def test_what_stands_beside_the_package_imports_modules_that_are_there() -> None
 #: Classes that have one name on purpose, with the reason.
 _SAME = {
     "Dataset": "api.py has that of recordings/records.py with what users of Python ask of it besides",
-    "Points": "target/f32.py and target/q31.py say the same in either arithmetic",
+    "Points": "mirror/f32.py and mirror/q31.py say the same in either arithmetic",
     "Result": "what gyrotc.build gives users of Python, and a file of JSON",
 }
 

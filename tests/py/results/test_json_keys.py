@@ -20,8 +20,8 @@ from gyrotc.model import load_model
 from gyrotc.results.base import Marker, Numbered, checked_result
 from gyrotc.results.evaluation import At, MapDifference
 from gyrotc.results.fleet import FleetEntry
+from gyrotc.results.marker import marker_of, marker_text
 from gyrotc.results.release import HeldLimits, Limit
-from gyrotc.store.marker import marker_of, marker_text
 from pydantic import ValidationError
 from pydantic_core import PydanticUndefined
 from recordings import columns, described, write_csv

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.common.errors import CheckFailed
+from gyrotc.mirror.table import E_ID, E_IMAGE, Words
 from gyrotc.model import Model, Term, load_model
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.table import E_ID, E_IMAGE, Words
 from gyrotc.train.uncertainty import rezero_dph
 from libc_build import Runtime, runtime
 from libc_device import SAVE_WORDS, Device, history, variant

@@ -22,10 +22,10 @@ import numpy as np
 import pytest
 from conftest import ROOT, quick_and_slow
 from emitted import GOLDEN, emitted, flip, spoil
+from gyrotc.mirror.table import Table
 from gyrotc.model import Model, load_model
 from gyrotc.tables import vectors
 from gyrotc.tables.emit import Emission, emit, emit_texts, quantise_all, write_texts
-from gyrotc.target.table import Table
 from models import bank_of, random_model, random_terms
 
 SCRIPT = ROOT / "tools" / "check_table.py"

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.mirror.f32 import gauss
+from gyrotc.mirror.history import evaluate_map
+from gyrotc.mirror.table import MAGIC, Table
 from gyrotc.model import Guard, Model, Term, load_model
 from gyrotc.tables.emit import COSTS, SWITCHES, config_text, emit, emit_texts, quantise_all
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.f32 import gauss
-from gyrotc.target.history import evaluate_map
-from gyrotc.target.table import MAGIC, Table
 from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.

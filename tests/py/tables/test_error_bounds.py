@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
 from gyrotc.common.errors import CheckFailed
+from gyrotc.mirror.history import recursions
+from gyrotc.mirror.recursions import Course, CourseChannel, Recursion, TermOutcome
+from gyrotc.mirror.table import Numeric
 from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
 from gyrotc.tables.emit import emit_texts, quantise_all
 from gyrotc.tables.error_bounds import channel_error_dph
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.history import recursions
-from gyrotc.target.recursions import Course, CourseChannel, Recursion, TermOutcome
-from gyrotc.target.table import Numeric
 from models import bank_of, random_model
 from numpy.typing import NDArray
 

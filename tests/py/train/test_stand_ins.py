@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
+from gyrotc.mirror.history import Replay, replay, stand_in
+from gyrotc.mirror.table import CHANNEL_LOST, Table
 from gyrotc.model import Model, Network, Scale, Term
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Rows
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import NUMERICS, channels_of, quantise
-from gyrotc.target.history import Replay, replay, stand_in
-from gyrotc.target.table import CHANNEL_LOST, Table
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from gyrotc.train.result import rescaled
 from libc_build import runtime

@@ -11,7 +11,7 @@ import pytest
 from conftest import ROOT, Command
 from emitted import emitted, measured, spoil
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.target.history import evaluate_map
+from gyrotc.mirror.history import evaluate_map
 from gyrotc.verify.job import Visited, verify, visit_all
 from gyrotc.verify.sizes import PUBLIC, function_costs, parse_graph
 from gyrotc.verify.toolchain import all_targets, runtime_object

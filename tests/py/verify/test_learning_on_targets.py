@@ -12,9 +12,9 @@ from conftest import run_here
 from gyrotc.assess.limits import load_limits
 from gyrotc.assess.product_guards import BuiltUnit
 from gyrotc.common.errors import InputError
+from gyrotc.mirror.learning import E_ID, E_IMAGE, KEPT_WORDS, OK, REFUSED, Learner
 from gyrotc.model import BiasSpread, Learning, Model, load_model
 from gyrotc.tables.emit import data_sheet_spread, emit, prior_of
-from gyrotc.target.learning import E_ID, E_IMAGE, KEPT_WORDS, OK, REFUSED, Learner
 from gyrotc.verify.job import verify
 from gyrotc.verify.replay import drawn_calls, expected_words
 

@@ -10,7 +10,7 @@ import pytest
 from conftest import packed
 from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.store import cache
+from gyrotc.results import cache
 from gyrotc.verify import bounds, toolchain
 from gyrotc.verify.board import board_entries
 from gyrotc.verify.toolchain import (

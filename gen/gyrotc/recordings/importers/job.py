@@ -22,9 +22,9 @@ from ... import __version__
 from ...common.errors import InputError
 from ...common.inputs import open_input, refuse_above
 from ...results.base import ADVICE, Finding
+from ...results.files import write_own
+from ...results.folder import result_folder, scratch_folder
 from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
-from ...store.files import write_own
-from ...store.folder import result_folder, scratch_folder
 from ..description import FILE, MIN_ROWS, check_serial, dataset_toml
 from ..parser_process import Parser, open_confined
 from ..plausibility import TRUSTED, Suspicion, suspicions

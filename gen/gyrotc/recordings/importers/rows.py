@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
-from ...store.files import create
+from ...results.files import create
 from ..description import Layout, faults, likely_temperature
 from ..reading import Evidence
 from ..tables import Chunk, Column, LoggerTable

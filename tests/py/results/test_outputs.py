@@ -21,12 +21,12 @@ import pytest
 from conftest import HOST, Command, quick_and_slow
 from gyrotc.cli import main
 from gyrotc.common.errors import GyrotcError, InputError
-from gyrotc.store import folder as folders
-from gyrotc.store import update as exchanging
-from gyrotc.store import update as updating
-from gyrotc.store.files import Lock, json_text, write_atomically
-from gyrotc.store.folder import result_folder, scratch_folder, write_result
-from gyrotc.store.marker import MARKER, check_separate, faults, read_marker
+from gyrotc.results import folder as folders
+from gyrotc.results import update as exchanging
+from gyrotc.results import update as updating
+from gyrotc.results.files import Lock, json_text, write_atomically
+from gyrotc.results.folder import result_folder, scratch_folder, write_result
+from gyrotc.results.marker import MARKER, check_separate, faults, read_marker
 from recordings import columns, toml, write_csv
 
 
@@ -201,7 +201,7 @@ def test_a_second_job_is_reported_who_holds_the_place(out: Path) -> None:
 
 def test_leftovers_of_dead_jobs_go_and_those_of_others_stay(out: Path) -> None:
     code = (
-        "import os, sys; from pathlib import Path; from gyrotc.store.folder import result_folder\n"
+        "import os, sys; from pathlib import Path; from gyrotc.results.folder import result_folder\n"
         "with result_folder(Path(sys.argv[1]), 'build') as stage:\n"
         "    (stage.folder / 'half').write_text('x'); os._exit(9)"
     )
@@ -523,13 +523,13 @@ def test_a_signal_cleans_up_and_ends_as_shells_expect(number: signal.Signals, ma
 
 JOB = """
 import time
-from gyrotc.store.folder import scratch_folder
+from gyrotc.results.folder import scratch_folder
 with scratch_folder() as folder:
     print(folder, flush=True)
     time.sleep(600)
 """
 MANY = """
-from gyrotc.store.folder import scratch_folder
+from gyrotc.results.folder import scratch_folder
 for _ in range(300):
     with scratch_folder() as folder:
         (folder / "x").write_text("1")

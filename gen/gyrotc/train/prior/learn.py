@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
 
-from .._core import posteriors
-from ..common.arrays import FloatArray, Progress
-from ..train.result import UnitMeans
+from ..._core import posteriors
+from ...common.arrays import FloatArray, Progress
+from ..result import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import FloatArray
-from ..common.errors import InputError
-from ..model import Model
-from ..results.fleet import KnownMap
-from ..results.training import ChangeKind, EarlierUse, Training, TriedChange
-from ..train.data import Scaling, TrainingData
-from ..train.evidence import Asked
-from ..train.result import Given, UnitMeans, means_of
+from ...common.arrays import FloatArray
+from ...common.errors import InputError
+from ...model import Model
+from ...results.fleet import KnownMap
+from ...results.training import ChangeKind, EarlierUse, Training, TriedChange
+from ..data import Scaling, TrainingData
+from ..evidence import Asked
+from ..result import Given, UnitMeans, means_of
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
 from .learn import Envelope, sums_of, that_count

@@ -12,20 +12,20 @@ import numpy as np
 from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
+from ..lot.service import Moved, covariance_at, fitted_ageing
+from ..mirror.learning import KNOTS
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
+from ..results.files import digest_of
 from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotAgeing, LotCluster, LotUnit
+from ..results.marker import check_intact
 from ..results.training import Training
-from ..store.files import digest_of
-from ..store.marker import check_intact
 from ..tables.emit import MONTH_H
-from ..target.learning import KNOTS
 from ..train.evidence import MEAN_S
+from ..train.prior.earlier import posterior_of_result
+from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, folds_of, freedom_of, learn, of_few
+from ..train.prior.use import prior_of, process_result, rounded
 from ..train.result import UnitMeans, means_of
-from .earlier import posterior_of_result
-from .learn import LEAST_UNITS, Envelope, Learned, folds_of, freedom_of, learn, of_few
-from .service import Moved, covariance_at, fitted_ageing
-from .use import prior_of, process_result, rounded
 
 _CELLS = (33, 13)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read

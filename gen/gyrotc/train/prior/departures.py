@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from ..common.arrays import FloatArray
-from ..common.errors import InputError
-from ..common.metrics import LEAST_SPAN_C
-from ..results.evaluation import At, MapDifference
-from ..results.training import ChangeKind, CheckedCell, MapChange
-from ..train.result import UnitMeans
+from ...common.arrays import FloatArray
+from ...common.errors import InputError
+from ...common.metrics import LEAST_SPAN_C
+from ...results.evaluation import At, MapDifference
+from ...results.training import ChangeKind, CheckedCell, MapChange
+from ..result import UnitMeans
 from .basis import PRIOR_LOG
 from .learn import FALSE_ALARM
 from .use import MapPosterior, MapPrior

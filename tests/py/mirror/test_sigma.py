@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.common.errors import CheckFailed
+from gyrotc.mirror.history import replay
+from gyrotc.mirror.table import E_ABSENT
 from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.target.history import replay
-from gyrotc.target.table import E_ABSENT
 from libc_build import Runtime, runtime
 from libc_device import history, variant
 from models import random_model, random_uncertainty

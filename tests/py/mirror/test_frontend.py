@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.target.front_end import Settings, expand_missed, missed_before, samples_per_block
-from gyrotc.target.recursions import F32
-from gyrotc.target.samples import Guarded
+from gyrotc.mirror.front_end import Settings, expand_missed, missed_before, samples_per_block
+from gyrotc.mirror.recursions import F32
+from gyrotc.mirror.samples import Guarded
 from gyrotc.train.samples import Blocks, run_blocks
 
 

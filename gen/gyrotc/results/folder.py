@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
-from ..results.base import Marker
+from .base import Marker
 from .files import Lock, check_replaceable, deferred, sync_folder, unfinished, write_atomically, write_own
 from .marker import (
     KINDS,

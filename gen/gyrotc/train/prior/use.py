@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.arrays import FloatArray
-from ..common.errors import InputError
-from ..results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
-from ..train.data import Bins, Scaling, TrainingData, average
-from ..train.evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
-from ..train.mrbf import fit_mrbf
-from ..train.result import Given, Outcome, UnitMeans, objection, unit_means
+from ...common.arrays import FloatArray
+from ...common.errors import InputError
+from ...results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
+from ..data import Bins, Scaling, TrainingData, average
+from ..evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
+from ..mrbf import fit_mrbf
+from ..result import Given, Outcome, UnitMeans, objection, unit_means
 from .basis import PARAMETERS, LotBasis
 from .learn import FALSE_ALARM, evidence, freedom_of, of_few, p_value, scores, sums_of
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..common.errors import InputError
-from ..results.base import Marker, checked_result
+from .base import Marker, checked_result
 from .files import json_text
 
 MARKER = ".gyrotc-result.json"

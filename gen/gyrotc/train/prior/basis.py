@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray
-from ..results.fleet import LotFunctions
+from ...common.arrays import FloatArray
+from ...results.fleet import LotFunctions
 
 PARAMETERS = ("constant", "short", "short_scale", "long", "long_scale", "coupled", "coupled_scale_t", "coupled_scale_r")
 """Standard deviations in units of the lot and scales in half ranges; a process is given by their logarithms."""

@@ -13,7 +13,7 @@ import pytest
 import typer
 from conftest import ROOT, quick_and_slow, run_gyrotc
 from gyrotc.common.errors import InputError
-from gyrotc.store.files import Lock, write_atomically
+from gyrotc.results.files import Lock, write_atomically
 from recordings import columns, toml, write_csv
 
 PACKAGE = ROOT / "gen" / "gyrotc"
@@ -223,9 +223,9 @@ def test_a_link_to_a_device_is_not_written_to(tmp_path: Path) -> None:
 
 _WRITING = ("write_text", "write_bytes", "touch", "copyfile", "copy2", "copytree", "symlink_to")
 _DOOR = {
-    "store/files.py",
-    "store/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
-    "store/update.py copy2",  # into a folder that the job has just made
+    "results/files.py",
+    "results/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
+    "results/update.py copy2",  # into a folder that the job has just made
     "cli/fleet.py copytree",  # likewise
     "recordings/importers/job.py open",  # into a scratch folder that the job has just made
     "recordings/importers/csv_table.py open",  # likewise

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from conftest import quick_and_slow
 from gyrotc.common.errors import CheckFailed
+from gyrotc.mirror import table as layout
+from gyrotc.mirror.history import evaluate_map, recursions, replay
+from gyrotc.mirror.q31 import GAUSS_ERROR, exp2
+from gyrotc.mirror.recursions import Course, TermOutcome
+from gyrotc.mirror.table import ARRAYS, HELD, Table, f32_words
 from gyrotc.model import Term
 from gyrotc.tables.quantise import NUMERICS, _limits, outside, quantise
-from gyrotc.target import table as layout
-from gyrotc.target.history import evaluate_map, recursions, replay
-from gyrotc.target.q31 import GAUSS_ERROR, exp2
-from gyrotc.target.recursions import Course, TermOutcome
-from gyrotc.target.table import ARRAYS, HELD, Table, f32_words
 from libc_build import ROOT, UNGUARDED, runtime
 from models import bank_of, bank_with_channels, random_channels, random_history, random_model, random_terms
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.target.learning import (
+from gyrotc.mirror.learning import (
     DISAGREES,
     E_ID,
     E_IMAGE,

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from ..results.base import Marker
+from .base import Marker
 from .files import create, sync_folder, write_own
 from .marker import MARKER, NEW, OWN, marker_text, sha256, walk
 

@@ -7,6 +7,7 @@ float32 operation is the one that the target does, in its order.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from ..common.inputs import need_memory
 from .recursions import Arithmetic, Course, Numbers
 from .samples import HELD, RESTART, Guarded, judge_readings
 from .table import WARMING
+
+if TYPE_CHECKING:
+    from ..recordings.records import Rows, Run
 
 MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
@@ -388,3 +392,10 @@ def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[n
     gaps = (time_s[late + 1] - time_s[late]) / row_period_s
     missed[late + 1] = np.minimum(np.rint(gaps) - 1.0, _MAX_MISSED).astype(np.int64)
     return missed
+
+
+def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
+    """Return the number of whole blocks from power-on to the first row; 0 if power-on is unknown or came later."""
+    if run.power_on_s is None:
+        return 0
+    return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
