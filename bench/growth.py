@@ -149,7 +149,7 @@ def _rows(folder: Path) -> Iterator[_Job]:
         yield size, ["check", str(data)]
         yield size, ["fit", str(data), "--out", f"{data}-out"]
         yield size, ["build", str(data), "--out", f"{data}-build"]
-        yield size, ["diagnose", str(data), "--out", f"{data}-diagnosis", "--fresh"]
+        yield size, ["diagnose", str(data), "--out", f"{data}-diagnosis"]
         shutil.rmtree(data)
 
 
@@ -157,7 +157,7 @@ def _gradient(folder: Path) -> Iterator[_Job]:
     for hz in _RAW_HZ[1:]:
         data = folder / str(hz)
         gyrotc(["simulate", "thermal-gradient", "--raw-hz", str(hz), "--format", "parquet", "--out", str(data)])
-        yield 12 * 8 * 3600 * hz, ["diagnose", str(data), "--out", f"{data}-diagnosis", "--fresh"]
+        yield 12 * 8 * 3600 * hz, ["diagnose", str(data), "--out", f"{data}-diagnosis"]
         shutil.rmtree(data)
 
 

@@ -571,12 +571,11 @@ def table_id(serial: str, axis: str | None) -> str:
     return f"{(plain + suffix)[:18]}_{digest[:8]}"
 
 
-def load_model(path: Path, *, stamped: bool = True) -> Model:
+def load_model(path: Path) -> Model:
     """Reads and checks a `model.json`.
 
     Args:
         path: The file, or the folder that holds it.
-        stamped: Demand that the checksum is that of the other fields; False only for `gyrotc stamp`.
 
     Raises:
         InputError: The file is missing, too large, not JSON, of another schema, a field is illegal, or the file
@@ -596,10 +595,10 @@ def load_model(path: Path, *, stamped: bool = True) -> Model:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "(whole)"
         raise InputError(f"{path}, field {field}", first["msg"]) from error
-    if stamped and checksum != model.hash:
+    if checksum != model.hash:
         raise InputError(
             f"{path}, field {CHECKSUM}",
             "is missing" if checksum is None else "is not that of the other fields: the file was changed or damaged",
-            f"the file as gyrotc wrote it (a change made on purpose: gyrotc stamp {path})",
+            "the file as gyrotc wrote it; build it again to change it",
         )
     return model

@@ -142,7 +142,6 @@ def commands(root: Path) -> list[Case]:
     """Commands on small recordings; `root` gets what they need."""
     scenario, data, out, other = root / "short.toml", root / "data", root / "out", root / "other"
     scenario.write_text(SCENARIO, encoding="utf-8")
-    keys = [_key(root / f"key-{k}.pem") for k in range(2)]
     subprocess.run([*GYROTC, "simulate", scenario, "--seed", "3", "--out", data], check=True, stdout=subprocess.DEVNULL)
 
     def case(name: str, line: Callable[[int], Sequence[object]], *results: Path) -> Case:
@@ -157,34 +156,17 @@ def commands(root: Path) -> list[Case]:
         case("emit", lambda v: [out / "model.json", "--out", other, "--numeric", numerics[v % 2]], other),
         case("verify", lambda v: [other, "--target", targets[v % 2]], other),
         case("evaluate", lambda v: [other, data, "--trace", other / "trace", "--average-s", 100 + v], other),
-        case("sign", lambda v: [other, "--key", keys[v % 2]], other),
         case("report", lambda _: [out], out),
         case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
-        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v, "--fresh"], root / "diagnosed"),
+        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v], root / "diagnosed"),
         case("plan", lambda v: [scenario, "--out", root / "planned", "--seed", v], root / "planned"),
         case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
              root / "imported"),
         case("check", lambda _: [data, "--json", root / "check.json"], root / "check.json"),
-        _stamp(root, out / "model.json"),
     ]  # fmt: skip
 
 
-def _stamp(root: Path, model: Path) -> Case:
-    """A model that was changed by hand, and the command that enters its checksum."""
-    changed = root / "changed.json"
-
-    def change(version: int) -> None:
-        changed.write_text(json.dumps(json.loads(model.read_text()) | {"seed": version}))
-
-    return Case("stamp", lambda _: command("stamp", changed), (changed,), prepare=change)
-
-
 GYROTC = (sys.executable, "-c", "from gyrotc.cli.main import main; main()")
-
-
-def _key(path: Path) -> Path:
-    subprocess.run(["openssl", "genpkey", "-algorithm", "ed25519", "-out", path], check=True)
-    return path
 
 
 def command(*arguments: object) -> None:

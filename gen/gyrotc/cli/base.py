@@ -59,8 +59,8 @@ GROUPS = {
     "Calibrate": ("build", "diagnose", "compare", "fit", "emit", "recalibrate"),
     "Judge": ("evaluate", "verify", "report"),
     "Many units": ("fleet", "catalogue", "lot"),
-    "Share": ("certificate", "sign", "export", "stamp"),
-    "This machine": ("completion", "cache", "schema"),
+    "Share": ("certificate", "export"),
+    "Forms": ("schema",),
 }
 """Names of commands by what a user does; a test holds that each stands once."""
 _MARGIN = 6  # blanks around a name, as click's own list has them
@@ -174,7 +174,6 @@ app = typer.Typer(
     cls=GroupedCommands,
     help="From thermal-chamber recordings of a gyro to verified C tables that compensate its bias.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
@@ -16,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..common.inputs import read_input
 from ..pages.display import displayed, in_unit, rate_unit, sci, shown, words
 from .base import (
     LOT,
@@ -367,66 +364,3 @@ def address_of(text: str) -> int:
     if not 0 <= found < 2**32:
         raise InputError("--address", repr(text), "an address of 32 bits, such as 0x80040000")
     return found
-
-
-@app.command()
-def sign(
-    folder: DirArg,
-    key: Annotated[
-        Path | None,
-        typer.Option("--key", help="Ed25519 private key (PEM); without it DIR/c/release.json is only written."),
-    ] = None,
-    passphrase_file: Annotated[
-        Path | None, typer.Option("--key-passphrase-file", help="Its first line is the passphrase of an encrypted key.")
-    ] = None,
-    accept_fail: AcceptOption = None,
-) -> None:
-    """Sign verdict, limits, uncertainty, dates and DIR/c (with --axis all: of every axis, too): DIR/c/release.json and
-    release.json.sig. Only what verify passes is signed, and FAIL or CONDITIONAL PASS only with --accept-fail.
-
-    Example: gyrotc sign result --key lab.pem
-    """
-    from ..jobs.release import check_emitted, release_of
-    from ..results.files import json_text, write_own
-    from ..results.folder import result_folder
-    from ..tables.record import RELEASE, SIGNATURE, load_private_key, sign_record
-
-    private = load_private_key(key, lambda: _passphrase(key, passphrase_file)) if key else None
-    with progress() as say:
-        check_emitted(folder, "not signed", say)
-        releases = release_of(folder, accept_fail)
-    old = shutil.ignore_patterns(RELEASE, SIGNATURE)
-    for part, release in releases:
-        with result_folder(part, "sign", entries=("c",)) as stage:
-            shutil.copytree(part / "c", stage.folder / "c", ignore=old)
-            write_own(stage.folder / "c" / RELEASE, json_text(release.content()))
-            if private is not None:
-                sign_record(stage.folder / "c", private)
-        verdict = release.verdict or "no limits were given"
-        written = f"{part / 'c' / SIGNATURE}: signed" if private else f"{part / 'c' / RELEASE}: not signed"
-        tell(f"{written}; {verdict}{f', accepted: {accept_fail}' if release.accepted_fail else ''}")
-
-
-def _passphrase(key: Path, file: Path | None) -> str:
-    if file is not None:
-        lines = read_input(file, "text_mib", "a passphrase").decode("utf-8", "replace").splitlines()
-        if not lines or not lines[0]:
-            raise InputError(str(file), "has an empty first line", "a passphrase")
-        return lines[0]
-    if not sys.stdin.isatty():
-        raise InputError(str(key), "is encrypted, and there is no terminal to ask", "--key-passphrase-file")
-    return str(typer.prompt(f"passphrase of {key}", hide_input=True, err=True))
-
-
-@app.command()
-def stamp(model: Annotated[Path, typer.Argument(help="A model.json that was changed on purpose.")]) -> None:
-    """Enter the checksum of a model.json that was changed by hand: from then on it is another model.
-
-    Example: gyrotc stamp result/model.json
-    """
-    from ..model import load_model
-
-    path = model / "model.json" if model.is_dir() else model
-    loaded = load_model(path, stamped=False)
-    loaded.save(path)
-    tell(f"{path}: stamped, sha256 {loaded.hash}")

@@ -391,9 +391,6 @@ def diagnose(
     accept_events: Annotated[
         bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
     ] = False,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Compute anew what an earlier call has found of the same recordings.")
-    ] = False,
     display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -427,7 +424,6 @@ def diagnose(
                 options=fitting if known is None else None,
                 progress=say,
                 accept_events=accept_events,
-                fresh=fresh,
             ).result
 
     if not several or out is None:

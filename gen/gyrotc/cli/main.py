@@ -169,7 +169,6 @@ def _without_warnings() -> None:
         logging.disable()  # of Dask: what becomes of a gyro is reported by the fleet
 
 
-_COMPLETE = "_GYROTC_COMPLETE"  # as in the scripts of `gyrotc completion`
 # Options of the whole program, taken after the command as well
 _ANYWHERE = ("-q", "--quiet", "-v", "--verbose")
 
@@ -195,12 +194,7 @@ def run(arguments: list[str]) -> int:
     Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
     """
     try:
-        app = application()
-        if _COMPLETE in os.environ:  # a shell asks what could follow
-            from typer._completion_classes import completion_init
-
-            completion_init()
-        app(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
+        application()(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
     except GyrotcError as error:
         # Compilers say more than a line
         shown = terminal_line if isinstance(error, InputError) else terminal_text

@@ -196,14 +196,6 @@ def file_notes(result: Verification | JointVerification) -> Iterator[str]:
     zero_at = options.zero_at_c if options else None
     shift = f", shifted to 0 at {zero_at:g} C" if zero_at is not None else ""
     yield f"{equal} of {len(result.emitted)} files are, byte for byte, what the model gives{shift}"
-    signed = result.signature
-    if signed:
-        verdict = "good" if signed.status == "pass" else f"BAD: {signed.reason}"
-        yield f"signature {verdict}; key sha256 {signed.key}"
-    if signed and signed.status == "pass":
-        why = f", accepted: {signed.accepted_fail}" if signed.accepted_fail else ""
-        until = f"; valid until {signed.valid_until}" if signed.valid_until else ""
-        yield f"released: {signed.verdict or 'no limits were given'}{why}{until}"
 
 
 def _difference_text(file: VerifiedFile) -> str:

@@ -1,4 +1,4 @@
-"""What concerns the user's own machine: completion of a shell, the cache, forms of the results."""
+"""Forms of the results, as JSON Schema and as tables."""
 
 from __future__ import annotations
 
@@ -6,24 +6,15 @@ import functools
 import json
 import types
 from collections.abc import Collection, Iterator
-from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
 
 from ..common.errors import InputError
-from .base import app, tell
+from .base import app
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
-
-
-class Shell(str, Enum):
-    """Shells that `gyrotc completion` has a script for."""
-
-    bash = "bash"
-    zsh = "zsh"
-    fish = "fish"
 
 
 @app.command()
@@ -49,41 +40,6 @@ def schema(
         typer.echo(json.dumps(whole, indent=1))
 
 
-@app.command()
-def completion(shell: Annotated[Shell, typer.Argument(help="The shell.")]) -> None:
-    """A script that completes commands and options in a shell, on stdout.
-
-    Example: gyrotc completion bash > ~/.local/share/bash-completion/completions/gyrotc
-    """
-    from typer._completion_shared import get_completion_script
-
-    typer.echo(get_completion_script(prog_name="gyrotc", complete_var="_GYROTC_COMPLETE", shell=shell.value))
-
-
-@app.command()
-def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove all of it.")] = False,
-    limit_gb: Annotated[
-        float | None,
-        typer.Option("--limit", min=0.0, max=1e6, help="Most GB that it may take, from now on; default 2."),
-    ] = None,
-) -> None:
-    """What gyrotc keeps between calls (diagnoses, compiled runtimes): where, how much, and how much it may be.
-
-    Example: gyrotc cache --limit 0.5
-    """
-    from ..results import cache as kept
-
-    if limit_gb is not None:
-        kept.set_limit(round(limit_gb * 1e9))
-    if clear:
-        kept.clear()
-    (banks, _), (diagnoses, _), (objects, _) = (kept.held(kind) for kind in ("bank", "diagnosis", "object"))
-    counted = f"{banks} banks of signatures, {diagnoses} diagnoses, {objects} objects of compilers"
-    _, size = kept.held()
-    tell(f"{kept.folder()}: {counted}, {size / 1e9:.3f} GB of at most {kept.limit() / 1e9:g} GB")
-
-
 @functools.cache
 def kinds() -> dict[str, type[BaseModel]]:
     """Every file and output by the name that `gyrotc schema` knows; imported when asked for, as help needs none."""
@@ -93,7 +49,7 @@ def kinds() -> dict[str, type[BaseModel]]:
     from ..results.evaluation import Changes, Comparison, Evaluation, InService
     from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary, Lot
     from ..results.recordings import Checked, ImportedFiles, LotPlan, NextRun, Plan, SimulatedTruth
-    from ..results.release import Budget, Emitted, HeldLimits, JointVerification, Release, Verification
+    from ..results.release import Budget, Emitted, HeldLimits, JointVerification, Verification
     from ..results.training import Manifest, Training
     from ..tables.record import EmissionRecord
 
@@ -119,7 +75,6 @@ def kinds() -> dict[str, type[BaseModel]]:
         "model": Model,
         "next-run": NextRun,
         "plan": Plan,
-        "release": Release,
         "result": Marker,
         "service": InService,
         "training": Training,

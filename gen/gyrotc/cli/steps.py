@@ -200,12 +200,6 @@ def verify(
     allow_edited: Annotated[
         list[str] | None, typer.Option("--allow-edited", help="main.c: the example is yours now and may differ.")
     ] = None,
-    signature: Annotated[
-        Path | None, typer.Option("--signature", help="Public key (PEM): DIR/c must be signed with it.")
-    ] = None,
-    replaces: Annotated[
-        Path | None, typer.Option("--replaces", help="Signed result that the gyro carries now: DIR may not be older.")
-    ] = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
@@ -223,8 +217,6 @@ def verify(
     from ..results.release import JointVerification, Verification
     from ..verify.job import verify as run
 
-    if replaces is not None and signature is None:
-        raise InputError("--replaces", "without --signature", "the public key that both are signed with")
     allowed = allow_edited or ()
     axes = axes_in(folder)
     if axes and log is not None:
@@ -242,8 +234,6 @@ def verify(
                     log=log,
                     exhaustive=exhaustive,
                     edited=allowed,
-                    signature=signature,
-                    replaces=replaces / axis if replaces and axis and axes else replaces,
                     trust_code=trust_code,
                     progress=say,
                 )
@@ -251,7 +241,7 @@ def verify(
     result: Verification | JointVerification = next(iter(results.values()))
     if axes:
         with result_folder(folder, "verify", entries=("verify.json",)) as stage:
-            result = verify_axes(folder, results, allowed, signature, replaces)
+            result = verify_axes(folder, results, allowed)
             write_atomically(stage.folder / "verify.json", json_text(result.content()))
     write_json(json_file, result.content())
     for one in results.values():

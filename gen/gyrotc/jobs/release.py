@@ -1,8 +1,8 @@
-"""What may be said of a result, and what a laboratory signs of it: files as they were written, figures that agree.
+"""What may be certified of a result: files as they were written, figures that agree.
 
 What can be computed again of the results in a folder is, and compared. This finds a decision or an uncertainty that was
 edited, also where hashes were made again. It cannot find figures of recordings that were edited together with all that
-follows from them: only a signature does.
+follows from them: only hashes that were kept elsewhere do.
 
 Of a unit with three axes: its one image, with the runtime once, a table for each axis, one page for all.
 """
@@ -19,7 +19,6 @@ from pydantic import ValidationError
 
 from .. import __version__
 from ..assess.budget import AGEING, budget_of
-from ..assess.changes import stated_day
 from ..assess.limits import Limits, held_against, worst_of
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
@@ -29,22 +28,19 @@ from ..pages.unit import UnitResults, unit_in
 from ..results.evaluation import Changes, Evaluation, Pooled
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
-from ..results.marker import check_intact, sha256
+from ..results.marker import check_intact
 from ..results.release import (
     NEED_REASON,
-    RELEASED,
     STATED,
     Budget,
     HeldLimits,
     JointVerification,
-    Release,
-    ReleasedUnit,
     Verification,
     VerifiedTarget,
 )
 from ..results.training import Training
 from ..tables.emit import config_text, emitted_tables, runtime_texts
-from ..tables.record import RECORD, check_signature, joint_record_text, load_public_key
+from ..tables.record import RECORD, joint_record_text
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.job import verify
@@ -225,61 +221,6 @@ def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> 
     return line
 
 
-def release_of(folder: Path, reason: str | None = None) -> list[tuple[Path, Release]]:
-    """What is to be signed of a result, with the folder that it is of: every axis, and with several all of them.
-
-    A folder of `emit` alone, which nothing was measured of, has no verdict.
-
-    Raises:
-        InputError: It is not as it was written, or it needs a reason to be released and there is none.
-    """
-    axes = axes_in(folder)
-    parts = [folder / axis for axis in axes] or [folder]
-    models, units = {}, {}
-    for part in parts:
-        check_intact(part, STATED)
-        models[part] = load_model(part / "model.json")
-        if (part / "evaluate.json").is_file():
-            units[part] = unit_of(part)
-    why = accepted(folder, list(units.values()), reason)
-    released = {part: _unit(models[part], units.get(part)) for part in parts}
-    return [
-        (place, _release(place, [(part, released[part]) for part in parts if place in (part, folder)], why))
-        for place in [*parts, *([folder] if axes else [])]
-    ]
-
-
-def _release(place: Path, units: Sequence[tuple[Path, ReleasedUnit]], why: str | None) -> Release:
-    verdict = worst_of(unit.verdict for _, unit in units)
-    listed = [part / name for part, _ in units for name in RELEASED]
-    return Release(
-        gyrotc_version=__version__,
-        serial=load_model(units[0][0] / "model.json").serial,
-        axis=units[0][1].axis if units[0][0] == place else None,
-        verdict=verdict,
-        accepted_fail=why if verdict in NEED_REASON else None,
-        units=tuple(unit for _, unit in units),
-        emission=sha256(place / "c" / RECORD),
-        files={p.relative_to(place).as_posix(): sha256(p) for p in listed if p.is_file()},
-    )
-
-
-def _unit(model: Model, unit: UnitResults | None) -> ReleasedUnit:
-    limits, budget = (unit.limits, unit.budget) if unit else (None, None)
-    return ReleasedUnit(
-        axis=model.axis,
-        model_hash=model.hash,
-        verdict=unit.decision if unit else None,
-        failures=tuple(unit.failures) if unit else (),
-        limits_sha256=limits.sha256 if limits else None,
-        limits=limits.limits if limits else (),
-        expanded_dph=budget.expanded_dph if budget else None,
-        coverage_factor=budget.coverage_factor if budget else None,
-        calibrated_on=budget.calibrated_on if budget else stated_day(model),
-        valid_until=budget.valid_until if budget else None,
-    )
-
-
 AXES = ("x", "y", "z")
 
 _HOST = "host-gcc-O2"
@@ -349,8 +290,6 @@ def verify_axes(
     folder: Path,
     results: Mapping[str, Verification],
     edited: Sequence[str] = (),
-    signature: Path | None = None,
-    replaces: Path | None = None,
 ) -> JointVerification:
     """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
 
@@ -365,17 +304,15 @@ def verify_axes(
     numeric = next(iter(results.values())).errors[0].numeric
     texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
     emitted = tuple(file_entries(folder / "c", texts, edited))
-    signed = check_signature(folder / "c", load_public_key(signature), replaces) if signature else None
     wrong = sum(file.status == "fail" for file in emitted)
     return JointVerification(
         gyrotc_version=__version__,
         serial=next(iter(results.values())).serial,
         axis=None,
         passed=sum(one.passed for one in results.values()),
-        failed=sum(one.failed for one in results.values()) + wrong + (signed is not None and signed.status == "fail"),
+        failed=sum(one.failed for one in results.values()) + wrong,
         missing=sum(one.missing for one in results.values()),
         emitted=emitted,
-        signature=signed,
         axes=dict(results),
     )
 

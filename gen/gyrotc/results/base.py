@@ -152,7 +152,7 @@ class Marker(Result):
 
     schema_: Annotated[Literal["gyrotc.result/1"], Field(alias="schema")] = "gyrotc.result/1"
     kind: str = Field(
-        description="`result` (build, fit, emit, verify, evaluate, sign), `diagnosis`, `plan`, `comparison`, "
+        description="`result` (build, fit, emit, verify, evaluate), `diagnosis`, `plan`, `comparison`, "
         "`data set` (simulate, import), `fleet`, `trace` (traces outside a result)"
     )
     command: str = Field(description="that wrote the folder last")

@@ -74,8 +74,8 @@ def _is_regular(path: Path) -> bool:
 
 T = TypeVar("T")
 
-_MOST_BYTES = 2 * 10**9  # some dozens of banks of signatures, beside which diagnoses are small
-_LIMIT = "limit_bytes"  # a file beside what is kept that says otherwise
+# Some dozens of banks of signatures, beside which compiled objects are small.
+_MAX_BYTES = 2 * 10**9
 _MAGIC = b"gyrotc kept\n"
 _HEAD_BYTES = len(_MAGIC) + hashlib.sha256().digest_size
 
@@ -144,47 +144,10 @@ def _is_own() -> bool:
     return facts.st_uid == os.geteuid() and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def limit() -> int:
-    """Most bytes that everything may take."""
-    try:
-        return min(int((folder() / _LIMIT).read_text("ascii")[:20]), 10**15)
-    except (OSError, ValueError):
-        return _MOST_BYTES
-
-
-def set_limit(most: int) -> None:
-    """Keeps to another limit from now on.
-
-    Raises:
-        InputError: The folder is not there and cannot be made, or is not the user's own.
-    """
-    if not _is_own():
-        raise InputError(str(folder()), "is not a folder that only this user may write", "such a folder")
-    write_atomically(folder() / _LIMIT, f"{most}\n")
-    _trim()
-
-
-def held(kind: str = "*") -> tuple[int, int]:
-    """How many files there are of a kind, and their bytes."""
-    sizes = [path.stat().st_size for path in _files(kind)]
-    return len(sizes), sum(sizes)
-
-
-def clear() -> None:
-    """Removes all of it."""
-    for path in _files():
-        path.unlink(missing_ok=True)
-
-
 def _trim() -> None:
     """Drops what was not used for longest, down to the limit."""
-    most = limit()
     total = 0
-    for path in sorted(_files(), key=lambda p: p.stat().st_mtime, reverse=True):
+    for path in sorted(folder().glob("*.*"), key=lambda p: p.stat().st_mtime, reverse=True):
         total += path.stat().st_size
-        if total > most:
+        if total > _MAX_BYTES:
             path.unlink(missing_ok=True)
-
-
-def _files(kind: str = "*") -> list[Path]:
-    return list(folder().glob(f"*.{kind}"))

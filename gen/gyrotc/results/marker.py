@@ -28,7 +28,6 @@ KINDS = {
     "recalibrate": "result",
     "verify": "result",
     "evaluate": "result",
-    "sign": "result",
     "diagnose": "diagnosis",
     "plan": "plan",
     "compare": "comparison",
@@ -44,7 +43,7 @@ OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
 """Names by which gyrotc keeps its books in a folder: the marker, one being written, what exchanges are tried on."""
 
 _AS_WRITTEN = "a folder as gyrotc wrote it; make it again"
-_FREE = frozenset(("c/main.c", "c/release.json.sig"))  # the user's, and what another tool may have signed
+_FREE = frozenset(("c/main.c",))  # the user's
 _ANYBODYS = "model.json"  # has a checksum of its own, and emit works beside one that came from elsewhere
 _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 

@@ -1,4 +1,4 @@
-"""What was emitted and verified of a unit, what is decided (`limits.json`, `budget.json`), what a laboratory signs."""
+"""What was emitted and verified of a unit, and what is decided of it (`limits.json`, `budget.json`)."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ Verdict = Literal["PASS", "CONDITIONAL PASS", "FAIL"]
 """Statement of conformity; a conditional pass is within its limit, but closer to it than the guard band."""
 
 NEED_REASON: tuple[Verdict, ...] = ("CONDITIONAL PASS", "FAIL")
-"""Verdicts of units that are certified and signed only for a stated reason."""
+"""Verdicts of units that are certified only for a stated reason."""
 
 JudgedOn = Literal["exam", "left_out", "train"]
 """What a figure was measured on."""
@@ -160,44 +160,11 @@ class HeldLimits(UnitResult):
         return tuple(dict.fromkeys(one.capped for one in self.limits if one.capped))
 
 
-RELEASED = (
+STATED = (
     "model.json", "training.json", "evaluate.json", "limits.json", "budget.json", "changes.json", "manifest.json",
-    "diagnosis/diagnose.json",
+    "diagnosis/diagnose.json", "verify.json", "c",
 )  # fmt: skip
-"""Files of an axis that say something of the unit, by their paths in its folder, and are signed."""
-
-STATED = (*RELEASED, "verify.json", "c")
-"""These and what is compared anew by whoever verifies."""
-
-
-class ReleasedUnit(Part):
-    """One axis."""
-
-    axis: Axis = Field(description="null where the recordings have one axis")
-    model_hash: str = Field(description="hash of the model")
-    verdict: Verdict | None = Field(description="of limits and checks; null: no limits were given")
-    failures: tuple[str, ...] = Field(description="checks that failed beside the limits")
-    limits_sha256: str | None = Field(description="of the limits file; null where none was given")
-    limits: tuple[Limit, ...] = Field(description="every limit")
-    expanded_dph: Amount | None = Field(description="U of the compensated bias; null: no budget, deg/h")
-    coverage_factor: Figure = Field(description="k of it")
-    calibrated_on: str | None = Field(description="day of the calibration; null: not stated")
-    valid_until: str | None = Field(description="last day of the interval; null: none is stated")
-
-
-class Release(Result):
-    """What is signed (`gyrotc sign`): it binds the emitted files to what was found of the unit."""
-
-    schema_: Annotated[Literal["gyrotc.release/1"], Field(alias="schema")] = "gyrotc.release/1"
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where there is one axis, and for the folder of several")
-    verdict: Verdict | None = Field(description="the gravest of all axes; null: no limits were given")
-    accepted_fail: str | None = Field(
-        description="why it is released although the verdict is FAIL or CONDITIONAL PASS; else null"
-    )
-    units: tuple[ReleasedUnit, ...] = Field(description="every axis")
-    emission: str = Field(description="SHA-256 of `c/emission.json`, which has that of every emitted file")
-    files: dict[str, str] = Field(description="SHA-256 of the files behind this, by path in the result")
+"""Files and folders of an axis that say something of the unit, by their paths in its folder."""
 
 
 class EmittedTable(Part):
@@ -316,23 +283,6 @@ class VerifiedFile(Part):
     expected: str | None = Field(default=None, description="what the model gives")
 
 
-class SignatureCheck(Part):
-    """The signature of the emitted files."""
-
-    file: str = Field(description="its name in `c/`")
-    status: PassOrFail = Field(description="whether the record of the files was signed with this key")
-    key: str = Field(description="SHA-256 of the public key")
-    reason: str | None = Field(description="why it is not good; null where it is")
-    verdict: Verdict | None = Field(
-        default=None, description="that was signed; null without limits, and where the signature is not good"
-    )
-    accepted_fail: str | None = Field(
-        default=None,
-        description="why it was released although the verdict is FAIL or CONDITIONAL PASS, as it was signed",
-    )
-    valid_until: str | None = Field(default=None, description="first day on which an axis ends, as it was signed")
-
-
 class MapError(Part):
     """Departure of the emitted map from the model, in one arithmetic."""
 
@@ -395,7 +345,6 @@ class _Counted(Result):
     failed: Count = Field(description="targets, files and other checks that failed")
     missing: Count = Field(description="targets whose compiler or emulator is not here")
     emitted: tuple[VerifiedFile, ...] = Field(description="every file that is or should be in `c/`")
-    signature: SignatureCheck | None = Field(default=None, description="null where none was asked for")
 
     @property
     def wrong_files(self) -> list[str]:

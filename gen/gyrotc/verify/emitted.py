@@ -28,10 +28,10 @@ from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
 from ..model import SERIAL, Model
 from ..results.files import write_own
-from ..results.marker import read_marker
+from ..results.marker import MARKER, read_marker
 from ..results.release import VerifiedFile
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
-from ..tables.record import BESIDES, Options, read_options
+from ..tables.record import Options, read_options
 from ..tables.text import ARITHMETICS, LEARNING, amalgamate
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
@@ -53,7 +53,7 @@ class Job:
 
 def c_hash(c_folder: Path, left_out: Mapping[str, bytes] | None = None) -> str:
     """SHA-256 over names and contents of the emitted files, and of those that are not kept."""
-    paths = (p for p in c_folder.iterdir() if p.is_file() and p.name not in BESIDES)
+    paths = (p for p in c_folder.iterdir() if p.is_file() and p.name != MARKER)
     contents = {**(left_out or {}), **{path.name: path.read_bytes() for path in paths}}
     digest = hashlib.sha256()
     for name, data in sorted(contents.items()):
@@ -127,7 +127,7 @@ def file_entries(
             yield VerifiedFile(file=name, verdict="equal", status="pass", mismatches=0)
         else:
             yield _differing(name, found, data, allowed=name in edited)
-    for name in sorted(there - set(texts) - BESIDES):
+    for name in sorted(there - set(texts) - {MARKER}):
         yield VerifiedFile(file=name, verdict="foreign", status="fail", mismatches=1)
 
 

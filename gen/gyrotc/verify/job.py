@@ -29,19 +29,15 @@ from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
 from ..results.folder import scratch_folder
-from ..results.marker import check_intact
 from ..results.release import (
-    STATED,
     EmittedWith,
     MapError,
-    SignatureCheck,
     Verification,
     VerifiedFile,
     VerifiedTarget,
     WorstError,
 )
 from ..tables.emit import expected_answers
-from ..tables.record import check_signature, load_public_key
 from ..tables.vectors import Vectors, make_vectors
 from .board import board_entries, log_entries
 from .emitted import (
@@ -224,8 +220,6 @@ def verify(
     exhaustive: bool = False,
     compiled: bool = True,
     edited: Sequence[str] = (),
-    signature: Path | None = None,
-    replaces: Path | None = None,
     trust_code: bool = False,
     progress: Progress | None = None,
 ) -> Verification:
@@ -240,8 +234,6 @@ def verify(
         exhaustive: Visit every input of the fixed-point table besides.
         compiled: False: no target; files and bounds are checked against model and reference alone.
         edited: Files of `EDITABLE` that the user made their own: they may differ.
-        signature: Public key with which `folder/c` must be signed.
-        replaces: A result signed with it that this one is to replace: it may not be of a later calibration.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         progress: Called with the name of each target before it is tried.
 
@@ -251,9 +243,6 @@ def verify(
     """
     say = progress or (lambda _: None)
     _check_edited(edited)
-    key = load_public_key(signature) if signature is not None else None
-    if key is not None:
-        check_intact(folder, STATED, needed=False)
     model = load_model(folder / "model.json")
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
     say("comparing files")
@@ -266,7 +255,6 @@ def verify(
     texts = texts_again(model, options, emission)
     left_out = left_out_of(folder, model, texts)
     emitted = tuple(file_entries(job.c_folder, texts, edited, left_out))
-    signed = check_signature(job.c_folder, key, replaces) if key is not None else None
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
     identity = (model.hash, c_hash(folder / "c", left_out))
@@ -279,7 +267,7 @@ def verify(
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     if exhaustive and not barred:
         errors = [_every_input(job, exact, say) if e.numeric == "q31" else e for e in errors]
-    passed, failed, missing = _counts(entries, [*emitted, *errors, *([signed] if signed else [])], set(targets))
+    passed, failed, missing = _counts(entries, [*emitted, *errors], set(targets))
     return Verification(
         gyrotc_version=__version__,
         serial=model.serial,
@@ -293,7 +281,6 @@ def verify(
         log=brought,
         options=EmittedWith(numeric=options.numeric, zero_at_c=options.zero_at_c),
         emitted=tuple(emitted),
-        signature=signed,
         errors=tuple(errors),
         error_bound_dph=max(e.bound_dph for e in errors),
         worst_error_dph=WorstError(
@@ -377,7 +364,7 @@ def _merged(earlier: list[VerifiedTarget], entries: list[VerifiedTarget]) -> lis
 
 
 def _counts(
-    entries: Sequence[VerifiedTarget], checks: Sequence[VerifiedFile | MapError | SignatureCheck], named: set[str]
+    entries: Sequence[VerifiedTarget], checks: Sequence[VerifiedFile | MapError], named: set[str]
 ) -> tuple[int, int, int]:
     """Targets passed, failed, missing. A named target that is missing has failed, and so has a check."""
     status = [entry.status for entry in entries]

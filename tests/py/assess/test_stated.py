@@ -7,7 +7,6 @@ import hashlib
 import json
 import random
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,11 +21,10 @@ from gyrotc.deliver.certificate import certificate
 from gyrotc.deliver.export import export
 from gyrotc.jobs.build import build_into
 from gyrotc.jobs.lot import _unit
-from gyrotc.jobs.release import release_of, unit_of
+from gyrotc.jobs.release import unit_of
 from gyrotc.recordings.load import load
 from gyrotc.results.folder import result_folder
 from gyrotc.results.marker import MARKER
-from gyrotc.results.release import RELEASED
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -80,15 +78,6 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _built(tmp_path_factory.mktemp("failing"), FAILS)
 
 
-@pytest.fixture(scope="module")
-def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    private = tmp_path_factory.mktemp("keys") / "lab.pem"
-    subprocess.run(["openssl", "genpkey", "-algorithm", "ed25519", "-out", private], check=True)
-    public = private.with_suffix(".pub")
-    subprocess.run(["openssl", "pkey", "-in", private, "-pubout", "-out", public], check=True)
-    return private
-
-
 @pytest.fixture(autouse=True)
 def paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(printing, "_BROWSERS", ())
@@ -130,19 +119,17 @@ def _passed(folder: Path) -> None:
 
 @pytest.mark.parametrize("hashes", ["as they were", "made again"])
 def test_a_fail_that_was_edited_into_a_pass_is_refused(
-    failing: Path, tmp_path: Path, key: Path, hashes: str,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    failing: Path, tmp_path: Path, hashes: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Before: a certificate that said PASS and U = 1e-6, on the page, in the PDF and in the DCC."""
     folder = shutil.copytree(failing, tmp_path / "out")
     _passed(folder)
     if hashes == "made again":
         _hash_again(folder, "limits.json", "budget.json")
-    for command in (("certificate", folder, "--draft", "--out", tmp_path / "C"), ("sign", folder, "--key", key)):
-        assert _status(*command) == 2
-        reported = capsys.readouterr().err
-        assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), reported
-    assert not (tmp_path / "C").exists() and not (folder / "c" / "release.json").exists()
+    assert _status("certificate", folder, "--draft", "--out", tmp_path / "C") == 2
+    reported = capsys.readouterr().err
+    assert len(reported.splitlines()) == 1 and ("limits.json" in reported or "budget.json" in reported), reported
+    assert not (tmp_path / "C").exists()
 
 
 @pytest.mark.parametrize(
@@ -158,57 +145,32 @@ def test_a_budget_is_computed_again(passing: Path, tmp_path: Path, name: str, fi
         unit_of(folder)
 
 
-def test_a_fail_needs_a_reason_which_is_signed_and_printed(
-    failing: Path, tmp_path: Path, key: Path,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    """Before: `sign` signed a result that said FAIL, and no verdict was among what it signed."""
-    folder, reason = shutil.copytree(failing, tmp_path / "out"), "bench unit, not for flight"
-    assert _status("sign", folder, "--key", key) == 2
-    reported = capsys.readouterr().err
-    assert (
-        "its verdict is FAIL (" in reported and "--accept-fail REASON" in reported and len(reported.splitlines()) == 1
-    )
-    with pytest.raises(InputError, match="its verdict is FAIL"):
-        certificate(folder, tmp_path / "C", draft=True)
+def test_a_fail_needs_a_reason_which_is_printed(failing: Path, tmp_path: Path) -> None:
+    reason = "bench unit, not for flight"
+    with pytest.raises(InputError, match=r"its verdict is FAIL \(.*--accept-fail REASON"):
+        certificate(failing, tmp_path / "C", draft=True)
     with pytest.raises(InputError, match="a reason"):
-        release_of(folder, " \n")
-    assert _status("sign", folder, "--key", key, "--accept-fail", reason) == 0
-    release = json.loads((folder / "c" / "release.json").read_text())
-    assert (release["verdict"], release["accepted_fail"]) == ("FAIL", reason)
-    [unit] = release["units"]
-    assert unit["valid_until"] == "2027-03-07" and unit["calibrated_on"] == "2026-03-07"
-    assert unit["expanded_dph"] == json.loads((folder / "budget.json").read_text())["expanded_dph"]
-    assert len(unit["limits"]) == 8
-    certificate(folder, tmp_path / "C", draft=True, accept_fail=reason)
+        certificate(failing, tmp_path / "C", draft=True, accept_fail=" \n")
+    certificate(failing, tmp_path / "C", draft=True, accept_fail=reason)
     page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
     assert f"Released although the verdict is FAIL:</b> {reason}" in page
-    public = key.with_suffix(".pub")
-    capsys.readouterr()
-    assert _status("verify", folder, "--target", "host-gcc-O2", "--signature", public) == 0
-    assert f"released: FAIL, accepted: {reason}; valid until 2027-03-07" in capsys.readouterr().out
 
 
-def test_a_conditional_pass_needs_a_reason_which_is_released_and_printed(passing: Path, tmp_path: Path) -> None:
-    """Before: it was certified and signed as if it were a PASS."""
+def test_a_conditional_pass_needs_a_reason_which_is_printed(passing: Path, tmp_path: Path) -> None:
     [rms] = [limit.measured for limit in unit_of(passing).held if limit.limit == "at_most.rms_dph"]
     assert isinstance(rms, float)
     folder = _built(tmp_path, PASSES.replace("rms_dph = 30.0", f"rms_dph = {rms * 1.0001}"))
     assert unit_of(folder).decision == "CONDITIONAL PASS"
     with pytest.raises(InputError, match=r"its verdict is CONDITIONAL PASS \(.*RMS"):
-        release_of(folder)
-    with pytest.raises(InputError, match="its verdict is CONDITIONAL PASS"):
         certificate(folder, tmp_path / "C", draft=True)
-    [(_, release)] = release_of(folder, "within its limit")
-    assert (release.verdict, release.accepted_fail) == ("CONDITIONAL PASS", "within its limit")
     certificate(folder, tmp_path / "C", draft=True, accept_fail="within its limit")
     page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
     assert "Released although the verdict is CONDITIONAL PASS:</b> within its limit" in page
 
 
-def test_a_reason_without_a_fail_is_refused(passing: Path) -> None:
+def test_a_reason_without_a_fail_is_refused(passing: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the verdict is PASS"):
-        release_of(passing, "why not")
+        certificate(passing, tmp_path / "C", draft=True, accept_fail="why not")
 
 
 @pytest.mark.parametrize(
@@ -231,8 +193,6 @@ def test_no_limits_are_no_pass(
     assert "No limits were given" in page and "PASS" not in page
     assert _status("report", folder) == 0
     assert "<strong>No verdict</strong>" in (folder / "report.html").read_text("utf-8")
-    [(_, release)] = release_of(folder)
-    assert release.verdict is None
     (tmp_path / "fleet.toml").write_text('schema = 1\ndatasets = ["RLG-1"]\nlimits = "limits.toml"\n')
     assert _status("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "F", "--jobs", "1") == 0
     [entry] = json.loads((tmp_path / "F" / "fleet.json").read_text())["serials"]
@@ -267,24 +227,15 @@ def _mutated(content: Any, path: tuple[str | int, ...]) -> Any:
 
 
 @pytest.mark.parametrize(("of_a_file", "least"), quick_and_slow([(12, 80)], [(100_000, 1000)]))
-def test_every_leaf_and_payload_is_guarded(
-    passing: Path, tmp_path: Path, key: Path, of_a_file: int, least: int
-) -> None:
-    """Certificate, signing, export, lot and the signature's own check refuse whatever of it was changed."""
-    from gyrotc.tables.record import check_signature, load_private_key, load_public_key, sign_record
-
+def test_every_leaf_and_payload_is_guarded(passing: Path, tmp_path: Path, of_a_file: int, least: int) -> None:
+    """Certificate, export and lot refuse whatever of it was changed."""
     print(f"seed {SEED}")
     rng = random.Random(SEED)
     folder = shutil.copytree(passing, tmp_path / "out")
-    [(_, release)] = release_of(folder)
-    (folder / "c" / "release.json").write_text(json.dumps(release.content()))
-    sign_record(folder / "c", load_private_key(key, lambda: ""))
-    public = load_public_key(key.with_suffix(".pub"))
-    assert check_signature(folder / "c", public).status == "pass"
     tried = 0
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = path.relative_to(folder).as_posix()
-        if name in (MARKER, "c/main.c", "c/release.json.sig", "entry.json"):
+        if name in (MARKER, "c/main.c"):
             continue
         before = path.read_bytes()
         if path.suffix == ".json":
@@ -299,31 +250,26 @@ def test_every_leaf_and_payload_is_guarded(
             texts += [before + b"\n", b""]
         for text in texts:
             path.write_bytes(text)
-            _refused(folder, tmp_path, name, public, check_signature)
+            _refused(folder, tmp_path, name)
             tried += 1
         path.unlink()
-        _refused(folder, tmp_path, name, public, check_signature)
+        _refused(folder, tmp_path, name)
         path.write_bytes(before)
     print(f"{tried} mutations, all refused")
     assert tried > least
     unit_of(folder)
-    assert check_signature(folder / "c", public).status == "pass"
 
 
-def _refused(folder: Path, tmp_path: Path, name: str, public: Any, check_signature: Any) -> None:
-    if name != "c/release.json":
-        for command in (lambda: certificate(folder, tmp_path / "C", draft=True), lambda: release_of(folder)):
-            with pytest.raises(GyrotcError, match=name.rpartition("/")[2].replace(".", r"\.")):
-                command()
-        assert not (tmp_path / "C").exists()
-    if name == "model.json" or (name.startswith("c/") and name != "c/release.json"):
+def _refused(folder: Path, tmp_path: Path, name: str) -> None:
+    with pytest.raises(GyrotcError, match=name.rpartition("/")[2].replace(".", r"\.")):
+        certificate(folder, tmp_path / "C", draft=True)
+    assert not (tmp_path / "C").exists()
+    if name == "model.json" or name.startswith("c/"):
         with pytest.raises(GyrotcError):
             export(folder, "csv", tmp_path / "map.csv")
     if name in ("model.json", "training.json"):
         with pytest.raises(GyrotcError):
             _unit(folder)
-    if name in (*RELEASED, "c/emission.json", "c/release.json"):
-        assert check_signature(folder / "c", public).status == "fail", name
 
 
 def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None:
@@ -333,22 +279,6 @@ def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None
     (folder / "changes.json").write_text("{}")
     with pytest.raises(InputError, match=r"changes\.json: was not written by gyrotc"):
         unit_of(folder)
-
-
-def test_verifying_a_signature_refuses_what_the_marker_does_not_know(
-    passing: Path, tmp_path: Path, key: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder, public = shutil.copytree(passing, tmp_path / "out"), key.with_suffix(".pub")
-    assert _status("sign", folder, "--key", key) == 0
-    _passed(folder)
-    capsys.readouterr()
-    assert _status("verify", folder, "--signature", public) == 2
-    reported = capsys.readouterr().err
-    assert "budget.json: is not as gyrotc wrote it" in reported and len(reported.splitlines()) == 1
-    for name in (MARKER, "verify.json"):  # as an archive may come: the signature alone says it
-        (folder / name).unlink()
-    assert _status("verify", folder, "--target", "host-gcc-O2", "--signature", public) == 1
-    assert "limits.json is not what was signed" in capsys.readouterr().out
 
 
 NAMED = ABOUT | {"refused"}

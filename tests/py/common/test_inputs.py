@@ -34,7 +34,6 @@ from gyrotc.results.evaluation import EvaluatedRun, Evaluation
 from gyrotc.results.release import Verification
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read, simulated_floor
-from gyrotc.tables.record import _serialization
 from gyrotc.train.samples import run_blocks
 from gyrotc.verify.board import log_parts
 from recordings import columns, csv_text, described, write_csv
@@ -383,12 +382,6 @@ def test_the_estimator_without_scikit_learn_names_the_command(monkeypatch: pytes
         _ = gyrotc.RBFNetworkRegressor
 
 
-def test_a_signature_without_its_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    _without("cryptography", monkeypatch)
-    with pytest.raises(InputError, match=re.escape('pip install "gyrotc[sign]"')):
-        _serialization()
-
-
 def test_a_scheduler_without_its_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     _without("distributed", monkeypatch)
     cluster = Cluster("tcp://127.0.0.1:1", 1.0, print)
@@ -396,7 +389,7 @@ def test_a_scheduler_without_its_package_names_the_command(monkeypatch: pytest.M
         pass
 
 
-@pytest.mark.parametrize("extra", ["sklearn", "sign", "dask", "hdf5", "tdms", "excel", "netcdf"])
+@pytest.mark.parametrize("extra", ["sklearn", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros", "mdf"])
 def test_an_extra_that_is_named_exists(extra: str) -> None:
     assert install_command(extra) == f'pip install "gyrotc[{extra}]"'
     assert re.search(rf"(?m)^{extra} = \[", (ROOT / "gen" / "pyproject.toml").read_text("utf-8"))

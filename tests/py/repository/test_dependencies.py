@@ -73,7 +73,6 @@ def test_the_main_job_loads_no_extra() -> None:
         "matplotlib",
         "PIL",
         "sklearn",
-        "cryptography",
         "distributed",
         "h5py",
         "nptdms",

@@ -31,8 +31,8 @@ from tests.blind.table import _gains, ended  # noqa: E402
 from tests.kills.driver import ACTIONS  # noqa: E402
 
 WRITING = {
-    "build", "check", "compare", "diagnose", "emit", "evaluate", "fit", "fleet", "import", "plan", "report", "sign",
-    "simulate", "stamp", "verify",
+    "build", "check", "compare", "diagnose", "emit", "evaluate", "fit", "fleet", "import", "plan", "report",
+    "simulate", "verify",
 }  # fmt: skip
 
 

@@ -72,10 +72,8 @@ COMMANDS = {
     "simulate": ("simulate", "paper-20C", "--row-s", "100", "--out", "S"),
     "export": ("export", "fleet/RLG-1", "--format", "csv", "--out", "map.csv"),
     "report": ("report", "fleet/RLG-1"),
-    "stamp": ("stamp", "fleet/RLG-1/model.json"),
     "certificate": ("certificate", "fleet/RLG-1", "--draft", "--out", "C"),
     "fleet": ("fleet", "data", "--out", "fleet"),  # whose gyro is done before: no process is needed for it
-    "sign": ("sign", "fleet/RLG-1"),
     "catalogue": ("catalogue", "fleet", "--export", "RLG-1", "--on", "2026-04-01", "--out", "X"),
     "verify": ("verify", "fleet/RLG-1", "--target", "host-gcc-O2", "--json", "v.json"),
     "evaluate": ("evaluate", "fleet/RLG-1", "data/RLG-1", "--trace", "T"),
@@ -84,8 +82,8 @@ COMMANDS = {
     "diagnose": ("diagnose", "data/RLG-1", "--out", "D"),
     "plan": ("plan", "paper-20C", "--out", "P"),
 }
-SLOW = ("report", "sign", "catalogue", "verify", "evaluate", "build", "compare", "diagnose", "plan")
-WRITE_NOTHING = {"completion", "schema", "cache"}  # but to standard output, and in the cache's own folder
+SLOW = ("report", "catalogue", "verify", "evaluate", "build", "compare", "diagnose", "plan")
+WRITE_NOTHING = {"schema"}  # but to standard output
 # A file by `write_atomically`, as check --json, of units that take minutes; a folder by `result_folder`, as fit.
 AS_OTHERS = {"lot", "recalibrate"}
 
