@@ -90,13 +90,6 @@ def _costs(docs: Path) -> None:
     write_costs()
 
 
-def _bounds(docs: Path) -> None:
-    """Static bounds on instructions, beside what an emulator counts."""
-    from .bounds import bounds, section
-
-    write(docs, "bounds", {"rows": bounds()}, section)
-
-
 def _fleet(docs: Path) -> None:
     """A thousand gyros through `gyrotc fleet`, and a million calibrations in a catalogue."""
     from .fleet import write_catalogue, write_fleet
@@ -169,7 +162,6 @@ _ALONE = {
     "faults-learned": _faults_learned,
     "sizes": _sizes,
     "costs": _costs,
-    "bounds": _bounds,
     "fleet": _fleet,
     "formats": _formats,
     "lot": _lot,

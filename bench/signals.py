@@ -32,8 +32,6 @@ from gyrotc.train.result import predict
 from numpy.typing import NDArray
 from results import write
 
-from .bounds import gaussian_instructions
-
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 
@@ -64,8 +62,7 @@ Mean gain {mean:.1%} (aim: 95 %), reached in {reached} of {worlds} worlds. A cha
 line of two Gaussians, or a slope that depends on temperature, takes its place where history left out shows it
 (docs/training.md, section 5).
 
-One Gaussian of a bent line takes {f32:g} instructions in float32 and {q31:g} in fixed point on a Cortex-M4F, counted in
-the object code (aim: 26). A term takes 32 bytes of a table whatever its shape, so Gaussians take none beside the line;
+A term takes 32 bytes of a table whatever its shape, so Gaussians take none beside the line;
 its fallback model is a network of 12 + 20 M bytes for M centers.
 
 ## Useless channels
@@ -343,7 +340,6 @@ def section(found: list[dict[str, Any]], seconds: float, drawn: bool) -> str:
         rows=rows,
         mean=np.mean([gain(w, w["channels"]) for w in found]),
         reached=sum(gain(w, w["channels"]) >= _AIM for w in found),
-        **gaussian_instructions(),
         useless=_USELESS,
         harm=", ".join(f"{w['useless'] / w['channels'] - 1.0:+.2%}" for w in found),
         useless_all=_USELESS * len(found),

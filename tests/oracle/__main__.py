@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 REFERENCE = Path(__file__).resolve().parent / "reference.json"
 #: On the path of programs alone, so that results do not depend on what is installed: of the targets those of gcc on
 #: this machine are verified, all others are "missing", and no browser prints a certificate.
-PROGRAMS = ("gcc", "as", "ld", "nm", "size", "objdump", "sh")
+PROGRAMS = ("gcc", "as", "ld", "nm", "size", "sh")
 _EACH = 3  # differences shown of a file
 
 Parts = Mapping[str, Mapping[str, Any]]  # of each step, by name

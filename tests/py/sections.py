@@ -20,7 +20,6 @@ import targets_page  # noqa: E402
 from results import recorded  # noqa: E402
 
 from bench import (  # noqa: E402  # noqa: E402
-    bounds,
     budget,
     faults,
     faults_learned,
@@ -48,7 +47,6 @@ PAGE = "results-all.md"
 SECTIONS: dict[str, Callable[[Any], str]] = {
     "bench": bench_page.section,
     "runtime": runtime.section,
-    "bounds": bounds.section,
     "sizes": sizes.section,
     "targets": targets_page.section,
     "self-test": self_test_page.section,

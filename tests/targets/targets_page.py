@@ -20,8 +20,7 @@ Counted in emulators; AVR: cycles. float32 is not offered where the compiler doe
 """
 _FUNCTIONS = """Public functions on {target} ({arithmetic}): bytes of code, of the function with all that it calls (what
 several call is linked once); of stack, by its graph of calls, the deepest one counted; both whatever terms a table has,
-without those of the compiler's own functions that are named; the most instructions of a call with this table, from the
-object code (Thumb-2). A program with the self-test, a state and its samples
+without those of the compiler's own functions that are named. A program with the self-test, a state and its samples
 links {read_only} bytes of constants, the table's among them.
 """
 _CONTROLS = """Negative controls: builds that are wrong on purpose. Each ran to its end; that many results differed.
@@ -72,18 +71,12 @@ def _function_tables(targets: Sequence[dict[str, Any]]) -> list[str]:
         if "functions" in t:
             head = {"target": t["name"], "arithmetic": t["numeric"], "read_only": t["read_only_bytes"]}
             rows = [
-                [
-                    f"`{name}`",
-                    cost["code_bytes"],
-                    cost["stack_bytes"],
-                    cost.get("instructions", "-"),
-                    ", ".join(cost["helpers"]) or "-",
-                ]
+                [f"`{name}`", cost["code_bytes"], cost["stack_bytes"], ", ".join(cost["helpers"]) or "-"]
                 for name, cost in t["functions"].items()
             ]
             parts += [
                 _FUNCTIONS.format(**head),
-                table(["function", "code ", "stack ", "instructions ", "calls, not counted"], rows),
+                table(["function", "code ", "stack ", "calls, not counted"], rows),
             ]
     return parts
 

@@ -23,7 +23,6 @@ _MANY = ("gen/core", "gen/gyrotc/fleet", "gen/gyrotc/jobs", "gen/gyrotc/recordin
 CODE: dict[str, tuple[str, ...]] = {
     "bench": _TRAIN,
     "blind": _DIAGNOSE,
-    "bounds": ("gen/gyrotc/tables",),
     "budget": ("gen/gyrotc/assess", *_TRAIN),
     "catalogue": ("gen/gyrotc/fleet/catalogue.py",),
     "events": ("gen/gyrotc/quality",),

@@ -203,9 +203,6 @@ class FunctionCost(Part):
     helpers: tuple[str, ...] = Field(
         description="functions of the compiler's library that it calls; their stack is not counted"
     )
-    instructions: Count | None = Field(
-        default=None, description="that no call with this table exceeds, from the object code; Thumb-2 alone"
-    )
 
 
 class ReplayedRows(Part):

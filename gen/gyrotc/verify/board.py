@@ -24,7 +24,6 @@ from ..results.folder import scratch_folder
 from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
 from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
-from .bounds import instruction_bounds
 from .emitted import Job, board_files, checked_sources
 from .replay import learned_on
 from .sizes import function_costs
@@ -275,7 +274,7 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
         runtime = runtime_object(target, c, work, fresh=job.trusted)
         shared = _shared(job, target, c, work, runtime)
-        functions = _functions(job, target, c, work, runtime)
+        functions = function_costs(runtime)
     except CheckFailed as error:
         shared = error
     for numeric in numerics:
@@ -317,23 +316,6 @@ def _shared(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> _
         (*runtime.symbols, *symbols(target, table)),
         runtime.writable_bytes + writable_bytes(target, table),
     )
-
-
-def _functions(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> dict[str, dict[str, FunctionCost]]:
-    """Code, stack and the most instructions of each public function, by arithmetic.
-
-    Code of other levels may have loops that no line of the text bounds: then no bound is stated, and the bits count.
-    """
-    costs = function_costs(runtime)
-    if not costs:
-        return costs
-    try:
-        bounds = instruction_bounds(target, c, job.tables, job.model.symbol, runtime, work)
-    except CheckFailed:
-        return costs
-    for n, most in bounds.items():
-        costs[n] = {f: cost.model_copy(update={"instructions": most.get(f)}) for f, cost in costs[n].items()}
-    return costs
 
 
 def _ran(job: Job, target: Target, numeric: str, shared: _Shared, work: Path, c: Path) -> dict[str, Any]:

@@ -76,17 +76,6 @@ PUBLIC = (
     "check", "open", "map", "init", "sample", "bias", "snapshot", "rezero", "angle", "save", "restore",
 )  # fmt: skip
 """Every function that gtc.h and what it includes declare, without its prefix."""
-_SWITCHED = {
-    "open": "GTC_WITH_IMAGE", "save": "GTC_WITH_SAVE", "restore": "GTC_WITH_SAVE",
-    "snapshot": "GTC_WITH_UNCERTAINTY", "rezero": "GTC_WITH_REZERO",
-}  # fmt: skip
-
-
-def functions_of(config: str) -> tuple[str, ...]:
-    """Those of PUBLIC that a runtime with this `gtc_config.h` has."""
-    return tuple(f for f in PUBLIC if f"#define {_SWITCHED.get(f)} 0\n" not in config)
-
-
 _NODE = re.compile(
     r'^node: \{ title: "(?:[^":]*:)?(?P<name>[\w.]+)" label: "[^"]*\\n(?P<bytes>\d+) bytes \((?P<how>[^)]*)\)'
 )
@@ -95,7 +84,6 @@ _EDGE = re.compile(
 )
 _INDIRECT = "__indirect_call"
 _CODES = "memory|play|warm_up|harmonic|auxiliary|curve|product"  # of terms in gtc_terms.inl
-TERM_CODES = tuple(_CODES.split("|"))  # by the kind of a term, from 1 on
 _HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{_CODES})_(?:begin|take|step|apply))$")
 
 
@@ -171,7 +159,7 @@ def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
     return {n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)}
 
 
-def linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:
+def _linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:
     """The name by which a public function is linked; None where it is not among them."""
     linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms(?:_plain)?)?$")
     return next(filter(linked.match, names), None)
@@ -180,7 +168,7 @@ def linked_name(names: Iterable[str], numeric: str, function: str) -> str | None
 def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, FunctionCost]:
     costs: dict[str, FunctionCost] = {}
     for function in PUBLIC:
-        name = linked_name(sizes, numeric, function)
+        name = _linked_name(sizes, numeric, function)
         if name is not None:
             costs[function] = FunctionCost(
                 code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),

@@ -143,7 +143,7 @@ _BARE = _HERE / "bare"
 _STDIN = "stdin.bin"
 _VERSION_OF_GCC = "<version of gcc>"  # in `package`: stands for the number of the installed release
 _SHOWN_LINES = 12  # of what a compiler says: the first error stands there
-_SYMBOL = re.compile(r"(?P<address>[0-9A-Fa-f]+) (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
+_SYMBOL = re.compile(r"[0-9A-Fa-f]+ (?P<size>[0-9A-Fa-f]+) (?P<kind>\S) (?P<name>\S+)")
 
 
 class Target(BaseModel):
@@ -192,7 +192,6 @@ class Symbol:
     name: str
     kind: str
     size: int
-    address: int
 
 
 def load_target(path: Path) -> Target:
@@ -257,13 +256,12 @@ class Object:
         return path
 
 
-# Debug information does not change code: gcc's manual, 3.10
-_GRAPH = ("-g", "-fstack-usage", "-fcallgraph-info=su")
+_GRAPH = ("-fstack-usage", "-fcallgraph-info=su")
 _made: dict[str, Object] = {}  # by name, of this process
 
 
 def runtime_object(target: Target, c_folder: Path, work: Path, *, fresh: bool = False) -> Object:
-    """The runtime, with lines of its text and its graph of calls where the compiler gives them; as `shared_object`."""
+    """Return the runtime, with its graph of calls if the compiler writes one; as `shared_object`."""
     counted = target.compiler.endswith("-gcc") and target.counts == "instructions"
     flags = (*target.flags, *_GRAPH) if counted else target.flags
     return shared_object(
@@ -302,7 +300,7 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
 
 def _content(found: Object) -> bytes:
     """A line of JSON, then the file."""
-    rows = [[s.name, s.kind, s.size, s.address] for s in found.symbols]
+    rows = [[s.name, s.kind, s.size] for s in found.symbols]
     measured = {"symbols": rows, "writable_bytes": found.writable_bytes, "graph": found.graph}
     return canonical_json(measured) + b"\n" + found.code
 
@@ -411,12 +409,7 @@ def run_program(
 def symbols(target: Target, *files: Path) -> list[Symbol]:
     """Symbols with a size, of objects or programs."""
     rows = [_SYMBOL.fullmatch(line) for line in _inspected(target, "nm", ("-S",), files)]
-    return [Symbol(row["name"], row["kind"], int(row["size"], 16), int(row["address"], 16)) for row in rows if row]
-
-
-def disassembly(target: Target, program: Path) -> list[str]:
-    """Lines of the code of a program, with those of its text in between."""
-    return _inspected(target, "objdump", ("-d", "-l", "--no-show-raw-insn"), [program])
+    return [Symbol(row["name"], row["kind"], int(row["size"], 16)) for row in rows if row]
 
 
 def writable_bytes(target: Target, *files: Path) -> int:
@@ -428,7 +421,7 @@ def writable_bytes(target: Target, *files: Path) -> int:
 
 
 def _inspected(target: Target, tool: str, options: Sequence[str], files: Sequence[Path]) -> list[str]:
-    """Lines that a tool of the toolchain (nm, size, objdump) prints."""
+    """Lines that a tool of the toolchain (nm, size) prints."""
     name = _tool(target.compiler, tool)
     done = run_to_end([name, *options, *(str(f.absolute()) for f in files)], files[0].parent, name)
     if done.returncode != 0:

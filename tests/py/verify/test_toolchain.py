@@ -11,7 +11,7 @@ from conftest import packed
 from emitted import emitted
 from gyrotc.common.errors import CheckFailed, InputError
 from gyrotc.results import cache
-from gyrotc.verify import bounds, toolchain
+from gyrotc.verify import toolchain
 from gyrotc.verify.board import board_entries
 from gyrotc.verify.toolchain import (
     Object,
@@ -225,9 +225,7 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["host-gcc-O2", pytest.param("cortex-m4f", marks=pytest.mark.slow)])
-def test_a_target_shows_the_same_with_kept_objects(
-    name: str, tmp_path: Path, compiled: _Compiled, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, compiled: _Compiled) -> None:
     target = all_targets()[name]
     if target.missing():
         pytest.skip(f"{target.missing()} is not installed")
@@ -235,16 +233,6 @@ def test_a_target_shows_the_same_with_kept_objects(
     first = [entry.content() for entry in board_entries(job, target)]
     assert all(entry["status"] == "pass" for entry in first)
     toolchain._made.clear()
-    monkeypatch.setattr(bounds, "_bounds", lambda *_: pytest.fail("bounds are kept"))
     before = compiled.count
     assert [entry.content() for entry in board_entries(job, target)] == first
     assert compiled.count == before, "the runtime is compiled once"
-
-
-def test_bounds_of_other_functions_or_tables_are_not_taken() -> None:
-    functions = ("map", "bias")
-    found = {"f32": dict.fromkeys(functions, 5)}
-    assert bounds._checked(found, {"f32": None}, functions) == found  # type: ignore[dict-item]
-    assert bounds._checked(found, {}, functions) is None
-    assert bounds._checked({"f32": {"map": 5}}, {"f32": None}, functions) is None  # type: ignore[dict-item]
-    assert bounds._checked({"f32": dict.fromkeys(functions, -1)}, {"f32": None}, functions) is None  # type: ignore[dict-item]
