@@ -37,11 +37,14 @@ def _fading(on_s: FloatArray, tau_s: float) -> FloatArray:
 
 
 def _features(history: History, values: Values) -> FloatArray:
-    """0 where the time of power-on is not known."""
-    on_s = np.full(len(history.time_s), -1.0) if history.on_s is None else history.on_s
-    return _fading(on_s, values["tau_s"])[:, None]
+    """0 where the time of power-on is not known, or so long before the run that nothing is left of a warm-up."""
+    on_s, tau_s = history.on_s, values["tau_s"]
+    if on_s is None or on_s[0] > _OVER * tau_s:
+        return np.zeros((len(history.time_s), 1))
+    return _fading(on_s, tau_s)[:, None]
 
 
+_OVER = 7.0  # time constants after which less than a thousandth is left: what fades then began later than power-on
 _TAU = Parameter("tau_s", "s", 200.0, 8000.0)
 
 

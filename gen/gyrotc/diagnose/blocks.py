@@ -121,9 +121,12 @@ class Records:
     def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
         """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
         tried = Records(tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s)
-        left = [r for r, kept in zip(tried.runs, tried.kept, strict=True) if kept.size > 1]
-        runs = [replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left)]
-        return Records(tuple(runs), self.block_s)
+        return Records(tried.long_enough(), self.block_s)
+
+    def long_enough(self) -> tuple[Record, ...]:
+        """The runs that have two blocks at least, numbered anew: of fewer a run shows no course of time."""
+        left = [r for r, kept in zip(self.runs, self.kept, strict=True) if kept.size > 1]
+        return tuple(replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left))
 
     def key(self) -> str:
         """Hash of everything but the rates: what a bank of signatures depends on."""
@@ -170,7 +173,8 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
     The mean rate is taken off: the static map leaves out weak directions, and with them a trace of any constant, which
     beside a large one (Earth's rate) would look like an effect.
 
-    Blocks are `average_s` long, shorter down to `block_s` where the recordings are short.
+    Blocks are `average_s` long, shorter down to `block_s` where the recordings are short. Runs without two blocks are
+    left out.
 
     Raises:
         InputError: There is no such run, or nothing usable in them.
@@ -185,12 +189,20 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
         if run.started is not None and first is not None:
             day = (run.started - first).total_seconds() / 86400.0
         found.append(_record(run, dataset.channels, k, len(runs), day, block_s))
-    count = sum(int(r.usable.sum()) for r in found)
-    if count == 0:
+    if not any(r.usable.any() for r in found):
         raise InputError(str(dataset.folder), "no usable row", "rows with a temperature and a rate")
-    mean_dph = sum(float(r.rate_dph.sum()) for r in found) / count
-    centred = [replace(r, rate_dph=np.where(r.usable, r.rate_dph - mean_dph, 0.0)) for r in found]
-    return Records(tuple(centred), block_length(found, block_s, average_s))
+    records = _in_blocks(tuple(r for r in found if len(r.usable) > 1), block_s, average_s)
+    count = sum(int(r.usable.sum()) for r in records.runs)
+    mean_dph = sum(float(r.rate_dph.sum()) for r in records.runs) / max(count, 1)
+    centred = [replace(r, rate_dph=np.where(r.usable, r.rate_dph - mean_dph, 0.0)) for r in records.runs]
+    return Records(tuple(centred), records.block_s)
+
+
+def _in_blocks(runs: tuple[Record, ...], block_s: float, average_s: float) -> Records:
+    """The runs that are long enough for blocks of a length that is chosen for them alone."""
+    records = Records(runs, block_length(runs, block_s, average_s) if runs else block_s)
+    left = records.long_enough()
+    return records if len(left) == len(runs) else _in_blocks(left, block_s, average_s)
 
 
 def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> float:
@@ -213,8 +225,12 @@ def _record(run: Run, channels: Sequence[str], number: int, count: int, day: flo
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: _bridged(rows.time_s, rows.channels[name]) for name in channels}
-    name = run.file if run.from_s is None else f"{run.file}@{run.from_s:g}"
-    return Record(name, history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
+    return Record(name_of(run), history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
+
+
+def name_of(run: Run) -> str:
+    """Name of a run in messages and tables."""
+    return run.file if run.from_s is None else f"{run.file}@{run.from_s:g}"
 
 
 def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, NDArray[np.bool_]]:

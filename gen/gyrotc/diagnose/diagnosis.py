@@ -34,7 +34,7 @@ from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_o
 from ..train.result import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .attribution import LEVEL, Attribution
-from .blocks import Records, centred_slope, records_of
+from .blocks import Records, centred_slope, name_of, records_of
 from .candidates import diagnosed
 from .detection import Found
 from .extension import Extension, Refitting, extend, stand_ins_of
@@ -117,6 +117,16 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
     undecidable = _undecidable(records)
     if undecidable:
         return Diagnosis(not_testable(dataset, chosen, undecidable), None, None, None)
+    known = {record.name for record in records.runs}
+    short = [run for run in dataset.runs if run.role == "train" and name_of(run) not in known]
+    found = _of_long_runs(replace(dataset, runs=tuple(r for r in dataset.runs if r not in short)), records, chosen, say)
+    text = "{} is left out: it has no two blocks of {:g} s"
+    missing = (*found.result.missing, *(text.format(name_of(run), records.block_s) for run in short))
+    return replace(found, result=found.result.model_copy(update={"missing": missing}))
+
+
+def _of_long_runs(dataset: Dataset, records: Records, chosen: FitOptions, say: Progress) -> Diagnosis:
+    """All stages behind the choice of runs."""
     # Before the search: the rows of a whole recording and what the search remembers need not fit into memory together.
     refitting = Refitting(dataset, records, chosen, single_cycle=is_single_cycle(records))
     analysis = analyse(records, declared_noise(dataset), say)
@@ -145,6 +155,8 @@ def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis
 
 def _undecidable(records: Records) -> str:
     """Why these recordings cannot decide anything; empty where they may."""
+    if not records.runs:
+        return f"No run has two blocks of {records.block_s:g} s: record longer ones."
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
     if float(np.ptp(temperature)) < LEAST_SPAN_C:
         return f"Temperature spans only {np.ptp(temperature):.2f} C: nothing can be learnt about temperature here."

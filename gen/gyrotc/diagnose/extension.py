@@ -48,6 +48,7 @@ from .refit import (
     scored_means,
 )
 from .single_cycle import cycle_of
+from .static_map import fits_exactly
 
 
 def stand_ins_of(
@@ -172,14 +173,18 @@ class Refitting:
         return scored_means(fitted, runs, effects, self.average_s, scored)
 
     def _chosen(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
-        """Best `count` causes on the records without the held-out samples."""
+        """Best `count` causes on the records without the held-out samples; none where these can tell of none."""
         masks = []
         for run, played, out in zip(self.records.runs, self.train, held, strict=True):
             # A row that is no sample's, as before the first, goes with the sample before it, or with the first.
             of = np.searchsorted(played.data.time_s[1:], run.history.time_s + _ROUNDING_S, side="right")
             masks.append(np.asarray(run.usable & ~np.append(out, False)[of], dtype=bool))
         rest = self.records.without_rows(masks)
-        return cycle_of(rest).states[:count] if self.single_cycle else choose(search_of(rest), count)
+        if count == 0 or not rest.runs:
+            return ()
+        if self.single_cycle:
+            return cycle_of(rest).states[:count]
+        return () if fits_exactly(rest) else choose(search_of(rest), count)
 
 
 def folds_of(refitting: Refitting) -> list[list[BoolArray]]:

@@ -30,7 +30,7 @@ from .profile_likelihood import Gains
 from .refine import Refined
 from .search import Search, open_search
 from .signature_bank import bank_of
-from .static_map import LEVELS
+from .static_map import LEVELS, fits_exactly
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
@@ -139,7 +139,7 @@ def search_of(
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
         search = open_search(records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour)
-        if level + 1 == len(LEVELS) or not needs_finer(search):
+        if level + 1 == len(LEVELS) or fits_exactly(records, level + 1) or not needs_finer(search):
             break
     return search
 
@@ -191,6 +191,7 @@ def _of_map(candidate: Candidate) -> bool:
 _MANY = 8  # single outliers are left out in silence
 _P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
+_SIGMAS = (0.1, 10.0)  # factors of a standard deviation: beyond them the functions extrapolate
 _KNOTS = 4  # hats over the temperature: the variance is a slow function of it
 
 
@@ -259,12 +260,12 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Flo
     f = float((weights**2).sum()) / rank / (left / freedom)
     p = float(fdtrc(rank, freedom, f))
     beta, *_ = np.linalg.lstsq(x, logs, rcond=1e-8)
-    sigma = np.exp(0.5 * (design @ beta - np.median(design @ beta)))
+    sigma = np.exp(np.clip(0.5 * (design @ beta - np.median(design @ beta)), *np.log(_SIGMAS)))
     low, high = np.quantile(sigma, [0.025, 0.975])
     ratio = float(high / low)
     if p > _P_VARIANCE or ratio < _RATIO:
         return None, p, ratio
-    return np.clip(sigma, 0.1, 10.0), p, ratio
+    return sigma, p, ratio
 
 
 def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray, NDArray[np.int64]]:

@@ -246,7 +246,8 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
     own = plain[k]
     design = np.column_stack([*blocks, *plain])
     white = fit.gains.whiten(design)
-    norm = np.linalg.norm(white, axis=0)
+    size = np.linalg.norm(white, axis=0)
+    norm = np.where(size > 0.0, size, 1.0)  # what runs show nothing of, as of a local function, gets a weight of 0
     y = fit.gains.whiten(search.y)
     weights = np.linalg.lstsq(white / norm, y, rcond=1e-10)[0] / norm
     mine = weights[start : start + own.shape[1]]

@@ -197,11 +197,12 @@ class Search(Question):
         return np.asarray(self.bank.map.T @ self.y)
 
     def extended(self, columns: FloatArray) -> Search:
-        """The same search with further columns, shape (N, k), in every model.
+        """The same search with further columns, shape (N, k), in every model; columns of zeros have no part in any.
 
         Only the colours that the data allow are looked at again.
         """
-        held = columns if self.beside is None else np.column_stack([self.beside, columns])
+        shown = columns[:, columns.any(axis=0)]
+        held = shown if self.beside is None else np.column_stack([self.beside, shown])
         wider = open_search(
             self.records,
             self.bank,

@@ -92,10 +92,14 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
     return replace(raw, mix=right[keep].T / size[keep]), left[:, keep]
 
 
-def fits_exactly(records: Records) -> bool:
-    """Whether the coarsest map has a function for every block: nothing is left that could tell of noise or a cause."""
-    n_t, n_a, n_r = LEVELS[0]
-    return records.size <= 3 + n_t + n_a * n_r and make_basis(records, 0)[1].shape[1] >= records.size
+def fits_exactly(records: Records, level: int = 0) -> bool:
+    """Whether the map of a level has a function for every block: nothing is left that could tell of noise or a cause.
+
+    Args:
+        level: Of `LEVELS`; 0 is the coarsest.
+    """
+    n_t, n_a, n_r = LEVELS[level]
+    return records.size <= 3 + n_t + n_a * n_r and make_basis(records, level)[1].shape[1] >= records.size
 
 
 def fine_columns(records: Records, spacing_c: float = FINE_C) -> FloatArray:

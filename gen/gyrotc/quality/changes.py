@@ -18,6 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
+from ..common.metrics import median_step
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
 from .fits import (
     LEAST_ENERGY,
@@ -50,6 +51,7 @@ _LEAST_CELLS = 60  # beside the columns that are fitted: fewer do not show what 
 _MOST = 12  # changes of a run that are fitted: more are what it always does
 _AROUND_S = 240.0  # in which a place is sought anew
 _EDGE = 3  # cells at the ends of a run in which a change cannot be distinguished from noise
+_LEAST_LENGTH = 4 * _EDGE  # in cells: a shorter run has hardly a place for a change
 _HOUR_S = 3600.0  # by definition
 _PLACED_95 = 7.35  # of a likelihood ratio of places: Hansen, Econometrica 68 (2000) 575, table 1
 _NEAR_CELLS = 8  # on either side of a step, in which its rows are looked at
@@ -126,9 +128,9 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     Args:
         runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
     """
-    long = [k for k in range(len(runs)) if _is_long(runs[k])]  # by number: no run is held while the next one is read
-    span = sum(float(np.ptp(runs[k][0])) for k in long)
-    cell_s = max(_CELL_S, span / _MOST_CELLS)
+    lengths = [_length_s(runs[k]) for k in range(len(runs))]  # by number: no run is held while the next one is read
+    cell_s = max(_CELL_S, sum(length for length, _ in lengths) / _MOST_CELLS)
+    long = [k for k, (length, row) in enumerate(lengths) if length > _LEAST_LENGTH * max(row, cell_s)]
     fine = [cells_of(runs[k], cell_s) for k in long]
     coarse = [cells_of(runs[k], max(_COARSE_S, cell_s)) for k in long]
     if sum(len(one) for one in coarse) < _LEAST_CELLS:
@@ -139,7 +141,7 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     for _ in range(2):
         beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
         noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside)
-        search = _Search(fine, maps_of(fine, knots_c), noise.scaled(coarse[0].cell_s / fine[0].cell_s), curves)
+        search = _Search(fine, maps_of(fine, knots_c), noise.in_cells(min(one.cell_s for one in fine)), curves)
         found = search.found(found)
         if not found:
             return []
@@ -150,9 +152,9 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
 
 
-def _is_long(rows: Rows) -> bool:
-    """Whether a run is long enough for a change, and its rate moves at all."""
-    return len(rows[0]) > 4 * _EDGE and bool(np.ptp(rows[2]) > 0.0)
+def _length_s(rows: Rows) -> tuple[float, float]:
+    """How long a run and one of its rows are, s; of one whose rate does not move at all 0."""
+    return (float(np.ptp(rows[0])), median_step(rows[0])) if np.ptp(rows[2]) > 0.0 else (0.0, 0.0)
 
 
 def _within(one: Change, gain: Change) -> bool:
@@ -183,7 +185,9 @@ class _Search:
         self._looks = _KINDS * sum(len(one) for one in cells)
         chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
         self._limit = _MARGIN * chance
-        self._scale: FloatArray | None = None  # of each run: what noise makes of a change of size over error 1
+        # What noise makes of a change of size over error 1: of each shape, and how much more of each run
+        self._scale: dict[_Tried, float] = {}
+        self._louder: list[float] = []
 
     def found(self, known: Sequence[_At]) -> list[_At]:
         """All that is clear, placed and fitted beside one another; it begins with what is known."""
@@ -202,17 +206,17 @@ class _Search:
                 break
         return found
 
-    def _measure(self, found: Sequence[_At]) -> tuple[SmoothFit, list[tuple[FloatArray, list[_Tried]]]]:
+    def _measure(self, found: Sequence[_At]) -> tuple[SmoothFit, list[dict[_Tried, FloatArray]]]:
         """The fit beside what was found, and sizes over errors at all places; the first time also their scale."""
         fit = self._fit(found)
         self._curves[:] = [np.stack([one.time_s, fit.curve[k]]) for k, one in enumerate(self._cells)]
         looked = [_looked(fit, k) for k in range(len(self._cells))]
-        if self._scale is None:
-            shapes = len(looked[0][1])
-            overall = [noise_of(np.concatenate([z[s] for z, _ in looked])) for s in range(shapes)]
+        if not self._scale:
+            for shape in dict.fromkeys(shape for of_run in looked for shape in of_run):
+                overall = noise_of(np.concatenate([of_run[shape] for of_run in looked if shape in of_run]))
+                self._scale[shape] = max(overall, fit.sigma)
             white = noise_of(np.concatenate(fit.rest))
-            louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in fit.rest]
-            self._scale = np.outer(louder, np.maximum(overall, fit.sigma))
+            self._louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in fit.rest]
         return fit, looked
 
     def _fit(self, changes: Sequence[_At]) -> SmoothFit:
@@ -222,11 +226,11 @@ class _Search:
     def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
         """Of every run the clearest change, if it is clear; of a departure that comes back both steps."""
         fit, looked = self._measure(found)
-        assert self._scale is not None
-        for k, (z, tried) in enumerate(looked):
+        for k, of_run in enumerate(looked):
             if sum(at.run == k for at in found) >= _MOST:
                 continue
-            far = np.abs(z) / self._scale[k][:, None]
+            tried = list(of_run)
+            far = np.abs([z / (self._louder[k] * self._scale[shape]) for shape, z in of_run.items()])
             for at in found:
                 if at.run == k:
                     far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._separation_s(k)] = 0.0
@@ -241,7 +245,7 @@ class _Search:
                 kind, length = tried[s]
                 if kind == "back":
                     yield _At(k, "step", begin)
-                    yield _At(k, "step", begin + length)
+                    yield _At(k, "step", begin + round(length / cells.cell_s) * cells.cell_s)
                 elif kind == "drift":
                     yield _At(k, "drift", begin + 0.5 * cells.cell_s)
                 else:
@@ -384,8 +388,7 @@ class _Search:
 
     def _white(self, run: int) -> float:
         """Standard deviation of what is white of a run."""
-        assert self._scale is not None
-        return float(self._scale[run][0])
+        return self._louder[run] * self._scale[_STEP]
 
     def change(self, at: _At, found: Sequence[_At], rows: Rows) -> Change | None:
         """The change with its limits; None where it falls into a gap over which the noise may move as far."""
@@ -397,7 +400,7 @@ class _Search:
         size, error = inner / energy, white / float(np.sqrt(energy))
         kind, duration, gap_s = at.kind, 0.0, self._gap_at(at) if at.kind == "step" else 0.0
         if gap_s > 0.0:
-            error = float(np.hypot(error, white * np.sqrt(self._noise.level * gap_s / cells.cell_s)))
+            error = float(np.hypot(error, white * np.sqrt(self._noise.level * gap_s / self._noise.cell_s)))
             if gap_s > LONGEST_GAP_S or abs(size) < self._limit * error:
                 return None
             time = _across_gap(at, rows, gap_s + cells.cell_s)
@@ -465,34 +468,33 @@ def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> Lim
     return float(t[k]), float(t[max(likely[0] - 2, 0)]), float(t[min(likely[-1] + 1, n - 1)])
 
 
-_Tried = tuple[str, float]
+_Tried = tuple[str, float]  # kind, and how long it lasts, s
+_STEP: _Tried = ("step", 0.0)
 
 
-def _looked(fit: SmoothFit, run: int) -> tuple[FloatArray, list[_Tried]]:
-    """Sizes over errors of changes at every cell of a run, shape (shapes, n), and what the shapes are.
+def _looked(fit: SmoothFit, run: int) -> dict[_Tried, FloatArray]:
+    """Sizes over errors of changes at every cell of a run, shape (n,), by what is tried: no more than fits into it.
 
     The filter does not change with time: the inner products of a change at every place are a correlation.
     """
     cells = fit.cells[run]
     n = len(cells)
     ages = np.arange(0.5, n) * cells.cell_s
-    steps = [fit.white(np.clip(ages / max(d, cells.cell_s) + 0.5 * (d == 0.0), 0.0, 1.0)) for d in _TRIED_S]
-    tried: list[_Tried] = [("step", d) for d in _TRIED_S]
-    shapes = list(steps)
+    shapes: dict[_Tried, FloatArray] = {
+        ("step", d): fit.white(run, np.clip(ages / max(d, cells.cell_s) + 0.5 * (d == 0.0), 0.0, 1.0)) for d in _TRIED_S
+    }
     for length in _BACK_S:
-        cells_of_length = round(length / cells.cell_s)
-        if 2 <= cells_of_length < n:
-            back = steps[0].copy()
-            back[cells_of_length:] -= steps[0][: n - cells_of_length]
-            shapes.append(back)
-            tried.append(("back", cells_of_length * cells.cell_s))
-    shapes.append(fit.white(np.arange(0.0, n) * cells.cell_s / _HOUR_S))
-    tried.append(("drift", 0.0))
+        behind = round(length / cells.cell_s)
+        if 2 <= behind < n:
+            back = shapes[_STEP].copy()
+            back[behind:] -= shapes[_STEP][: n - behind]
+            shapes["back", length] = back
+    shapes["drift", 0.0] = fit.white(run, np.arange(0.0, n) * cells.cell_s / _HOUR_S)
     size = next_fast_len(2 * n, real=True)
     beside = np.column_stack([fit.own[run], fit.shared[run]])
     of_rest, of_beside = rfft(fit.rest[run], size), rfft(beside, size, axis=0)
-    found = np.zeros((len(shapes), n))
-    for k, shape in enumerate(shapes):
+    found = {}
+    for tried, shape in shapes.items():
         h = np.conj(rfft(shape, size))
         inner = irfft(of_rest * h, size)[:n]
         held = irfft(of_beside * h[:, None], size, axis=0)[:n]
@@ -500,6 +502,6 @@ def _looked(fit: SmoothFit, run: int) -> tuple[FloatArray, list[_Tried]]:
         left = energy - np.sum(held**2, axis=1)
         good = left > LEAST_ENERGY * energy
         good[:_EDGE] = False
-        good[n - _EDGE - round(tried[k][1] / cells.cell_s) :] = False
-        found[k, good] = inner[good] / np.sqrt(left[good])
-    return found, tried
+        good[max(n - _EDGE - round(tried[1] / cells.cell_s), 0) :] = False
+        found[tried] = np.where(good, inner / np.sqrt(np.where(good, left, 1.0)), 0.0)
+    return found

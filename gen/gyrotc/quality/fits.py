@@ -67,18 +67,35 @@ def cells_of(rows: Rows, cell_s: float) -> RunCells:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """White noise of variance 1 with walks of a level and its slope: variances of their steps from cell to cell."""
+    """White noise of variance 1 with walks of a level and its slope: variances of their steps from cell to cell.
+
+    Attributes:
+        level, slope: Variances of the steps.
+        cell_s: Length of the cells.
+    """
 
     level: float
     slope: float
+    cell_s: float
 
-    def scaled(self, cells: float) -> Noise:
-        """The same in cells that are so many times shorter."""
-        return Noise(self.level / cells**2, self.slope / cells**4)
+    def in_cells(self, cell_s: float) -> Noise:
+        """The same in cells of another length, over the variance that their white part has."""
+        ratio = cell_s / self.cell_s
+        return Noise(self.level * ratio**2, self.slope * ratio**4, cell_s)
 
-    def filter(self) -> tuple[FloatArray, FloatArray, float]:
-        """Coefficients of the filter that makes it white, and the variance of what comes out."""
-        return _filter(self.level, self.slope)
+    def variance(self) -> float:
+        """Of what the filter makes of it."""
+        return _filter(self.level, self.slope)[2]
+
+    def log_scale(self, cell_s: float) -> float:
+        """Logarithm of the factor that makes noise of a run with cells of any length as large as of this one's."""
+        return 0.5 * float(np.log(self.variance() / self.in_cells(cell_s).variance() * (cell_s / self.cell_s)))
+
+    def white(self, columns: FloatArray, cell_s: float) -> FloatArray:
+        """Columns of a run with cells of any length, filtered so that noise comes out white, as large in every run."""
+        own = self.in_cells(cell_s)
+        b, a, _ = _filter(own.level, own.slope)
+        return np.asarray(_filtered(b, a, columns) * np.exp(self.log_scale(cell_s)))
 
 
 @lru_cache(maxsize=256)
@@ -128,7 +145,6 @@ class SmoothFit:
             maps: Columns of the map at the cells of each run (`maps_of`).
             changes: Columns of what changes in each run, shape (n, k) each; None: nothing.
         """
-        b, a, variance = noise.filter()
         own, white, rates = [], [], []
         for one, of_map, change in zip(cells, maps, changes, strict=True):
             n = len(one)
@@ -138,12 +154,13 @@ class SmoothFit:
             columns += [
                 np.asarray(np.arange(n) >= k, dtype=np.float64) for k, gap in one.behind_gap if gap > LONGEST_GAP_S
             ]
-            q = orthonormal(_filtered(b, a, np.column_stack(columns)))
+            q = orthonormal(noise.white(np.column_stack(columns), one.cell_s))
             own.append(q)
-            both = _filtered(b, a, np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]))
+            both = noise.white(np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]), one.cell_s)
             both -= q @ (q.T @ both)
             white.append(both[:, :-1])
             rates.append(both[:, -1])
+        log_scale = sum(len(one) * noise.log_scale(one.cell_s) for one in cells)
         ends = np.cumsum([len(one) for one in cells])[:-1]
         stacked, y = np.concatenate(white), np.concatenate(rates)
         shared = orthonormal(stacked)
@@ -158,15 +175,14 @@ class SmoothFit:
             tuple(own),
             tuple(np.split(shared, ends)),
             tuple(np.split(rest, ends)),
-            float(np.sqrt(left / variance)),
-            -0.5 * len(y) * float(np.log(left)),
+            float(np.sqrt(left / noise.variance())),
+            -0.5 * len(y) * float(np.log(left)) + log_scale,
             tuple(of_map @ by_column if shared.size else np.zeros(len(of_map)) for of_map in maps),
         )
 
-    def white(self, columns: FloatArray) -> FloatArray:
-        """Columns of one run through the filter."""
-        b, a, _ = self.noise.filter()
-        return _filtered(b, a, columns)
+    def white(self, run: int, columns: FloatArray) -> FloatArray:
+        """Columns of a run through its filter."""
+        return self.noise.white(columns, self.cells[run].cell_s)
 
     def amplitudes(self, run: int, columns: FloatArray, beside: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of each column the inner product with the rates and its energy, both beside all else that is fitted.
@@ -175,7 +191,7 @@ class SmoothFit:
             columns: Of the run, not yet white, shape (n, k).
             beside: Further columns of the run that are fitted with each, shape (n, j).
         """
-        d, o = self.white(columns), self.white(beside)
+        d, o = self.white(run, columns), self.white(run, beside)
         held_d, held_o = (np.concatenate([self.own[run].T @ v, self.shared[run].T @ v]) for v in (d, o))
         inner, raw = d.T @ self.rest[run], np.sum(d * d, axis=0)
         energy = raw - np.sum(held_d * held_d, axis=0)
@@ -230,10 +246,11 @@ def likeliest_noise(
 ) -> tuple[Noise, float]:
     """The walks of the largest likelihood beside changes that are known (as for `SmoothFit.of`), and its logarithm."""
     known: dict[tuple[int, int], float] = {}
+    cell_s = min(one.cell_s for one in cells)
 
     def likelihood(at: tuple[int, int]) -> float:
         if at not in known:
-            noise = Noise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]))
+            noise = Noise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
             known[at] = SmoothFit.of(cells, maps, noise, changes).log_likelihood
         return known[at]
 
@@ -243,7 +260,7 @@ def likeliest_noise(
         around = [(last[0] + i, last[1] + j) for i in (0, -1, 1) for j in (0, -1, 1)]
         inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
         best = max(inside, key=likelihood)
-    return Noise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]])), known[best]
+    return Noise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]]), cell_s), known[best]
 
 
 _WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through

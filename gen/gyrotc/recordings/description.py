@@ -188,7 +188,7 @@ class RunEntry(_Part):
     role: Literal["train", "exam"] = "train"
     environment: str = ""
     started: Instant | None = None
-    power_on_s: PowerOn = 0.0
+    power_on_s: PowerOn | None = None
     from_s: Seconds | None = None
     to_s: Seconds | None = None
     exclude: tuple[ExcludeEntry, ...] = ()

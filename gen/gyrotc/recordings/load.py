@@ -365,7 +365,7 @@ def _description(folder: Path, problems: Problems) -> Description | None:
 
 
 def _recordings(folder: Path, description: Description, problems: Problems) -> tuple[dict[str, Recording], set[int]]:
-    """Every file that is in order, by name, without its times; and which runs have rows in them."""
+    """Every file that is in order, by name, of its times the ends; and which runs have rows in them."""
     recordings: dict[str, Recording] = {}
     with_rows: set[int] = set()
     for name in dict.fromkeys(entry.file for entry in description.run):
@@ -384,7 +384,7 @@ def _recordings(folder: Path, description: Description, problems: Problems) -> t
                 expected = f"one that meets the rows of the file, {first:.10g} ... {last:.10g} s"
                 where = place_of(description, index)
                 problems.add(InputError(where, "a span without rows", expected))
-        recordings[name] = recording = replace(recording, time_s=np.zeros(0))  # before the next file is read
+        recordings[name] = recording = replace(recording, time_s=recording.time_s[[0, -1]])  # before the next is read
     return recordings, with_rows
 
 
@@ -428,6 +428,21 @@ def _angle(
     return None
 
 
+_SETTLED_S = 4e4  # after power-on: five of the longest time constants of a warm-up
+
+
+def _power_on_s(entry: RunEntry, time_s: FloatArray) -> float | None:
+    """Power-on of a run on its file's clock, s; None: unknown.
+
+    Where it is not stated the clock starts at power-on. A clock by which power-on came when all has settled, or behind
+    the last row, counts from something else: there it is the first row.
+    """
+    if entry.power_on_s is not None:
+        return None if entry.power_on_s == "unknown" else entry.power_on_s
+    first, last = float(time_s[0]), float(time_s[-1])
+    return 0.0 if first <= _SETTLED_S and last >= 0.0 else first
+
+
 def _run(folder: Path, entry: RunEntry, recording: Recording, reader: Reader) -> Run:
     return Run(
         file=entry.file,
@@ -436,7 +451,7 @@ def _run(folder: Path, entry: RunEntry, recording: Recording, reader: Reader) ->
         role=entry.role,
         environment=entry.environment,
         started=entry.started,
-        power_on_s=None if entry.power_on_s == "unknown" else entry.power_on_s,
+        power_on_s=_power_on_s(entry, recording.time_s),
         from_s=entry.from_s,
         to_s=entry.to_s,
         exclude=tuple(Exclusion(gap.from_s, gap.to_s, gap.reason) for gap in entry.exclude),
