@@ -173,7 +173,7 @@ lot-prior: setup
 	@$(PYTHON) -c "import sklearn" 2>/dev/null || $(PYTHON) -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@$(PYTHON) -m bench.lot_prior docs $${SET_SEED:+"$$SET_SEED"}
 
-## a thousand gyros through gyrotc fleet, a million calibrations in a catalogue: docs/results.md
+## a thousand gyros through gyrotc fleet: docs/results.md
 fleet: setup
 	@$(PYTHON) -m bench docs --only fleet
 

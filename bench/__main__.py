@@ -91,11 +91,10 @@ def _costs(docs: Path) -> None:
 
 
 def _fleet(docs: Path) -> None:
-    """A thousand gyros through `gyrotc fleet`, and a million calibrations in a catalogue."""
-    from .fleet import write_catalogue, write_fleet
+    """A thousand gyros through `gyrotc fleet`."""
+    from .fleet import write_fleet
 
     write_fleet(docs)
-    write_catalogue(docs)
 
 
 def _lot(docs: Path) -> None:

@@ -1,34 +1,22 @@
-"""A thousand gyros of a lot through `gyrotc fleet` and `gyrotc lot`, faults planted in lots, a million calibrations."""
+"""A thousand gyros of a lot through `gyrotc fleet` and `gyrotc lot`, faults planted in lots."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import sqlite3
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import closing
-from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from gyrotc.fleet.catalogue import catalogued, hash_rows, opened
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.page import summary_of
 from gyrotc.fleet.run import run_fleet
-from gyrotc.model import load_model
-from gyrotc.results.folder import kept_by_hash
-from gyrotc.tables.emit import image_of
-from gyrotc.tables.quantise import quantise
 from lot import FAULTS, Lot
 from results import machine, write
 
 from .growth import gyrotc
-from .sizes import MODEL
 
 _SERIALS = 1000
 _JOBS = 2
@@ -161,88 +149,4 @@ def write_lot(docs: Path) -> None:
     figures = planted_lots(_DRAWS, _SEED)
     write(docs, "lot", figures, lot_section)
     if min(figures["named"].values()) < 7 * _DRAWS / 8 or figures["accused"] > 1:
-        sys.exit(1)
-
-
-_ROWS, _EACH, _ASKED = 1_000_000, 5, 200  # calibrations; of each gyro; gyros that are asked for
-_FIRST = date(2020, 1, 1)
-_CATALOGUE = """## The catalogue (`make fleet`)
-
-"Which table may this gyro carry on this day, and from which data", asked for {asked} random gyros of a catalogue of
-{rows} calibrations with two recordings each ({megabytes:.0f} MB), the file opened anew each time, as `gyrotc catalogue`
-does it. The aim is 50 ms.
-
-| median | 95 % | longest |
-| --- | --- | --- |
-| {median_ms:.2f} ms | {most_ms:.2f} ms | {longest_ms:.2f} ms |
-"""
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _rows(rows: int, kept: dict[int, tuple[str, str, str]]) -> Iterator[tuple[Any, ...]]:
-    """Calibrations; `kept`: hashes of model, image and file of those gyros whose payloads are there."""
-    for k in range(rows):
-        day = _FIRST + timedelta(days=365 * (k % _EACH))
-        known = _hash(str(k))
-        yield (
-            f"RLG-{k // _EACH:06d}", "", day.isoformat(), (day + timedelta(days=400)).isoformat(), "lot", "done",
-            "PASS", *kept.get(k // _EACH, (known, known, known)), known, 7e-4, 1e-4, "RLG",
-        )  # fmt: skip
-
-
-def _kept(folder: Path, gyros: Iterable[int]) -> dict[int, tuple[str, str, str]]:
-    """Payloads of gyros, as a fleet leaves them: hashes of model, image and file."""
-    kept, base, made = {}, load_model(MODEL), folder / "made"
-    for k in gyros:
-        model = base.model_copy(update={"serial": f"RLG-{k:06d}"})
-        model.save(made)
-        text = kept_by_hash(folder / "payloads", made).name
-        made.write_bytes(image_of(quantise(model, "f32")))
-        kept[k] = model.hash, kept_by_hash(folder / "payloads", made).name, text
-    return kept
-
-
-def times(rows: int) -> dict[str, Any]:
-    """Times of the question, s, in a catalogue of so many calibrations."""
-    asked = np.random.default_rng(1).integers(0, rows // _EACH, _ASKED)
-    with tempfile.TemporaryDirectory(prefix="gyrotc-catalogue-") as work:
-        path = Path(work) / "catalogue.sqlite"
-        with opened(path):
-            pass  # made as a fleet makes it; its statements end after a minute, those below need more
-        with closing(sqlite3.connect(path)) as base, base:
-            columns = base.execute("SELECT group_concat(name) FROM pragma_table_info('calibration')").fetchone()[0]
-            names = columns.removeprefix("id,").removesuffix(",row_sha256")
-            places = ", ".join("?" * 14)
-            made = _rows(rows, _kept(path.parent, set(asked.tolist())))
-            base.executemany(f"INSERT INTO calibration ({names}) VALUES ({places})", made)
-            files = ((k + 1, f"run-{n}.csv", "train", _hash(f"{k} {n}")) for k in range(rows) for n in range(2))
-            base.executemany("INSERT INTO recording VALUES (?, ?, ?, ?)", files)
-            for k in range(rows // _EACH):
-                hash_rows(base, f"RLG-{k:06d}")
-        took = []
-        for k in asked:
-            begun = time.perf_counter()
-            answer = catalogued(path, f"RLG-{k:06d}", "2022-06-01")
-            took.append(1e3 * (time.perf_counter() - begun))
-            assert [len(one.recordings) for one in answer.found] == [2]
-        size = path.stat().st_size / 1e6
-    return {
-        "rows": rows, "asked": _ASKED, "megabytes": size, "median_ms": float(np.median(took)),
-        "most_ms": float(np.quantile(took, 0.95)), "longest_ms": max(took),
-    }  # fmt: skip
-
-
-def catalogue_section(result: dict[str, Any]) -> str:
-    """The catalogue_section of docs/results.md."""
-    return _CATALOGUE.format(**result)
-
-
-def write_catalogue(docs: Path) -> None:
-    """The section `catalogue`; status 1 where one question in twenty takes longer than 50 ms."""
-    result = times(_ROWS)
-    write(docs, "catalogue", result, catalogue_section)
-    if result["most_ms"] > 50.0:
         sys.exit(1)

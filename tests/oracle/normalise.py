@@ -31,7 +31,6 @@ NAMES_ALONE = ("files",)
 UNREAD = {
     ".svg": "coordinates, rounded; the figures in it stand in the JSON results",
     ".png": "likewise",
-    ".sqlite": "the order of rows and pages is SQLite's; `gyrotc catalogue` says what is in it",
 }
 #: What replaces parts of pages and certificates, with the reason.
 OF_PAGES = (

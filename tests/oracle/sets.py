@@ -241,8 +241,6 @@ def _lot(s: Steps) -> None:
     s.run(*made, "--units", 10, "--base", "short.toml", "--out", "short", name="simulate a new unit")
     s.write(_reversed_unit, name="a unit with its sign reversed")
     s.run("fleet", "whole", "--out", "fleet", "--jobs", 1, "--json", "fleet.json")
-    s.run("catalogue", "fleet", "--on", "2026-09-01", "--json", "catalogue.json")
-    s.run("catalogue", "fleet", "LOT-0005-003", "--on", "2026-02-01", name="catalogue of a unit")
     s.run("lot", "fleet", "--out", "lot.json")
     unit = "short/LOT-0005-010"
     s.run("fit", unit, "--lot", "lot.json", "--out", "with-lot")

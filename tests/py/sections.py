@@ -64,7 +64,6 @@ SECTIONS: dict[str, Callable[[Any], str]] = {
     "lot-prior": lot_prior.section,
     "fleet": fleet.section,
     "fleet-kills": fleet.kills_section,
-    "catalogue": fleet.catalogue_section,
     "growth": growth.section,
     "formats": formats.section,
     "import": importing.section,

@@ -24,7 +24,6 @@ CODE: dict[str, tuple[str, ...]] = {
     "bench": _TRAIN,
     "blind": _DIAGNOSE,
     "budget": ("gen/gyrotc/assess", *_TRAIN),
-    "catalogue": ("gen/gyrotc/fleet/catalogue.py",),
     "events": ("gen/gyrotc/quality",),
     "evidence": ("gen/gyrotc/assess", "gen/gyrotc/fleet/outliers.py", "gen/gyrotc/quality", "gen/gyrotc/recordings"),
     "faults": (*_RUNTIME, *_TRAIN),

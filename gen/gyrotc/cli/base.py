@@ -58,7 +58,7 @@ GROUPS = {
     "Record": ("plan", "simulate", "import", "check"),
     "Calibrate": ("build", "diagnose", "compare", "fit", "emit", "recalibrate"),
     "Judge": ("evaluate", "verify", "report"),
-    "Many units": ("fleet", "catalogue", "lot"),
+    "Many units": ("fleet", "lot"),
     "Share": ("certificate", "export"),
     "Forms": ("schema",),
 }

@@ -1,12 +1,10 @@
-"""Commands for many serials (`fleet`, `catalogue`, `lot`), and for what leaves the laboratory (`certificate`, `export`,
-`sign`, `stamp`)."""
+"""Commands for many serials (`fleet`, `lot`), and for what leaves the laboratory (`certificate`, `export`)."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import date
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -64,11 +62,6 @@ def fleet(
     full: Annotated[
         bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
     ] = False,
-    tag: Annotated[str, typer.Option("--tag", help="Goes into the catalogue with what is new, e.g. a release.")] = "",
-    shard: Annotated[
-        str | None, typer.Option("--shard", help="k/N: only this share, without the summary; for arrays of jobs.")
-    ] = None,
-    gathered: Annotated[bool, typer.Option("--gather", help="Only the summary of what shares have done.")] = False,
     release: Annotated[
         list[str] | None, typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it.")
     ] = None,
@@ -83,36 +76,20 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..fleet.manifest import load_manifest, share_of
+    from ..fleet.manifest import load_manifest
     from ..fleet.page import summary_of
-    from ..fleet.run import Cluster, gather, run_fleet, run_share
+    from ..fleet.run import Cluster, run_fleet
 
-    share = share_of(shard) if shard else None
     if bool(release) != bool(why.strip()):
         raise InputError("--release", "and --reason go together", "--release SERIAL --reason TEXT")
     releases = dict.fromkeys(release or (), " ".join(why.split()))
-    if share and gathered:
-        raise InputError("--gather", "goes with no --shard", "one of them")
     wanted = load_manifest(manifest)
     options = replace(wanted.options, prior=lot_in(lot))
     wanted = replace(wanted, options=options, display=display or wanted.display)
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
     with displayed(wanted.display), progress() as say:
         done = _Done(len(wanted.units), say)
-        if share:
-            entries = run_share(wanted, out, share, jobs=jobs, cluster=cluster, full=full, done=done)
-        elif gathered:
-            entries = gather(wanted, out, full=full, tag=tag, releases=releases, done=done)
-        else:
-            entries = run_fleet(
-                wanted, out, jobs=jobs, cluster=cluster, full=full, tag=tag, releases=releases, done=done
-            )
-    if share:
-        missing = sum(entry.status != "done" for entry in entries)
-        tell(f"share {shard}: {len(entries) - missing} of {len(entries)} done; gyrotc fleet --gather makes the summary")
-        if missing:
-            raise CheckFailed(f"{missing} of {len(entries)} gyros of the share are not done")
-        return
+        entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, full=full, releases=releases, done=done)
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     with displayed(wanted.display):
@@ -121,67 +98,6 @@ def fleet(
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
         raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed{left}")
-
-
-@app.command()
-def catalogue(
-    place: Annotated[Path, typer.Argument(help="The --out of fleet, or a catalogue.sqlite.")],
-    serial: Annotated[str | None, typer.Argument(help="Which table may this gyro carry?")] = None,
-    day: Annotated[str | None, typer.Option("--on", help="On this day, ISO 8601; default today.")] = None,
-    exported: Annotated[
-        str | None, typer.Option("--export", metavar="SERIAL", help="Write the complete result of this gyro to --out.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for --export.")] = None,
-    withdrawn: Annotated[
-        str | None, typer.Option("--withdraw", metavar="HASH", help="Mark the model of this hash as withdrawn.")
-    ] = None,
-    display: DisplayOption = None,
-    json_file: JsonOption = None,
-) -> None:
-    """Which table a gyro may carry on a day, and from which data; without a serial the last calibrations.
-
-    --export writes the folder that a firmware engineer gets, with what a fleet keeps once for all gyros or not at
-    all. Exit status 1 where there is no table.
-
-    Example: gyrotc catalogue fleet RLG-0042 --on 2026-09-01
-    """
-    from ..fleet.catalogue import catalogued, export, withdraw
-
-    try:
-        asked = (date.fromisoformat(day) if day else date.today()).isoformat()
-    except ValueError as error:
-        raise InputError("--on", repr(day), "a day such as 2026-09-01") from error
-    if withdrawn is not None:
-        if exported is not None or serial is not None:
-            raise InputError("--withdraw", "goes with no serial", "--withdraw HASH alone")
-        tell(f"{place}: {withdraw(place, withdrawn)} calibrations withdrawn")
-        return
-    if exported is not None:
-        if out is None or serial is not None:
-            raise InputError("--export", "goes with --out and no other serial", "--export SERIAL --out DIR")
-        serial = exported
-    answer = catalogued(place, serial, asked)
-    if exported is not None and out is not None and answer.found:
-        export(place, exported, asked, out)
-    write_json(json_file, answer.content())
-    for one in shown(answer).found:
-        until = f" to {one.valid_until}" if one.valid_until else ""
-        spread = f", U {sci(one.expanded_dph, 1)} {rate_unit()}" if one.expanded_dph is not None else ""
-        tell(
-            f"{one.serial}{f' axis {one.axis}' if one.axis else ''}: {one.valid_from or 'no date'}{until}, "
-            f"{one.verdict or one.status}{f', {one.tag}' if one.tag else ''}{spread}"
-        )
-        tell(f"  model {one.model_hash or 'none: the job failed without one'}")
-        if one.image_sha256:
-            tell(f"  image {one.image_sha256}")
-        for file in one.recordings if serial else ():
-            tell(f"  {file.role} {file.file} {file.sha256}")
-    if exported is not None and answer.found:
-        tell(f"{out}: complete")
-    if serial is None:
-        tell(f"{answer.calibrations} calibrations in all")
-    elif not answer.found:
-        raise CheckFailed(f"{serial} may carry no table of this catalogue on {asked}")
 
 
 def _tell_comparison(summary: FleetSummary) -> None:
@@ -202,7 +118,7 @@ def _tell_comparison(summary: FleetSummary) -> None:
     for unit in summary.serials:
         if unit.barred:
             tell(
-                f"{unit.name}: not in the catalogue, in no lot: {', '.join(unit.barred)}; look at it, or "
+                f"{unit.name}: not released, in no lot: {', '.join(unit.barred)}; look at it, or "
                 f"--release {unit.serial} --reason TEXT"
             )
 

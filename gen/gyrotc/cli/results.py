@@ -187,8 +187,6 @@ def file_notes(result: Verification | JointVerification) -> Iterator[str]:
             yield f"{file.file}: foreign; gyrotc did not write it, move it elsewhere"
         elif file.verdict == "missing":
             yield f"{file.file}: missing"
-        elif file.verdict == "left_out":
-            yield f"{file.file}: not kept by the fleet; the model gives it as it was (gyrotc catalogue --export)"
         elif file.verdict != "equal":
             yield f"{file.file}: {_difference_text(file)}"
     equal = sum(file.verdict == "equal" for file in result.emitted)

@@ -47,7 +47,7 @@ def kinds() -> dict[str, type[BaseModel]]:
     from ..results.base import MapOnGrid, Marker
     from ..results.diagnosed import Diagnosed, DiagnosisSeries
     from ..results.evaluation import Changes, Comparison, Evaluation, InService
-    from ..results.fleet import CatalogueAnswer, FleetEntry, FleetSummary, Lot
+    from ..results.fleet import FleetEntry, FleetSummary, Lot
     from ..results.recordings import Checked, ImportedFiles, LotPlan, NextRun, Plan, SimulatedTruth
     from ..results.release import Budget, Emitted, HeldLimits, JointVerification, Verification
     from ..results.training import Manifest, Training
@@ -55,7 +55,6 @@ def kinds() -> dict[str, type[BaseModel]]:
 
     return {
         "budget": Budget,
-        "catalogue": CatalogueAnswer,
         "changes": Changes,
         "check": Checked,
         "compare": Comparison,

@@ -30,7 +30,7 @@ from ..pages.report import page_environment, thermal_picture
 from ..pages.unit import UnitResults
 from ..results.files import write_atomically, write_own
 from ..results.folder import result_folder, scratch_folder
-from ..results.marker import read_marker, sha256
+from ..results.marker import sha256
 from ..results.release import Limit
 
 _CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
@@ -319,12 +319,9 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
         return
     if manifest.model_hash != unit.model.hash:
         raise InputError(str(folder / "manifest.json"), "is of another model", "a folder as gyrotc build left it")
-    marker = read_marker(folder)
-    left_out = marker.left_out if marker is not None else {}  # the model gives them; no fleet keeps them
     for name, known in manifest.files.items():
         path = folder / name
-        own = name.endswith("main.c") or not (name in _NEVER_REWRITTEN or name.startswith("c/"))
-        if own or (known == left_out.get(name) and not path.exists()):
+        if name.endswith("main.c") or not (name in _NEVER_REWRITTEN or name.startswith("c/")):
             continue
         if not path.is_file() or sha256(path) != known:
             raise InputError(str(path), "is not as it was built", "a folder as gyrotc build left it")

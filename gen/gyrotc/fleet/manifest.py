@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import compress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -46,8 +44,8 @@ class Unit:
     @property
     def refused(self) -> str:
         """Why no result folder may have this name; empty if it may."""
-        if self.folder.casefold() in (*SUMMARY, "catalogue"):
-            return "is the name of a file of the summary or a folder of the fleet; give the data set another name"
+        if self.folder.casefold() in SUMMARY:
+            return "is the name of a file of the summary; give the data set another name"
         if not self.folder.strip("-xyz") or self.folder.startswith("."):
             return "a name that is empty or begins with a dot is no name for a result"
         return ""
@@ -62,39 +60,6 @@ class Fleet:
     numerics: tuple[str, ...] | None
     limits: Limits | None
     display: str = NATIVE
-
-
-@dataclass(frozen=True, slots=True)
-class Share:
-    """The k-th of n shares of a fleet, from 1 on: for jobs of an array."""
-
-    number: int
-    of: int
-
-
-_MOST_SHARES = 100_000  # as many as a fleet may have units
-
-
-def share_of(text: str) -> Share:
-    """`k/N` as a share.
-
-    Raises:
-        InputError: It is not of that form.
-    """
-    number, _, of = text.partition("/")
-    if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of) <= _MOST_SHARES:
-        return Share(int(number), int(of))
-    raise InputError("--shard", repr(text)[:40], f"k/N with 1 <= k <= N <= {_MOST_SHARES}, such as 3/16")
-
-
-def mine(fleet: Fleet, share: Share) -> Fleet:
-    """The fleet with the units of a share alone, in their order.
-
-    Which share a unit belongs to follows from the hash of its name alone: all machines agree without talking.
-    """
-    numbers = (hashlib.sha256(os.fsencode(unit.folder)).digest()[:8] for unit in fleet.units)
-    own = (int.from_bytes(number, "big") % share.of == share.number - 1 for number in numbers)
-    return replace(fleet, units=tuple(compress(fleet.units, own)))
 
 
 class _Part(BaseModel):

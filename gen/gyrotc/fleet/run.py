@@ -1,8 +1,4 @@
-"""A fleet: units that are done stay, the rest is done on processes of this machine or on a Dask cluster.
-
-What is done is reported by the results themselves. So a job of an array can do a share of the units and write nothing
-else, and a call that gathers finds what all of them did.
-"""
+"""A fleet: units that are done stay, the rest is done on processes of this machine or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -25,17 +21,14 @@ from ..common.errors import InputError, install_command
 from ..results.cache import program_of
 from ..results.files import Lock, deferred
 from ..results.fleet import FleetEntry
-from ..results.folder import result_folder
 from ..results.marker import KINDS, check_contents, check_separate, final_place
-from .catalogue import enter
-from .manifest import SUMMARY, Fleet, Share, mine, printable
+from .manifest import SUMMARY, Fleet, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
 _STOPPED = "the fleet was stopped before it: give the command again"
-_NO_RESULT = "no share has made it: give its share again, which says why where it fails"
 
 
 def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
@@ -231,7 +224,6 @@ def run_fleet(
     jobs: int = 2,
     cluster: Cluster | None = None,
     full: bool = False,
-    tag: str = "",
     releases: Mapping[str, str] | None = None,
     done: Done | None = None,
 ) -> list[FleetEntry]:
@@ -241,9 +233,8 @@ def run_fleet(
         out: A folder for each unit goes into it, and the files of the summary.
         jobs: Processes on this machine.
         cluster: To use instead; its workers see the same folders.
-        tag: Goes into the catalogue with what is new in it.
-        releases: Reasons, by serial, for which units are released although a finding bars them.
         full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
+        releases: Reasons, by serial, for which units are released although a finding bars them.
         done: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
@@ -253,86 +244,13 @@ def run_fleet(
     place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        entries = _run(fleet, place, jobs, cluster, full, done or (lambda _: None), releases)
-        enter(place, entries, tag)
-        return entries
+        return _run(fleet, place, jobs, cluster, full, done or (lambda _: None), releases or {})
     finally:
         with deferred():
             try:
                 clean_units(place, [unit.folder for unit in fleet.units])  # of processes that this one ended
             finally:
                 lock.release()
-
-
-def run_share(
-    fleet: Fleet,
-    out: Path,
-    share: Share,
-    *,
-    jobs: int = 2,
-    cluster: Cluster | None = None,
-    full: bool = False,
-    done: Done | None = None,
-) -> list[FleetEntry]:
-    """Does the units of one share that are not done yet, and writes no summary; arguments as of `run_fleet`.
-
-    Raises:
-        InputError: As `run_fleet`; what the summary would replace is none.
-    """
-    place, own, say = _checked_place(fleet, out), mine(fleet, share), done or (lambda _: None)
-    try:
-        tasks = tasks_of(own, place, full)
-        entries = _done_already(tasks, say)
-        if len(entries) < len(tasks):
-            _without_summary(place)  # what it says of them ends now
-        return _worked(tasks, entries, jobs, cluster, say)
-    finally:
-        with deferred():
-            clean_units(place, [unit.folder for unit in own.units])
-
-
-def _without_summary(out: Path) -> None:
-    """Takes an earlier summary away; shares that do it at the same time wait for one another."""
-    lock = Lock(out / "fleet.json", "fleet", wait=True)
-    try:
-        if any((out / name).exists() for name in SUMMARY):
-            with result_folder(out, "fleet", entries=SUMMARY):
-                pass
-    finally:
-        with deferred():
-            lock.release()
-
-
-def gather(
-    fleet: Fleet,
-    out: Path,
-    *,
-    full: bool = False,
-    tag: str = "",
-    releases: Mapping[str, str] | None = None,
-    done: Done | None = None,
-) -> list[FleetEntry]:
-    """The summary and the catalogue of the results that shares have made; arguments as of `run_fleet`.
-
-    A unit without a result of its present recordings, options and program is unfinished.
-
-    Raises:
-        InputError: As `run_fleet`.
-    """
-    place, say = _checked_place(fleet, out), done or (lambda _: None)
-    lock = Lock(place / "fleet.json", "fleet")
-    try:
-        entries = []
-        for task in tasks_of(fleet, place, full):
-            known = made_before(task.keyed())
-            entries.append(known.as_kept() if known else _unfinished(task, _NO_RESULT))
-            say(entries[-1])
-        found = _summed(fleet, place, entries, releases)
-        enter(place, found, tag)
-        return found
-    finally:
-        with deferred():
-            lock.release()
 
 
 def _checked_place(fleet: Fleet, out: Path) -> Path:
@@ -368,51 +286,27 @@ def _run(
     cluster: Cluster | None,
     full: bool,
     say: Done,
-    releases: Mapping[str, str] | None,
+    releases: Mapping[str, str],
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
-    tasks = tasks_of(fleet, out, full)
-    entries = _done_already(tasks, say)
+    tasks = [task.keyed() for task in tasks_of(fleet, out, full)]
+    entries = {}
+    for number, task in enumerate(tasks):
+        if (known := made_before(task)) and known.status == "done":
+            entries[number] = known.as_kept()
+            say(entries[number])
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
         so_far = [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)]
         write_summary(out, so_far, fleet.display)
-    return _summed(fleet, out, _worked(tasks, entries, jobs, cluster, say), releases)
-
-
-def _done_already(tasks: list[Task], say: Done) -> dict[int, FleetEntry]:
-    """Entries of earlier calls that still hold, by the number of their task. Every task gets its key."""
-    entries = {}
-    for number, task in enumerate(tasks):
-        tasks[number] = task.keyed()
-        if (known := made_before(tasks[number])) and known.status == "done":
-            entries[number] = known.as_kept()
-            say(entries[number])
-    return entries
-
-
-def _worked(
-    tasks: Sequence[Task], entries: dict[int, FleetEntry], jobs: int, cluster: Cluster | None, say: Done
-) -> list[FleetEntry]:
-    """Does what has no entry yet; all entries in the order of the tasks."""
     waiting = [number for number in range(len(tasks)) if number not in entries]
     left = [tasks[number] for number in waiting]
     for k, entry in on_dask(cluster, left) if cluster and left else on_processes(jobs, left):
         entries[waiting[k]] = entry
         say(entry)
-    return [entries[number] for number in range(len(tasks))]
-
-
-def _summed(
-    fleet: Fleet, out: Path, entries: Sequence[FleetEntry], releases: Mapping[str, str] | None
-) -> list[FleetEntry]:
-    """Writes the summary; the entries as it tells them."""
-    why = releases or {}
     found = [
-        entry.model_copy(update={"released": why[entry.serial]})
-        if entry.serial is not None and entry.serial in why
-        else entry
-        for entry in _one_of_each_serial(entries)
+        entry.model_copy(update={"released": why}) if (why := releases.get(entry.serial or "")) else entry
+        for entry in _one_of_each_serial([entries[number] for number in range(len(tasks))])
     ]
     write_summary(out, found, fleet.display)
     return found

@@ -6,8 +6,8 @@ import itertools
 import os
 import socket
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,12 @@ from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.build import Built, build_into
 from ..quality.events import found_events
-from ..recordings.description import FILE, Problems, parse_description
 from ..recordings.load import load
 from ..recordings.records import Dataset
 from ..results.cache import inputs_of, program_of
 from ..results.files import Lock, digest_of, json_text, write_atomically
 from ..results.fleet import Facts, FleetEntry
-from ..results.folder import clean, leftovers, result_folder, share_by_hash
+from ..results.folder import clean, leftovers, result_folder
 from ..results.marker import KINDS, faults, read_marker, survey
 from .manifest import Fleet, Unit, printable
 from .outliers import facts_of
@@ -64,9 +63,6 @@ def clean_units(out: Path, names: Sequence[str]) -> None:
 
 
 ENTRY = "entry.json"
-PAYLOADS = "catalogue/payloads"
-"""In the fleet's folder: what is kept under its hash."""
-_OF_ALL = ("c/gtc.c", "c/gtc.h")  # the same for every gyro
 
 
 def write_entry(folder: Path, entry: FleetEntry) -> FleetEntry:
@@ -144,36 +140,12 @@ def do_unit(task: Task) -> FleetEntry:
             found = f"is {here}, and {there} where the fleet was started"
             raise InputError(f"the gyrotc of worker {_worker()}", found, "the same gyrotc everywhere")
         return _built(task)
-    except _NotCalibrated as error:
-        return _identified(failed(task, str(error)), task)
     except GyrotcError as error:
         return failed(task, str(error))
     except OSError as error:
         return failed(task, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except Exception as error:  # a fault of the program itself must not stop the other serials either
         return failed(task, f"{type(error).__name__}: {error}")
-
-
-class _NotCalibrated(GyrotcError):
-    """The recordings give no table: the reason lies in them, not in what ran where."""
-
-
-@contextmanager
-def _calibrating() -> Iterator[None]:
-    try:
-        yield
-    except GyrotcError as error:
-        raise _NotCalibrated(str(error)) from error
-
-
-def _identified(entry: FleetEntry, task: Task) -> FleetEntry:
-    """With serial, day and key, as far as the description of the data set can be read: it failed, and that is known."""
-    description = parse_description(task.unit.dataset / FILE, Problems(collect=True))
-    if description is None or not task.key:
-        return entry
-    days = [one.started.date().isoformat() for one in description.run if one.started is not None]
-    known = {"serial": description.serial, "date": _day_of(description.meta, days), "key": task.key}
-    return entry.model_copy(update=known)
 
 
 def _worker() -> str:
@@ -202,30 +174,25 @@ def _built(task: Task) -> FleetEntry:
     if task.key not in ("", key):
         found = f"is {key[:16]} on worker {_worker()}, and {task.key[:16]} where the fleet was started"
         raise InputError(f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere")
-    with _calibrating():
-        dataset = load(task.unit.dataset, axis=task.unit.axis)
+    dataset = load(task.unit.dataset, axis=task.unit.axis)
     moved_to = move_away(task.out)
     runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:
         stage.of(dataset.serial, dataset.axis)
         fleet = task.fleet
-        with _calibrating():
-            built = build_into(
-                stage.folder,
-                dataset,
-                fleet.options,
-                numerics=fleet.numerics,
-                limits=fleet.limits,
-                compiled=task.full,
-                watch=lambda run, averages: runs.append((run.file, averages)),
-            )
+        built = build_into(
+            stage.folder,
+            dataset,
+            fleet.options,
+            numerics=fleet.numerics,
+            limits=fleet.limits,
+            compiled=task.full,
+            watch=lambda run, averages: runs.append((run.file, averages)),
+        )
         if task.found() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
         entry = _entry_of(task, key, dataset, built, runs)
         write_entry(stage.folder, entry)
-        for name in _OF_ALL:
-            share_by_hash(task.out.parent / PAYLOADS, stage.folder / name)
-        stage.leave_out(f"c/vectors_{built.model.id}.txt")  # nine tenths of what is this gyro's alone
     return entry.model_copy(update={"moved_to": moved_to}) if moved_to else entry
 
 

@@ -144,7 +144,6 @@ class MarkerFields(TypedDict, total=False):
     parts: tuple[str, ...]
     pending: dict[str, dict[str, str]]
     unfinished: bool
-    left_out: dict[str, str]
 
 
 class Marker(Result):
@@ -175,17 +174,12 @@ class Marker(Result):
         description="true in folders named `.<name>.gyrotc-part-<8 digits>` alone, which a job is writing "
         "or died writing",
     )
-    left_out: dict[str, str] = Field(
-        default={},
-        description="SHA-256 of files that follow from the others and are not kept, by path: in a gyro's folder of a "
-        "fleet the answers to the vectors; `gyrotc catalogue --export` makes them",
-    )
 
     def content(self) -> dict[str, Any]:
-        """The JSON object; files and parts by name, the last three fields only where they say something."""
+        """The JSON object; files and parts by name, the last two fields only where they say something."""
         found = super().content()
         found |= {"files": dict(sorted(self.files.items())), "parts": sorted(self.parts)}
-        rare = ("pending", "unfinished", "left_out")
+        rare = ("pending", "unfinished")
         return {name: value for name, value in found.items() if value or name not in rare}
 
     def but(self, **changed: Unpack[MarkerFields]) -> Marker:

@@ -1,4 +1,4 @@
-"""Many units: `fleet.json`, the `entry.json` of each gyro, what a catalogue answers; `lot.json`, what they share."""
+"""Many units: `fleet.json`, the `entry.json` of each gyro; `lot.json`, what they share."""
 
 from __future__ import annotations
 
@@ -10,48 +10,6 @@ from .base import Amount, Axis, Count, Figure, Finding, Part, Positive, Result, 
 from .release import Verdict
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-
-
-class CataloguedFile(Part):
-    """A recording that a table was made of."""
-
-    file: str = Field(description="as in `dataset.toml`")
-    role: Literal["train", "exam"] = Field(description="of the run")
-    sha256: Sha256 = Field(description="of the file")
-
-
-class Catalogued(Part):
-    """One calibration of one axis."""
-
-    serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
-    valid_from: str | None = Field(description="day of the calibration; null: not stated, so it is valid on no day")
-    valid_until: str | None = Field(description="last day; null: until the next calibration")
-    tag: str = Field(description="`--tag` of the fleet; `withdrawn`: may not be carried")
-    status: Literal["done", "failed"] = Field(description="as in the fleet")
-    verdict: Verdict | None = Field(description="of its limits; null without limits")
-    model_hash: Sha256 | None = Field(description="of its model; null where a failed job made none")
-    image_sha256: Sha256 | None = Field(
-        description="of its image for a target, a payload of the catalogue; null without a model"
-    )
-    model_sha256: Sha256 | None = Field(
-        description="of its `model.json`, a payload of the catalogue; null without a model"
-    )
-    after_rms_dph: Figure = Field(description="RMS after compensation, deg/h")
-    expanded_dph: Figure = Field(description="U of the compensated bias, deg/h")
-    folder: str = Field(description="its folder in the fleet when it was entered")
-    recordings: tuple[CataloguedFile, ...] = Field(description="data that it was made of")
-
-
-class CatalogueAnswer(Result):
-    """Tables that a gyro may carry on a day, or what a catalogue holds."""
-
-    schema_: Annotated[Literal["gyrotc.catalogue/1"], Field(alias="schema")] = "gyrotc.catalogue/1"
-    serial: str | None = Field(description="that was asked for; null: none")
-    axis: None = Field(description="each calibration has its own")
-    day: str | None = Field(description="that was asked for; null: every calibration is listed")
-    calibrations: Count = Field(description="in the catalogue")
-    found: tuple[Catalogued, ...] = Field(description="one for each axis, or the last 100 that were entered")
 
 
 BARRING = frozenset(
@@ -123,7 +81,7 @@ class FleetUnit(Part):
 
     @property
     def barred(self) -> tuple[str, ...]:
-        """Findings for which no catalogue and no lot takes it; none where a release is recorded."""
+        """Findings for which no lot takes it; none where a release is recorded."""
         return () if self.released else tuple(sorted(BARRING & {*self.findings}))
 
 

@@ -68,13 +68,6 @@ class Stage:
         parts = self._job.parts
         parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
 
-    def leave_out(self, name: str) -> None:
-        """Removes a file that was written and that the others tell; the marker keeps its hash."""
-        path, parts = self.folder / name, self._job.parts
-        known = parts[self._part].left_out | {name: sha256(path)}
-        parts[self._part] = parts[self._part].but(left_out=known)
-        path.unlink()
-
     def stale(self) -> None:
         """Says that what else gyrotc wrote into the folder no longer holds: it is removed when the new files come.
 
@@ -133,37 +126,6 @@ def result_folder(
         with deferred():
             if job is not None:
                 job.end()
-
-
-def kept_by_hash(store: Path, source: Path) -> Path:
-    """Where a copy of a file is kept under its hash, read-only; it is made where there is none.
-
-    Raises:
-        InputError: What lies there is something else.
-    """
-    known = sha256(source)
-    place = store / known[:2] / known
-    if place.exists() or place.is_symlink():
-        if not place.is_file() or sha256(place) != known:
-            raise InputError(str(place), "is not what its name says", "a file that gyrotc fleet wrote, or none")
-    else:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(place, source.read_bytes())
-        place.chmod(0o444)
-    return place
-
-
-def share_by_hash(store: Path, path: Path) -> Path:
-    """Makes a file another name of the one that is kept under its hash, which is returned; raises as `kept_by_hash`.
-
-    Where the file system has no such names, or no more of them, the file stays.
-    """
-    place = kept_by_hash(store, path)
-    part = path.with_name(f".{path.name}.gyrotc-part")
-    with suppress(OSError):
-        os.link(place, part)
-        part.replace(path)
-    return place
 
 
 def write_result(path: Path, text: str) -> None:

@@ -268,9 +268,8 @@ class VerifiedFile(Part):
     """An emitted file, compared with what the model gives."""
 
     file: str = Field(description="its name in `c/`")
-    verdict: Literal["equal", "differs", "missing", "foreign", "edited", "left_out"] = Field(
-        description="`foreign`: gyrotc does not make it; `edited`: it differs, which `--allow-edited` allows; "
-        "`left_out`: a fleet did not keep it, and what the model gives has the hash that it had"
+    verdict: Literal["equal", "differs", "missing", "foreign", "edited"] = Field(
+        description="`foreign`: gyrotc does not make it; `edited`: it differs, which `--allow-edited` allows"
     )
     status: PassOrFail = Field(description="whether it is as it has to be")
     mismatches: Count = Field(description="lines or words that differ; 1 for what has none")

@@ -96,12 +96,7 @@ class Update:
         self._changed = sorted(written | (entries & self._before.entries()))
         kept = {n: h for n, h in self._before.files.items() if _top(n) not in self._changed}
         parts = {part for part in self._before.parts if _top(part) not in self._changed}
-        left_out = {n: h for n, h in self._before.left_out.items() if _top(n) not in self._changed}
-        self._after = marker.but(
-            files=kept | marker.files,
-            parts=tuple(sorted(parts | set(marker.parts))),
-            left_out=left_out | marker.left_out,
-        )
+        self._after = marker.but(files=kept | marker.files, parts=tuple(sorted(parts | set(marker.parts))))
         if earlier is not None:  # who made the folder, and of what gyro, unless this job says it anew
             self._after = self._after.but(kind=earlier.kind, command=earlier.command)
         if marker.serial is None:

@@ -28,7 +28,7 @@ from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
 from ..model import SERIAL, Model
 from ..results.files import write_own
-from ..results.marker import MARKER, read_marker
+from ..results.marker import MARKER, sha256
 from ..results.release import VerifiedFile
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
@@ -51,13 +51,11 @@ class Job:
     trusted: bool = False  # the user takes the code of the folder as it is
 
 
-def c_hash(c_folder: Path, left_out: Mapping[str, bytes] | None = None) -> str:
-    """SHA-256 over names and contents of the emitted files, and of those that are not kept."""
-    paths = (p for p in c_folder.iterdir() if p.is_file() and p.name != MARKER)
-    contents = {**(left_out or {}), **{path.name: path.read_bytes() for path in paths}}
+def c_hash(c_folder: Path) -> str:
+    """SHA-256 over names and contents of the emitted files."""
     digest = hashlib.sha256()
-    for name, data in sorted(contents.items()):
-        digest.update(f"{name} {hashlib.sha256(data).hexdigest()}\n".encode())
+    for path in sorted(p for p in c_folder.iterdir() if p.is_file() and p.name != MARKER):
+        digest.update(f"{path.name} {sha256(path)}\n".encode())
     return digest.hexdigest()
 
 
@@ -84,41 +82,16 @@ def texts_again(model: Model, options: Options, emission: Emission) -> dict[str,
     return emit_texts(model, emission, asked=options.numeric is not None, zero_at=options.zero_at_c)
 
 
-def left_out_of(folder: Path, model: Model, texts: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The files of a result's `c/` that were not kept, by name: at most the answers to the vectors.
-
-    Args:
-        texts: What emission gives.
-
-    Raises:
-        InputError: The marker says another hash, or is damaged.
-    """
-    name = f"vectors_{model.id}.txt"
-    marker = read_marker(folder)
-    known = marker.left_out.get(f"c/{name}") if marker else None
-    if known is None:
-        return {}
-    if hashlib.sha256(texts[name]).hexdigest() != known:
-        raise InputError(str(folder / "model.json"), f"does not give {name} as it was", "a result as written")
-    return {name: texts[name]}
-
-
-def file_entries(
-    c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = (), left_out: Collection[str] = ()
-) -> Iterator[VerifiedFile]:
+def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()) -> Iterator[VerifiedFile]:
     """One entry for each file that should be there or is.
 
     Args:
         c_folder: The emitted folder.
         texts: What must lie there, by name.
         edited: Names of `EDITABLE` that may differ, but not be missing.
-        left_out: Names of files that were not kept; those that are there nevertheless are compared.
     """
     there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
     for name, data in sorted(texts.items()):
-        if name not in there and name in left_out:
-            yield VerifiedFile(file=name, verdict="left_out", status="pass", mismatches=0)
-            continue
         if name not in there:
             yield VerifiedFile(file=name, verdict="missing", status="fail", mismatches=1)
             continue

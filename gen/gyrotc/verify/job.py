@@ -46,7 +46,6 @@ from .emitted import (
     c_hash,
     checked_sources,
     file_entries,
-    left_out_of,
     made_again,
     table_files,
     texts_again,
@@ -253,11 +252,10 @@ def verify(
     vectors = make_vectors(model, tuple(tables))
     job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
     texts = texts_again(model, options, emission)
-    left_out = left_out_of(folder, model, texts)
-    emitted = tuple(file_entries(job.c_folder, texts, edited, left_out))
+    emitted = tuple(file_entries(job.c_folder, texts, edited))
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
-    identity = (model.hash, c_hash(folder / "c", left_out))
+    identity = (model.hash, c_hash(folder / "c"))
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
     if dataset is not None and not barred:

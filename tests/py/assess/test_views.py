@@ -1,4 +1,4 @@
-"""Every view of a verdict says the same: terminal, pages, certificate, DCC, Python, catalogue, JSON."""
+"""Every view of a verdict says the same: terminal, pages, certificate, DCC, Python, fleet, JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from gyrotc.assess.limits import Limits, decided, held_against
 from gyrotc.cli.results import limit_lines, summary
 from gyrotc.deliver.certificate import LaboratoryFacts, certificate_page, rows_of
-from gyrotc.fleet import catalogue, unit
+from gyrotc.fleet import unit
 from gyrotc.fleet.manifest import Fleet, Unit
 from gyrotc.fleet.page import write_summary
 from gyrotc.jobs.api import Result
@@ -111,7 +111,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
             assert (where[name] in summary(evaluation)) == (judged[0] == name), number
 
 
-def test_fleet_and_catalogue_have_the_decision_of_the_unit(
+def test_a_fleet_has_the_decision_of_the_unit(
     model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(unit, "facts_of", lambda runs: None)  # no verdict depends on the comparison
@@ -127,23 +127,11 @@ def test_fleet_and_catalogue_have_the_decision_of_the_unit(
         task = unit.Task(Unit(Path(f"u{number}"), None), "d", _NO_FLEET, tmp_path / f"u{number}", False, "")
         dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", runs=(), sketch=(), noise_signs=()))
         entry = unit._entry_of(task, "0" * 64, dataset, one, ())
-        folder = tmp_path / entry.name
-        (folder / "c").mkdir(parents=True)
-        (folder / "c" / f"gtc_{model.id}.bin").write_bytes(b"table")
-        model.save(folder / "model.json")
-        unit.write_entry(folder, entry)
         built.append(one)
         entries.append(entry)
     views = {
         entry.name: UnitResults(model, one.evaluation, None, VERIFICATION, None, None, one.limits, None, None)
         for entry, one in zip(entries, built, strict=True)
-    }
-    monkeypatch.setattr(catalogue, "unit_of", lambda folder: views[folder.name])
-    assert catalogue.enter(tmp_path, entries) == draws
-    listed = catalogue.catalogued(tmp_path, None, None).found
-    assert len(listed) == draws
-    assert {one.serial: one.verdict for one in listed} == {
-        entry.serial: views[entry.name].decision for entry in entries
     }
     for entry in write_summary(tmp_path, entries).serials:
         assert entry.verdict == views[entry.name].decision, entry.name

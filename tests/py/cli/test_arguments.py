@@ -163,4 +163,4 @@ def _toml_text(name: str) -> str:
 
 
 def test_every_command_is_among_them() -> None:
-    assert {"check", "build", "import", "verify", "catalogue"} <= set(COMMANDS)
+    assert {"check", "build", "import", "verify", "fleet"} <= set(COMMANDS)

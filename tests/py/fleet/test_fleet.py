@@ -24,6 +24,7 @@ from gyrotc.fleet.run import run_fleet
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
+from gyrotc.verify.job import verify
 from recordings import columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
@@ -54,6 +55,8 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     lines = {line.split(":")[0]: line for line in done.stdout.splitlines()}
     assert "done; RMS" in lines["RLG-1"] and "done; RMS" in lines["RLG-2"]
     assert "failed; run-01.csv, line 1: no column temperature_c" in lines["RLG-3"]
+    verified = verify(out / "RLG-1", compiled=False).emitted
+    assert {file.verdict for file in verified} == {"equal"}, "the folder of a gyro is complete"
     summary = json.loads((out / "fleet.json").read_text())
     assert json.loads((tmp_path / "fleet.json").read_text()) == summary
     assert (summary["schema"], summary["done"], summary["failed"]) == ("gyrotc.fleet/1", 2, 1)
@@ -165,7 +168,7 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("done (done before)") >= 2
     assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
-        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html", "catalogue",
+        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html",
     }  # fmt: skip
 
 

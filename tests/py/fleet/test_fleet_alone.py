@@ -138,7 +138,7 @@ def test_a_tampered_result_is_not_done(case: str, task: Task) -> None:
         assert {path.relative_to(moved): path.read_bytes() for path in moved.rglob("*.*")} == damaged
     else:
         assert case in ("half the files", "the evaluation")
-    assert {p.name for p in task.out.parent.iterdir()} <= {"RLG-1", "RLG-1.changed-1", "catalogue"}
+    assert {p.name for p in task.out.parent.iterdir()} <= {"RLG-1", "RLG-1.changed-1"}
 
 
 def test_a_foreign_file_in_a_result_stays_and_stops_its_gyro_alone(task: Task) -> None:
@@ -165,7 +165,7 @@ def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
     assert run_fleet(fleet, out)[0].status == "done"
-    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", "catalogue", MARKER, *SUMMARY}
+    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
 
 
 @pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
@@ -424,5 +424,5 @@ def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
         _agrees(out)
     assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert _agrees(out) == 3
-    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), "catalogue", MARKER, *SUMMARY}
+    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), MARKER, *SUMMARY}
     assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}

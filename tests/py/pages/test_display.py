@@ -159,7 +159,7 @@ def test_every_command_that_states_rates_takes_the_unit_and_refuses_another() ->
     commands = get_command(application()).commands  # type: ignore[attr-defined]
     takes = {name for name, one in commands.items() if any(p.name == "display" for p in one.params)}
     assert takes >= {
-        "fit", "evaluate", "check", "build", "diagnose", "compare", "plan", "fleet", "catalogue", "lot", "report",
+        "fit", "evaluate", "check", "build", "diagnose", "compare", "plan", "fleet", "lot", "report",
     }  # fmt: skip
     for name in sorted(takes):
         done = CliRunner().invoke(application(), [name, "--display", "knots", *["nowhere"] * 3])

@@ -1,0 +1,89 @@
+"""A fleet on processes and on Dask: the same bytes, whatever is killed in between."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import re
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gyrotc.fleet import run as pools
+from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
+from gyrotc.fleet.run import Cluster, run_fleet, tasks_of
+from gyrotc.fleet.unit import Task, do_unit
+from gyrotc.results.fleet import FleetEntry
+from gyrotc.results.marker import MARKER
+from gyrotc.train.fitting import FitOptions
+from recordings import columns, toml, write_csv
+
+
+def gyro(folder: Path, serial: str, *, seed: int) -> None:
+    write_csv(folder / "run-01.csv", columns(720, seed=seed))
+    head = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"'
+    (folder / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """All files of a fleet but markers; without the seconds that training took."""
+    found = {}
+    for path in out.rglob("*"):
+        name = path.relative_to(out).as_posix()
+        if not path.is_file() or path.name == MARKER:
+            continue
+        found[name] = path.read_bytes()
+        if path.name == "training.json":
+            found[name] = re.sub(rb'"seconds": {[^}]*}', b"", found[name])
+        elif path.name == "manifest.json":
+            found[name] = re.sub(rb'"training.json": "[0-9a-f]*"', b"", found[name])
+    return found
+
+
+@pytest.fixture(scope="module")
+def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four gyros, of which one has no recordings."""
+    folder = tmp_path_factory.mktemp("lot")
+    for k in range(4):
+        gyro(folder / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    (folder / "d" / "RLG-3" / "run-01.csv").write_text("time_s,rate_dph\n")
+    run_fleet(load_manifest(folder / "d"), folder / "whole")
+    return folder
+
+
+@pytest.mark.slow
+def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+        cluster = Cluster(local.scheduler_address, 60.0)
+        entries = run_fleet(load_manifest(lot / "d"), lot / "dask", cluster=cluster)
+    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+    assert contents(lot / "dask") == contents(lot / "whole")
+
+
+def test_a_task_does_not_carry_the_fleet(tmp_path: Path) -> None:
+    sizes = []
+    for count in (10, 10000):
+        units = tuple(Unit(tmp_path / f"RLG-{k:05d}", None) for k in range(count))
+        sizes.append(len(pickle.dumps(tasks_of(Fleet(units, FitOptions(), None, None), tmp_path, False)[0])))
+    assert sizes[0] == sizes[1] < 5000
+
+
+def _dies_once(task: Task) -> FleetEntry:
+    mark = task.out.parent / f"{task.unit.name}.died"
+    if task.unit.name == "RLG-1" and not mark.exists():
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return do_unit(task)
+
+
+@pytest.mark.slow
+def test_a_unit_whose_process_is_killed_is_done_again(
+    lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pools, "do_unit", _dies_once)
+    entries: Any = run_fleet(load_manifest(lot / "d"), tmp_path / "out", jobs=1)
+    assert (tmp_path / "out" / "RLG-1.died").exists()
+    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
