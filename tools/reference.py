@@ -26,7 +26,7 @@ PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE
 #: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
     "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
-    "tables.emit", "target.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",
+    "tables.emit", "mirror.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",
     "simulate.campaign", "plan.plan", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(
