@@ -168,8 +168,18 @@ _LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 cha
 _COPIES = 2.0  # of the columns while they are checked
 _IMPORT = "`gyrotc import` reads other forms"
 _NAN = ("nan", "+nan", "-nan")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-_TORN_NUMBER = re.compile(r"[+-]?([0-9]*\.?[0-9]*|([0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?)")
+LONGEST_NUMBER = 64  # characters: a float64 needs 25
+_BEGINS = frozenset("0123456789.")  # of a number behind its sign
+
+
+def number_in(cell: str) -> float | None:
+    """The number that a cell holds, written with a point; None where it holds none, or a word such as nan."""
+    if len(cell) > LONGEST_NUMBER or not cell.isascii() or "_" in cell or cell.lstrip("+-")[:1] not in _BEGINS:
+        return None
+    try:
+        return float(cell)
+    except ValueError:
+        return None
 
 
 def blocks_of_lines(
@@ -210,6 +220,15 @@ def blocks_of_lines(
             if number >= first and lines.strip():
                 yield lines.removeprefix(codecs.BOM_UTF8), number, 1.0 - left / size
             number += count
+    if left:
+        raise InputError(name, f"became {left} bytes shorter while it was read", "a file that stays as it is")
+
+
+def lines_held(lines: bytes) -> int:
+    """Number of lines that are not empty."""
+    if lines.startswith(b"\n") or b"\n\n" in lines:
+        lines = re.sub(rb"\n+", b"\n", lines).removeprefix(b"\n")
+    return lines.count(b"\n") + (not lines.endswith(b"\n") and bool(lines))
 
 
 def _with_lf(block: bytes, *, last: bool) -> bytes:
@@ -294,12 +313,15 @@ class CsvFile(Source):
         at = 0
         try:
             for lines, _, _ in blocks_of_lines(self.path, self.size, self.name):
+                before = at
                 for batch in parsed(lines, unique, wanted).to_batches():
                     for column, values in zip(read.values(), batch.columns, strict=True):
                         if values.null_count:
                             return None
                         column[at : at + len(batch)] = numpy_of(values)
                     at += len(batch)
+                if at - before != lines_held(lines):  # a quote that stays open joins lines
+                    return None
         except pa.ArrowInvalid:
             return None
         return {name: column[:at] for name, column in read.items()}
@@ -367,8 +389,8 @@ class _Faults:
 
     def number(self, line: int, column: str, cell: str) -> float:
         """The number in a cell; NaN and a fault if there is none."""
-        if _NUMBER.fullmatch(cell):
-            return float(cell)
+        if (value := number_in(cell)) is not None:
+            return value
         if cell.lower() in _NAN:
             return float("nan")
         if not cell:
@@ -405,7 +427,7 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
                 raise InputError(where, f"{what} between columns", expected)
     cells = next(csv.reader([text], skipinitialspace=True), [])
     names = tuple(_bare(cell) for cell in cells)
-    if not names or all(_NUMBER.fullmatch(cell) for cell in names):
+    if not names or all(number_in(cell) is not None for cell in names):
         raise InputError(where, "no header" if names else "an empty line", f"the names of the columns; {_IMPORT}")
     return names
 
@@ -425,9 +447,9 @@ def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[
     at = max(tail.rfind(b"\n"), tail.rfind(b"\r")) + 1
     line = tail[at:].decode("utf-8", "replace")
     cells = [cell.strip() for cell in line.split(",")]
-    whole = len(cells) == columns and _NUMBER.fullmatch(cells[-1])
-    cut = _NUMBER.fullmatch(cells[-1]) or _TORN_NUMBER.fullmatch(cells[-1])
-    numbers = cut and all(_NUMBER.fullmatch(cell) for cell in cells[:-1])
+    whole = len(cells) == columns and number_in(cells[-1]) is not None
+    cut = number_in(f"{cells[-1]}0") is not None  # a digit more makes a number of what was torn off within one
+    numbers = cut and all(number_in(cell) is not None for cell in cells[:-1])
     if not line or whole or not numbers or len(cells) > columns:
         return size, ""
     return start + at, line

@@ -121,6 +121,7 @@ class _Rows(LoggerTable):
             file=path.name,
             index=index,
             rows=int(stated["rows"]),
+            above=int(stated["above"]),
             worker=worker,
         )
 
@@ -134,7 +135,8 @@ class _Rows(LoggerTable):
                 name: column if pa.types.is_string(column.type) else numpy_of(column)
                 for name, column in zip(batch.schema.names, batch.columns, strict=True)
             }
-            yield Chunk(values, first, float(batch.schema.metadata[b"done"]))
+            metadata = batch.schema.metadata
+            yield Chunk(values, first, float(metadata[b"done"]), json.loads(metadata[b"left_out"]))
             first += len(batch)
 
 
@@ -428,6 +430,7 @@ def _stated(table: LoggerTable) -> dict[str, Any]:
         "started": table.started.isoformat() if table.started else None,
         "notes": list(table.notes),
         "rows": table.rows,
+        "above": table.above,
     }
 
 
@@ -435,7 +438,8 @@ def _stream_of(chunk: Chunk) -> pa.Buffer:
     """Rows as an Arrow stream of one batch."""
     arrays = [_array(values) for values in chunk.columns.values()]
     batch = pa.RecordBatch.from_arrays(arrays, names=list(chunk.columns))
-    batch = batch.replace_schema_metadata({"done": repr(float(chunk.done))})
+    left_out = json.dumps(dict(chunk.left_out))
+    batch = batch.replace_schema_metadata({"done": repr(float(chunk.done)), "left_out": left_out})
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, batch.schema) as stream:
         stream.write_batch(batch)

@@ -52,11 +52,13 @@ class Chunk:
         columns: Values by name: numbers (NaN where a cell is missing), datetime64[ns], or text (pyarrow).
         first: Number of the first row in the table, from 0.
         done: Share of the table that has been read with these rows, 0 to 1.
+        left_out: Number of rows of the file that are not among them, by the reason.
     """
 
     columns: dict[str, Any]
     first: int
     done: float
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0
@@ -72,8 +74,9 @@ class LoggerTable(ABC):
         rate_hz: Rows per second where the format states it and no column holds times.
         why_rate: Where that stands.
         started: Time of the first row where the format states it.
-        notes: What a user should know of how the table was read.
+        notes: What the file says, or shows, of rows that it lacks.
         rows: Number of rows where the format states it, else 0.
+        above: Lines of text above the first row: names, units, and what else a logger writes there.
     """
 
     name: str
@@ -83,6 +86,7 @@ class LoggerTable(ABC):
     started: datetime | None = None
     notes: tuple[str, ...] = field(default=())
     rows: int = 0
+    above: int = 0
 
     @abstractmethod
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:

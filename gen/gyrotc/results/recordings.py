@@ -69,6 +69,8 @@ class ImportedFile(Part):
     """A run that was written."""
 
     file: str = Field(description="as in `dataset.toml`")
+    read: Count = Field(description="rows of the file: those in `rows` and those in `left_out`")
+    above: Count = Field(description="lines of text above the first row: names, units, and what else is written there")
     rows: Count = Field(description="rows that were taken")
     left_out: dict[str, Count] = Field(description="rows that were not, by the reason")
     trusted: tuple[str, ...] = Field(

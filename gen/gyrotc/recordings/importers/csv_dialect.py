@@ -14,97 +14,12 @@ from typing import Any, TypeVar
 
 from ...common.errors import InputError
 from ..units import kind_of
+from .cells import DELIMITERS, MISSING, cells_of, is_number, kind_of_cells, thousands_of
+from .layout import check_between, first_row, rows_among
 from .stamps import forms_of
 
-MISSING = (
-    "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
-)  # fmt: skip
-HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]{1,15}")  # of a counter; within 63 bits
-_NUMBER = re.compile(r"(?:[+-] *)?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?[iI]nf(inity)?")
-_BLANKS = " \u00a0\u202f\u2009'\u2019"  # between thousands: blanks of all widths, apostrophes
-_GROUPED = {
-    decimal: re.compile(
-        rf"(?:[+-] *)?[0-9]{{1,3}}(?P<mark>[{_BLANKS}{other}])[0-9]{{3}}(?:(?P=mark)[0-9]{{3}})*"
-        rf"{re.escape(decimal)}[0-9]+"
-    )
-    for decimal, other in ((",", "."), (".", ","))
-}  # only with a decimal mark behind it: 1.234 alone may be either
-
-
-def cells_of(line: str, delimiter: str) -> list[str]:
-    """Cells of a line without the spaces and quotes around them."""
-    if delimiter == "whitespace":
-        return line.split()
-    cells, cell, quoted = [], "", False
-    for mark in line:
-        if mark == '"':
-            quoted = not quoted
-        elif mark == delimiter and not quoted:
-            cells.append(cell.strip())
-            cell = ""
-        else:
-            cell += mark
-    return [*cells, cell.strip()]
-
-
-def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> str:
-    """What cells hold: "number", "stamp", "text", or "empty".
-
-    Args:
-        thousands: The mark between thousands, where it is stated.
-    """
-    held = [cell for cell in cells if cell not in MISSING]
-    if not held:
-        return "empty"
-    if all(is_number(cell, decimal, thousands) for cell in held):
-        return "number"
-    return "stamp" if forms_of(held) else "text"
-
-
-def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
-    """Whether a cell is a number, with marks between thousands where nothing else can be meant, or as stated."""
-    if thousands and re.fullmatch(rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell):
-        cell = cell.replace(thousands, "")
-    if _GROUPED[decimal].fullmatch(cell) or HEXADECIMAL.fullmatch(cell):
-        return True
-    if decimal == ",":
-        return "." not in cell and bool(_NUMBER.fullmatch(cell.replace(",", ".", 1)))
-    return bool(_NUMBER.fullmatch(cell))
-
-
-def thousands_of(cells: Sequence[str], decimal: str) -> str:
-    """The mark between thousands of numbers, empty where there is none."""
-    for cell in cells:
-        if found := _GROUPED[decimal].fullmatch(cell):
-            return found["mark"]
-    return ""
-
-
-def plain_number(cell: str, decimal: str, thousands: str) -> str:
-    """A number without marks between thousands and without blanks behind its sign, with a point."""
-    plain = cell.replace(thousands, "") if thousands else cell
-    plain = re.sub(r"^([+-]) +", r"\1", plain)
-    return plain.replace(",", ".", 1) if decimal == "," else plain
-
-
-def plain_lines(lines: bytes, delimiter: str, thousands: str, *, spaced_sign: bool) -> bytes:
-    """Lines of cells, in UTF-8, likewise; the decimal mark stays.
-
-    Args:
-        spaced_sign: Signs are separate from the digits.
-    """
-    edge = re.escape(delimiter.encode())
-    if spaced_sign:
-        lines = re.sub(rb"(?m)(^|" + edge + rb'|")( *[+-]) +(?=[0-9.])', rb"\1\2", lines)
-    if thousands:
-        mark = thousands.encode()
-        start, digits = rb"(?m)(^|" + edge + rb'|")( *[+-]?[0-9]{1,3}', rb"[0-9]{3})+)"
-        grouped = re.compile(start + rb"(?:" + re.escape(mark) + digits + rb'(?=[.,"\r\n]|' + edge + rb"|$)")
-        lines = grouped.sub(lambda found: found[1] + found[2].replace(mark, b""), lines)
-    return lines
-
-
 _FACTS = re.compile(r"^\W*(?P<key>[A-Za-z][\w .#/]{1,40}?)\s*[:=,;\t]+\s*(?P<value>[^;,\t]+?)[\s;,]*$")
+_LONGEST_FACT = 400  # characters of a line
 _UNITS_LABEL = re.compile(r"(?:y_)?units?(?:_label)?:?|einheit(?:en)?:?", re.IGNORECASE)
 
 
@@ -213,11 +128,10 @@ def facts_above(lines: Sequence[str], header: int) -> dict[str, str]:
 
 def _fact_pairs(lines: Sequence[str]) -> Iterator[tuple[str, str]]:
     for line in lines:
-        if found := _FACTS.match(line.lstrip("#%!*/ ")):
+        if len(line) <= _LONGEST_FACT and (found := _FACTS.match(line.lstrip("#%!*/ "))):
             yield found["key"].strip().lower(), found["value"].strip().strip('"')
 
 
-_DELIMITERS = (";", "\t", ",", "|", "whitespace")
 _COMMENTS = ("#", "%", "//", "!", "*")
 # Found and expected, for a file that is no text.
 _BINARY = ("binary data of no known format", "CSV from the program that wrote it, or a format of docs/import.md")
@@ -238,6 +152,8 @@ class Dialect:
         header_line: Line of the names, from 1; 0: there is none.
         units_line: Line of the units, from 1; 0: there is none.
         data_line: First line of rows, from 1.
+        above: Lines above it that hold something else than rows, and are no comments.
+        ignored: Rows above a line of names that was stated.
         names: Names of the columns; empty for a column that only ends the lines.
         units: Units by column, empty where none are given.
         missing: What cells without a number hold.
@@ -258,6 +174,8 @@ class Dialect:
     missing: tuple[str, ...] = MISSING
     thousands: str = ""
     spaced_sign: bool = False
+    above: int = 0
+    ignored: int = 0
     facts: dict[str, str] = field(default_factory=dict)
 
     def to_map(self) -> dict[str, Any]:
@@ -296,11 +214,19 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     delimiter, decimal = _separators(name, [line for _, line in kept], given)
     split = [(k, cells_of(line, delimiter)) for k, line in kept]
     count = Counter((len(cells) for _, cells in _last(split))).most_common(1)[0][0]
-    first = _first_row(name, split, count, decimal, int(given.get("header_line") or 0))
+    stated = int(given.get("header_line") or 0)
+    skipped = sum(k < stated for k, _ in kept)
+    guessed = _first_row(name, split, count, decimal, stated)
+    first = skipped + first_row(name, kept[skipped:], guessed - skipped, count, delimiter, decimal)
+    ignored = len(rows_among(kept[:skipped], delimiter, decimal))
     above = [(k, cells) for k, cells in split if k < split[first][0]]
     above += in_comments(lines, comment, split[first][0], delimiter, count) if not above else []
     header, units_line, names, units = header_of(above, count, given, decimal)
     _check_commas(name, header, above, count)
+    if header:
+        between = [(k, line) for k, line in kept[:first] if k > max(header, units_line)]
+        begins = check_between(name, between, count, delimiter, decimal)
+        first = next((n for n, (k, _) in enumerate(kept) if k == begins), first)
     return Dialect(
         encoding=encoding,
         delimiter=delimiter,
@@ -309,6 +235,8 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         header_line=header,
         units_line=units_line,
         data_line=split[first][0],
+        above=first - ignored,
+        ignored=ignored,
         names=names,
         units=units,
         missing=(*MISSING, *given.get("missing", ())),
@@ -394,11 +322,11 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
     """Delimiter and decimal mark that make numbers of most cells of the last lines."""
     sample = _last(lines)
     best: tuple[float, int, tuple[str, str]] = (0.0, 0, ("", ""))
-    for delimiter in [given["delimiter"]] if given.get("delimiter") else _DELIMITERS:
+    for delimiter in [given["delimiter"]] if given.get("delimiter") else DELIMITERS:
         split = [cells_of(line, delimiter) for line in sample]
         count, often = Counter(len(cells) for cells in split).most_common(1)[0]
-        rows = [cells for cells in split if len(cells) == count]
         for decimal in [given["decimal"]] if given.get("decimal") else (".", ","):
+            rows = [cells for cells in split if len(cells) == count and _holds_number(cells, decimal)]
             stated = given.get("thousands", "")
             kinds = [kind_of_cells(column, decimal, stated) for column in zip(*rows, strict=True)]
             numbers = sum(kind in ("number", "stamp") for kind in kinds)
@@ -410,6 +338,11 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
     if not best[2][0]:
         raise InputError(name, f"no columns of numbers: {sample[-1][:60]!r}", _instead(name, sample[-1]))
     return best[2]
+
+
+def _holds_number(cells: Sequence[str], decimal: str) -> bool:
+    """Whether a line says what rows hold: names that come again do not."""
+    return any(is_number(cell, decimal) for cell in cells)
 
 
 def _instead(name: str, line: str) -> str:
@@ -431,7 +364,7 @@ def _last(lines: Sequence[T]) -> Sequence[T]:
 
 def _first_row(name: str, split: Sequence[tuple[int, list[str]]], count: int, decimal: str, header: int) -> int:
     """Index of the first row of numbers: it and most of the next lines have the kinds of cells of the last ones."""
-    tail = [cells for _, cells in _last(split) if len(cells) == count]
+    tail = [cells for _, cells in _last(split) if len(cells) == count and _holds_number(cells, decimal)]
     kinds = [kind_of_cells(column, decimal) for column in zip(*tail, strict=True)]
     for k, (line, _) in enumerate(split):
         if line > header and all(_like(cells, kinds, decimal, count) for _, cells in split[k : k + 1]):

@@ -9,6 +9,7 @@ import codecs
 import csv
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, time
@@ -19,9 +20,11 @@ import numpy as np
 import pyarrow as pa
 
 from ...common.errors import InputError
-from ..files import blocks_of_lines, parsed
+from ..files import blocks_of_lines, lines_held, number_in, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable, library
-from .csv_dialect import HEXADECIMAL, MISSING, Dialect, cells_of, dialect_of, kind_of_cells, plain_lines, plain_number
+from .cells import HEXADECIMAL, MISSING, cells_of, is_infinite, is_number, kind_of_cells, plain_lines, plain_number
+from .csv_dialect import Dialect, dialect_of
+from .layout import SeveralLayouts, can_be_row, misfit, other_names
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
@@ -29,8 +32,8 @@ def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
 
 
 _HEAD_BYTES = 2**18  # for guessing a dialect: about a thousand lines
+_MOST = 0.8  # share of the cells of a column of numbers that are numbers
 _SAMPLE = 40  # rows, half of them from the end, where formats that change show
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
@@ -51,7 +54,13 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
         for k, (name, unit) in enumerate(zip(_unique(dialect.names), dialect.units, strict=True))
     )
     table = CsvTable(
-        name="", columns=columns, path=path, dialect=dialect, size=path.stat().st_size, **_stated_rate(dialect)
+        name="",
+        columns=columns,
+        path=path,
+        dialect=dialect,
+        size=path.stat().st_size,
+        above=dialect.above,
+        **_stated_rate(dialect),
     )
     return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.to_map())
 
@@ -64,29 +73,30 @@ class CsvTable(LoggerTable):
         path: The file.
         dialect: How it is written.
         size: Bytes that are read; what is written meanwhile is not.
-        remarks: What was left out while reading, by what it was.
     """
 
     path: Path = Path()
     dialect: Dialect = field(default_factory=lambda: Dialect("utf-8", ",", ".", (), 0, 0, 1, (), ()))
     size: int = 0
-    remarks: dict[str, int] = field(default_factory=dict)
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`: a chunk for each block of lines."""
         first = 0
+        left = Counter({"above the stated line of names": self.dialect.ignored})
         for lines, number, done in self._blocks():
-            rows = self._rows(lines, number, names, last=done >= 1.0)
-            if rows is not None and len(next(iter(rows.values()))):
-                yield Chunk(rows, first, done)
-                first += len(next(iter(rows.values())))
+            left["behind a mark of comments"] += self._commented_rows(lines)
+            rows = self._rows(lines, number, names, left, last=done >= 1.0)
+            chunk = Chunk(rows, first, done, {reason: count for reason, count in left.items() if count})
+            yield chunk
+            first += len(chunk)
+            left.clear()
 
     def place(self, row: int) -> str:
         """Number of the line of a row."""
         at = 0
         for lines, number, _ in self._blocks():
             for line, text in _lines_of(lines, number):
-                if self._is_row(text):
+                if self._is_line(text) and not self._is_header(text):
                     if at == row:
                         return f"line {line}"
                     at += 1
@@ -96,8 +106,8 @@ class CsvTable(LoggerTable):
         one = self.dialect
         return blocks_of_lines(self.path, self.size, self.path.name, first=one.data_line, encoding=one.encoding)
 
-    def _is_row(self, text: str) -> bool:
-        return bool(text.strip()) and not text.startswith(self.dialect.comment) and not self._is_header(text)
+    def _is_line(self, text: str) -> bool:
+        return bool(text.strip()) and not text.startswith(self.dialect.comment)
 
     def _is_header(self, text: str) -> bool:
         cells = cells_of(text, self.dialect.delimiter)
@@ -105,15 +115,32 @@ class CsvTable(LoggerTable):
         return (
             bool(self.dialect.header_line)
             and [c for c in cells if c] == names
-            and not all(_NUMBER.fullmatch(name) for name in names)
+            and not all(is_number(name, self.dialect.decimal) for name in names)
         )
 
-    def _rows(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any] | None:
+    def _commented_rows(self, lines: bytes) -> int:
+        """Number of lines that would be rows without the mark of comments that they begin with."""
+        one, found = self.dialect, 0
+        for mark in one.comment:
+            octets = mark.encode()
+            if lines.startswith(octets) or b"\n" + octets in lines:
+                for line in re.findall(rb"(?m)^" + re.escape(octets) + rb"([^\n]*)", lines):
+                    cells = cells_of(line.decode("utf-8", "replace"), one.delimiter)
+                    found += len(cells) == len(one.names) and can_be_row(cells, one.decimal)
+        return found
+
+    def _rows(
+        self, lines: bytes, number: int, names: Sequence[str], left: Counter[str], *, last: bool
+    ) -> dict[str, Any]:
+        """The rows of a block; lines that are none are counted in `left`."""
         plain = self._without_comments(lines)
         try:
-            return self._fast(plain, names)
+            rows = self._fast(plain, names)
         except (pa.ArrowInvalid, pa.ArrowKeyError):
-            return self._slow(lines, number, names, last=last)
+            return self._slow(lines, number, names, left, last=last)
+        if len(next(iter(rows.values()))) != lines_held(plain):  # a quote that stays open joins lines
+            return self._slow(lines, number, names, left, last=last)
+        return rows
 
     def _without_comments(self, lines: bytes) -> bytes:
         for mark in self.dialect.comment:
@@ -121,8 +148,8 @@ class CsvTable(LoggerTable):
             if lines.startswith(octets) or b"\n" + octets in lines:
                 lines = re.sub(rb"(?m)^" + re.escape(octets) + rb"[^\n]*\n?", b"", lines)
         if self.dialect.delimiter == "whitespace":
-            lines = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", lines)
             lines = re.sub(rb"[ \t]+", b" ", lines)
+            lines = re.sub(rb"(?m)^ | $", b"", lines)
         elif self.dialect.thousands or self.dialect.spaced_sign:
             one = self.dialect
             lines = plain_lines(lines, one.delimiter, one.thousands, spaced_sign=one.spaced_sign)
@@ -150,7 +177,9 @@ class CsvTable(LoggerTable):
         counted = any(column.sample) and all(HEXADECIMAL.fullmatch(c) for c in column.sample if c)
         return pa.int64() if whole or counted else pa.float64()
 
-    def _slow(self, lines: bytes, number: int, names: Sequence[str], *, last: bool) -> dict[str, Any]:
+    def _slow(
+        self, lines: bytes, number: int, names: Sequence[str], left: Counter[str], *, last: bool
+    ) -> dict[str, Any]:
         """The rows of a block cell by cell.
 
         Raises:
@@ -158,53 +187,60 @@ class CsvTable(LoggerTable):
         """
         index = {column.name: k for k, column in enumerate(self.columns)}
         cells: dict[str, list[Any]] = {name: [] for name in names}
-        every = list(_lines_of(lines, number))
+        every = [(line, text) for line, text in _lines_of(lines, number) if self._is_line(text)]
         torn = last and not lines.endswith((b"\n", b"\r"))
         for k, (line, text) in enumerate(every):
-            if not self._is_row(text):
-                self.remarks["repeated header lines"] = self.remarks.get("repeated header lines", 0) + (
-                    bool(text.strip()) and self._is_header(text)
-                )
+            if self._is_header(text):
+                left["repeated header lines"] += 1
                 continue
-            row = cells_of(text, self.dialect.delimiter)
             try:
-                parsed = self._parsed(line, row, names, index)
+                parsed = self._parsed(line, text, names, index, every[k + 1][1] if k + 1 < len(every) else None)
             except InputError:
                 if torn and k == len(every) - 1:
-                    self.remarks["unfinished last line"] = 1
+                    left["unfinished last line"] += 1
                     break
                 raise
             for name, value in parsed.items():
                 cells[name].append(value)
         return {
-            name: np.array(values) if self._type(name) != pa.string() else pa.array(values, pa.string())
+            name: np.array(values, dtype=np.int64 if self._type(name) == pa.int64() and _whole(values) else np.float64)
+            if self._type(name) != pa.string()
+            else pa.array(values, pa.string())
             for name, values in cells.items()
         }
 
-    def _parsed(self, line: int, row: list[str], names: Sequence[str], index: dict[str, int]) -> dict[str, Any]:
-        where = f"{self.path.name}, line {line}"
+    def _parsed(
+        self, line: int, text: str, names: Sequence[str], index: dict[str, int], following: str | None
+    ) -> dict[str, Any]:
+        one = self.dialect
+        row = cells_of(text, one.delimiter)
         if len(row) != len(self.columns):
-            found = f"{len(row)} cells: {self.dialect.delimiter.join(row)[:60]!r}"
-            hint = f'--csv comment="{_beginning(row)}" leaves out lines that begin so'
-            if row and row[0][:1].isdigit():
-                hint = "mend or delete that line, which looks like a row"
-            raise InputError(where, found, f"{len(self.columns)} as in the first rows; {hint}")
-        values: dict[str, Any] = {}
-        for name in names:
-            cell = row[index[name]]
-            if cell in self.dialect.missing:
-                values[name] = float("nan") if self._type(name) != pa.string() else None
-            elif self._type(name) == pa.string():
-                values[name] = cell
-            elif HEXADECIMAL.fullmatch(cell):
-                values[name] = int(cell, 16)
-            else:
-                plain = plain_number(cell, self.dialect.decimal, self.dialect.thousands)
-                if not _NUMBER.fullmatch(plain) and plain.lower().lstrip("+-") not in ("inf", "infinity"):
-                    hint = f'--csv missing="{cell[:20]}" takes it as no reading'
-                    raise InputError(f"{where}, column {name}", repr(cell[:40]), f"a number; {hint}")
-                values[name] = int(plain) if self._type(name) == pa.int64() else float(plain)
-        return values
+            layout = (len(self.columns), one.delimiter, one.decimal, one.data_line)
+            raise misfit(self.path.name, line, row, layout, following)
+        return {name: self._value(line, row, name, row[index[name]]) for name in names}
+
+    def _value(self, line: int, row: list[str], name: str, cell: str) -> Any:
+        one, kind = self.dialect, self._type(name)
+        if cell in one.missing:
+            return float("nan") if kind != pa.string() else None
+        if kind == pa.string():
+            return cell
+        if HEXADECIMAL.fullmatch(cell):
+            return int(cell, 16)
+        plain = plain_number(cell, one.decimal, one.thousands)
+        value = number_in(plain)
+        if value is None and is_infinite(plain):
+            value = float(plain)
+        if value is not None:
+            return int(plain) if kind == pa.int64() and plain.lstrip("+-").isdigit() else value
+        if len(row) > 1 and not any(c in one.missing or is_number(c, one.decimal, one.thousands) for c in row):
+            raise other_names(self.path.name, line, row)
+        hint = f'--csv missing="{cell[:20]}" takes it as no reading'
+        raise InputError(f"{self.path.name}, line {line}, column {name}", repr(cell[:40]), f"a number; {hint}")
+
+
+def _whole(values: Sequence[Any]) -> bool:
+    return all(isinstance(value, int) for value in values)
 
 
 def _values(column: Any) -> Any:
@@ -232,7 +268,11 @@ def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Col
     kind = kind_of_cells(cells, dialect.decimal, dialect.thousands)
     why = f"in line {dialect.units_line}" if unit else ""
     known = tuple("" if cell in MISSING else cell for cell in cells)
-    return Column(name, unit or None, why, "number" if kind in ("number", "empty") else kind, known)  # type: ignore[arg-type]
+    held = [cell for cell in known if cell]
+    numbers = sum(is_number(cell, dialect.decimal, dialect.thousands) for cell in held)
+    if kind == "empty" or (kind == "text" and numbers > _MOST * len(held)):  # its words are refused with their line
+        kind = "number"
+    return Column(name, unit or None, why, kind, known)  # type: ignore[arg-type]
 
 
 def _unique(names: Sequence[str]) -> list[str]:
@@ -246,17 +286,14 @@ def _unique(names: Sequence[str]) -> list[str]:
     return result
 
 
-def _beginning(row: Sequence[str]) -> str:
-    word = re.match(r"\W*\w*", row[0] if row else "")
-    return word[0][:20] if word else ""
-
-
 def _stated_rate(dialect: Dialect) -> dict[str, Any]:
     """Rows per second where a line above the header states them: `Sample rate: 100 Hz`."""
     for key, value in dialect.facts.items():
         found = re.match(r"([\d.,]+)\s*(k?hz|/s|sps|samples/s)?", value.lower())
-        if re.search(r"sampl\w*.{0,3}(rate|freq)|abtastrate|^fs$|output data rate|^odr$", key) and found and found[2]:
-            rate = float(found[1].replace(",", ".")) * (1000.0 if found[2] == "khz" else 1.0)
+        number = number_in(found[1].replace(",", ".")) if found else None
+        named = re.search(r"sampl\w*.{0,3}(rate|freq)|abtastrate|^fs$|output data rate|^odr$", key)
+        if named and found and found[2] and number is not None:
+            rate = number * (1000.0 if found[2] == "khz" else 1.0)
             return {"rate_hz": rate, "why_rate": f"{key}: {value}, above the rows"} if rate > 0.0 else {}
     return {}
 
@@ -286,19 +323,28 @@ def open_spreadsheet(path: Path) -> LoggerFile:
     folder = Path(tempfile.mkdtemp())
     tables: list[LoggerTable] = []
     refused: list[InputError] = []
-    sheets = book.worksheets[:_MOST_SHEETS]
+    notes: list[str] = []
+    sheets = book.worksheets
+    if len(sheets) > _MOST_SHEETS:
+        raise InputError(path.name, f"{len(sheets)} sheets", f"at most {_MOST_SHEETS}: those with the recording")
     for k, sheet in enumerate(sheets):
-        place = folder / f"{k}.csv"
+        place = folder / str(k) / path.name
+        place.parent.mkdir()
         with place.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
             writer.writerows([_cell(value) for value in row] for row in sheet.iter_rows(values_only=True))
         try:
             tables += _tables(place, sheet.title if len(sheets) > 1 else "")
+        except SeveralLayouts as error:
+            where = f"{path.name}, sheet {sheet.title}{error.where.removeprefix(path.name)}"
+            raise SeveralLayouts(where, error.found, error.expected) from error
         except InputError as error:
             refused.append(InputError(f"{path.name}, sheet {sheet.title}", error.found, error.expected))
+            if any(can_be_row(cells_of(line, ","), ".") for line in place.read_text("utf-8").splitlines()):
+                notes.append(f"the rows of sheet {sheet.title} are not read: {error.found}")
     if not tables:
         raise refused[0] if refused else InputError(path.name, "no sheets", "a sheet with a header and rows")
-    return LoggerFile(path, "spreadsheet", tuple(tables))
+    return LoggerFile(path, "spreadsheet", tuple(replace(table, notes=tuple(notes)) for table in tables))
 
 
 def _tables(place: Path, name: str) -> list[LoggerTable]:
@@ -315,4 +361,4 @@ def _cell(value: Any) -> str:
         return value.isoformat(sep=" ")
     if isinstance(value, date | time):
         return value.isoformat()
-    return repr(value) if isinstance(value, float) else str(value)
+    return repr(value) if isinstance(value, float) else " ".join(str(value).split())

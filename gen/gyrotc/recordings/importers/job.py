@@ -158,10 +158,11 @@ def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         low, high = entry["evidence"].temperature_c
         length = _period(*entry["period_s"])
         means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(cells[:, 2:].mean(axis=0)))
-        left = "".join(f"; {count} left out: {reason}" for reason, count in entry["left_out"].items())
+        left = "".join(f", {count} left out: {reason}" for reason, count in entry["left_out"].items())
+        above = f" below {entry['above']} lines of other text" if entry["above"] else ""
         yield (
             f"{out / entry['file']}: {entry['rows']} rows of {length} s, {low:.4g} ... {high:.4g} C, "
-            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}{left}"
+            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}; {entry['read']} read{above}{left}"
         )
         for text in entry["trusted"]:
             yield f"  {TRUSTED}{text}"
@@ -244,6 +245,8 @@ class Imported:
             runs=tuple(
                 ImportedFile(
                     file=entry["file"],
+                    read=entry["read"],
+                    above=entry["above"],
                     rows=entry["rows"],
                     left_out=entry["left_out"],
                     trusted=tuple(entry["trusted"]),
@@ -261,6 +264,7 @@ class Imported:
             for entry in self.runs
             for id, texts in (
                 ("left_out", [f"{rows} rows are left out: {reason}" for reason, rows in entry["left_out"].items()]),
+                ("left_out", entry["notes"]),
                 ("units_trusted", [TRUSTED + text for text in entry["trusted"]]),
             )
             for text in texts
@@ -398,8 +402,10 @@ def _run(
         "started": started,
         "pulses": layout.pulses,
         "rows": rows.count,
-        "left_out": dict(rows.left_out)
-        | {k: v for t in file.tables for k, v in getattr(t, "remarks", {}).items() if v},
+        "read": rows.read,
+        "above": rows.plan.main.above,
+        "left_out": dict(rows.left_out),
+        "notes": rows.plan.main.notes,
         "trusted": trusted,
         "evidence": rows.evidence,
         "period_s": rows.period_s,

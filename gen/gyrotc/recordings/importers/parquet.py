@@ -14,7 +14,7 @@ from ...common.arrays import numpy_of
 from ...common.errors import InputError
 from ...common.inputs import ceiling, open_input, refuse_above
 from ..tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
-from .csv_dialect import kind_of_cells
+from .cells import kind_of_cells
 
 _BUFFER_BYTES = 2**20  # of a column: without one the whole column of a row group is read at once
 _SAMPLE_ROWS = 20  # enough to tell text that is a date, a number or a hexadecimal count

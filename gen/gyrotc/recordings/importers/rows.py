@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,8 +42,9 @@ class ImportedRows:
         file: Name for messages.
         plan: What is read.
         stated: `[time]` of the map.
-        count: Rows that were given.
-        left_out: Rows that were not, by the reason.
+        read: Rows of the file.
+        count: Rows of these that were given.
+        left_out: Rows of these that were not, by the reason.
         evidence: What the units can be judged by.
         raw: The first rows as the file has them, by column; for a preview.
         first_rows: The same rows as they were given.
@@ -52,8 +54,9 @@ class ImportedRows:
     file: str
     plan: ImportPlan
     stated: TimeMap
+    read: int = 0
     count: int = 0
-    left_out: dict[str, int] = field(default_factory=dict)
+    left_out: Counter[str] = field(default_factory=Counter)
     raw: dict[str, list[str]] = field(default_factory=dict)
     first_rows: dict[str, list[float]] = field(default_factory=dict)
     period_s: tuple[float, float] = (np.inf, 0.0)
@@ -89,6 +92,14 @@ class ImportedRows:
         choices += [plan.temperature] * (plan.temperature.table is plan.main)
         names = list(dict.fromkeys([*self.clock.names, *(choice.column.name for choice in choices)]))
         for chunk in plan.main.chunks(names):
+            self.read += len(chunk) + sum(chunk.left_out.values())
+            self.left_out.update(chunk.left_out)
+            lengths = {len(values) for values in chunk.columns.values()}
+            if len(lengths) > 1:
+                found = f"columns of {min(lengths)} to {max(lengths)} rows where they should be of one length"
+                raise InputError(self.file, found, "a whole file: what is missing may be in the original")
+            if not len(chunk):
+                continue
             time = self.clock(chunk)
             columns = {"time_s": time}
             self._time = time
@@ -102,6 +113,19 @@ class ImportedRows:
                 value_names = [NAMES[choice.role] for choice in plan.values]
                 self.evidence.add(kept["time_s"], kept["temperature_c"], [kept[n] for n in value_names])
                 yield kept, chunk.done
+        self._check_count()
+
+    def _check_count(self) -> None:
+        """Every row that was read was given or left out, and where the file states a number, as many were read.
+
+        Raises:
+            InputError: The file states another number.
+        """
+        stated = self.plan.main.rows
+        if stated and self.read != stated:
+            found = f"states {stated} rows, and {self.read} can be read"
+            raise InputError(self.file, found, "a whole file: what is missing may be in the original")
+        assert self.read == self.count + self.left_out.total()
 
     def name_of(self, choice: Choice) -> str:
         """Name of the column that a choice becomes."""
@@ -166,8 +190,7 @@ class ImportedRows:
         for name, values in columns.items():
             missing = ~np.isfinite(values) & good
             if missing.any():
-                reason = f"no number in {name}"
-                self.left_out[reason] = self.left_out.get(reason, 0) + int(missing.sum())
+                self.left_out[f"no number in {name}"] += int(missing.sum())
                 good &= ~missing
         rows = np.flatnonzero(good)
         return ({n: v if good.all() else v[good] for n, v in columns.items()}, rows)
@@ -182,9 +205,7 @@ class ImportedRows:
         before = {name: np.r_[last[name], values[:-1]] for name, values in kept.items()}
         copies = np.all([values == before[name] for name, values in kept.items()], axis=0)
         if copies.any():
-            self.left_out["copies of the row before"] = self.left_out.get("copies of the row before", 0) + int(
-                copies.sum()
-            )
+            self.left_out["copies of the row before"] += int(copies.sum())
         wrong = (kept["time_s"] <= before["time_s"]) & ~copies
         if wrong.any():
             at = int(np.argmax(wrong))
