@@ -186,7 +186,7 @@ fleet-kills: setup
 kills: setup
 	@$(PYTHON) -m tests.kills.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
-## copies of runs, faults of timing, holding and pairing, and clean sets: which findings name them (20 minutes)
+## faults of timing, holding and pairing, and clean sets: which findings name them (20 minutes)
 evidence: setup
 	@$(PYTHON) -m tests.evidence.run --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 

@@ -9,7 +9,6 @@
 
 #include "evidence.hpp"
 #include "equal_gaussians.hpp"
-#include "fingerprints.hpp"
 #include "kohonen.hpp"
 #include "mixed.hpp"
 #include "ols.hpp"
@@ -52,8 +51,6 @@ VariableProjection projection(VectorXd t, VectorXd r, VectorXd weight, VectorXd 
 }
 
 using Stack = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-using Column = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Bytes = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // The numbers as an array that owns them.
 template <typename T>
@@ -220,43 +217,4 @@ NB_MODULE(_core, m) {
                                    array_of(std::move(log_determinant)));
         },
         "prior"_a, "precision"_a);
-    m.def(
-        "windows_of",
-        [](const Column &temperature, const std::vector<Column> &rates, std::vector<std::size_t> lengths, std::uint64_t mask,
-           double bits, std::size_t own) {
-            std::vector<const double *> columns;
-            for (const Column &rate : rates) {
-                same_length({static_cast<Eigen::Index>(temperature.size()), static_cast<Eigen::Index>(rate.size())});
-                columns.push_back(rate.data());
-            }
-            Windows found;
-            {
-                const nb::gil_scoped_release released;
-                found = windows_of(temperature.data(), columns, temperature.size(), {std::move(lengths), mask, bits, own});
-            }
-            return std::make_tuple(array_of(std::move(found.hash)), array_of(std::move(found.first)),
-                                   array_of(std::move(found.last)));
-        },
-        "temperature_c"_a, "rates"_a, "lengths"_a, "mask"_a, "bits"_a, "own"_a);
-    m.def(
-        "alike_runs",
-        [](const Bytes &packed, std::vector<std::int64_t> start, std::vector<std::int64_t> count,
-           std::vector<std::int64_t> serial, const std::vector<std::int64_t> &offsets, std::int64_t crowd,
-           std::int64_t first_look, double least_excess, double independent, double least_sigmas) {
-            same_length({static_cast<Eigen::Index>(start.size()), static_cast<Eigen::Index>(count.size()),
-                         static_cast<Eigen::Index>(serial.size())});
-            if (offsets.size() < 3 || offsets.back() >= 2 * kSignsAtOnce) throw nb::value_error("offsets: too wide");
-            Alike found;
-            {
-                const nb::gil_scoped_release released;
-                found = alike_runs({{packed.data(), packed.data() + packed.size()}, std::move(start), std::move(count),
-                                    std::move(serial)},
-                                   offsets, {crowd, first_look, least_excess, independent, least_sigmas});
-            }
-            return std::make_tuple(array_of(std::move(found.one)), array_of(std::move(found.other)),
-                                   array_of(std::move(found.lag)), array_of(std::move(found.common)),
-                                   array_of(std::move(found.excess)));
-        },
-        "packed"_a, "start"_a, "count"_a, "serial"_a, "offsets"_a, nb::kw_only(), "crowd"_a, "first_look"_a,
-        "least_excess"_a, "independent"_a, "least_sigmas"_a);
 }

@@ -1,7 +1,5 @@
 """Types of the C++ core (gen/core/bind.cpp). Arrays are float64; lengths that differ raise ValueError."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -153,28 +151,3 @@ def posteriors(prior: _Floats, precision: _Floats) -> tuple[_Floats, _Floats]:
     Raises:
         ValueError: A sum is not positive definite.
     """
-
-def windows_of(
-    temperature_c: _Floats,
-    rates: Sequence[_Floats],
-    lengths: Sequence[int],
-    mask: int,
-    bits: float,
-    own: int,
-) -> tuple[NDArray[np.uint64], NDArray[np.int64], NDArray[np.int64]]:
-    """Hash, first and last row of the windows that are kept; arrays must be contiguous."""
-
-def alike_runs(
-    packed: NDArray[np.uint8],
-    start: Sequence[int],
-    count: Sequence[int],
-    serial: Sequence[int],
-    offsets: Sequence[int],
-    *,
-    crowd: int,
-    first_look: int,
-    least_excess: float,
-    independent: float,
-    least_sigmas: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], _Floats]:
-    """Pairs of runs whose signs agree at a lag: their numbers, the lag, signs in common, excess of those that agree."""

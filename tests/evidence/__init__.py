@@ -1,1 +1,1 @@
-"""Recordings that are no evidence: copies, and faults of timing, holding and pairing; what is found of drawn ones."""
+"""Recordings that are no evidence: faults of timing, holding and pairing; what is found of drawn ones."""

@@ -1,6 +1,6 @@
-"""What is found of drawn sets: copies in a set and in a fleet, faults of timing, holding and pairing, and clean ones.
+"""What is found of drawn sets: faults of timing, holding and pairing, and clean ones.
 
-`python -m tests.evidence.run --clean 500 --copies 200 --faults 200 --fleets 200 --seed 1 --docs docs` (`make evidence`)
+`python -m tests.evidence.run --clean 500 --faults 200 --seed 1 --docs docs` (`make evidence`)
 prints a table and keeps it as a record. A set is made again by its seed and number.
 """
 
@@ -17,55 +17,28 @@ from typing import Any
 
 import numpy as np
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.fleet.outliers import copies
 from gyrotc.jobs.build import build_into
-from gyrotc.recordings.copies import noise_of, noise_signs
 from gyrotc.recordings.load import load
-from gyrotc.results.fleet import FleetEntry
 from gyrotc.train.fitting import FitOptions
 
 from ..events import table, write_record
-from .sets import EXPORTS, FAULTS, Recorded, drawn_set, exported_again, faulty, written
+from .sets import FAULTS, drawn_set, faulty, written
 
 ABOUT = frozenset(
     {
         "shared_rows", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
-        "runs_contradict", "run_outlier", "sign_reversed", "copy_of_other",
+        "runs_contradict", "run_outlier", "sign_reversed",
     }
 )  # fmt: skip
 """Findings that say that recordings are no evidence of their own, or do not belong together."""
-KINDS = {"clean": ("clean",), "copies": EXPORTS, "faults": FAULTS, "fleets": EXPORTS}
-_GYROS = 12  # of a fleet
-
-
-def found_in_fleet(way: str, rng: np.random.Generator) -> set[str]:
-    """`copy_of_other` where the copy of one gyro's run among another's, and no other, is found; else what is."""
-    drawn = [drawn_set(rng) for _ in range(_GYROS)]
-    one, other = (int(k) for k in rng.choice(_GYROS, 2, replace=False))
-    gyro, runs = drawn[one]
-    drawn[other][1][int(rng.integers(5))] = exported_again(runs[int(rng.integers(5))], way, gyro, rng)
-    pairs = {(copy.name, copy.other) for copy in copies([_entry(k, runs) for k, (_, runs) in enumerate(drawn)])}
-    right = {(str(min(one, other)), str(max(one, other)))}
-    return {"copy_of_other"} if pairs == right else {f"{a} and {b}" for a, b in pairs}
-
-
-def _entry(number: int, runs: list[Recorded]) -> FleetEntry:
-    """As a fleet keeps it of a gyro."""
-    prints = [(f"run-{k + 1}", noise_of(run.time_s, run.rate_dph)) for k, run in enumerate(runs)]
-    noise = tuple(signs for file, one in prints for signs in noise_signs(file, one))
-    return FleetEntry(name=str(number), axis=None, status="done", serial=f"S-{number}", noise=noise)
+KINDS = {"clean": ("clean",), "faults": FAULTS}
 
 
 def found(kind: str, way: str, seed: int, number: int) -> set[str]:
-    """Ids of findings (or `refused`) of a drawn set; a copy is an exam in half of the cases."""
+    """Ids of findings of a drawn set."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind), number])
-    if kind == "fleets":
-        return found_in_fleet(way, rng)
-    gyro, runs = drawn_set(rng)
-    if kind == "copies":
-        place = 4 if number % 2 else 3  # the exam, or a training run
-        runs[place] = exported_again(runs[int(rng.integers(3))], way, gyro, rng)
-    elif kind == "faults":
+    _, runs = drawn_set(rng)
+    if kind == "faults":
         runs = faulty(runs, way, rng)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -73,13 +46,9 @@ def found(kind: str, way: str, seed: int, number: int) -> set[str]:
         out.mkdir()
         try:
             dataset = load(written(Path(folder, "data"), runs))
-            if kind == "copies":
-                return {"shared_rows"} if dataset.shared else set()
             built = build_into(out, dataset, FitOptions(method="cubic"), compiled=False)
-        except CheckFailed as error:
+        except (CheckFailed, InputError) as error:
             return {str(error)}
-        except InputError as error:
-            return {"refused"} if "rows of an exam that" in str(error) else {str(error)}
         return {finding.id for finding in built.evaluation.findings}
 
 
@@ -103,7 +72,7 @@ def section(record: dict[str, Any]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    for kind, count in (("clean", 500), ("copies", 200), ("faults", 200), ("fleets", 200)):
+    for kind, count in (("clean", 500), ("faults", 200)):
         parser.add_argument(f"--{kind}", type=int, default=count)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
@@ -115,8 +84,8 @@ def main() -> None:
     with ProcessPoolExecutor(given.workers) as pool:
         for kind, way, number, ids in pool.map(_one, every):
             drawn[kind, way] += 1
-            named[kind, way] += bool(ids & (ABOUT | {"refused"}))
-            if bool(ids & (ABOUT | {"refused"})) == (kind == "clean"):
+            named[kind, way] += bool(ids & ABOUT)
+            if bool(ids & ABOUT) == (kind == "clean"):
                 print(f"  {kind} {way}, set {number}: {', '.join(sorted(ids)) or 'nothing'}", flush=True)
     rows = [{"kind": k, "way": way, "drawn": n, "named": named[k, way]} for (k, way), n in drawn.items()]
     record = {"seed": given.seed, "rows": rows}

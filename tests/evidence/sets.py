@@ -1,4 +1,4 @@
-"""Drawn calibrations of a gyro, clean ones and such with a copy or a fault in one run."""
+"""Drawn calibrations of a gyro, clean ones and such with a fault in one run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-EXPORTS = ("decimals", "resampled", "shifted", "scaled", "noise")
 FAULTS = ("late", "held", "paired", "reversed")
 
 
@@ -72,24 +71,6 @@ def drawn_set(rng: np.random.Generator) -> tuple[Gyro, list[Recorded]]:
     period = float(rng.choice([5.0, 10.0, 20.0]))
     runs = [drawn_run(gyro, rng, int(rng.uniform(5.0, 10.0) * 3600.0 / period), period) for _ in range(5)]
     return gyro, runs
-
-
-def exported_again(run: Recorded, way: str, gyro: Gyro, rng: np.random.Generator) -> Recorded:
-    """A run as another program writes it."""
-    time, temperature, rate = run.time_s, run.temperature_c, run.rate_dph
-    if way == "decimals":
-        step = 10.0 ** np.ceil(np.log10(gyro.noise_dph) - 1.0)
-        return Recorded(time, np.round(temperature, 1), np.round(rate / step) * step)
-    if way == "shifted":
-        return Recorded(time + rng.uniform(1.0, 5000.0), temperature, np.round(rate, 7))
-    if way == "scaled":
-        return Recorded(time, temperature, rate * (1.0 + 10.0 ** rng.uniform(-7, -1)) + rng.normal(0.0, gyro.noise_dph))
-    if way == "noise":
-        level = gyro.noise_dph * 10.0 ** rng.uniform(-7.0, -0.5)
-        return Recorded(time, temperature, rate + rng.normal(0.0, level, len(rate)))
-    period = time[1] - time[0]
-    grid = np.arange(time[0] + rng.uniform(0.0, period), time[-1], period * rng.uniform(0.5, 3.0))
-    return Recorded(grid, np.interp(grid, time, temperature), np.interp(grid, time, rate))
 
 
 def faulty(runs: list[Recorded], way: str, rng: np.random.Generator) -> list[Recorded]:

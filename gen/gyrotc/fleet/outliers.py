@@ -1,26 +1,15 @@
-"""Serials that differ from the rest of their fleet, reversed signs, and copies of one recording under two serials.
-
-Rows are compared by hashes. Noise is compared by the signs that each gyro keeps of it (`noise_signs`), without a
-correlation of every pair: some signs of a window, spaced unevenly, are a number, and two recordings that have a number
-in common are compared sign by sign at that lag (locality-sensitive hashing: Charikar, "Similarity estimation
-techniques from rounding algorithms", STOC 2002; spaced seeds: Ma, Tromp, Li, "PatternHunter", Bioinformatics 18, 2002).
-"""
+"""Serials that differ from the rest of their fleet, reversed signs, and copies of one recording under two serials."""
 
 from __future__ import annotations
 
-import base64
-import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA, Averages, median
-from ..recordings.copies import FASTEST_SIGNS, SLOWEST
 from ..results.fleet import (
     ComparedRun,
     Copy,
@@ -29,7 +18,6 @@ from ..results.fleet import (
     FleetOutlier,
     FleetUnit,
     LikelyStep,
-    NoiseSigns,
     ResidualSeries,
     Spread,
 )
@@ -247,29 +235,29 @@ def _mirrored_of(lot: Sequence[tuple[str, Sequence[float | None]]]) -> list[str]
 _DIGITS = 16  # of a hash
 _LEAST_COMMON = 2  # hashes; one alone might be chance among 100,000 gyros
 _CROWD = 16  # gyros of which one hash is known: enough to name
-_WINDOWS = 4  # ways to space the signs of a window: each finds a faint copy by itself
-_GAPS = (2, 4)  # between signs of a window: nearer ones are not independent, for noise is band-limited
-_NARROWEST, _WIDEST = 12, 26  # signs that are compared; the widest lie in two words
-_FIRST_LOOK, _LEAST_EXCESS = (224, 0.3)  # signs about a window; by how much more of them agree than differ
-_COPY_SIGMAS = 7.0  # of the signs that agree by chance: once in 4e11, and a fleet of a thousand looks at 1e7 lags
-_COPY_ALIKE = 0.5  # correlation: at periods of minutes nothing shakes two gyros by as much as their own noise
-
-Numbers = NDArray[np.int64]
 
 
 def copies(entries: Sequence[FleetEntry]) -> list[Copy]:
-    """Pairs of gyros of different serials that share rows, or else noise, in the order of the entries."""
-    pairs = {**_same_noise(entries), **_same_rows(entries)}
+    """Return pairs of gyros of different serials that share rows, in the order of the entries."""
+    words = [[e.sketch[k : k + _DIGITS] for k in range(0, len(e.sketch), _DIGITS)] for e in entries]
+    holders: dict[str, list[int]] = defaultdict(list)
+    for number, of_one in enumerate(words):
+        for word in of_one:
+            if len(holders[word]) < _CROWD:
+                holders[word].append(number)
+    common: Counter[tuple[int, int]] = Counter()
+    for numbers in holders.values():
+        common.update(combinations(numbers, 2))
     return [
         Copy(
             name=entries[a].name,
             serial=entries[a].serial or "",
             other=entries[b].name,
             other_serial=entries[b].serial or "",
-            share=min(1.0, share),
-            likeness=likeness,
+            share=count / min(len(words[a]), len(words[b])),
         )
-        for (a, b), (share, likeness) in sorted(pairs.items())
+        for (a, b), count in sorted(common.items())
+        if count >= min(_LEAST_COMMON, len(words[a])) and (entries[a].serial or "") != (entries[b].serial or "")
     ]
 
 
@@ -285,106 +273,3 @@ def with_copies(entries: Sequence[FleetEntry], found: Sequence[Copy]) -> list[Fl
         else entry
         for entry in entries
     ]
-
-
-_Pairs = dict[tuple[int, int], tuple[float, float | None]]
-"""Share and likeness of pairs of entries, by their numbers."""
-
-
-def _same_rows(entries: Sequence[FleetEntry]) -> _Pairs:
-    words = [[e.sketch[k : k + _DIGITS] for k in range(0, len(e.sketch), _DIGITS)] for e in entries]
-    holders: dict[str, list[int]] = defaultdict(list)
-    for number, of_one in enumerate(words):
-        for word in of_one:
-            if len(holders[word]) < _CROWD:
-                holders[word].append(number)
-    common: Counter[tuple[int, int]] = Counter()
-    for numbers in holders.values():
-        if len(numbers) > 1:
-            common.update((a, b) for k, a in enumerate(numbers) for b in numbers[k + 1 :])
-    return {
-        (a, b): (count / min(len(words[a]), len(words[b])), None)
-        for (a, b), count in common.items()
-        if count >= min(_LEAST_COMMON, len(words[a])) and (entries[a].serial or "") != (entries[b].serial or "")
-    }
-
-
-def _same_noise(entries: Sequence[FleetEntry]) -> _Pairs:
-    serials = {serial: k for k, serial in enumerate(dict.fromkeys(entry.serial or "" for entry in entries))}
-    by_octave: dict[int, list[tuple[int, NoiseSigns]]] = defaultdict(list)
-    for number, entry in enumerate(entries):
-        for signs in entry.noise:
-            by_octave[signs.octave].append((number, signs))
-    alike: dict[tuple[int, int], dict[str, tuple[float, float]]] = defaultdict(dict)
-    for octave, held in by_octave.items():
-        serial = np.array([serials[entries[number].serial or ""] for number, _ in held])
-        for i, j, count, likeness in _Runs.of([signs for _, signs in held], serial).alike():
-            of_runs, file = alike[held[i][0], held[j][0]], held[i][1].file
-            of_runs[file] = max(of_runs.get(file, (0.0, 0.0)), (count * 2.0**octave, likeness))
-    return {
-        pair: (
-            sum(span_s for span_s, _ in of_runs.values()) / min(_span_s(entries[k]) for k in pair),
-            max(likeness for _, likeness in of_runs.values()),
-        )
-        for pair, of_runs in alike.items()
-    }
-
-
-def _span_s(entry: FleetEntry) -> float:
-    """Of all recordings whose noise is known."""
-    spans = {one.file: one.count * 2.0**one.octave for one in entry.noise}
-    return sum(spans.values())
-
-
-@dataclass(frozen=True, slots=True)
-class _Runs:
-    """Signs of the noise of many runs, one behind the other.
-
-    Attributes:
-        packed: Eight signs a byte, the first one in the highest bit.
-        start: Place of each run's first sign.
-        count: Number of its signs.
-        serial: Number of its gyro's serial.
-    """
-
-    packed: NDArray[np.uint8]
-    start: Numbers
-    count: Numbers
-    serial: Numbers
-
-    @staticmethod
-    def of(runs: Sequence[NoiseSigns], serial: Numbers) -> _Runs:
-        parts = [np.unpackbits(np.frombuffer(base64.b64decode(one.signs), np.uint8))[: one.count] for one in runs]
-        count = np.array([len(part) for part in parts])
-        return _Runs(np.packbits(np.concatenate(parts)), np.cumsum(count) - count, count, serial)
-
-    def alike(self) -> list[tuple[int, int, int, float]]:
-        """Pairs of runs of different serials with the same noise: the earlier one first, signs in common, likeness."""
-        met = (self._met(np.random.default_rng(k)) for k in range(_WINDOWS))
-        one, other, lag, common, excess = (np.concatenate(column) for column in zip(*met, strict=True))
-        first = np.unique(np.stack([one, other, lag]), axis=1, return_index=True)[1]
-        likeness = np.sin(0.5 * np.pi * excess[first])  # of Gaussian noise whose signs agree so often
-        kept, likeness = first[likeness >= _COPY_ALIKE], likeness[likeness >= _COPY_ALIKE]
-        columns = (one[kept], other[kept], common[kept], likeness)
-        return list(zip(*(column.tolist() for column in columns), strict=True))
-
-    def _met(self, rng: np.random.Generator) -> tuple[Numbers, Numbers, Numbers, Numbers, FloatArray]:
-        """What runs have in common where windows have the same number: signs at drawn places, against the first.
-
-        Signs are as many as leave each window about one foreign one with its number, so that time goes with the
-        signs in all.
-        """
-        bits = min(max(round(math.log2(int(self.count.sum()) / 4.0)), _NARROWEST), _WIDEST)
-        offsets = np.r_[0, np.cumsum(rng.integers(_GAPS[0], _GAPS[1] + 1, 2 + bits))]
-        return _core.alike_runs(
-            self.packed,
-            self.start.tolist(),
-            self.count.tolist(),
-            self.serial.tolist(),
-            offsets.tolist(),
-            crowd=_CROWD,
-            first_look=_FIRST_LOOK,
-            least_excess=_LEAST_EXCESS,
-            independent=2.0 * (FASTEST_SIGNS - SLOWEST),
-            least_sigmas=_COPY_SIGMAS,
-        )

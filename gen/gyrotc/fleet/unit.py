@@ -229,7 +229,6 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
-        noise=dataset.noise_signs,
         key=key,
     )
     return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry

@@ -181,10 +181,9 @@ def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
     """Rows that several training runs, or several exams, hold, or one run twice: they count twice."""
     for shared in dataset.shared:
         rows = shared.rows[1] - shared.rows[0] + 1
-        same = "are also" if shared.likeness is None else f"have the noise (correlation {shared.likeness:.2f}) of"
         other = "the same file" if shared.other_file == shared.file else shared.other_file
         text = (
-            f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} {same} rows {shared.other_rows[0]} to "
+            f"Rows {shared.rows[0]} to {shared.rows[1]} of {shared.file} are also rows {shared.other_rows[0]} to "
             f"{shared.other_rows[1]} of {other}: these {rows} rows would count twice, so the former are left out. To "
             f"state it: {exclude_line([shared.span_s], f'also in {shared.other_file}')}"
         )
@@ -192,13 +191,10 @@ def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
 
 
 def shared_axes_findings(dataset: Dataset) -> Iterator[Finding]:
-    """Axes of a recording that hold the same noise."""
+    """Axes of a recording that hold the same values."""
     for shared in dataset.shared_axes:
         one, other = shared.axes
-        text = (
-            f"Axes {one} and {other} of {shared.file} hold the same noise (correlation {shared.likeness:.2f}): one of "
-            "them is a copy of the other."
-        )
+        text = f"Axes {one} and {other} of {shared.file} hold the same values: one of them is a copy of the other."
         yield finding("shared_axes", text, shared.file, **asdict(shared))
 
 

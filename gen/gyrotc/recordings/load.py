@@ -15,12 +15,12 @@ from pydantic_core import PydanticCustomError, ValidationError
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
-from .copies import noise_signs, sketch
 from .description import FILE, Description, Problems, RunEntry, arrange, check_serial, parse_description
-from .overlap import counted_once, shared_axes, shared_rows
+from .fingerprints import sketch
+from .overlap import counted_once, shared_rows
 from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
-from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, inside
+from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, SharedAxes, inside
 from .units import NATIVE
 
 __all__ = [
@@ -309,20 +309,15 @@ def survey(
             f"temperature_late_s = {description.temperature_late_s:g}: every rate goes with the temperature that was "
             "recorded so many seconds later"
         )
-    shared = shared_rows(runs, recordings, axis, problems)
+    shared = shared_rows(runs, recordings, problems)
     kept = counted_once(runs_by_entry, shared) if once else runs_by_entry
     counted = tuple(kept.values())
     dataset = _dataset(folder, description, axis, counted, channels, tuple(warnings), trusted_texts)
     return replace(
         dataset,
         shared=shared,
-        shared_axes=shared_axes(recordings),
+        shared_axes=tuple(SharedAxes(name, axes) for name, r in recordings.items() for axes in r.equal_axes),
         sketch=sketch([r.fingerprints for r in recordings.values()]),
-        noise_signs=tuple(
-            signs
-            for name in dict.fromkeys(run.file for run in runs)
-            for signs in noise_signs(name, recordings[name].noise_on(axis))
-        ),
         curves=curves_of(description, kept, recordings),
     )
 

@@ -1,11 +1,8 @@
-"""Runs that hold the same rows or the same noise: an exam on training data is refused, what two runs of one role have
-in common counts once and is reported.
-"""
+"""Runs that hold the same rows: an exam on training data is refused, what two runs of one role share counts once."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from .copies import AXES_ALIKE, noise_copies, windows_in_common
 from .description import FILE, MIN_ROWS, Problems, exclude_line
+from .fingerprints import windows_in_common
 from .reading import Reader, Recording
-from .records import Exclusion, Run, SharedAxes, SharedRows
+from .records import Exclusion, Run, SharedRows
 
 _PART = 2**20  # rows that are compared at once
 _MOST = 20  # stretches of two runs that are reported
@@ -34,51 +31,21 @@ class _Span:
     values: tuple[NDArray[np.float32], ...]
 
 
-def shared_rows(
-    runs: Sequence[Run], recordings: Mapping[str, Recording], axis: str | None, problems: Problems
-) -> tuple[SharedRows, ...]:
-    """Rows that runs of one role have in common, or that a run has twice; of runs without such rows the same noise.
+def shared_rows(runs: Sequence[Run], recordings: Mapping[str, Recording], problems: Problems) -> tuple[SharedRows, ...]:
+    """Return rows that runs of one role have in common, or that a run has twice.
 
     Rows that a training run and an exam have in common are a problem, with the exclusion that mends it.
     """
     found: list[SharedRows] = []
     prints = [recordings[run.file].fingerprints.within(run) for run in runs]
-    windows = windows_in_common(prints)
-    stretches = ((j, i, shared) for (j, i), one in windows.items() for shared in _stretches(runs[j], runs[i], one))
-    for j, i, shared in itertools.chain(stretches, _same_noise(runs, recordings, axis, set(windows))):
-        if runs[i].role == runs[j].role:
-            found.append(shared)
-        else:
-            of_exam = shared if runs[j].role == "exam" else _reversed_roles(shared)
-            problems.add(_refused(of_exam), *of_exam.marks)
+    for (j, i), windows in windows_in_common(prints).items():
+        for shared in _stretches(runs[j], runs[i], windows):
+            if runs[i].role == runs[j].role:
+                found.append(shared)
+            else:
+                of_exam = shared if runs[j].role == "exam" else _reversed_roles(shared)
+                problems.add(_refused(of_exam), *of_exam.marks)
     return tuple(found)
-
-
-def _same_noise(
-    runs: Sequence[Run], recordings: Mapping[str, Recording], axis: str | None, known: Container[tuple[int, int]]
-) -> Iterator[tuple[int, int, SharedRows]]:
-    """Pairs of runs with the same noise, without those that are known: the later one first."""
-    prints = []
-    for run in runs:
-        recording = recordings[run.file]
-        noise = recording.noise_on(axis)
-        prints.append(noise.within(run.in_span(noise.time_s)))
-    for copy in noise_copies(prints):
-        i, j = copy.one, copy.other
-        if (j, i) not in known:
-            low = max(prints[j].time_s[0], prints[i].time_s[0] + copy.late_s)
-            high = min(prints[j].time_s[-1], prints[i].time_s[-1] + copy.late_s)
-            rows, span = _rows_between(runs[j], low, high)
-            other_rows, other_span = _rows_between(runs[i], low - copy.late_s, high - copy.late_s)
-            files = runs[j].file, runs[i].file
-            yield j, i, SharedRows(files[0], rows, span, files[1], other_rows, other_span, copy.likeness)
-
-
-def _rows_between(run: Run, low_s: float, high_s: float) -> tuple[tuple[int, int], tuple[float, float]]:
-    """First and last row of a span, from 1, and its times: first row, row after the last."""
-    time = _span(run).time_s
-    first, last = np.searchsorted(time, [low_s, high_s]).clip(0, len(time) - 1).tolist()
-    return (first + 1, last + 1), _times(time, first, last + 1, run.row_period_s)
 
 
 def counted_once(runs: Mapping[int, Run], shared: Sequence[SharedRows]) -> dict[int, Run]:
@@ -91,18 +58,6 @@ def counted_once(runs: Mapping[int, Run], shared: Sequence[SharedRows]) -> dict[
         if not gaps or np.count_nonzero(without.in_span(_span(run).time_s)) >= MIN_ROWS:
             kept[number] = without
     return kept
-
-
-def shared_axes(recordings: Mapping[str, Recording]) -> tuple[SharedAxes, ...]:
-    """Axes of one file that hold the same noise at the same times."""
-    found = []
-    for name, recording in recordings.items():
-        axes = list(recording.layout.axes)
-        for copy in noise_copies(recording.noise):
-            together = abs(copy.late_s) < recording.row_period_s
-            if copy.likeness > AXES_ALIKE or not together:
-                found.append(SharedAxes(name, (axes[copy.one], axes[copy.other]), copy.likeness))
-    return tuple(found)
 
 
 def _reversed_roles(shared: SharedRows) -> SharedRows:
@@ -120,10 +75,9 @@ def _reversed_roles(shared: SharedRows) -> SharedRows:
 def _refused(shared: SharedRows) -> InputError:
     """The exam holds training data."""
     line = exclude_line([shared.span_s], f"also in {shared.other_file}")
-    same = "are also" if shared.likeness is None else f"have the noise (correlation {shared.likeness:.2f}) of"
     return InputError(
         f"{shared.file}, rows {shared.rows[0]} to {shared.rows[1]}",
-        f"{shared.rows[1] - shared.rows[0] + 1} rows of an exam that {same} rows {shared.other_rows[0]} to "
+        f"{shared.rows[1] - shared.rows[0] + 1} rows of an exam that are also rows {shared.other_rows[0]} to "
         f"{shared.other_rows[1]} of {shared.other_file}, which is trained on",
         f"rows that training has not seen: {line} in the exam's [[run]] of {FILE}, or one role for both",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,9 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import median_step
-from .copies import Fingerprints, NoisePrint, fingerprints_of, noise_of
 from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, faults, rate_faults
 from .files import CsvFile, Source
+from .fingerprints import Fingerprints, fingerprints_of
 from .parser_process import Parser, open_confined
 from .records import Applied, EarthRate, Mark, Rows
 from .tables import LoggerTable
@@ -169,7 +170,7 @@ class Recording:
         units: Conversions to gyrotc's units, by column.
         evidence: What its units can be judged by.
         fingerprints: What its rows can be known again by.
-        noise: What its noise can be known again by, of every axis.
+        equal_axes: Pairs of axes that hold the same values.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -180,14 +181,10 @@ class Recording:
     units: dict[str, Conversion]
     evidence: Evidence
     fingerprints: Fingerprints
-    noise: tuple[NoisePrint, ...]
+    equal_axes: tuple[tuple[str, str], ...]
     time_s: FloatArray
     n_rows: int
     row_period_s: float
-
-    def noise_on(self, axis: str | None) -> NoisePrint:
-        """Of the one rate, or of that of an axis."""
-        return self.noise[list(self.layout.axes).index(axis) if axis else 0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,7 +298,7 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence, fingerprints, noise = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+        time, evidence, fingerprints, equal_axes = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
@@ -312,7 +309,7 @@ def open_recording(
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, conversions, evidence, fingerprints, noise, time, len(time), period)
+    return Recording(file, layout, conversions, evidence, fingerprints, equal_axes, time, len(time), period)
 
 
 def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
@@ -335,8 +332,8 @@ def open_file(name: str, path: Path) -> Source:
 
 def _checked(
     file: Source, layout: Layout, units: Mapping[str, Conversion], pulse_weight_arcsec: float | None, problems: Problems
-) -> tuple[FloatArray, Evidence, Fingerprints, tuple[NoisePrint, ...]]:
-    """Reads all columns and checks them; the times, and what units are judged by and copies are known by."""
+) -> tuple[FloatArray, Evidence, Fingerprints, tuple[tuple[str, str], ...]]:
+    """Read all columns and check them; return times, evidence, fingerprints and equal axes of a `Recording`."""
     values = file.columns(file.names)
     lines = None
     if values is None:
@@ -369,9 +366,17 @@ def _checked(
     evidence = Evidence(len(rates))
     evidence.add(time, values[layout.temperature], rates)
     fingerprints = fingerprints_of(time, values[layout.temperature], rates)
-    if layout.pulses and not found:
-        rates = [rate_of_pulses(time, rates[0], 1.0)]
-    return time, evidence, fingerprints, tuple(noise_of(time, rate) for rate in rates)
+    equal_axes = tuple(
+        (one, other)
+        for one, other in combinations(layout.axes, 2)
+        if _are_copies(values[layout.axes[one]], values[layout.axes[other]])
+    )
+    return time, evidence, fingerprints, equal_axes
+
+
+def _are_copies(one: FloatArray, other: FloatArray) -> bool:
+    """Test whether two columns hold the same values, of which not all are alike."""
+    return np.array_equal(one, other, equal_nan=True) and bool(np.nanmin(one) < np.nanmax(one))
 
 
 def _problem(file: Source, fault: Fault, place: int, unit: Conversion | None = None) -> InputError:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..results.fleet import NoiseSigns
 
 __all__ = [
     "Applied",
@@ -218,8 +217,6 @@ class SharedRows:
         other_file: The other file, or the same.
         other_rows: First and last row in the other file, as `rows`.
         other_span_s: As `span_s`.
-        likeness: Of the noise, where the rows were rounded, scaled, resampled or changed a little; None: they are the
-            same.
     """
 
     file: str
@@ -228,7 +225,6 @@ class SharedRows:
     other_file: str
     other_rows: tuple[int, int]
     other_span_s: tuple[float, float]
-    likeness: float | None = None
 
     @property
     def marks(self) -> tuple[Mark, Mark]:
@@ -238,17 +234,15 @@ class SharedRows:
 
 @dataclass(frozen=True, slots=True)
 class SharedAxes:
-    """Two axes of a file that hold the same noise: one of them was recorded, or neither.
+    """Two axes of a file that hold the same values: one of them was recorded, or neither.
 
     Attributes:
         file: The file.
         axes: Their names.
-        likeness: Of their noise, 1: the same.
     """
 
     file: str
     axes: tuple[str, str]
-    likeness: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,9 +307,8 @@ class Dataset:
         trusted: What the values look like against their units, where the user's word was taken for them.
         sources: Files of loggers that the runs were imported from: file, sha256, bytes, imported_by, map, run.
         shared: Rows that runs of one role have in common, or that a run has twice; they count once.
-        shared_axes: Axes that hold the same noise.
-        sketch: Hashes of rows by which gyros of a fleet are compared (`shared_rows.sketch`).
-        noise_signs: What their noise is compared by (`copies.noise_signs`).
+        shared_axes: Axes that hold the same values.
+        sketch: Hashes of rows by which gyros of a fleet are compared (`fingerprints.sketch`).
         curves: Mean rates over temperature, of every axis of every run.
     """
 
@@ -336,7 +329,6 @@ class Dataset:
     shared: tuple[SharedRows, ...] = ()
     shared_axes: tuple[SharedAxes, ...] = ()
     sketch: tuple[int, ...] = ()
-    noise_signs: tuple[NoiseSigns, ...] = ()
     curves: tuple[Curve, ...] = ()
 
     def __repr__(self) -> str:

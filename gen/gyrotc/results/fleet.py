@@ -72,7 +72,7 @@ class FleetUnit(Part):
     moved_to: str | None = Field(
         default=None, description="folder of an earlier result of the gyro that somebody had changed"
     )
-    copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows or noise")
+    copy_of: tuple[str, ...] = Field(default=(), description="gyros of other serials with the same rows")
     outlier_reason: str | None = Field(default=None, description="why it is an outlier, as in `reasons` of the fleet")
 
     released: str | None = Field(
@@ -125,15 +125,6 @@ class Facts(Part):
     own: tuple[Finding, ...] = Field(default=(), description="events of its runs; sought where more than noise is left")
 
 
-class NoiseSigns(Part):
-    """What the noise of a recording is known again by."""
-
-    file: str = Field(description="as in `dataset.toml`")
-    octave: int = Field(description="log2 of the seconds from one sign to the next")
-    count: Count = Field(description="signs")
-    signs: str = Field(description="1 for a positive value of its whitened noise: eight in a byte, base64")
-
-
 class FleetEntry(FleetUnit):
     """One gyro as in `fleet.json`, and what it was made of and is compared by."""
 
@@ -141,7 +132,6 @@ class FleetEntry(FleetUnit):
     sketch: Annotated[str, Field(pattern="^([0-9a-f]{16})*$")] = Field(
         default="", description="the 16-digit hashes of some rows, chosen by their value: copies share them"
     )
-    noise: tuple[NoiseSigns, ...] = Field(default=(), description="of its recordings: copies have it in common")
     key: Sha256 | None = Field(default=None, description="SHA-256 over recordings, options, limits and program")
     _kept: bool = PrivateAttr(default=False)
 
@@ -195,22 +185,18 @@ class Reason(Part):
 
 
 class Copy(Part):
-    """Two gyros of different serials that have the same rows or the same noise: the recordings are of one of them."""
+    """Two gyros of different serials that have the same rows: the recordings are of one of them."""
 
     name: str = Field(description="of a gyro")
     serial: str = Field(description="its serial")
     other: str = Field(description="name of the other")
     other_serial: str = Field(description="the other's serial")
-    share: Share = Field(description="of the recordings of the one with fewer, about: of rows, or of the time of noise")
-    likeness: Share | None = Field(
-        default=None, description="correlation of the noise where no rows are the same; null: rows are the same"
-    )
+    share: Share = Field(description="of the rows of the one with fewer, about")
 
     @property
     def words(self) -> str:
         """What both have in common."""
-        of_noise = f"the noise (correlation {self.likeness:.2f}) of " if self.likeness is not None else ""
-        return f"{of_noise}about {self.share:.0%} of its {'recordings' if of_noise else 'rows'} in common"
+        return f"about {self.share:.0%} of its rows in common"
 
 
 class FleetSummary(Result):
@@ -229,7 +215,7 @@ class FleetSummary(Result):
     outliers: tuple[FleetOutlier, ...] = Field(description="figures that are outliers, the farthest first")
     reasons: tuple[Reason, ...] = Field(description="gyros that are outliers, in the order of the manifest")
     copies: tuple[Copy, ...] = Field(
-        description="pairs of gyros of different serials with the same rows or noise, in the order of the manifest"
+        description="pairs of gyros of different serials with the same rows, in the order of the manifest"
     )
     serials: tuple[FleetUnit, ...] = Field(description="every gyro, in the order of the manifest")
 

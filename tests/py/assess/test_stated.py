@@ -276,37 +276,23 @@ def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None
         unit_of(folder)
 
 
-NAMED = ABOUT | {"refused"}
-
-
 @pytest.mark.parametrize("number", range(2))
 def test_nothing_is_said_of_a_clean_set(number: int) -> None:
-    assert not found("clean", "clean", 2, number) & NAMED
-
-
-@pytest.mark.parametrize("number", range(2))  # a training run, and the exam
-@pytest.mark.parametrize("way", KINDS["copies"])
-def test_a_run_exported_again_is_named(way: str, number: int) -> None:
-    assert found("copies", way, 2, number) & NAMED
+    assert not found("clean", "clean", 2, number) & ABOUT
 
 
 @pytest.mark.parametrize("way", KINDS["faults"])
 def test_a_fault_of_one_run_is_named(way: str) -> None:
     """Before: held rates, a late temperature and a run turned over built at up to 2.78 times the floor in silence."""
-    assert found("faults", way, 2, 0) & NAMED
-
-
-@pytest.mark.parametrize("way", ["decimals", "shifted"])  # of those sampled anew one in four is missed
-def test_a_run_of_another_gyro_of_the_fleet_is_named(way: str) -> None:
-    assert found("fleets", way, 2, 0) == {"copy_of_other"}
+    assert found("faults", way, 2, 0) & ABOUT
 
 
 @pytest.mark.slow
 def test_a_tenth_of_the_campaign_keeps_to_its_shares() -> None:
-    """`make evidence` draws 500 clean sets, and 200 of each kind that is none."""
+    """`make evidence` draws 500 clean sets, and 200 with a fault."""
     print("seed 3")
-    counts = {"clean": 50, "copies": 20, "faults": 20, "fleets": 20}
+    counts = {"clean": 50, "faults": 20}
     named = dict.fromkeys(counts, 0)
     for kind, way, seed, number in tasks(counts, 3):
-        named[kind] += bool(found(kind, way, seed, number) & NAMED)
-    assert named["clean"] <= 1 and all(named[kind] >= 19 for kind in counts if kind != "clean"), named
+        named[kind] += bool(found(kind, way, seed, number) & ABOUT)
+    assert named["clean"] <= 1 and named["faults"] >= 19, named
