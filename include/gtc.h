@@ -14,7 +14,7 @@
  *
  * Samples are averaged over blocks of the table's `block_us`. The correction of block n comes from the blocks up to
  * n-1: T is the mean of the last one, dT/dt the least-squares slope over the last `slope_blocks`. The correction is 0
- * with GTC_HELD until readings have agreed for the guard's time, then the map with slope 0 (GTC_WARMING) until the
+ * with GTC_HELD until readings have agreed (gtc_<n>_sample()), then the map with slope 0 (GTC_WARMING) until the
  * window is full.
  *
  * Concurrency: a table is constant and may be read from anywhere. A state belongs to one task, a gtc_<n>_angle_t
@@ -83,7 +83,7 @@ typedef struct {
 } gtc_q31_snapshot_t;
 
 /* Words of a saved state, see gtc_<n>_save(). */
-#define GTC_SAVE_WORDS (25 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (13 * GTC_MAX_TERMS) + (14 * GTC_WITH_UNCERTAINTY))
+#define GTC_SAVE_WORDS (26 + GTC_MAX_SLOPE_BLOCKS + (2 * GTC_TERM_SLOTS) + (14 * GTC_MAX_TERMS) + (14 * GTC_WITH_UNCERTAINTY))
 
 /* Bytes on a Cortex-M4F at -O2, the larger of arm-none-eabi-gcc 12.2 and 14.2, rounded up: code with all that it
  * calls (linked once) and stack of the deepest call, whatever terms a table has. `gyrotc verify` measures both with
@@ -130,7 +130,10 @@ GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *t
  * the order of their names (q31: 2^-16 of their unit); NULL: nothing was read. No reading is an error:
  *   - A missing or stuck reading, one too far from those before it, and a temperature outside the guard's range are
  *     held; an auxiliary reading outside its range counts as the edge (GTC_CLAMPED).
- *   - After start, a jump or a loss, readings are accepted once they have agreed for the guard's time.
+ *   - After start, a jump or a loss, a reading is accepted if it is at least the third of readings that agree, and comes
+ *     the guard's time (1 s by default) or more after the first of them. Missing ones in between are neither for nor
+ *     against them, as long as two lie less than the time apart after which the channel is lost. One that is stuck or
+ *     outside the range begins them anew: so hand over a lost reading as missing, not as a number.
  *   - Missing too long: GTC_FALLBACK for the temperature, GTC_CHANNEL_LOST for an auxiliary channel.
  *   - Times are put on a grid of periods, and periods without a reading count as missed: jitter below half a period does
  *     no harm, lost samples leave the slope right. A reading whose period is taken, or that comes up to 268 s before the

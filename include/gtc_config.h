@@ -20,7 +20,7 @@
 #endif
 
 /* Most extension terms of one table, and most auxiliary channels. Diagnosis ships at most three causes; four leaves
- * room for one that is known beforehand. Each costs 60 bytes of RAM in the state; 0 leaves the code of terms and
+ * room for one that is known beforehand. Each costs 64 bytes of RAM in the state; 0 leaves the code of terms and
  * channels out. */
 #ifndef GTC_MAX_TERMS
 #define GTC_MAX_TERMS 4

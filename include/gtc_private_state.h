@@ -58,24 +58,26 @@ typedef struct {
 
 /* State of one channel of a table: temperature or auxiliary. */
 typedef struct {
-    uint_least32_t gap_us;      /* since the last accepted reading; 0: none was */
-    uint_least32_t agreed_us;   /* for how long readings agree that do not follow it */
-    uint_least32_t same_us;     /* for how long the reading has been the same */
-    uint_least32_t received;    /* last reading, its bits */
-    uint_least32_t valid;       /* accepted readings of the running block */
-    uint_least32_t held_blocks; /* blocks in a row with too few of them */
-    uint_least32_t clamped;     /* whether any was taken as the edge of its range */
-    float near;                 /* limit of a change between samples */
-    float last;                 /* last accepted reading */
-    float candidate;            /* last one that does not follow it */
-    float base;                 /* first accepted reading of the block */
-    float mean;                 /* of the last block with enough of them, or what stands for it */
-    float sum;                  /* of differences from base */
+    uint_least32_t gap_us;       /* since the last accepted reading; 0: none was */
+    uint_least32_t series_us;    /* since the first of the readings that agree and do not follow it */
+    uint_least32_t candidate_us; /* since the last of these; 2^32 - 1: there is none */
+    uint_least32_t same_us;      /* for how long the reading has been the same */
+    uint_least32_t received;     /* last reading, its bits */
+    uint_least32_t valid;        /* accepted readings of the running block */
+    uint_least32_t held_blocks;  /* blocks in a row with too few of them */
+    uint_least32_t clamped;      /* whether any was taken as the edge of its range */
+    float near;                  /* limit of a change between samples */
+    float last;                  /* last accepted reading */
+    float candidate;             /* last reading that does not follow it */
+    float base;                  /* first accepted reading of the block */
+    float mean;                  /* of the last block with enough of them, or what stands for it */
+    float sum;                   /* of differences from base */
 } gtc_f32_input_t;
 
 typedef struct {
     uint_least32_t gap_us;
-    uint_least32_t agreed_us;
+    uint_least32_t series_us;
+    uint_least32_t candidate_us;
     uint_least32_t same_us;
     uint_least32_t received;
     uint_least32_t valid;

@@ -17,7 +17,7 @@
 /* Stamps that are so much earlier than the last one are of samples that come late, microseconds. */
 #define LATEST 0x10000000UL
 
-/* The longest time that is counted, microseconds. */
+/* The longest time that is counted, microseconds. What was so long ago is forgotten. */
 #define MAX_US 0xFFFFFFFFUL
 
 /* What becomes of a reading. */
@@ -208,6 +208,8 @@ static void FN(hold)(INPUT *in, uint_least32_t us)
     if (in->gap_us != 0U) {
         in->gap_us = FN(later)(in->gap_us, us);
     }
+    in->series_us = FN(later)(in->series_us, us);
+    in->candidate_us = FN(later)(in->candidate_us, us);
 }
 
 /* 1 if x has been the same for too long. */
@@ -242,17 +244,47 @@ static int FN(follows)(const STATE *state, const INPUT *in, const gtc_word_t *gu
     return near;
 }
 
-/* What becomes of a reading that does not follow the last one: it must agree with those after it. */
+/* 1 if x agrees with the candidate before it: as near as an accepted reading must be to the last one, and no later than a
+ * channel is held. */
+static int FN(agrees)(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
+{
+    const uint_least32_t us = in->candidate_us;
+    const uint_least32_t blocks = us / state->table->block_us;
+    int near = 0;
+
+    if ((us < MAX_US) && (blocks <= guard[GUARD_MISSING].bits)) {
+        near = FN(is_near)(x, in->candidate, FN(limit)(guard, us));
+    }
+    return near;
+}
+
+/* Decides on a reading that does not follow the last accepted one. Such readings make a series while each agrees with
+ * the one before it. One that is at least the third of its series, and comes at least GUARD_AGREE after the first, is a
+ * new start; how many polls were missed in between does not matter. Where GUARD_AGREE is 0, any reading is.
+ *
+ * The first reading of a series sets both of its times to 0, and from then on they grow alike; so series_us is larger
+ * than candidate_us from the second reading on. Returns IS_HELD or IS_NEW_START. */
 static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
 {
-    const uint_least32_t before = in->agreed_us;
+    const uint_least32_t least_us = guard[GUARD_AGREE].bits;
+    int verdict = (least_us == 0U) ? IS_NEW_START : IS_HELD;
 
-    in->agreed_us = state->period_us;
-    if ((before != 0U) && FN(is_near)(x, in->candidate, in->near)) {
-        in->agreed_us = FN(later)(before, state->period_us);
+    if (!FN(agrees)(state, in, guard, x)) {
+        in->series_us = 0U;
+    } else if ((in->series_us > in->candidate_us) && (in->series_us >= least_us)) {
+        verdict = IS_NEW_START;
+    } else {
+        /* too few, or not for long enough */
     }
     in->candidate = x;
-    return ((in->agreed_us - state->period_us) >= guard[GUARD_AGREE].bits) ? IS_NEW_START : IS_HELD;
+    in->candidate_us = 0U;
+    return verdict;
+}
+
+/* Forgets the candidate, so that the next reading that does not follow begins a series. */
+static void FN(forget_candidate)(INPUT *in)
+{
+    in->candidate_us = MAX_US;
 }
 
 /* Takes x into the running block. */
@@ -266,7 +298,7 @@ static void FN(accept)(INPUT *in, NUM x, uint_least32_t period_us)
     in->valid++;
     in->last = x;
     in->gap_us = period_us;
-    in->agreed_us = 0U;
+    FN(forget_candidate)(in);
 }
 
 /* One reading x within its range: held, accepted, or accepted as a new start, which is the mean until a block ends. */
@@ -291,10 +323,10 @@ static int FN(judge)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM
     return verdict;
 }
 
-/* A reading that is none. */
+/* A reading that cannot be true: it speaks against the candidate before it, which one that is missing does not. */
 static void FN(reject)(INPUT *in, uint_least32_t us)
 {
-    in->agreed_us = 0U;
+    FN(forget_candidate)(in);
     FN(hold)(in, us);
 }
 
@@ -306,7 +338,9 @@ static int FN(take_temperature)(STATE *state, NUM x)
     const int is_first = FN(is_new)(in);
     int verdict = IS_HELD;
 
-    if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
+    if (FN(is_missing)(x) != 0) {
+        FN(hold)(in, state->period_us);
+    } else if ((FN(is_stuck)(in, guard, x, state->period_us) != 0)
         || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
         FN(reject)(in, state->period_us);
     } else {
@@ -327,7 +361,11 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
     NUM x;
     int verdict;
 
-    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
+    if (FN(is_missing)(reading) != 0) {
+        FN(hold)(in, state->period_us);
+        return;
+    }
+    if (FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
         FN(reject)(in, state->period_us);
         return;
     }
@@ -472,7 +510,8 @@ static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t 
 static void FN(clear_input)(volatile INPUT *in)
 {
     in->gap_us = 0U;
-    in->agreed_us = 0U;
+    in->series_us = MAX_US;
+    in->candidate_us = MAX_US;
     in->same_us = 0U;
     in->received = NUM_MISSING_BITS;
     in->valid = 0U;
@@ -577,23 +616,25 @@ static int FN(all_lost)(const STATE *state)
     return lost;
 }
 
-/* `samples` samples passed, of the running block, in which nothing came. */
+/* `samples` samples passed in which nothing came. */
 static void FN(miss)(STATE *state, uint_least32_t samples)
 {
     uint_least32_t c;
 
     for (c = 0U; c < FN(n_channels)(state->table); c++) {
-        FN(reject)(&state->input[c], samples * state->period_us);
+        FN(hold)(&state->input[c], samples * state->period_us);
     }
 }
 
-/* Whole blocks in which nothing can change but the time. Returns the samples that are left, at least one. */
+/* Whole blocks in which nothing can change but the times. Returns the samples that are left, at least one. */
 static uint_least32_t FN(skip)(STATE *state, uint_least32_t samples)
 {
     const uint_least32_t blocks = (samples - 1U) / state->samples_per_block;
+    const uint_least32_t skipped = blocks * state->samples_per_block;
 
     FN(pass)(state, blocks);
-    return samples - (blocks * state->samples_per_block);
+    FN(miss)(state, skipped);
+    return samples - skipped;
 }
 
 /* `count` samples of the grid in which nothing came, the same bits as in `count` calls. */

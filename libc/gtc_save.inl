@@ -8,7 +8,7 @@
 
 #if GTC_WITH_SAVE
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545335UL
+#define SAVE_MAGIC 0x47545336UL
 
 /* What another build may have otherwise. */
 #define SAVE_OPTIONS \
@@ -93,7 +93,8 @@ static void FN(carry_input)(FN(cursor_t) *at, INPUT *in, const gtc_word_t *guard
     const NUM most = (high > NUM_ZERO) ? high : NUM_ZERO;
 
     FN(carry_bits)(at, &in->gap_us);
-    FN(carry_bits)(at, &in->agreed_us);
+    FN(carry_bits)(at, &in->series_us);
+    FN(carry_bits)(at, &in->candidate_us);
     FN(carry_bits)(at, &in->same_us);
     FN(carry_bits)(at, &in->received);
     FN(carry_count)(at, &in->valid, position);

@@ -305,9 +305,9 @@ class Guard(_Frozen):
     """What is accepted of an auxiliary channel, in its unit; times in s.
 
     Beyond `low` ... `high` the edge is taken. A change is accepted up to `max_step`, and `max_rate_per_min` for the
-    time since the last reading that was accepted; anything else must agree with itself for `agree_s`, and so must the
-    first readings. A reading that stays the same for `stuck_s` is none (0: never). After `missing_s` without enough
-    readings `fallback` stands for the channel.
+    time since the last reading that was accepted; of anything else, and of the first readings, at least three must
+    agree for `agree_s` (0: one is enough). A reading that stays the same for `stuck_s` is none (0: never). After
+    `missing_s` without enough readings `fallback` stands for the channel.
     """
 
     low: Annotated[float, Field(ge=-1e9, le=1e9)]

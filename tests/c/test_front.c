@@ -184,7 +184,7 @@ TEST(a_first_conversion_alone_is_not_accepted)
 
     CHECK_INT(GTC_HELD, feed(&state, C(85.0), 1));
     CHECK(same(0, bias_of(&state)));
-    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 2));
     CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
     CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
 }
@@ -216,16 +216,14 @@ TEST(agreement_takes_as_long_with_quick_samples)
     CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
 }
 
-TEST(candidates_that_disagree_or_are_interrupted_start_again)
+TEST(candidates_that_disagree_or_follow_something_impossible_start_again)
 {
     state_t state = agreeing(2UL * PERIOD);
 
     (void)feed(&state, C(10.0), 5);
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(30.0), 1));
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
-    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, MISSING, 1));
-    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
-    CHECK_INT(GTC_WARMING | GTC_HELD, missed(&state, 1U));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(200.5), 1));
     CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(45.0), 2));
     CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
     state = agreeing(2UL * PERIOD);
@@ -236,6 +234,95 @@ TEST(candidates_that_disagree_or_are_interrupted_start_again)
     CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
 }
 
+TEST(candidates_that_are_stuck_start_again)
+{
+    static gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, AGREE_US, 3UL * PERIOD);
+    state_t state;
+
+    guard[STUCK_US].bits = 2UL * PERIOD;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 9));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.125), 1));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.25), 1));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.125), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.25), 1));
+}
+
+TEST(a_missing_sample_is_neither_for_nor_against_a_candidate)
+{
+    state_t state = agreeing(4UL * PERIOD);
+    int k;
+
+    (void)feed(&state, C(10.0), 5);
+    for (k = 0; k < 2; k++) {
+        CHECK((feed(&state, C(45.0), 1) & GTC_HELD) != 0);
+        CHECK(same(map_of(C(10.0), 0), bias_of(&state)));
+        CHECK((((k == 0) ? feed(&state, MISSING, 1) : missed(&state, 1U)) & GTC_HELD) != 0);
+    }
+    CHECK_INT(GTC_WARMING, feed(&state, C(45.0), 1));
+    CHECK(same(map_of(C(45.0), 0), bias_of(&state)));
+}
+
+/* How long it took does not make up for readings. */
+TEST(two_readings_are_not_accepted_however_far_apart_they_are)
+{
+    state_t state = agreeing(1UL);
+
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_HELD, missed(&state, 6U));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
+}
+
+/* The test table bridges 2 blocks; so a candidate counts until 3 blocks have passed. */
+TEST(a_candidate_is_forgotten_when_a_channel_would_be)
+{
+    static gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, AGREE_US, PERIOD);
+    state_t state;
+    int gap;
+
+    for (gap = 3 * (int)N - 1; gap <= 3 * (int)N; gap++) {
+        CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+        CHECK((feed(&state, C(15.0), 1) & GTC_HELD) != 0);
+        CHECK((missed(&state, (uint_least32_t)(gap - 1)) & GTC_HELD) != 0);
+        CHECK((feed(&state, C(15.0), 1) & GTC_HELD) != 0);
+        CHECK((missed(&state, (uint_least32_t)(gap - 1)) & GTC_HELD) != 0);
+        CHECK_INT((gap < 3 * (int)N) ? 0 : GTC_HELD, feed(&state, C(15.0), 1) & GTC_HELD);
+    }
+    /* Not after the longest time that is counted, either. */
+    guard[MISSING_BLOCKS].bits = 100000UL;
+    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 2));
+    CHECK_INT(GTC_HELD, missed(&state, 3000UL));
+    CHECK_INT(GTC_HELD, feed(&state, C(15.0), 2));
+    CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1) & ~GTC_HELD);
+}
+
+/* The guard grants 0.5 C and 0.1 C in a second: 2.5 C in the 8 periods between two readings. */
+TEST(candidates_may_lie_as_far_apart_as_accepted_readings)
+{
+    static gtc_word_t guard[GTC_GUARD_WORDS];
+    table_t table = guarded(guard, AGREE_US, PERIOD);
+    num_t temp;
+    state_t state;
+    int k;
+    int far;
+
+    for (far = 0; far < 2; far++) {
+        CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+        for (k = 0; k < 3; k++) {
+            temp = C(15.0) + ((num_t)k * ((far != 0) ? C(2.75) : C(2.25)));
+            if (k > 0) {
+                (void)missed(&state, 7U);
+            }
+            (void)feed_one(&state, &temp);
+        }
+        CHECK_INT((far != 0) ? GTC_HELD : 0, status_of(&state) & GTC_HELD);
+    }
+}
+
 /* After a loss the last accepted temperature proves nothing: a sensor that was plugged in again shows 85 C first. */
 TEST(after_a_loss_readings_must_agree_again)
 {
@@ -244,7 +331,7 @@ TEST(after_a_loss_readings_must_agree_again)
     (void)feed(&state, C(15.0), 9);
     CHECK_INT(GTC_HELD | GTC_FALLBACK, missed(&state, 100UL * N));
     CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, C(55.0), 1));
-    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, C(15.0), 1));
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, C(15.0), 2));
     CHECK_INT(GTC_WARMING, feed(&state, C(15.0), 1));
     CHECK(same(map_of(C(15.0), 0), bias_of(&state)));
 }
@@ -662,7 +749,12 @@ int main(void)
     RUN(stamps_tell_lost_samples_late_ones_and_a_clock_that_is_off);
     RUN(a_table_with_a_lead_looks_a_block_ahead);
     RUN(no_correction_leaves_the_authority);
-    RUN(candidates_that_disagree_or_are_interrupted_start_again);
+    RUN(candidates_that_disagree_or_follow_something_impossible_start_again);
+    RUN(candidates_that_are_stuck_start_again);
+    RUN(a_missing_sample_is_neither_for_nor_against_a_candidate);
+    RUN(two_readings_are_not_accepted_however_far_apart_they_are);
+    RUN(a_candidate_is_forgotten_when_a_channel_would_be);
+    RUN(candidates_may_lie_as_far_apart_as_accepted_readings);
     RUN(the_longer_the_gap_the_larger_the_accepted_step);
     RUN(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says);
     RUN(a_table_that_accepts_any_number_of_identical_samples);

@@ -205,7 +205,7 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define BIAS 10
 #define WINDOW_AT 11
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
-#define TERM_AT (INPUT_AT + (13 * (GTC_MAX_TERMS + 1)))
+#define TERM_AT (INPUT_AT + (14 * (GTC_MAX_TERMS + 1)))
 #define UNCERTAINTY_AT (TERM_AT + (2 * GTC_MAX_TERMS))
 #define SHIFT_AT (UNCERTAINTY_AT + 11)
 
@@ -227,8 +227,8 @@ static void resealed(gtc_word_t words[WORDS])
 TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
 {
     static const int at[20] = {
-        STATUS, STATUS, POSITION, FILLED, ELAPSED, BIAS, WINDOW_AT + 3, INPUT_AT + 4, INPUT_AT + 5, INPUT_AT + 6,
-        INPUT_AT + 7, INPUT_AT + 8, INPUT_AT + 9, INPUT_AT + 10, INPUT_AT + 10, INPUT_AT + 7, TERM_AT, TERM_AT + 1,
+        STATUS, STATUS, POSITION, FILLED, ELAPSED, BIAS, WINDOW_AT + 3, INPUT_AT + 5, INPUT_AT + 6, INPUT_AT + 7,
+        INPUT_AT + 8, INPUT_AT + 9, INPUT_AT + 10, INPUT_AT + 11, INPUT_AT + 11, INPUT_AT + 8, TERM_AT, TERM_AT + 1,
         TERM_AT + 1, TERM_AT,
     };
     static const uint_least32_t to[20] = {
@@ -256,9 +256,9 @@ TEST(numbers_that_no_call_leaves_are_refused_with_a_right_crc)
     for (k = 0; k < 2; k++) {
         memcpy(forged, words, sizeof forged);
         forged[POSITION].bits = 1U;
-        forged[INPUT_AT + 4].bits = 1U;
-        forged[INPUT_AT + 11].bits = (k == 0) ? 0x70000000UL : (TEST_Q31 ? 0x80000000UL : 0xF0000000UL);
-        forged[INPUT_AT + 12].bits = (TEST_Q31 && (k == 1)) ? 0xFFFFFFFFUL : 0U;
+        forged[INPUT_AT + 5].bits = 1U;
+        forged[INPUT_AT + 12].bits = (k == 0) ? 0x70000000UL : (TEST_Q31 ? 0x80000000UL : 0xF0000000UL);
+        forged[INPUT_AT + 13].bits = (TEST_Q31 && (k == 1)) ? 0xFFFFFFFFUL : 0U;
         resealed(forged);
         CHECK_INT(GTC_E_IMAGE, restored(&state, forged, 0U));
     }

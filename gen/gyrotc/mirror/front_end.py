@@ -88,9 +88,11 @@ class Steps:
 
 
 def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
-    """Counts of missing samples, shortened by whole blocks where nothing changes any more but the time."""
-    n = settings.samples_per_block
-    most = settings.longest_blocks + 2
+    """Counts of missing samples, shortened by whole blocks where nothing changes any more but the times."""
+    n, longest = settings.samples_per_block, settings.longest_blocks
+    # Every channel is lost, and so late that its candidate is forgotten; blocks of samples may be shorter than block_us.
+    forgotten = -(-(longest + 1) * settings.block_us // (n * settings.period_us))
+    most = max(longest + 2, forgotten + 1)
     many = np.flatnonzero(missed >= (most + 1) * n)
     if many.size == 0:
         return missed
@@ -218,7 +220,9 @@ def _accepted(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> tuple[N
     n = settings.samples_per_block
     lost: list[int] = []
     while True:
-        verdict = judge_readings(arithmetic, x, settings.guard, period_us=settings.period_us, lost=lost)
+        verdict = judge_readings(
+            arithmetic, x, settings.guard, period_us=settings.period_us, block_us=settings.block_us, lost=lost
+        )
         fallback = _fallen(verdict, settings)
         starts = (1 + np.flatnonzero(fallback & ~np.concatenate([[False], fallback[:-1]]))) * n
         new = [int(start) for start in starts if start < x.size and start not in lost]

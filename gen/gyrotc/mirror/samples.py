@@ -29,9 +29,11 @@ class Guarded:
         low, high: Range of the readings.
         max_step: Largest accepted change between two of them, besides ...
         max_rate: ... this much for each microsecond since the last accepted one (fixed point: 2^-40).
-        agree_us: How long readings must agree that do not follow the last one.
+        agree_us: Least time from the first to the last of the readings that agree and do not follow the last accepted
+            one; 0: one of them is enough.
         stuck_us: How long a reading may stay the same; 0: for ever.
-        missing_blocks: Blocks in a row with too few readings that are bridged.
+        missing_blocks: Blocks in a row with too few readings that are bridged. In so many blocks and one more, a
+            candidate is forgotten.
         takes_edge: A reading outside the range is taken as its edge; False: it is none.
     """
 
@@ -50,7 +52,7 @@ class Guarded:
 
 
 def judge_readings(
-    arithmetic: Arithmetic, x: Numbers, guard: Guarded, *, period_us: int, lost: Sequence[int] = ()
+    arithmetic: Arithmetic, x: Numbers, guard: Guarded, *, period_us: int, block_us: int, lost: Sequence[int] = ()
 ) -> NDArray[np.int8]:
     """Verdict on every reading: HELD, ACCEPTED, or RESTART (readings that agreed with one another for long enough).
 
@@ -59,10 +61,12 @@ def judge_readings(
         x: Readings, shape (n,); missing ones as `arithmetic.missing`.
         guard: What is accepted.
         period_us: Time from reading to reading, microseconds.
+        block_us: Length of a block, microseconds.
         lost: Readings before which the channel was lost, ascending: what was accepted is forgotten.
     """
-    judged, sound = guard.limited(x), _sound(arithmetic, x, guard, period_us)
-    judge = _Judge(arithmetic, guard, period_us)
+    there = ~arithmetic.is_missing(x)
+    judged, sound = guard.limited(x), _sound(x, there, guard, period_us)
+    judge = _Judge(arithmetic, guard, period_us, block_us)
     events = _events(arithmetic, judged, sound, judge.near, lost)
     verdict = np.zeros(x.size, dtype=np.int8)
     waiting = list(lost)
@@ -74,6 +78,8 @@ def judge_readings(
         if not sound[i]:
             rest = sound[i:]
             gap = int(np.argmax(rest)) if rest.any() else rest.size
+            if there[i : i + gap].any():
+                judge.forget_candidate()
             judge.hold(gap)
             i += gap
             continue
@@ -101,11 +107,10 @@ def _events(
     return np.flatnonzero(~regular)
 
 
-def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -> NDArray[np.bool_]:
+def _sound(x: Numbers, there: NDArray[np.bool_], guard: Guarded, period_us: int) -> NDArray[np.bool_]:
     """Readings that are there, in their range or taken as its edge, and not stuck."""
-    there = ~arithmetic.is_missing(x)
     with np.errstate(invalid="ignore"):
-        sound = there.copy() if guard.stuck_us else there
+        sound = there.copy()
         if not guard.takes_edge:
             sound &= x >= guard.low
             sound &= x <= guard.high
@@ -123,37 +128,50 @@ def _sound(arithmetic: Arithmetic, x: Numbers, guard: Guarded, period_us: int) -
 
 
 class _Judge:
-    """The state of the target between events: last accepted reading, gap, suspects."""
+    """The state of the target between events.
 
-    def __init__(self, arithmetic: Arithmetic, guard: Guarded, period_us: int) -> None:
+    Times are counted in samples, up to the sample that comes next: `gap` since the last accepted reading, `candidate_gap`
+    since the candidate (None: there is none), `series` since the first reading that agrees with it.
+    """
+
+    def __init__(self, arithmetic: Arithmetic, guard: Guarded, period_us: int, block_us: int) -> None:
         self._arithmetic = arithmetic
         self._guard = guard
         self._period_us = period_us
+        self._forgotten_us = min((guard.missing_blocks + 1) * block_us, _LONGEST_US)
         self.near = self._limit(1)
         self.last: Any = None
         self._gap = 1
         self._candidate: Any = None
-        self._suspects = 0
+        self._candidate_gap: int | None = None
+        self._series = 0
+
+    def _time_us(self, samples: int) -> int:
+        return min(samples * self._period_us, _LONGEST_US)
 
     def _limit(self, gap: int) -> Any:
         """Largest accepted change after so many samples."""
-        us = min(gap * self._period_us, _LONGEST_US)
-        return self._arithmetic.limit(self._guard.max_step, self._guard.max_rate, us)
+        return self._arithmetic.limit(self._guard.max_step, self._guard.max_rate, self._time_us(gap))
+
+    def forget_candidate(self) -> None:
+        """Makes the next reading that does not follow the first of a series."""
+        self._candidate_gap = None
 
     def hold(self, count: int) -> None:
-        """`count` readings that are missing, impossible or stuck."""
-        self._suspects = 0
+        """Lets `count` samples pass, none of which is accepted."""
         self._gap += count
+        self._series += count
+        if self._candidate_gap is not None:
+            self._candidate_gap += count
 
     def take(self, x: Any) -> int:
+        """Decides on a reading that is there and sound."""
         if self._follows(x):
             return self._accepted(x, ACCEPTED)
-        agrees = self._suspects and self._arithmetic.is_near(x, self._candidate, self.near)
-        self._suspects = self._suspects + 1 if agrees else 1
-        self._candidate = x
-        if (self._suspects - 1) * self._period_us >= self._guard.agree_us:
+        if self._confirms(x):
             return self._accepted(x, RESTART)
-        self._gap += 1
+        self._candidate, self._candidate_gap = x, 0
+        self.hold(1)
         return HELD
 
     def _follows(self, x: Any) -> bool:
@@ -161,6 +179,23 @@ class _Judge:
             return False
         return bool(self._arithmetic.is_near(x, self.last, self._limit(self._gap)))
 
+    def _confirms(self, x: Any) -> bool:
+        """Test whether x is at least the third reading of its series, and late enough; begins a new series if it does not agree."""
+        if not self._guard.agree_us:
+            return True
+        gap = self._candidate_gap
+        if gap is None or not self._agrees(x, gap):
+            self._series = 0
+            return False
+        series_us = self._time_us(self._series)
+        return series_us > self._time_us(gap) and series_us >= self._guard.agree_us
+
+    def _agrees(self, x: Any, gap: int) -> bool:
+        if self._time_us(gap) >= self._forgotten_us:
+            return False
+        return bool(self._arithmetic.is_near(x, self._candidate, self._limit(gap)))
+
     def _accepted(self, x: Any, verdict: int) -> int:
-        self.last, self._gap, self._suspects = x, 1, 0
+        self.last, self._gap = x, 1
+        self.forget_candidate()
         return verdict

@@ -34,9 +34,9 @@ def example_values(model: Model) -> dict[str, Any]:
 
 
 def example_samples(model: Model) -> int:
-    """Samples until the first start of the example is accepted, of every channel."""
+    """Samples until the first start of the example is accepted, of every channel; at least three must agree."""
     longest_s = max(guard_of(model, name).agree_s for name in (None, *channel_names(model)))
-    return math.ceil(longest_s * 1e6 / example_period_us(model)) + 1
+    return max(math.ceil(longest_s * 1e6 / example_period_us(model)) + 1, 3 if longest_s else 1)
 
 
 def example_period_us(model: Model) -> int:

@@ -14,7 +14,7 @@
 pub type Word = u32;
 
 /// Words of a saved state, `GTC_SAVE_WORDS`.
-pub const SAVE_WORDS: usize = 39 + MAX_SLOPE_BLOCKS + 15 * MAX_TERMS;
+pub const SAVE_WORDS: usize = 40 + MAX_SLOPE_BLOCKS + 16 * MAX_TERMS;
 
 const MAX_SLOPE_BLOCKS: usize = 20;
 const MAX_TERMS: usize = 4;

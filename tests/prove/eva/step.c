@@ -32,7 +32,8 @@ static void any_input(uint_least32_t least_valid, uint_least32_t most_valid)
 {
     NAME(input_t) *const in = &state.input[0];
     in->gap_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
-    in->agreed_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->series_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->candidate_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     in->same_us = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     in->received = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     in->valid = Frama_C_unsigned_long_interval(least_valid, most_valid);
