@@ -323,10 +323,12 @@ static int FN(judge)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM
     return verdict;
 }
 
-/* A reading that cannot be true: it speaks against the candidate before it, which one that is missing does not. */
-static void FN(reject)(INPUT *in, uint_least32_t us)
+/* A reading x that is missing or cannot be true. The latter speaks against the candidate before it. */
+static void FN(reject)(INPUT *in, NUM x, uint_least32_t us)
 {
-    FN(forget_candidate)(in);
+    if (FN(is_missing)(x) == 0) {
+        FN(forget_candidate)(in);
+    }
     FN(hold)(in, us);
 }
 
@@ -338,11 +340,9 @@ static int FN(take_temperature)(STATE *state, NUM x)
     const int is_first = FN(is_new)(in);
     int verdict = IS_HELD;
 
-    if (FN(is_missing)(x) != 0) {
-        FN(hold)(in, state->period_us);
-    } else if ((FN(is_stuck)(in, guard, x, state->period_us) != 0)
+    if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
         || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
-        FN(reject)(in, state->period_us);
+        FN(reject)(in, x, state->period_us);
     } else {
         verdict = FN(judge)(state, in, guard, x);
         if (verdict == IS_NEW_START) {
@@ -361,12 +361,8 @@ static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
     NUM x;
     int verdict;
 
-    if (FN(is_missing)(reading) != 0) {
-        FN(hold)(in, state->period_us);
-        return;
-    }
-    if (FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
-        FN(reject)(in, state->period_us);
+    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
+        FN(reject)(in, reading, state->period_us);
         return;
     }
     x = FN(saturate)(reading, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH]), &remarks);

@@ -5,4 +5,4 @@ with Gtc.Binding;
 with Gtc.C_F32; use Gtc.C_F32;
 with Interfaces.C; use Interfaces.C;
 
-package Gtc.F32 is new Gtc.Binding (Number => C_float, Zero => 0.0, Longest => 1000.0, Input_Words => 13);
+package Gtc.F32 is new Gtc.Binding (Number => C_float, Zero => 0.0, Longest => 1000.0, Input_Words => 14);

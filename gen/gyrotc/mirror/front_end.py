@@ -90,7 +90,7 @@ class Steps:
 def expand_missed(missed: NDArray[np.int64], settings: Settings) -> NDArray[np.int64]:
     """Counts of missing samples, shortened by whole blocks where nothing changes any more but the times."""
     n, longest = settings.samples_per_block, settings.longest_blocks
-    # Every channel is lost, and so late that its candidate is forgotten; blocks of samples may be shorter than block_us.
+    # So late that every channel is lost and its candidate forgotten; a block of samples may be shorter than block_us.
     forgotten = -(-(longest + 1) * settings.block_us // (n * settings.period_us))
     most = max(longest + 2, forgotten + 1)
     many = np.flatnonzero(missed >= (most + 1) * n)

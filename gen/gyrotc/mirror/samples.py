@@ -130,8 +130,8 @@ def _sound(x: Numbers, there: NDArray[np.bool_], guard: Guarded, period_us: int)
 class _Judge:
     """The state of the target between events.
 
-    Times are counted in samples, up to the sample that comes next: `gap` since the last accepted reading, `candidate_gap`
-    since the candidate (None: there is none), `series` since the first reading that agrees with it.
+    Times are counted in samples, up to the sample that comes next: `gap` since the last accepted reading,
+    `candidate_gap` since the candidate (None: there is none), `series` since the first reading that agrees with it.
     """
 
     def __init__(self, arithmetic: Arithmetic, guard: Guarded, period_us: int, block_us: int) -> None:
@@ -180,7 +180,10 @@ class _Judge:
         return bool(self._arithmetic.is_near(x, self.last, self._limit(self._gap)))
 
     def _confirms(self, x: Any) -> bool:
-        """Test whether x is at least the third reading of its series, and late enough; begins a new series if it does not agree."""
+        """Test whether x is at least the third reading of its series, and late enough.
+
+        Begins a new series if it does not agree.
+        """
         if not self._guard.agree_us:
             return True
         gap = self._candidate_gap

@@ -87,8 +87,8 @@ def run_blocks(
         slope_blocks: Window of dT/dt, blocks.
         max_step_c: Largest accepted change between two samples, C, besides ...
         max_rate_c_per_min: ... this rate times the time since the last accepted one.
-        agree_s: Least time from the first to the last of the readings that agree and do not follow the last accepted one,
-            s; 0: one of them is enough.
+        agree_s: Least time from the first to the last of the readings that agree and do not follow the last accepted
+            one, s; 0: one of them is enough.
         stuck_s: Time after which a reading that stays the same is none, s; 0: never.
         hold_blocks: Invalid blocks in a row that are bridged before the fallback.
         lead_blocks: 1: map and terms see where the slope brings a block's mean by the time that it is in force.

@@ -351,14 +351,14 @@ macro_rules! arithmetic {
 #[repr(C)]
 #[derive(Clone)]
 struct FixedInput {
-    words: [Word; 12],
+    words: [Word; 13],
     sum: i64,
 }
 
 arithmetic! {
     /// float32: C, C per block, deg/h; increments in arcsec over seconds.
     float32, number f32, age f32, interval f32,
-    state words 53, input [Word; 13], inputs MAX_TERMS + 1, angle [f32; 2],
+    state words 53, input [Word; 14], inputs MAX_TERMS + 1, angle [f32; 2],
     "gtc_f32_check" "gtc_f32_open"
     "gtc_f32_init_20blocks_4terms" "gtc_f32_sample"
     "gtc_f32_bias" "gtc_f32_snapshot"

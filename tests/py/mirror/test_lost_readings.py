@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from gyrotc.tables.quantise import NUMERICS, quantise
 from gyrotc.mirror.history import replay
 from gyrotc.mirror.table import FALLBACK, HELD, Table
+from gyrotc.tables.quantise import NUMERICS, quantise
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from libc_build import runtime
@@ -106,12 +106,13 @@ def test_the_first_correction_comes_in_time_with_one_reading_in_so_many_polls(
 
 # What a reading is beside the one before it.
 KINDS = ("near", "near", "near", "same", "far", "back", "impossible", "missing")
+UNREADABLE = {"impossible": 300.0, "missing": np.nan}
 GAPS = (0, 0, 0, 0, 1, 2, 5, 9, 23, 60, 400, 100_000)
 
 
 @st.composite
 def histories(draw: st.DrawFn) -> tuple[int, int, list[tuple[int, str, int, int]]]:
-    """A model, samples in a block, and rows: their kind, how often it is repeated, and the samples missed before each."""
+    """A model, samples in a block, and rows: channel, kind, how often it comes, and samples missed before each."""
     rows = st.tuples(
         st.integers(0, 2),
         st.sampled_from(KINDS),
@@ -140,7 +141,7 @@ def lossy_table(numeric: str, number: int) -> Table:
 @pytest.mark.parametrize("numeric", NUMERICS)
 @seed(1)
 @settings(
-    max_examples=150,
+    max_examples=100,
     deadline=None,
     database=None,
     suppress_health_check=list(HealthCheck),
@@ -154,28 +155,21 @@ def test_reference_and_c_agree_bit_for_bit_with_readings_missing_anywhere(
     table = lossy_table(numeric, number)
     rng = np.random.default_rng(number)
     values, missed = [], []
-    now = np.array([20.0, 12.0, 12.0])
-    before = now.copy()
+    level = np.array([20.0, 12.0, 12.0])
+    earlier = level.copy()
     for which, kind, count, gap in rows:
+        if kind == "far":
+            earlier = level.copy()
+            level[which] += float(rng.choice([-3.0, 1.0, 7.0]))
+        elif kind == "back":
+            level = earlier.copy()
         for _ in range(count):
-            shown = now.copy()
-            if kind == "near":
-                shown[which] += float(rng.normal(0.0, 0.02))
-            elif kind == "far":
-                before, shown[which] = (
-                    now.copy(),
-                    now[which] + float(rng.choice([-3.0, 1.0, 7.0])),
-                )
-                kind = "near"
-            elif kind == "back":
-                shown = before.copy()
-            if kind in ("near", "back"):
-                now = shown.copy()
-            elif kind == "impossible":
-                shown[which] = 300.0
-            elif kind == "missing":
-                shown[which] = np.nan
-            values.append(shown)
+            reading = level.copy()
+            if kind in ("near", "far", "back"):
+                reading[which] += float(rng.normal(0.0, 0.02))
+            elif kind in UNREADABLE:
+                reading[which] = UNREADABLE[kind]
+            values.append(reading)
             missed.append(gap)
     n_channels = table.records("guards").shape[0]
     channels = table.encode_inputs(np.array(values)[:, :n_channels])

@@ -304,7 +304,8 @@ int main()
         && fixed.init(gtc_rlg_0042_q31, 1000000UL).is_ok()
         && !fixed.sample(1000000UL, gtc::q31::Celsius(20L * 65536L)).failed()
         && correction.init(gtc_rlg_0042_f32, 1000000UL).is_ok()
-        && correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_HELD); // one alone is not accepted
+        && correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_HELD)
+        && correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_HELD); // two are not accepted
     const bool went = correction.sample(1000000UL, gtc::f32::Celsius(20.0F)).has(GTC_WARMING)
         && correction.bias(bias).has(GTC_WARMING)
         && (gtc_f32_map(&gtc_rlg_0042_f32, 20.0F, 0.0F, &map) >= 0)

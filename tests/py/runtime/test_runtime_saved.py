@@ -97,8 +97,8 @@ def _after_a_ramp(device: Device) -> tuple[Any, Words, Words]:
 
 
 def _first(device: Device, state: Any, sample: Words) -> Words:
-    """Correction after the first sample that another one confirms."""
-    return device.steps(state, np.repeat(sample, 2, axis=0), np.zeros(2))[1][-1:]
+    """Correction after the first sample that two others confirm."""
+    return device.steps(state, np.repeat(sample, 3, axis=0), np.zeros(3))[1][-1:]
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
