@@ -122,8 +122,8 @@ def _paper(s: Steps) -> None:
         "q31",
         name="emit shifted",
     )
-    for form in ("px4", "ardupilot", "csv", "json", "a2l", "cdf"):
-        s.run("export", "result", "--format", form, "--out", f"exported.{form}", name=f"export {form}")
+    for form in ("csv", "json"):
+        s.run("emit", "result/model.json", "--out", "mapped", "--map", f"map.{form}", name=f"emit a map as {form}")
     s.run("schema")
 
 
@@ -433,7 +433,7 @@ def _wrong(s: Steps) -> None:
         ("plan", "paper", "--require", "hysteresis=x"), ("lot", "nowhere", "--out", "lot.json"),
         ("import", "RLG-1/a.csv", "--out", "made", "--rate-unit", "apples"), ("diagnose", "RLG-1", "--model", "x"),
         ("certificate", "result", "--number", "1", "--out", "made"), ("verify", "nowhere"), ("schema", "nothing"),
-        ("export", "result", "--format", "x", "--out", "made"), ("emit", "bad.toml"), ("report", "nowhere"), ("x",),
+        ("emit", "bad.toml"), ("report", "nowhere"), ("x",),
     ):  # fmt: skip
         out = () if words[0] not in ("fit", "build") else ("--out", "made")
         s.run(*words, *out, name=" ".join(words))

@@ -59,7 +59,7 @@ GROUPS = {
     "Calibrate": ("build", "diagnose", "compare", "fit", "emit", "recalibrate"),
     "Judge": ("evaluate", "verify", "report"),
     "Many units": ("fleet", "lot"),
-    "Share": ("certificate", "export"),
+    "Share": ("certificate",),
     "Forms": ("schema",),
 }
 """Names of commands by what a user does; a test holds that each stands once."""

@@ -1,11 +1,9 @@
-"""Commands for many serials (`fleet`, `lot`), and for what leaves the laboratory (`certificate`, `export`)."""
+"""Commands for many serials (`fleet`, `lot`), and for what leaves the laboratory (`certificate`)."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +16,6 @@ from .base import (
     AcceptOption,
     DirArg,
     DisplayOption,
-    GyroAxis,
     JsonOption,
     LotOption,
     OutOption,
@@ -32,18 +29,6 @@ from .base import (
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
-
-
-class ExportFormat(str, Enum):
-    """What `gyrotc export` writes."""
-
-    px4 = "px4"
-    ardupilot = "ardupilot"
-    csv = "csv"
-    json = "json"
-    a2l = "a2l"
-    cdf = "cdf"
-    fmu = "fmu"
 
 
 @app.command()
@@ -194,9 +179,6 @@ def lot(
         )
 
 
-_MOST_POINTS = 1000  # of an axis: a table of a million is more than any control unit holds
-
-
 @app.command()
 def certificate(
     folder: DirArg,
@@ -224,59 +206,3 @@ def certificate(
         tell(str(path))
     if not found.pdf:
         tell("no PDF: Chromium is not installed or did not print; print certificate.html", wrong=True)
-
-
-@app.command()
-def export(
-    folder: DirArg,
-    format: Annotated[
-        ExportFormat, typer.Option("--format", help="px4, ardupilot; csv, json, a2l, cdf: the map as a table; fmu.")
-    ],
-    out: Annotated[Path, typer.Option("--out", callback=written_place, help="The file.")],
-    axis_as: Annotated[
-        GyroAxis, typer.Option("--axis-as", help="Axis of the autopilot for a gyro of one axis.")
-    ] = GyroAxis.x,
-    device: Annotated[int, typer.Option("--device", min=0, help="PX4: CAL_GYRO0_ID of the vehicle.")] = 0,
-    points: Annotated[str, typer.Option("--points", help="Temperatures x rates of temperature of a table.")] = "61x25",
-    address: Annotated[
-        str, typer.Option("--address", help="A2L: where the table begins in memory, e.g. 0x80040000.")
-    ] = "0",
-) -> None:
-    """Write the correction in another form: parameters of PX4 (TC_G*) or ArduPilot (INS_TCAL*); a table of the map
-    for a control unit (ASAP2 A2L and its values as ASAM CDF) or any program (CSV, JSON); a unit of co-simulation
-    (FMU, FMI 3.0) with the same C inside.
-
-    What the other form loses against the map is reported, and stands in the file.
-
-    Example: gyrotc export result --format px4 --out gyro.params
-    """
-    from ..deliver.export import Exporting
-    from ..deliver.export import export as run
-
-    options = Exporting(axis_as.value, device, points_of(points), address_of(address))
-    with progress() as say:
-        say(f"writing {format.value}")
-        lines = run(folder, format.value, out, options)
-    for line in lines:
-        tell(line)
-    tell(str(out))
-
-
-def points_of(text: str) -> tuple[int, int]:
-    """Temperatures and rates of `--points`; raises InputError."""
-    found = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
-    temperatures, rates = (int(n) for n in found.groups()) if found else (0, 0)
-    if not (2 <= temperatures <= _MOST_POINTS and 2 <= rates <= _MOST_POINTS):
-        raise InputError("--points", repr(text), f"two numbers from 2 to {_MOST_POINTS}, such as 61x25")
-    return temperatures, rates
-
-
-def address_of(text: str) -> int:
-    """The number of `--address`; raises InputError."""
-    try:
-        found = int(text, 0)
-    except ValueError:
-        found = -1
-    if not 0 <= found < 2**32:
-        raise InputError("--address", repr(text), "an address of 32 bits, such as 0x80040000")
-    return found

@@ -44,12 +44,12 @@ def schema(
 def kinds() -> dict[str, type[BaseModel]]:
     """Every file and output by the name that `gyrotc schema` knows; imported when asked for, as help needs none."""
     from ..model import Model
-    from ..results.base import MapOnGrid, Marker
+    from ..results.base import Marker
     from ..results.diagnosed import Diagnosed, DiagnosisSeries
     from ..results.evaluation import Changes, Comparison, Evaluation, InService
     from ..results.fleet import FleetEntry, FleetSummary, Lot
     from ..results.recordings import Checked, ImportedFiles, LotPlan, NextRun, Plan, SimulatedTruth
-    from ..results.release import Budget, Emitted, HeldLimits, JointVerification, Verification
+    from ..results.release import Budget, Emitted, HeldLimits, JointVerification, MapOnGrid, Verification
     from ..results.training import Manifest, Training
     from ..tables.record import EmissionRecord
 

@@ -41,6 +41,7 @@ from .base import (
     tell,
     with_build_options,
     write_json,
+    written_place,
 )
 from .results import (
     evaluation_table,
@@ -136,6 +137,13 @@ def fit(
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
 
 
+def _map_place(path: Path | None) -> Path | None:
+    """Checks the file of `--map` before the work begins."""
+    if path is not None and path.suffix not in (".csv", ".json"):
+        raise InputError("--map", repr(path.name), "a name that ends in .csv or .json")
+    return written_place(path)
+
+
 @app.command()
 def emit(
     model: Annotated[Path, typer.Argument(help="The model.json to emit.")],
@@ -144,16 +152,22 @@ def emit(
     zero_at: Annotated[
         float | None, typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C.")
     ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", callback=_map_place, help="Write the map at 61 x 25 points here, too: CSV or JSON."),
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Write the C files of a model into DIR/c.
 
-    Example: gyrotc emit result/model.json --out result
+    Example: gyrotc emit result/model.json --out result --map result/map.csv
     """
     from ..model import load_model
-    from ..results.folder import result_folder
+    from ..results.files import json_text
+    from ..results.folder import result_folder, write_result
     from ..results.release import Emitted, EmittedTable
     from ..tables.emit import emit as run
+    from ..tables.map_grid import csv_text, map_grid, map_result
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
@@ -177,6 +191,11 @@ def emit(
         refused=emission.refused,
     )
     write_json(json_file, result.content())
+    if map_file is not None:
+        grid = map_grid(loaded if zero_at is None else loaded.zeroed_at(zero_at))
+        text = csv_text(grid) if map_file.suffix == ".csv" else json_text(map_result(grid).content())
+        write_result(map_file, text)
+        tell(f"{map_file}: {grid.summary}")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     for line in learning_lines(loaded, emission.tables):

@@ -97,7 +97,7 @@ def c_code(text: str) -> CText:
 
 @functools.cache
 def c_environment() -> jinja2.Environment:
-    """The templates of C, compiled once in a process. Filters: `comment`, `literal` for text, `hex32`, `tenths`."""
+    """The templates of C, compiled once in a process. Filters: `comment` for text, `hex32`, `tenths`."""
     import jinja2
 
     def only_c(value: Any) -> Any:
@@ -112,7 +112,6 @@ def c_environment() -> jinja2.Environment:
     )
     environment.filters.update(
         comment=lambda value: c_comment(str(value)),
-        literal=lambda value: c_literal(str(value)),
         hex32=lambda value: CText(f"0x{int(value):08x}UL"),
         tenths=lambda value: CText(f"{float(value):.1f}"),
     )

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,6 @@ from ..tables.emit import config_text, emitted_tables, runtime_texts
 from ..tables.record import RECORD, joint_record_text
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
-from ..verify.job import verify
 from ..verify.toolchain import all_targets, compile_c, run_program
 
 _EXPECTED = "what gyrotc build wrote; build it again"
@@ -315,28 +314,6 @@ def verify_axes(
         emitted=emitted,
         axes=dict(results),
     )
-
-
-def check_emitted(folder: Path, refused: str, progress: Callable[[str], None] = lambda _: None) -> None:
-    """Is what `folder/c` holds (with several axes: of every axis, too) what gyrotc makes of the models?
-
-    Args:
-        refused: What is not done with it otherwise, in words.
-
-    Raises:
-        InputError: There is no emitted code, or a model cannot be read.
-        CheckFailed: It is not.
-    """
-    axes = axes_in(folder)
-    parts = [folder / axis for axis in axes] or [folder]
-    results = {}
-    for k, part in enumerate(parts, 1):
-        progress(f"comparing files, {k} of {len(parts)}")
-        results[part.name] = verify(part, compiled=False)
-    judged = [*results.values(), *([verify_axes(folder, results)] if axes else [])]
-    wrong = [name for result in judged for name in result.wrong_files]
-    if wrong or any(result.failed for result in judged):
-        raise CheckFailed(f"{refused}: {wrong[0] if wrong else 'a check'} fails; see gyrotc verify {folder}")
 
 
 def _run_together(c: Path, ids: Sequence[str]) -> None:

@@ -1,7 +1,6 @@
 """What every JSON result has: frozen fields of known types, one form on disk, one way to be read back.
 
-Also what several hold: findings with their sizes; and what stands beside results in a folder: its marker, and a map on
-a grid.
+Also what several hold: findings with their sizes; and what stands beside results in a folder: its marker.
 """
 
 from __future__ import annotations
@@ -102,35 +101,6 @@ def checked_result(content: Any, kind: type[R], where: str, text: bytes | None =
     if content.get("schema") != schema:
         raise InputError(f"{where}, field schema", repr(content.get("schema"))[:60], repr(schema))
     return checked(kind, content, where, text)
-
-
-class MapOfAxis(Part):
-    """The static map of one axis at the points of a grid."""
-
-    axis: Axis = Field(description="null where the recordings have one axis")
-    model_hash: str = Field(description="of its model, shifted as its tables are (`emit --zero-at`)")
-    temperature_c: tuple[float, ...] = Field(description="n temperatures, ascending, C")
-    slope_c_per_min: tuple[float, ...] = Field(
-        description="m rates of temperature, ascending, C/min; 0 is one of them where the envelope holds it"
-    )
-    bias_dph: tuple[tuple[float, ...], ...] = Field(
-        description="n rows of m: the bias to be subtracted at each temperature and rate, deg/h"
-    )
-    linear_rms_dph: Amount = Field(
-        description="RMS of what interpolation (bilinear, of values in float32) loses against the map, deg/h"
-    )
-    linear_largest_dph: Amount = Field(description="the most that it loses")
-    terms: tuple[str, ...] = Field(description="ids of terms of the model, which no static map holds")
-
-
-class MapOnGrid(Result):
-    """The correction of a gyro as a table that any program reads."""
-
-    schema_: Annotated[Literal["gyrotc.map/1"], Field(alias="schema")] = "gyrotc.map/1"
-    serial: str = Field(description="gyro serial")
-    axis: None = Field(description="each map has its own")
-    units: dict[str, str] = Field(description="of every quantity of a map")
-    maps: tuple[MapOfAxis, ...] = Field(description="one for each axis")
 
 
 class MarkerFields(TypedDict, total=False):

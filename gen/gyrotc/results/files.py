@@ -264,13 +264,7 @@ def _parsed(text: bytes) -> dict[str, object] | None:
 
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
-# How exports begin
-_EXPORTED = (
-    b"# gyrotc: ", b"serial,axis,temperature_c,slope_c_per_min,bias_dph", b"/* gyrotc: ",
-    b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- gyrotc: ',
-)  # fmt: skip
-# An FMU: a ZIP file, its description first and as it is
-_UNIT, _MADE_BY = b"PK\x03\x04", b'generationTool="gyrotc"'
+_MAP = b"serial,axis,temperature_c,slope_c_per_min,bias_dph"  # how a map in CSV begins
 
 unfinished: list[Path] = []
 """Folders that this process is writing; they are put on disk and into their places as a whole."""
@@ -330,7 +324,7 @@ def _replace(path: Path, *content: bytes) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuses to replace a file, named by `--json`, `--plots` or `export --out`, that gyrotc did not write.
+    """Refuses to replace a file, named by `--json`, `--plots` or `--map`, that gyrotc did not write.
 
     Raises:
         InputError: There is such a file, a folder, or a link to a device or a pipe.
@@ -345,7 +339,7 @@ def check_replaceable(path: Path) -> None:
             return
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
-            if _PAGE in head or head.startswith(_EXPORTED) or (head.startswith(_UNIT) and _MADE_BY in head):
+            if _PAGE in head or head.startswith(_MAP):
                 return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:

@@ -184,6 +184,26 @@ class Emitted(UnitResult):
     refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
 
 
+class MapOnGrid(UnitResult):
+    """The static map at the points of a grid (`gyrotc emit --map`), for programs that know no networks."""
+
+    schema_: Annotated[Literal["gyrotc.map/1"], Field(alias="schema")] = "gyrotc.map/1"
+    model_hash: str = Field(description="hash of the model, shifted as its tables are (`emit --zero-at`)")
+    units: dict[str, str] = Field(description="unit of each quantity of the map")
+    temperature_c: tuple[float, ...] = Field(description="n temperatures, ascending, C")
+    slope_c_per_min: tuple[float, ...] = Field(
+        description="m rates of temperature, ascending, C/min; 0 is one of them where the envelope contains it"
+    )
+    bias_dph: tuple[tuple[float, ...], ...] = Field(
+        description="n rows of m: bias to be subtracted at each temperature and rate, deg/h"
+    )
+    linear_rms_dph: Amount = Field(
+        description="RMS error of bilinear interpolation of these values in float32 against the map, deg/h"
+    )
+    linear_largest_dph: Amount = Field(description="largest error of that interpolation, deg/h")
+    terms: tuple[str, ...] = Field(description="ids of terms of the model, which no static map contains")
+
+
 PassOrFail = Literal["pass", "fail"]
 
 
@@ -341,11 +361,6 @@ class _Counted(Result):
     failed: Count = Field(description="targets, files and other checks that failed")
     missing: Count = Field(description="targets whose compiler or emulator is not here")
     emitted: tuple[VerifiedFile, ...] = Field(description="every file that is or should be in `c/`")
-
-    @property
-    def wrong_files(self) -> list[str]:
-        """Names of files that are not what gyrotc makes."""
-        return [file.file for file in self.emitted if file.status == "fail"]
 
 
 class Verification(_Counted):

@@ -18,7 +18,6 @@ from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import GyrotcError, InputError
 from gyrotc.deliver import certificate as printing
 from gyrotc.deliver.certificate import certificate
-from gyrotc.deliver.export import export
 from gyrotc.jobs.build import build_into
 from gyrotc.jobs.lot import _unit
 from gyrotc.jobs.release import unit_of
@@ -223,7 +222,7 @@ def _mutated(content: Any, path: tuple[str | int, ...]) -> Any:
 
 @pytest.mark.parametrize(("of_a_file", "least"), quick_and_slow([(12, 80)], [(100_000, 1000)]))
 def test_every_leaf_is_guarded(passing: Path, tmp_path: Path, of_a_file: int, least: int) -> None:
-    """Certificate, export and lot refuse whatever of it was changed."""
+    """Certificate and lot refuse whatever of it was changed."""
     print(f"seed {SEED}")
     rng = random.Random(SEED)
     folder = shutil.copytree(passing, tmp_path / "out")
@@ -259,9 +258,6 @@ def _refused(folder: Path, tmp_path: Path, name: str) -> None:
     with pytest.raises(GyrotcError, match=name.rpartition("/")[2].replace(".", r"\.")):
         certificate(folder, tmp_path / "C", draft=True)
     assert not (tmp_path / "C").exists()
-    if name == "model.json" or name.startswith("c/"):
-        with pytest.raises(GyrotcError):
-            export(folder, "csv", tmp_path / "map.csv")
     if name in ("model.json", "training.json"):
         with pytest.raises(GyrotcError):
             _unit(folder)

@@ -22,11 +22,9 @@ from conftest import Command, invoked, on_terminal, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base
 from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, GyroAxis, NoiseLevel, StageLine, folded
-from gyrotc.cli.fleet import ExportFormat
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, NoiseLevel, StageLine, folded
 from gyrotc.cli.main import _hoisted, application, run
 from gyrotc.cli.recordings import RunFormat
-from gyrotc.deliver import export
 from gyrotc.model import Model
 from gyrotc.recordings.importers import rows
 from gyrotc.results.marker import MARKER
@@ -128,7 +126,7 @@ COMMANDS = {
     "fleet": ("fleet", "lot", "--out", "out"),
     "plan": ("plan", "paper", "--out", "out"),
     "verify": ("verify", "made"),
-    "export": ("export", "made", "--format", "fmu", "--out", "out"),
+    "emit": ("emit", "made", "--out", "out"),
 }
 _QUICK = ("fit", "fleet", "verify")
 
@@ -197,7 +195,7 @@ def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
 @pytest.mark.slow
 def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
     wide = []
-    for words in ([], *([name] for name in ("build", "export", "fleet", "diagnose", "import"))):
+    for words in ([], *([name] for name in ("build", "emit", "fleet", "diagnose", "import"))):
         command = [PROGRAM, *words, "--help"]
         reported = subprocess.run(
             command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"}
@@ -258,8 +256,6 @@ def test_bash_completes_commands_and_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
-        ("export result --format a", ["ardupilot", "a2l"]),
-        ("export result --axis-as", ["x", "y", "z"]),
         ("simulate paper --format", ["csv", "parquet"]),
         ("simulate paper --noise cl", ["class"]),
         ("plan paper --noise", ["paper", "class"]),
@@ -282,8 +278,8 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [(ExportFormat, (export.Format,)), (RunFormat, (campaign.Format, rows.Format)), (NoiseLevel, (campaign.Noise,))],
-    ids=["export", "runs", "noise"],
+    [(RunFormat, (campaign.Format, rows.Format)), (NoiseLevel, (campaign.Noise,))],
+    ids=["runs", "noise"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:
     for of_job in types:
@@ -294,8 +290,6 @@ def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
     for command, right in (
         (("plan", "paper", "--noise", "none"), NoiseLevel),
         (("simulate", "paper", "--out", "R", "--format", "xml"), RunFormat),
-        (("export", "result", "--out", "a", "--format", "dcm"), ExportFormat),
-        (("export", "result", "--out", "a", "--format", "px4", "--axis-as", "w"), GyroAxis),
     ):
         done = invoked(*command)
         assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command

@@ -65,10 +65,9 @@ def status(*arguments: str) -> int:
 COMMANDS = {
     "check": ("check", "data/RLG-1", "--json", "c.json", "--plots", "p.html"),
     "fit": ("fit", "data/RLG-1", "--method", "constant", "--out", "R"),
-    "emit": ("emit", "fleet/RLG-1/model.json", "--out", "E"),
+    "emit": ("emit", "fleet/RLG-1/model.json", "--out", "E", "--map", "map.csv"),
     "import": ("import", "data/RLG-1/run-01.csv", "--out", "I", "--serial", "A"),
     "simulate": ("simulate", "paper-20C", "--row-s", "100", "--out", "S"),
-    "export": ("export", "fleet/RLG-1", "--format", "csv", "--out", "map.csv"),
     "report": ("report", "fleet/RLG-1"),
     "certificate": ("certificate", "fleet/RLG-1", "--draft", "--out", "C"),
     "fleet": ("fleet", "data", "--out", "fleet"),  # whose gyro is done before: no process is needed for it
