@@ -390,7 +390,7 @@ def test_a_scheduler_without_its_package_names_the_command(monkeypatch: pytest.M
         pass
 
 
-@pytest.mark.parametrize("extra", ["sklearn", "dask", "hdf5", "tdms", "ulog", "dataflash", "ros", "mdf"])
+@pytest.mark.parametrize("extra", ["sklearn", "dask", "hdf5", "tdms", "excel", "netcdf"])
 def test_an_extra_that_is_named_exists(extra: str) -> None:
     assert install_command(extra) == f'pip install "gyrotc[{extra}]"'
     assert re.search(rf"(?m)^{extra} = \[", (ROOT / "gen" / "pyproject.toml").read_text("utf-8"))
