@@ -132,11 +132,6 @@ bench:
 	@build/bench/bin/python -m pip install -q --disable-pip-version-check -e "./gen[bench]"
 	@build/bench/bin/python -m bench docs
 
-## learning in service beside re-zero, Android's and ArduPilot's (minutes; DATA=FOLDER: power-ons of a measured gyro)
-service: setup
-	@tools/setup.sh test
-	@$(PYTHON) -m bench.service docs $${DATA:+--recordings "$$DATA"}
-
 ## a CSV file of 2 GB through gyrotc import, pandas, polars and pyarrow (in build/bench): docs/results.md
 bench-import:
 	@tools/setup.sh test
@@ -155,7 +150,6 @@ uncertainty: setup
 ## is sigma true, and does the status say so, when a sensor, the clock or a re-zero fails: docs/results.md
 faults: setup
 	@$(PYTHON) -m bench docs --only faults
-	@$(PYTHON) -m bench docs --only faults-learned
 
 ## every result of the generator as in tests/oracle/reference.json? minutes (GYROTC_REAL_DATA names measured recordings)
 oracle: setup
@@ -245,4 +239,4 @@ packages:
 clean:
 	rm -rf build
 
-.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals service fleet fleet-kills lot lot-prior uncertainty faults kills mutants oracle blind events invariance odd cycles packages dist release lock offline site clean
+.PHONY: help setup demo test test-all targets prove check cov fuzz picture paper real bench bench-import signals fleet fleet-kills lot lot-prior uncertainty faults kills mutants oracle blind events invariance odd cycles packages dist release lock offline site clean

@@ -69,13 +69,6 @@ def _faults(docs: Path) -> None:
     write(docs, "faults", faults(_say), section)
 
 
-def _faults_learned(docs: Path) -> None:
-    """The same where firmware has learned in service."""
-    from .faults_learned import faults_learned, section
-
-    write(docs, "faults-learned", faults_learned(_say), section)
-
-
 def _sizes(docs: Path) -> None:
     """Flash and RAM of whole programs."""
     from .sizes import section, sizes
@@ -158,7 +151,6 @@ _ALONE = {
     "raw": _raw,
     "sigma": _sigma,
     "faults": _faults,
-    "faults-learned": _faults_learned,
     "sizes": _sizes,
     "costs": _costs,
     "fleet": _fleet,

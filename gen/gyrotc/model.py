@@ -40,12 +40,10 @@ from .results.files import digest_of, json_text, write_atomically
 
 __all__ = [
     "SCHEMA",
-    "BiasSpread",
     "Coverage",
     "DataFile",
     "Envelope",
     "Guard",
-    "Learning",
     "Model",
     "Network",
     "Rules",
@@ -65,7 +63,7 @@ _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
 _TAKEN_ID = re.compile(
-    r"e|angle|crc|config|learn|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
+    r"e|angle|crc|config|table|private|private_state|(f32|q31)(_\w+)?|(num|save|selftest|usable)_(f32|q31)"
 )
 
 Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
@@ -190,67 +188,6 @@ class Network(_Frozen):
         return self
 
 
-class BiasSpread(_Frozen):
-    """How the biases of a type differ: standard deviations in deg/h unless stated, lengths in C, times in s.
-
-    Attributes:
-        level: Of the map as a whole, from unit to unit.
-        slope: Of its slope, deg/h/C.
-        shape: Of the map's random walk along T, deg/h/√C.
-        turn_on: Of the constant drawn at each power-on.
-        turn_on_slope: Of the slope drawn then, deg/h/C.
-        warm_up: Of what decays after power-on with `warm_up_s`.
-        memory: Of the process along T with length `memory_c`, forgotten in `memory_s`.
-        ageing: Of the level in an hour, deg/h/√h.
-        ageing_shape: Of the map's random walk along T in an hour, deg/h/√(h C).
-    """
-
-    level: Amount
-    slope: Amount
-    shape: Amount
-    turn_on: Amount
-    turn_on_slope: Amount
-    warm_up: Amount
-    warm_up_s: Positive
-    memory: Amount
-    memory_s: Annotated[float, Field(gt=0.0, le=1e9)]
-    memory_c: Positive
-    ageing: Amount = 0.0
-    ageing_shape: Amount = 0.0
-
-    def scaled(self, factor: float) -> BiasSpread:
-        """The same type with all deviations this many times as large."""
-        same = {"warm_up_s", "memory_s", "memory_c"}
-        return self.model_copy(update={n: value * factor for n, value in self if n not in same})
-
-
-class Learning(_Frozen):
-    """What firmware may learn in service: `gtc_learn_prior_t` is made of it (docs/numerics.md, section 9).
-
-    Attributes:
-        spread: How units of the type differ from their tables.
-        reference_c: Where the table is known best.
-        authority_dph: Largest |shift|.
-        noise_deg_per_sqrt_h: Angle random walk.
-        settle_s: Rests before this time since power-on are refused.
-        span_c: Temperature may change by this in a rest.
-        gate_sigma: Innovations up to this are accepted ...
-        jump_sigma: ... and up to this as a new offset.
-        agreeing_rests, agreeing_power_ons: So many refused rests that agree, over so many power-ons, are accepted.
-    """
-
-    spread: BiasSpread
-    reference_c: Celsius
-    authority_dph: Positive
-    noise_deg_per_sqrt_h: Positive
-    settle_s: Amount = 0.0
-    span_c: Positive = 1.5
-    gate_sigma: Positive = 4.0
-    jump_sigma: Positive = 4.0
-    agreeing_rests: Annotated[int, Field(ge=1, le=255)] = 3
-    agreeing_power_ons: Annotated[int, Field(ge=1, le=255)] = 3
-
-
 class Term(_Frozen):
     """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel.
 
@@ -359,7 +296,6 @@ class Model(_Frozen):
     rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
     q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
     left_out: tuple[RuntimePart, ...] = ()
-    learning: Learning | None = None
     hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
     agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
@@ -536,8 +472,6 @@ class Model(_Frozen):
             del content["q31_bias_frac_bits"]
         if not self.left_out:
             del content["left_out"]
-        if self.learning is None:
-            del content["learning"]
         return content
 
     def to_json(self) -> str:

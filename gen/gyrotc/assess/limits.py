@@ -27,7 +27,7 @@ from ..model import Model, RuntimePart
 from ..results.evaluation import Evaluation, FigureUncertainty
 from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict, Verification
 from ..verify.toolchain import all_targets
-from .product_guards import ProductGuard, ServiceLearning
+from .product_guards import ProductGuard
 
 _NORMAL = NormalDist()
 _UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
@@ -280,7 +280,6 @@ class Limits(_Part):
     # Unit of fixed point for all tables of the product: 2^-this deg/h
     q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
     guards: dict[str, ProductGuard] = {}  # by channel: what the runtime accepts of it
-    learning: ServiceLearning | None = None
     sha256: str = ""  # of the file ...
     file: str = ""  # ... and its name
 

@@ -56,7 +56,7 @@ def completing(words: Sequence[str]) -> Callable[[str], list[str]]:
 
 GROUPS = {
     "Record": ("plan", "simulate", "import", "check"),
-    "Calibrate": ("build", "diagnose", "compare", "fit", "emit", "recalibrate"),
+    "Calibrate": ("build", "diagnose", "compare", "fit", "emit"),
     "Judge": ("evaluate", "verify", "report"),
     "Many units": ("fleet", "lot"),
     "Share": ("certificate",),

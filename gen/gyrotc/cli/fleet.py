@@ -147,10 +147,6 @@ def lot(
     axis: Annotated[
         str | None, typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own.")
     ] = None,
-    earlier: Annotated[
-        Path | None,
-        typer.Option("--earlier", help="An earlier fleet of the same units: how they age, for learning in service."),
-    ] = None,
     display: DisplayOption = None,
 ) -> None:
     """Learn what units of one type share, so that the next ones need fewer runs (build --lot).
@@ -162,7 +158,7 @@ def lot(
     from ..results.folder import write_result
 
     with progress(LOT) as say:
-        found = lot_of(fleet, axis=axis, earlier=earlier, progress=say)
+        found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
     checked = shown(found.cross_validation)
     tell(f"{out}: {found.text}")
@@ -170,13 +166,6 @@ def lot(
         f"a new unit, before any run: {sci(checked.left_rms_dph)} {rate_unit()} about the lot's map, "
         f"{sci(checked.constant_rms_dph)} about its own mean"
     )
-    if found.ageing is not None:
-        ageing = shown(found.ageing)
-        tell(
-            f"ageing, by {ageing.units} units after {ageing.months:.1f} months: level "
-            f"{sci(ageing.level_dph_per_sqrt_month)} {rate_unit()}/√month, along T "
-            f"{sci(ageing.shape_dph_per_sqrt_month_c)} {rate_unit()}/√(month C)"
-        )
 
 
 @app.command()

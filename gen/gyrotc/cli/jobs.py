@@ -43,10 +43,8 @@ from .base import (
 from .results import (
     change_lines,
     evaluation_table,
-    learning_lines,
     limit_lines,
     not_installed_lines,
-    service_lines,
     summary,
     training_lines,
     verified_line,
@@ -253,54 +251,6 @@ def build(
         raise CheckFailed("; ".join(failures))
 
 
-@app.command()
-def recalibrate(
-    unit: Annotated[Path, typer.Argument(help="The result of gyrotc build whose table was in service.")],
-    learned: Annotated[Path, typer.Option("--learned", help="What gtc_learn_save kept: 48 words in hexadecimal.")],
-    stops: Annotated[
-        Path | None, typer.Option("--stops", help="Its stops as CSV, as simulate service writes them: for the page.")
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for service.json, page and new table.")] = None,
-    limits: Annotated[
-        Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if it drifted further.")
-    ] = None,
-    display: DisplayOption = None,
-    json_file: JsonOption = None,
-) -> None:
-    """Show what a unit learned in service beside the chamber's table, and make a new table of it.
-
-    Example: gyrotc recalibrate build/RLG-0042 --learned learned.txt --out build/RLG-0042-served
-    """
-    from ..assess.limits import load_limits
-    from ..jobs.recalibration import learned_in_service
-    from ..pages.short import write_service_page
-    from ..results.files import json_text, write_atomically
-    from ..results.folder import result_folder
-    from ..tables.emit import emit
-
-    product = load_limits(limits) if limits else None
-    result, model = learned_in_service(unit, learned, product, stops)
-    unit_of_rates = display or (product.display if product else NATIVE)
-    if out is not None:
-        with result_folder(out, "recalibrate", inputs=[unit]) as stage:
-            stage.of(result.serial, result.axis)
-            write_atomically(stage.folder / "service.json", json_text(result.content()))
-            if model is not None:
-                model.save(stage.folder / "model.json")
-                emit(model, stage.folder)
-            write_service_page(stage.folder, unit_of_rates)
-    write_json(json_file, result.content())
-    with displayed(unit_of_rates):
-        for line in service_lines(shown(result)):
-            tell(line)
-    if out is not None:
-        tell(f"report: {out / 'report.html'}")
-    if out is not None and model is not None:
-        tell(f"{out / 'c'}: a new table; firmware with it refuses the words of the old one and learns anew")
-    if result.findings:
-        raise CheckFailed("; ".join(finding.text for finding in result.findings))
-
-
 def _left_out(model: Model) -> Iterator[str]:
     """What the runtime does not do, as nobody asked for it or the recordings do not show it."""
     if model.left_out:
@@ -323,7 +273,6 @@ def _print_built(result: Built) -> None:
         *training_lines(shown(result.training)),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
         *_left_out(result.model),
-        *learning_lines(result.model, [error.numeric for error in result.verification.errors]),
         *(extension_lines(shown(result.diagnosis)) if result.diagnosis else ()),
         *(limit_lines(shown(result.limits)) if result.limits else ()),
         *(change_lines(shown(result.changes)) if result.changes else ()),

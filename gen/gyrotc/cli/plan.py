@@ -305,9 +305,6 @@ def _next_run(
         )
     for line in programme_text(best).splitlines():
         tell(line)
-    for rest in result.parkings:
-        before, after = sci(rest.before_dph), sci(rest.after_dph)
-        tell(f"a parking of {plain(rest.minutes)} min: {before} -> {after} {rate_unit()} (1 sigma)")
     if out is not None:
         tell(f"{out / 'programme.csv'}: set points over time")
 

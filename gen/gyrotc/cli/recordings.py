@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
-from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -169,7 +167,7 @@ def _ask(question: str) -> str | None:
 
 @app.command()
 def simulate(
-    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...), a scenario file, lot or service.")],
+    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...), a scenario file, or lot.")],
     out: OutOption,
     seed: SeedOption = 1,
     row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
@@ -191,25 +189,13 @@ def simulate(
     ] = None,
     base: Annotated[
         str | None,
-        typer.Option(
-            "--base", help="Of a lot: the scenario that its units run, default paper; of service: the result."
-        ),
-    ] = None,
-    power_ons: Annotated[
-        int | None, typer.Option("--power-ons", help="Of service: a day to three apart; default 100.")
-    ] = None,
-    mounted: Annotated[
-        list[int] | None,
-        typer.Option("--mounted", help="Of service: power-on before which it is mounted anew; repeatable."),
+        typer.Option("--base", help="Of a lot: the scenario that its units run, default paper."),
     ] = None,
 ) -> None:
     """Make a data set from the physical simulation, and truth.json beside it; or a lot of gyros, a data set each.
 
-    `service`: a unit's stops in service, and what its firmware has learned in the end.
-
     Example: gyrotc simulate paper --seed 1 --out demo-data
     Example: gyrotc simulate lot --units 60 --family 0.94 --seed 1 --out lot-data
-    Example: gyrotc simulate service --base build/RLG-0042 --power-ons 100 --out service
     """
     from ..simulate.campaign import simulate as run
 
@@ -218,12 +204,6 @@ def simulate(
     if scenario == "lot":
         _simulate_lot(given, base or "paper", seed, out, (row_s, raw_hz, pulses, format), noise)
         return
-    if scenario == "service" and not given:
-        _simulate_service(base, seed, out, 100 if power_ons is None else power_ons, mounted or ())
-        return
-    if power_ons is not None or mounted:
-        name = "--mounted" if power_ons is None else "--power-ons"
-        raise InputError(name, "is an option of service", "gyrotc simulate service")
     if given or base:
         raise InputError(f"--{next(iter(given), 'base')}", "is an option of lots", "gyrotc simulate lot")
     with progress() as say:
@@ -239,25 +219,6 @@ def simulate(
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: data set of scenario {scenario}, seed {seed}")
-
-
-def _simulate_service(base: str | None, seed: int, out: Path, power_ons: int, mounted: Sequence[int]) -> None:
-    """`gyrotc simulate service`."""
-    from ..lot.service import simulate_service
-    from ..pages.display import sci
-
-    if base is None:
-        raise InputError("--base", "is missing", "a result of gyrotc build with [learning] in its limits file")
-    found = simulate_service(Path(base), out, seed, power_ons, mounted)
-    tell(f"{out}: {power_ons} power-ons, seed {seed}; stops.csv, learned.txt")
-    tell(
-        f"RMS under way {sci(found.table_dph)} -> {sci(found.learned_dph)} deg/h; "
-        f"error over sigma {found.over_sigma:.2f}"
-    )
-    tell(
-        f"next: gyrotc recalibrate {shlex.quote(base)} --learned {shlex.quote(str(out / 'learned.txt'))} "
-        f"--stops {shlex.quote(str(out / 'stops.csv'))} --out served"
-    )
 
 
 def _simulate_lot(

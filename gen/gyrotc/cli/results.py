@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -12,7 +12,6 @@ from rich.table import Table as RichTable
 from ..pages.display import (
     COVERAGE,
     bound_words,
-    in_unit,
     measured_words,
     plain,
     rate_unit,
@@ -22,8 +21,7 @@ from ..pages.display import (
 )
 
 if TYPE_CHECKING:
-    from ..model import Model
-    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, InService, Pooled
+    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
     from ..results.release import HeldLimits, JointVerification, ReadLog, Verification, VerifiedFile
     from ..results.training import Training
 
@@ -116,8 +114,8 @@ def verify_table(result: Verification) -> RichTable:
         table.add_column(name, justify="right", no_wrap=True)
     for entry in (e for e in result.targets if e.status != "missing"):  # `not_installed_lines` names those
         replayed, counted = entry.replayed, entry.map_cost
-        beside = sum(part.mismatches for part in (replayed, entry.learned) if part)
-        differ = None if entry.mismatches is None else entry.mismatches + beside
+        of_rows = replayed.mismatches if replayed else 0
+        differ = None if entry.mismatches is None else entry.mismatches + of_rows
         table.add_row(
             entry.name, entry.numeric, entry.status, _known(entry.vectors),
             _known(replayed.rows if replayed else None), _known(differ),
@@ -155,9 +153,8 @@ def verify_notes(result: Verification) -> Iterator[str]:
         who = f"{entry.name} {entry.numeric}"
         replayed = entry.replayed
         found = [entry.error, replayed.error if replayed else None, *entry.first_mismatches]
+        found += replayed.first_mismatches if replayed else ()
         yield from (f"{who}: {text}" for text in found if text)
-        parts = (part for part in (replayed, entry.learned) if part)
-        yield from (f"{who}: {text}" for part in parts for text in part.first_mismatches)
     yield from file_notes(result)
     yield from _log_notes(result.log) if result.log else ()
     for error in result.errors:
@@ -313,46 +310,3 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
     yield f"  as found: RMS {sci(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
-
-
-def learning_lines(model: Model, numerics: Collection[str]) -> Iterator[str]:
-    """What firmware may learn, and what that asks of a processor that was to need no floating point."""
-    learning = model.learning
-    if learning is None:
-        return
-    from ..tables.emit import MONTH_H
-
-    spread = learning.spread
-    amounts = learning.authority_dph, spread.level, spread.turn_on, spread.ageing * MONTH_H**0.5
-    authority, level, turn_on, ageing = (sci(float(x)) for x in in_unit(amounts))
-    yield (
-        f"learns in service up to {authority} {rate_unit()}; 1 sigma of the table's level {level}, of a power-on "
-        f"{turn_on}, of ageing in a month {ageing}; main.c has the calls"
-    )
-    if "f32" not in numerics:
-        yield (
-            "learning in service is float32 beside a fixed-point table, too: without a floating-point unit the "
-            "compiler's routines compute it (docs/numerics.md, section 9)"
-        )
-
-
-_MOVED = {"offset": "an offset", "slope": "an offset and a slope", "shape": "a new shape"}
-
-
-def service_lines(result: InService) -> Iterator[str]:
-    """What a unit learned in service, knot by knot, and what it means for the table."""
-    yield (
-        f"{result.serial} after {result.power_ons} power-ons in {result.days:.0f} days; authority "
-        f"{sci(result.authority_dph)} {rate_unit()}"
-    )
-    for knot in result.knots:
-        yield (
-            f"  {knot.temperature_c:6.1f} C: table {sci(knot.table_dph)}, learned {sci(knot.shift_dph)} +- "
-            f"{sci(knot.sigma_dph)} {rate_unit()} (1 sigma; {sci(knot.unlearned_dph)} without)"
-        )
-    if result.moved == "nothing":
-        yield "the table holds: what was learned is within 1 sigma of it"
-    else:
-        yield f"learned, within 1 sigma: {_MOVED[result.moved]}"
-    for finding in result.findings:
-        yield f"finding {finding.id}: {finding.text}; {finding.next}"

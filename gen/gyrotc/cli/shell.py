@@ -46,7 +46,7 @@ def kinds() -> dict[str, type[BaseModel]]:
     from ..model import Model
     from ..results.base import Marker
     from ..results.diagnosed import Diagnosed, DiagnosisSeries
-    from ..results.evaluation import Changes, Comparison, Evaluation, InService
+    from ..results.evaluation import Changes, Comparison, Evaluation
     from ..results.fleet import FleetEntry, FleetSummary, Lot
     from ..results.recordings import Checked, ImportedFiles, LotPlan, NextRun, Plan, SimulatedTruth
     from ..results.release import Budget, Emitted, HeldLimits, JointVerification, MapOnGrid, Verification
@@ -75,7 +75,6 @@ def kinds() -> dict[str, type[BaseModel]]:
         "next-run": NextRun,
         "plan": Plan,
         "result": Marker,
-        "service": InService,
         "training": Training,
         "truth": SimulatedTruth,
         "verify-axes": JointVerification,

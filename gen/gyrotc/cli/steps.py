@@ -46,7 +46,6 @@ from .base import (
 from .results import (
     evaluation_table,
     file_notes,
-    learning_lines,
     prediction_line,
     training_lines,
     verify_notes,
@@ -198,8 +197,6 @@ def emit(
         tell(f"{map_file}: {grid.summary}")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
-    for line in learning_lines(loaded, emission.tables):
-        tell(line)
     tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
 
 
@@ -315,21 +312,19 @@ def evaluate(
 
 @app.command()
 def report(folder: DirArg, display: DisplayOption = None) -> None:
-    """Write DIR/report.html from what build, diagnose, plan or recalibrate left in DIR.
+    """Write DIR/report.html from what build, diagnose or plan left in DIR.
 
     Example: gyrotc report result
     """
     from ..jobs.release import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.report import axes_page, write_page, write_report
-    from ..pages.short import is_plan, is_service, write_plan_page, write_service_page
+    from ..pages.short import is_plan, write_plan_page
 
     with progress() as say:
         say("drawing")
         if is_diagnosis(folder) or is_plan(folder):
             path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
-        elif is_service(folder):
-            path = write_service_page(folder, display)
         elif axes := axes_in(folder):
             path = write_page(folder, axes_page(folder, axes, display))
         else:

@@ -24,7 +24,7 @@ from ..assess.budget import budget_of
 from ..assess.changes import changes_since, load_earlier
 from ..assess.evaluate import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
-from ..assess.product_guards import BuiltUnit, guarded
+from ..assess.product_guards import guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average
@@ -47,7 +47,6 @@ from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit
 from ..train.options import DEFAULTS, METHODS, BuildOptions
-from ..train.prior.use import LotPrior
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify
@@ -217,13 +216,11 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     fitted = fitted or fit_dataset(dataset, options, progress=say)
     if order.limits:
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
-        left_out = order.limits.needs.left_out
-        stated = order.limits.learning
-        lot = options.prior.lot if isinstance(options.prior, LotPrior) else None
-        seen = BuiltUnit(lot, fitted.training.known, fitted.means)
-        learning = stated.of(model, seen, order.limits.file) if stated else None
         model = model.model_copy(
-            update={"q31_bias_frac_bits": order.limits.q31_bias_frac_bits, "left_out": left_out, "learning": learning}
+            update={
+                "q31_bias_frac_bits": order.limits.q31_bias_frac_bits,
+                "left_out": order.limits.needs.left_out,
+            }
         )
         fitted = replace(fitted, model=model)
     fitted.model.save(work / "model.json")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +11,14 @@ import numpy as np
 from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
-from ..lot.service import Moved, covariance_at, fitted_ageing
-from ..mirror.learning import KNOTS
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.files import digest_of
-from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotAgeing, LotCluster, LotUnit
+from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotCluster, LotUnit
 from ..results.marker import check_intact
 from ..results.training import Training
-from ..tables.emit import MONTH_H
 from ..train.evidence import MEAN_S
-from ..train.prior.earlier import posterior_of_result
-from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, folds_of, freedom_of, learn, of_few
+from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, folds_of, learn
 from ..train.prior.use import prior_of, process_result, rounded
 from ..train.result import UnitMeans, means_of
 
@@ -37,14 +32,12 @@ class _Calibrated:
 
     Attributes:
         model: Its model.
-        where: Its `training.json`.
-        means: From there.
+        means: Of its training runs.
         mean_s: Their length, s.
         by_itself: It was calibrated without a lot or an earlier model.
     """
 
     model: Model
-    where: Path
     means: UnitMeans
     mean_s: float
     by_itself: bool
@@ -69,22 +62,17 @@ def checksum_of(lot: Lot) -> str:
     return digest_of({key: value for key, value in lot.content().items() if key != "checksum"})
 
 
-def lot_of(
-    fleet: Path, *, axis: str | None = None, earlier: Path | None = None, progress: Progress | None = None
-) -> Lot:
+def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = None) -> Lot:
     """Learns a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
 
     Args:
         axis: Axis of three-axis gyros: each axis is a lot of its own.
-        earlier: The folder of an earlier calibration of units of the lot: how they age.
 
     Raises:
-        InputError: Fewer than three units, or units of several axes and none is named; fewer than three that were
-            calibrated twice.
+        InputError: Fewer than three units, or units of several axes and none is named.
     """
     say = progress or (lambda _: None)
     units = _units(fleet, axis)
-    ageing = _ageing(units, _units(earlier, axis), earlier) if earlier else None
     means, envelope = [u.means for u in units], _envelope([u.model for u in units])
     found = learn(means, envelope, say)
     kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
@@ -97,7 +85,6 @@ def lot_of(
         axis=units[0].model.axis,
         mean_s=float(np.median([u.mean_s for u in kept])),
         between_dph=float(np.sqrt(np.mean([u.model.between_dph**2 for u in kept]))),
-        ageing=ageing,
     )
 
 
@@ -127,46 +114,7 @@ def _unit(place: Path) -> _Calibrated:
     training = read_result(where, Training)
     means = means_of(training.means, where)
     assert training.means is not None  # else it is refused
-    return _Calibrated(model, where, means, training.means.mean_s, training.lot is None and training.prior is None)
-
-
-def _ageing(units: Sequence[_Calibrated], earlier: Sequence[_Calibrated], folder: Path) -> LotAgeing:
-    """How units moved from an earlier calibration to the one in the lot."""
-    before = {u.model.serial: u for u in earlier}
-    pairs = [(before[u.model.serial], u) for u in units if u.model.serial in before]
-    moves = [one for old, new in pairs if (one := _moved(old, new)) is not None]
-    if len(moves) < LEAST_UNITS:
-        found = f"{len(moves)} units with another calibration, both with a date ([meta] calibrated_on)"
-        raise InputError(f"--earlier {folder}", found, f"{LEAST_UNITS} at least")
-    low, high = _envelope([u.model for pair in pairs for u in pair])[0]
-    level, shape = fitted_ageing(moves, 0.5 * (low + high))
-    wider = float(np.sqrt(of_few(freedom_of(len(moves), 1, 0))))
-    return LotAgeing(
-        units=len(moves),
-        months=float(np.median([one.months for one in moves])),
-        level_dph_per_sqrt_month=wider * level,
-        shape_dph_per_sqrt_month_c=wider * shape,
-    )
-
-
-def _moved(old: _Calibrated, new: _Calibrated) -> Moved | None:
-    """How far a map moved over temperatures that both calibrations know; None: not two with dates."""
-    try:
-        days = [date.fromisoformat(str(u.model.meta.get("calibrated_on"))[:10]) for u in (old, new)]
-    except ValueError:
-        return None
-    months = (days[1] - days[0]).days * 24.0 / MONTH_H
-    spans = [u.model.envelope.temperature_c for u in (old, new)]
-    low, high = max(s[0] for s in spans), min(s[1] for s in spans)
-    if months <= 0.0 or low >= high:
-        return None
-    t, covariance, maps = np.linspace(low, high, KNOTS), np.zeros((KNOTS, KNOTS)), []
-    for u in (old, new):
-        known = posterior_of_result(read_result(u.where, Training), u.model, u.where)
-        power_ons = len({one.file for one in u.model.data if one.role == "train"})
-        covariance += covariance_at(known, t) + u.model.between_dph**2 / power_ons
-        maps.append(u.model.map_dph(t, 0.0))
-    return Moved(t, maps[1] - maps[0], covariance, months)
+    return _Calibrated(model, means, training.means.mean_s, training.lot is None and training.prior is None)
 
 
 def _envelope(models: Sequence[Model]) -> Envelope:
@@ -185,7 +133,6 @@ def lot_from(
     axis: str | None = None,
     mean_s: float = MEAN_S,
     between_dph: float = 0.0,
-    ageing: LotAgeing | None = None,
 ) -> Lot:
     """The file of a lot that was learnt.
 
@@ -197,7 +144,6 @@ def lot_from(
         axis: Of the gyros.
         mean_s: Length of the means behind `units`, s.
         between_dph: Standard deviation of the constant from power-on to power-on, deg/h.
-        ageing: Of units that were calibrated twice.
     """
     state, cluster = found.state, iter(found.state.cluster.tolist())
     inside = [u for u, kept in zip(units, found.inside, strict=True) if kept]
@@ -234,7 +180,7 @@ def lot_from(
         at_rest=AtRest(temperature_c=(), mean_dph=(), spread_dph=()),
         checksum="",
     )
-    lot = lot.model_copy(update={"at_rest": _at_rest(lot)} | ({"ageing": ageing} if ageing else {}))
+    lot = lot.model_copy(update={"at_rest": _at_rest(lot)})
     return lot.model_copy(update={"checksum": checksum_of(lot)})
 
 

@@ -24,7 +24,6 @@ from ..simulate.profile import corners
 from ..simulate.scenario import Scenario, read
 from ..train.prior.basis import CONSTANT, PRIOR_LOG, LotBasis
 from ..train.prior.use import LotPrior, MapPosterior, prior_of
-from .service import parkings
 
 _GRID_S = 10.0  # of the simulated temperatures: a hundredth of the instrument's slowest mode
 _SLOPE_S = 100.0  # window of dT/dt, as of the front end
@@ -295,7 +294,6 @@ def next_run(
         price_per_run=price.per_run,
         proposals=proposals,
         best=int(np.argmax(worth)),
-        parkings=parkings(model.learning, model.envelope.temperature_c) if model.learning else (),
     )
 
 

@@ -273,15 +273,6 @@ class CrossValidation(Part):
     constant_rms_dph: Amount = Field(description="RMS of a unit's map about its own mean, deg/h")
 
 
-class LotAgeing(Part):
-    """How biases of the lot's units moved between two calibrations: random walks in time, 1 sigma."""
-
-    units: Count = Field(description="units that were calibrated twice")
-    months: Positive = Field(description="median time between the two calibrations")
-    level_dph_per_sqrt_month: Amount = Field(description="of the level, deg/h/√month")
-    shape_dph_per_sqrt_month_c: Amount = Field(description="of the map's random walk along T, deg/h/√(month C)")
-
-
 class AtRest(Part):
     """The lot to be read: its first cluster where temperature stands still."""
 
@@ -293,7 +284,7 @@ class AtRest(Part):
 class Lot(Result):
     """What units of one type share (`gyrotc lot`)."""
 
-    schema_: Annotated[Literal["gyrotc.train.prior/1"], Field(alias="schema")] = "gyrotc.train.prior/1"
+    schema_: Annotated[Literal["gyrotc.lot/1"], Field(alias="schema")] = "gyrotc.lot/1"
     axis: Axis = Field(description="of the gyros; null where their recordings have one axis")
     units: tuple[LotUnit, ...] = Field(description="fully calibrated units, in the order of their folders")
     text: str = Field(description="in words: how much is shared, clusters, outliers")
@@ -316,7 +307,6 @@ class Lot(Result):
     between_dph: Amount = Field(description="of the constant from power-on to power-on: RMS over the units, deg/h")
     cross_validation: CrossValidation = Field(description="over units")
     at_rest: AtRest = Field(description="to be read")
-    ageing: LotAgeing | None = Field(default=None, description="not there: no earlier fleet was given")
     checksum: str = Field(description="SHA-256 of the canonical form without this field")
 
 

@@ -25,7 +25,6 @@ KINDS = {
     "build": "result",
     "fit": "result",
     "emit": "result",
-    "recalibrate": "result",
     "verify": "result",
     "evaluate": "result",
     "diagnose": "diagnosis",

@@ -153,7 +153,7 @@ class LotProgramme(Part):
 class LotPlan(Result):
     """The shortest programme with a lot, and without."""
 
-    schema_: Annotated[Literal["gyrotc.train.prior-plan/1"], Field(alias="schema")] = "gyrotc.train.prior-plan/1"
+    schema_: Annotated[Literal["gyrotc.lot-plan/1"], Field(alias="schema")] = "gyrotc.lot-plan/1"
     lot: str = Field(description="checksum of the lot")
     scenario: str = Field(description="whose chamber and instrument are assumed")
     accuracy_dph: Amount = Field(description="required, deg/h")
@@ -170,14 +170,6 @@ class ProposedRun(Part):
     price: Amount = Field(description="of the run, with what one run costs before it begins")
 
 
-class Parking(Part):
-    """What a first parking is worth to a gyro that learns in service."""
-
-    minutes: Positive = Field(description="its length, min")
-    before_dph: Amount = Field(description="1 sigma of the shift without it, deg/h")
-    after_dph: Amount = Field(description="the same right after it, where the table is known best, deg/h")
-
-
 class NextRun(UnitResult):
     """Which run to record next for a unit (`gyrotc plan --unit`)."""
 
@@ -191,7 +183,6 @@ class NextRun(UnitResult):
         description="each longer than the one before it and beginning like it; the last is the longest that is allowed"
     )
     best: int = Field(ge=0, description="number of the one that removes most variance for its price, from 0")
-    parkings: tuple[Parking, ...] = Field(default=(), description="of one that learns in service; empty: it does not")
 
 
 class AssumedNoise(Part):

@@ -235,15 +235,6 @@ class ReplayedRows(Part):
     error: str | None = Field(default=None, description="why it could not be replayed to the end")
 
 
-class LearnedCalls(Part):
-    """Calls of the learning unit, through power-ons, saves and writes that were cut off."""
-
-    calls: Count = Field(description="that were made")
-    words: Count = Field(description="of their answers and of the state after each, which were compared")
-    mismatches: Count = Field(description="calls after which any bit differs from the reference")
-    first_mismatches: tuple[str, ...] = Field(description="the first of them")
-
-
 class VerifiedTarget(Part):
     """The board test on one target, in one arithmetic."""
 
@@ -273,9 +264,6 @@ class VerifiedTarget(Part):
     functions: dict[str, FunctionCost] | None = Field(default=None, description="public functions by name")
     error: str | None = Field(default=None, description="why there is no result")
     replayed: ReplayedRows | None = Field(default=None, description="recordings, where some were given")
-    learned: LearnedCalls | None = Field(
-        default=None, description="learning in service, where the model has it; with the first arithmetic"
-    )
 
     @property
     def map_cost(self) -> tuple[str, CallCost] | None:

@@ -22,21 +22,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import runtime_folders
 from ..common.texts import CText, c_code, c_environment, c_literal
 from ..mirror.history import answers
-from ..mirror.learning import KNOTS, ServicePrior, packed
 from ..mirror.table import LAYOUT, Table
-from ..model import BiasSpread, Learning, Model, RuntimePart
+from ..model import Model, RuntimePart
 from ..results.files import write_own
 from ..results.folder import result_folder
 from .error_bounds import MARGIN, channel_error_dph
 from .quantise import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text
 from .rounding import channel_names
-from .text import LEARNING, amalgamate, example_values, float_text, table_text
+from .text import amalgamate, example_values, table_text
 from .vectors import MISSING, Vectors, answers_text, make_vectors
 
 COSTS = Path(__file__).resolve().parent / "costs.json"
@@ -97,7 +95,6 @@ __all__ = [
     "emitted_tables",
     "expected_answers",
     "image_of",
-    "prior_of",
     "quantise_all",
     "runtime_texts",
     "write_texts",
@@ -257,7 +254,6 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "axis": model.axis,
         "model_hash": model.hash,
         "options": options.text,
-        "learning": learning_text(prior) if (prior := prior_of(model, emission.tables)) is not None else [],
         "layout": LAYOUT,
         "numerics": numerics,
         "v": vectors,
@@ -286,20 +282,8 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
 
 def runtime_texts(models: Iterable[Model], numerics: Iterable[str]) -> dict[str, bytes]:
     """Files of the runtime for these tables in these arithmetics, by name."""
-    learns = any(model.learning is not None for model in models)
-    folders = runtime_folders()
-    header, source = amalgamate(*folders, numerics=tuple(sorted(numerics)), learns=learns)
-    own = {LEARNING: (folders[0] / LEARNING).read_bytes()} if learns else {}
-    return {"gtc.h": header.encode("ascii"), "gtc.c": source.encode("ascii"), **own}
-
-
-def prior_of(model: Model, tables: Mapping[str, Table]) -> ServicePrior | None:
-    """What a table's gyro may learn in service; None: nothing. Its id is of the table's words, not of the gyro alone:
-    what was learned on top of one table must not come on top of the next.
-    """
-    if model.learning is None:
-        return None
-    return service_prior(model.learning, model.envelope.temperature_c, next(iter(tables.values())).crc)
+    header, source = amalgamate(*runtime_folders(), numerics=tuple(sorted(numerics)))
+    return {"gtc.h": header.encode("ascii"), "gtc.c": source.encode("ascii")}
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
@@ -408,69 +392,3 @@ def _intel_hex(data: bytes) -> str:
             lines.append(record(4, 0, struct.pack(">H", start >> 16)))
         lines.append(record(0, start & 0xFFFF, data[start : start + 16]))
     return "".join(lines) + record(1, 0, b"")
-
-
-MONTH_H = 30.44 * 24.0  # the mean month
-_COMMENTS = {
-    "low_c": "first knot, C",
-    "knots_per_c": "1/C",
-    "reference_c": "C",
-    "authority_dph": "|shift| is at most this, deg/h",
-    "power_on_var": "offset, its slope, warm-up, memory",
-    "off_s": "without power, where the caller does not know it",
-    "map_var": "covariance of the knots, packed rows",
-    "ageing_var": "what it gains each second",
-}
-_ROW = 6  # numbers
-
-
-def data_sheet_spread(table_dph: float, turn_on_dph: float, ageing_dph_per_sqrt_month: float) -> BiasSpread:
-    """Of a laser gyro, from its data sheet: the table's error, turn-on offsets, ageing of the level.
-
-    A table's error is mostly one of its level, a fifth of it a slope over 30 C; a fiftieth comes and goes with the
-    thermal history, as do 3e-5 deg/h of any gyro.
-    """
-    ageing = ageing_dph_per_sqrt_month / float(np.sqrt(MONTH_H))
-    return BiasSpread(
-        level=table_dph, slope=0.2 * table_dph / 30.0, shape=0.16 * table_dph, turn_on=turn_on_dph,
-        turn_on_slope=0.0, warm_up=0.0, warm_up_s=600.0, memory=float(np.hypot(3e-5, 0.02 * table_dph)),
-        memory_s=14400.0, memory_c=20.0, ageing=1.06 * ageing, ageing_shape=0.09 * ageing,
-    )  # fmt: skip
-
-
-def walk(knots: FloatArray) -> FloatArray:
-    """Covariance of a random walk from 0 to either side."""
-    same_side = np.outer(knots, knots) > 0
-    return np.where(same_side, np.minimum.outer(np.abs(knots), np.abs(knots)), 0.0)
-
-
-def service_prior(learning: Learning, envelope_c: tuple[float, float], id: int = 0) -> ServicePrior:
-    """The prior of a table with this id; the knots lie over the envelope."""
-    spread, (low, high) = learning.spread, envelope_c
-    knots = np.linspace(low, high, KNOTS) - learning.reference_c
-    level = spread.level**2 + spread.slope**2 * np.outer(knots, knots) + spread.shape**2 * walk(knots)
-    ageing = spread.ageing**2 + spread.ageing_shape**2 * walk(knots)
-    return ServicePrior(
-        id=id, low_c=low, knots_per_c=(KNOTS - 1) / (high - low), reference_c=learning.reference_c,
-        authority_dph=learning.authority_dph,
-        power_on_var=(spread.turn_on**2, spread.turn_on_slope**2, spread.warm_up**2, spread.memory**2),
-        memory_per_c=float(np.sqrt(3.0)) / spread.memory_c, memory_per_s=1.0 / spread.memory_s,
-        warm_up_per_s=1.0 / spread.warm_up_s, off_s=86400.0,
-        noise_var=(60.0 * learning.noise_deg_per_sqrt_h) ** 2, noise_ratio=9.0, span_c=learning.span_c,
-        settle_s=learning.settle_s, gate_square=learning.gate_sigma**2, jump_square=learning.jump_sigma**2,
-        agreeing_rests=learning.agreeing_rests, agreeing_power_ons=learning.agreeing_power_ons - 1,
-        map_var=packed(level), ageing_var=packed(ageing / 3600.0),
-    )  # fmt: skip
-
-
-def learning_text(prior: ServicePrior) -> list[dict[str, Any]]:
-    """Members of the prior as the template of a table prints them: name, rows of numbers, comment."""
-    found: list[dict[str, Any]] = []
-    for name, value in prior.members().items():
-        if isinstance(value, int):
-            cells = [f"0x{value:08x}UL" if name == "id" else f"{value}UL"]
-        else:
-            cells = [float_text(int(word)) for word in value.view(np.uint32)]
-        rows = [c_code(", ".join(cells[k : k + _ROW])) for k in range(0, len(cells), _ROW)]
-        found.append({"name": name, "rows": rows, "array": len(cells) > 1, "comment": _COMMENTS.get(name, "")})
-    return found

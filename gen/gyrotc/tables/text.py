@@ -220,7 +220,6 @@ def float_text(word: int) -> str:
 
 _HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc_angle.h", "gtc.h")
 ARITHMETICS = ("f32", "q31")
-LEARNING = "gtc_learn.h"
 _INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
 _DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
 _CONFIG = "#include GTC_CONFIG_HEADER\n#endif\n"
@@ -230,9 +229,7 @@ _LICENCE = " * SPDX-License-Identifier: MIT"
 
 
 @functools.cache
-def amalgamate(
-    include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS, learns: bool = False
-) -> tuple[str, str]:
+def amalgamate(include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS) -> tuple[str, str]:
     """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
 
     `gtc.h` includes a `gtc_config.h` beside it, with the options of the tables (`tables.emit`).
@@ -240,20 +237,15 @@ def amalgamate(
     Args:
         include_dir, libc_dir: As `common.inputs.runtime_folders` gives them.
         numerics: The arithmetics that `gtc.c` holds; `gtc.h` declares all.
-        learns: With learning in service, which brings float32; `LEARNING` is then to stand beside `gtc.h`.
     """
     header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
     header = header.replace(_CONFIG, _CONFIG + '#include "gtc_config.h"\n', 1)
     seen: set[str] = set()
-    parts = [_banner(), f'#include "{LEARNING if learns else "gtc.h"}"\n\n#include <stddef.h>\n']
+    parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
     parts.append("".join(_expanded(libc_dir / "gtc_crc.c", libc_dir, seen)))
     for arithmetic in ARITHMETICS:
-        learning = learns and arithmetic == "f32"
-        if arithmetic in numerics or learning:
-            own = seen | {LEARNING}
-            text = "".join(_expanded(libc_dir / f"gtc_{arithmetic}.c", libc_dir, own))
-            if learning:
-                text += "".join(_expanded(libc_dir / "gtc_learn.c", libc_dir, own))
+        if arithmetic in numerics:
+            text = "".join(_expanded(libc_dir / f"gtc_{arithmetic}.c", libc_dir, set(seen)))
             parts.append(text + _undefined(text))
     return _one_licence(header), _one_licence("\n".join(p for p in parts if p))
 

@@ -26,8 +26,8 @@ from ..results.base import Finding
 from ..results.evaluation import Pooled
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
-from .data import Span, TrainingData, average, cleaned, joined, scaling_of, training_spans, whole_runs
-from .evidence import MEAN_S, TrainingFailed, noise_terms, sensitivities, stretches
+from .data import Span, TrainingData, cleaned, joined, scaling_of, training_spans, whole_runs
+from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
 from .mrbf import Bumps
 from .options import AUTO, SIMPLE, BuildOptions
@@ -77,11 +77,10 @@ class FitOptions(BuildOptions):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model, what `training.json` says of it, and means over 50 s that it was fitted to, `run` being the power-on."""
+    """A model, and what `training.json` says of it."""
 
     model: Model
     training: Training
-    means: TrainingData | None = None  # None: an extended model
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,8 +174,7 @@ def fit_dataset(
         choice = chosen_channels(dataset, data, read.channels, options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
-    power_on = power_ons(stretches)
-    fitted = _fit(data, options, power_on=power_on, serial=dataset.serial)
+    fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
     spans = training_spans(stretches, data)
     if not spans and not any(run.role == "exam" for run in dataset.runs):
         spans = whole_runs(stretches, data)  # what the correction is judged by
@@ -196,8 +194,7 @@ def fit_dataset(
     if choice:
         content["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
-    means = average(cleaned(replace(data, run=power_on[data.run])), MEAN_S)
-    return Fitted(model, training.model_copy(update=content), means)
+    return Fitted(model, training.model_copy(update=content))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,10 +22,8 @@ from ..common.inputs import read_input
 from ..mirror.history import answers
 from ..results.folder import scratch_folder
 from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
-from ..tables.emit import prior_of
 from ..tables.vectors import Vectors
 from .emitted import Job, board_files, checked_sources
-from .replay import learned_on
 from .sizes import function_costs
 from .toolchain import (
     Object,
@@ -290,12 +288,7 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
         try:
             if isinstance(shared, CheckFailed):
                 raise shared
-            result = {**_ran(job, target, numeric, shared, work, c), **extra}
-            prior = prior_of(job.model, job.tables)
-            if prior is not None and target.reads_input and numeric == numerics[0]:
-                learned = learned_on(target, job.model, prior, c, shared.objects, work)
-                result |= {"learned": learned} | ({"status": "fail"} if learned.mismatches else {})
-            yield entry(**result)
+            yield entry(**_ran(job, target, numeric, shared, work, c), **extra)
         except CheckFailed as error:
             yield entry(status="fail", error=str(error))
 

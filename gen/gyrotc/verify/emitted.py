@@ -11,7 +11,6 @@ the names it knows, and comments. Whether the numbers are right is not asked her
 from __future__ import annotations
 
 import hashlib
-import itertools
 import os
 import re
 import stat
@@ -32,7 +31,7 @@ from ..results.marker import MARKER, sha256
 from ..results.release import VerifiedFile
 from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
-from ..tables.text import ARITHMETICS, LEARNING, amalgamate
+from ..tables.text import ARITHMETICS, amalgamate
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})
@@ -181,10 +180,6 @@ _TABLE_C = (
     r"const gtc_<n>_table_t gtc_{symbol}_\1 = \{{",
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
     r"\}};",
-    r"const gtc_learn_prior_t gtc_{symbol}_lrn = \{{",
-    r"    \.[a-z_]{{1,20}} = \{{ /\* <text> \*/",
-    "        (?:<cells>),",
-    r"    \}},",
 )
 _CONFIG_H = ("#ifndef GTC_[A-Z_]{{1,32}}", "#define GTC_[A-Z_]{{1,32}}(?: [0-9]{{1,2}})?")
 _TABLE_H = (
@@ -196,8 +191,6 @@ _TABLE_H = (
     "#define GTC_{SYMBOL}_ID <hex><note>",
     r'#define GTC_{SYMBOL}_[A-Z0-9_]{{1,32}} (?:<cells>|\((?:<cells>)\)|"<name>")<note>',
     r"extern const gtc_<n>_table_t gtc_{symbol}_\1;",
-    r'#include "gtc_learn\.h"',
-    r"extern const gtc_learn_prior_t gtc_{symbol}_lrn;",
 )
 _VECTORS_H = (
     "#(?:ifndef|define) VECTORS_{SYMBOL}_INCLUDED",
@@ -218,8 +211,7 @@ _ANY = ("", "#endif", r"/\* <text> \*/")
 
 def table_files(model: Model) -> dict[str, Check]:
     """Runtime and table of a model, each with what it must be."""
-    own: dict[str, Check] = {LEARNING: lambda data: _runtime(data, 2)} if model.learning is not None else {}
-    return own | {
+    return {
         "gtc.h": lambda data: _runtime(data, 0),
         "gtc.c": lambda data: _runtime(data, 1),
         "gtc_config.h": _grammar(_CONFIG_H, model),
@@ -266,14 +258,9 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
 
 
 def _runtime(data: bytes, part: int) -> str | None:
-    """Part: 0 for `gtc.h`, 1 for `gtc.c`, 2 for the header of learning in service."""
-    folders = runtime_folders()
-    if part == 2:
-        ours = {(folders[0] / LEARNING).read_bytes()}
-    else:
-        held = itertools.product((ARITHMETICS, *((n,) for n in ARITHMETICS)), (False, True))
-        texts = (amalgamate(*folders, numerics=n, learns=learns)[part] for n, learns in held)
-        ours = {text.encode("ascii") for text in texts}
+    """Part: 0 for `gtc.h`, 1 for `gtc.c`."""
+    held = (ARITHMETICS, *((n,) for n in ARITHMETICS))
+    ours = {amalgamate(*runtime_folders(), numerics=numerics)[part].encode("ascii") for numerics in held}
     return None if data in ours else "is not the runtime of this gyrotc"
 
 

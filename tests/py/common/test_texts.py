@@ -246,7 +246,6 @@ _RAN = {
     "vectors": 2,
     "first_mismatches": ["vector 0"],
     "replayed": {"runs": 1, "rows": 1, "mismatches": 1, "first_mismatches": ["row 0"], "error": "text"},
-    "learned": {"calls": 1, "words": 1, "mismatches": 1, "first_mismatches": ["call 0"]},
 }
 _HEAD = {"gyrotc_version": "1", "serial": "s", "axis": None}
 _RANGE = {"before": [0.0, 1.0], "after": [0.0, 1.0]}

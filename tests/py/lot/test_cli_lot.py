@@ -13,11 +13,10 @@ from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.extension import Refitting
 from gyrotc.jobs.lot import load_lot, lot_of
 from gyrotc.lot.planning import plan_with_lot
-from gyrotc.model import BiasSpread, load_model
+from gyrotc.model import load_model
 from gyrotc.recordings.load import load
 from gyrotc.results.files import json_text
 from gyrotc.results.recordings import LotPlan, NextRun
-from gyrotc.tables.emit import MONTH_H
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions
 from gyrotc.train.prior.use import prior_of
@@ -90,46 +89,6 @@ def test_header_and_report_show_the_lot(world: Path) -> None:
     assert "<h2>The lot</h2>" in page and "the lot alone, 5 units" in page
     with pytest.raises(InputError, match="--extend"):
         run_here("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
-
-
-def test_a_lot_of_two_calibrations_gives_the_prior_of_learning(world: Path, tmp_path: Path) -> None:
-    """Ageing of the lot, what lot and own run leave of the map; the other sources of the prior, and what each lacks."""
-    text = RUNS.replace("PROFILES", '"fast", "slow", "fast"').replace("2026-01", "2025-01")
-    (tmp_path / "before.toml").write_text(text, "utf-8")
-    made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "5")
-    run_here(*made, "--base", tmp_path / "before.toml", "--out", tmp_path / "before")
-    run_here("fleet", tmp_path / "before", "--out", tmp_path / "earlier", "--jobs", "1")
-    aged = ("lot", world / "fleet", "--out", tmp_path / "lot.json", "--earlier")
-    assert "ageing, by 5 units after 12.0 months" in run_here(*aged, tmp_path / "earlier")
-    found = load_lot(tmp_path / "lot.json").ageing
-    assert found is not None and found.level_dph_per_sqrt_month < 1e-4  # nothing ages in the simulation
-    with pytest.raises(InputError, match="0 units with another calibration"):
-        run_here(*aged, world / "fleet")
-    limits, unit = tmp_path / "limits.toml", world / "short" / "LOT-0005-006"
-
-    def built(learning: str, lot: Path | None, of: Path = unit) -> BiasSpread:
-        limits.write_text(f"schema = 1\n[learning]\nauthority_dph = 0.03\n{learning}\n")
-        given = ("--lot", lot) if lot else ()
-        run_here("build", of, *given, "--limits", limits, *HOST, "--out", tmp_path / of.name)
-        learns = load_model(tmp_path / of.name).learning
-        assert learns is not None and (tmp_path / of.name / "c" / "gtc_learn.h").is_file()
-        return learns.spread
-
-    spread = built('prior = "lot"', tmp_path / "lot.json")
-    known = json.loads((tmp_path / unit.name / "training.json").read_text())["lot"]["sigma_dph"]
-    assert 0.3 < np.hypot(spread.level, spread.shape * 30**0.5) / known < 3.0
-    assert spread.ageing * np.sqrt(MONTH_H) == pytest.approx(found.level_dph_per_sqrt_month)
-    stated = built('prior = "lot"\nageing_dph_per_sqrt_month = 0.0', world / "lot.json")
-    assert stated.ageing == 0.0 and stated.level == pytest.approx(spread.level, rel=0.05)
-    built('prior = "power_ons"', None, world / "whole" / "LOT-0005-001")
-    for learning, lot, why in (
-        ('prior = "lot"', None, r"learning\.prior: 'lot' without --lot"),
-        ('prior = "lot"', world / "lot.json", "no unit of the lot was calibrated twice"),
-        ('prior = "lot"\ntable_dph = 1e-4', world / "lot.json", "beside table_dph"),
-        ('prior = "power_ons"', None, r"learning\.prior: 1 training runs"),
-    ):
-        with pytest.raises(InputError, match=why):
-            built(learning, lot)
 
 
 @pytest.mark.slow

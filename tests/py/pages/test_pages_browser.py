@@ -16,7 +16,7 @@ from recordings import columns, toml, write_csv
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
 
-PAGES = ("unit", "axes", "fleet", "diagnosis", "plan", "check", "service")
+PAGES = ("unit", "axes", "fleet", "diagnosis", "plan", "check")
 
 _CONTRAST = """(() => {
   const channel = v => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4 };
@@ -76,13 +76,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> dict[str
     rows["temperature_c"][300:310] += 5.0
     write_csv(folder / "e" / "run-01.csv", rows)
     gyrotc("check", folder / "e", "--plots", folder / "check.html")
-    limits.write_text("schema = 1\n[learning]\nauthority_dph = 1.0\ntable_dph = 0.05\nturn_on_dph = 0.01\n")
-    gyrotc(*build, folder / "a" / "RLG-1", "--out", folder / "learns")
-    served = ("simulate", "service", "--base", folder / "learns", "--power-ons", "30")
-    gyrotc(*served, "--out", folder / "served")
-    words, stops = (folder / "served" / name for name in ("learned.txt", "stops.csv"))
-    gyrotc("recalibrate", folder / "learns", "--learned", words, "--stops", stops, "--out", folder / "service")
-    found |= {name: folder / name / "report.html" for name in ("diagnosis", "plan", "service")}
+    found |= {name: folder / name / "report.html" for name in ("diagnosis", "plan")}
     found |= {"fleet": folder / "fleet" / "fleet.html", "check": folder / "check.html"}
     assert [name for name, page in found.items() if not page.is_file()] == []
     return found

@@ -81,7 +81,7 @@ COMMANDS = {
 SLOW = ("report", "verify", "evaluate", "build", "compare", "diagnose", "plan")
 WRITE_NOTHING = {"schema"}  # but to standard output
 # A file by `write_atomically`, as check --json, of units that take minutes; a folder by `result_folder`, as fit.
-AS_OTHERS = {"lot", "recalibrate"}
+AS_OTHERS = {"lot"}
 
 
 @pytest.fixture(params=quick_and_slow([name for name in COMMANDS if name not in SLOW], SLOW))
