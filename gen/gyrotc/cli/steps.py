@@ -225,7 +225,7 @@ def verify(
 
     Example: gyrotc verify result --target all
     """
-    from ..jobs.release import axes_in, verify_axes
+    from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
     from ..recordings.load import load
     from ..results.files import json_text, write_atomically
@@ -316,7 +316,7 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
 
     Example: gyrotc report result
     """
-    from ..jobs.release import axes_in
+    from ..jobs.axes import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.report import axes_page, write_page, write_report
     from ..pages.short import is_plan, write_plan_page

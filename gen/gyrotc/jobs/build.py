@@ -50,8 +50,8 @@ from ..train.options import DEFAULTS, METHODS, BuildOptions
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify
+from .axes import join_axes
 from .recalibration import refuse_together, with_prior
-from .release import join_axes
 
 _TRACE_ROWS = 2**18  # of a run: thousands for each point of a picture
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")

@@ -16,11 +16,10 @@ import pytest
 from conftest import quick_and_slow, run_gyrotc
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import GyrotcError, InputError
-from gyrotc.deliver import certificate as printing
-from gyrotc.deliver.certificate import certificate
 from gyrotc.jobs.build import build_into
+from gyrotc.jobs.certificate import certificate, unit_of
 from gyrotc.jobs.lot import _unit
-from gyrotc.jobs.release import unit_of
+from gyrotc.pages import certificate as printing
 from gyrotc.recordings.load import load
 from gyrotc.results.folder import result_folder
 from gyrotc.results.marker import MARKER

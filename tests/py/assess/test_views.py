@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from gyrotc.assess.limits import Limits, decided, held_against
 from gyrotc.cli.results import limit_lines, summary
-from gyrotc.deliver.certificate import LaboratoryFacts, certificate_page, rows_of
 from gyrotc.fleet import unit
 from gyrotc.fleet.manifest import Fleet, Unit
 from gyrotc.fleet.page import write_summary
 from gyrotc.jobs.api import Result
 from gyrotc.jobs.build import Built
+from gyrotc.jobs.certificate import LaboratoryFacts
 from gyrotc.model import Model
+from gyrotc.pages.certificate import certificate_page, rows_of
 from gyrotc.pages.report import page_environment
 from gyrotc.pages.unit import UnitResults
 from gyrotc.recordings.records import Dataset

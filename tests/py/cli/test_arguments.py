@@ -56,7 +56,7 @@ def place(start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     os.mkfifo(work / "pipe")
     for name in ("HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
-    monkeypatch.setattr("gyrotc.deliver.certificate._BROWSERS", ())
+    monkeypatch.setattr("gyrotc.pages.certificate._BROWSERS", ())
     before = Path.cwd()
     os.chdir(work)
     yield work

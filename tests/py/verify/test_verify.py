@@ -17,7 +17,7 @@ import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, entries, flip, recorded, spoil
 from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.jobs.release import axes_in, joint_texts, verify_axes
+from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
 from gyrotc.tables.emit import emit, expected_answers
 from gyrotc.verify import job as package

@@ -1,19 +1,12 @@
-"""A certificate of a result folder: on paper, and as a digital calibration certificate (PTB's DCC, schema 3.3).
+"""Certify a result folder: check what it states, complete it with the facts of the laboratory, write the certificate.
 
-Both are made of the same rows, so that a figure has the same digits in both.
-
-What is missing is reported before anything is written. Figures are those of the page, digit by digit.
+What is missing is reported before anything is written.
 """
 
 from __future__ import annotations
 
-import math
-import os
-import re
-import shutil
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,137 +14,20 @@ from typing import Annotated, Any, Literal
 from markupsafe import Markup
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from ..assess.limits import worst_of
+from ..assess.stated import check_stated
 from ..common.errors import InputError
 from ..common.inputs import checked, read_toml
-from ..common.texts import html_environment
-from ..jobs.release import accepted, axes_in, unit_of
-from ..pages.display import bound_words, digits_of, limit_words, measured_words, rounded
-from ..pages.report import page_environment, thermal_picture
-from ..pages.unit import UnitResults
-from ..results.files import write_atomically, write_own
-from ..results.folder import result_folder, scratch_folder
-from ..results.marker import sha256
-from ..results.release import Limit
+from ..pages.certificate import certificate_page, dcc_text, print_to_pdf
+from ..pages.report import thermal_picture
+from ..pages.unit import UnitResults, unit_in
+from ..results.files import write_atomically
+from ..results.folder import result_folder
+from ..results.marker import check_intact, sha256
+from ..results.release import NEED_REASON, STATED
+from .axes import axes_in
 
-_CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
-_UNITS = (
-    ("_dph", r"\degree\hour\tothe{-1}"),
-    ("_arcsec", r"\arcsecond"),
-    ("rms_over_floor", r"\one"),
-    ("improvement", r"\one"),
-)
-"""Ends of the names of figures, and their units in D-SI."""
-
-
-@dataclass(frozen=True, slots=True)
-class CertifiedRow:
-    """A result: what it is, its text on the page, and for machines value, U, k and unit (empty: it has no U)."""
-
-    text: str
-    page: str
-    value: str = ""
-    spread: str = ""
-    factor: str = ""
-    unit: str = ""
-    bound: str = ""
-    verdict: str = ""
-
-    @property
-    def conformity(self) -> str:
-        """As the DCC says it; empty without a limit."""
-        return _CONFORMITY.get(self.verdict, "")
-
-
-def rows_of(unit: UnitResults) -> list[CertifiedRow]:
-    """Results of an axis: the bias after compensation, then every limit, those that are not met first."""
-    rows, budget = [_row(limit) for limit in unit.held], unit.budget
-    if budget is None or budget.expanded_dph <= 0.0:
-        return rows
-    found = digits_of(0.0, budget.expanded_dph)
-    bias = CertifiedRow(
-        text="bias after compensation, deg/h",
-        page=f"0 ± {rounded(budget.expanded_dph)}",
-        value="0",
-        spread=found.decimal(found.spread),
-        factor=f"{budget.coverage_factor:.2f}",
-        unit=_UNITS[0][1],
-    )
-    return [bias, *rows]
-
-
-def _row(limit: Limit) -> CertifiedRow:
-    text, page, bound = limit_words(limit.limit), measured_words(limit), bound_words(limit)
-    plain = CertifiedRow(text, page, bound=bound, verdict=limit.decision)
-    unit = next((unit for end, unit in _UNITS if limit.limit.endswith(end)), "")
-    known = limit.expanded_uncertainty
-    if not unit or not known or not math.isfinite(known) or not isinstance(limit.measured, float):
-        return plain
-    found = digits_of(limit.measured, known)
-    return replace(
-        plain,
-        value=found.decimal(found.value),
-        spread=found.decimal(found.spread),
-        factor=f"{limit.coverage_factor or 2.0:.2f}",
-        unit=unit,
-    )
-
-
-def certificate_page(
-    units: Sequence[UnitResults],
-    pictures: Mapping[str | None, Markup | None],
-    facts: Any,
-    missing: Sequence[str],
-    accepted: str | None = None,
-) -> str:
-    """The page.
-
-    Args:
-        pictures: By axis: bias against temperature; None: it has no traces.
-        facts: What the laboratory states.
-        missing: What is missing makes it a draft.
-        accepted: Why the unit is released although a verdict is FAIL or CONDITIONAL PASS.
-    """
-    template = page_environment().get_template("certificate.html.j2")
-    rows = [rows_of(unit) for unit in units]
-    return template.render(units=units, rows=rows, pictures=pictures, facts=facts, missing=missing, accepted=accepted)
-
-
-def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
-    """The XML of a DCC; arguments as of the page."""
-    # Text as a DCC takes it: words with a blank between them, and never none
-    environment = html_environment(
-        line=lambda value: " ".join(str(value).split()) or "-", day=lambda text: text[:10], rounded=rounded
-    )
-    text = environment.get_template("dcc.xml.j2").render(
-        units=units, rows=[rows_of(unit) for unit in units], facts=facts, accepted=accepted
-    )
-    return re.sub(r"\n\s*\n+", "\n", text)
-
-
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-_LONGEST_S = 120.0  # a page takes two seconds; a browser that hangs must not hold the job
-
-
-def print_to_pdf(page: Path, pdf: Path) -> bool:
-    """Prints a page of our own; False where no browser is there or it does not do it."""
-    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
-    if found is None:
-        return False
-    with scratch_folder() as work:
-        command = [
-            found, "--headless", "--disable-gpu", "--disable-extensions", "--no-first-run",
-            *(["--no-sandbox"] if os.geteuid() == 0 else []),  # which it refuses to have as root
-            f"--user-data-dir={work / 'browser'}", "--no-pdf-header-footer", f"--print-to-pdf={work / 'page.pdf'}",
-            page.resolve().as_uri(),
-        ]  # fmt: skip
-        try:
-            subprocess.run(command, check=True, timeout=_LONGEST_S, capture_output=True)
-            write_own(pdf, (work / "page.pdf").read_bytes())
-        except (OSError, subprocess.SubprocessError):
-            return False
-    return True
-
-
+_LONGEST = 300  # characters of a reason: a line or two of a certificate
 _EXPECTED = "a facts file (docs/delivery.md)"
 Line = Annotated[str, Field(min_length=1, max_length=300)]
 _NEEDED = {
@@ -287,6 +163,51 @@ def certificate(
         printed = print_to_pdf(stage.folder / "certificate.html", stage.folder / "certificate.pdf")
     written = {"certificate.html": True, "dcc.xml": not missing, "certificate.pdf": printed}
     return Certified(tuple(out / name for name, there in written.items() if there), printed)
+
+
+def unit_of(folder: Path) -> UnitResults:
+    """What a result of one axis says, once it is seen that it is as it was written and follows from itself.
+
+    Raises:
+        InputError: It does not; or as `unit_in`.
+    """
+    check_intact(folder, STATED)
+    unit = unit_in(folder)
+    model, evaluation = unit.model, unit.evaluation
+    named = {
+        "evaluate.json": evaluation, "training.json": unit.training, "verify.json": unit.verification,
+        "manifest.json": unit.manifest, "limits.json": unit.limits, "budget.json": unit.budget,
+    }  # fmt: skip
+    for name, result in named.items():
+        if result is not None and (result.serial, result.axis) != (model.serial, model.axis):
+            raise InputError(str(folder / name), "is of another gyro or axis", f"serial {model.serial}")
+    check_stated(
+        folder, model, evaluation, training=unit.training, verification=unit.verification, changes=unit.changes,
+        limits=unit.limits, budget=unit.budget,
+    )  # fmt: skip
+    return unit
+
+
+def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> str | None:
+    """The reason for which a unit is released whose verdict is FAIL or CONDITIONAL PASS; None where it is neither.
+
+    Raises:
+        InputError: The verdict is one of these and there is no reason, or it is neither and there is one.
+    """
+    verdict = worst_of(unit.decision for unit in units) or ""
+    if reason is None:
+        if verdict in NEED_REASON:
+            why = [text for unit in units for text in (*unit.failures, unit.named(verdict)) if text]
+            raise InputError(
+                str(folder), f"its verdict is {verdict} ({'; '.join(why)[:200]})", "a PASS, or --accept-fail REASON"
+            )
+        return None
+    if verdict not in NEED_REASON:
+        raise InputError("--accept-fail", f"the verdict is {verdict or 'not stated'}", "no such option")
+    line = " ".join(reason.split())
+    if not 0 < len(line) <= _LONGEST:
+        raise InputError("--accept-fail", repr(reason)[:40], f"a reason of at most {_LONGEST} characters")
+    return line
 
 
 def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
-from gyrotc.deliver import certificate as printing
-from gyrotc.deliver.certificate import certificate, facts_of
 from gyrotc.jobs.build import build_into
+from gyrotc.jobs.certificate import certificate, facts_of
+from gyrotc.pages import certificate as printing
 from gyrotc.pages.display import digits_of
 from gyrotc.pages.unit import unit_in
 from gyrotc.recordings.load import load

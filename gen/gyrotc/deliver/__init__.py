@@ -1,1 +1,0 @@
-"""What leaves the laboratory with a unit: its certificate."""

@@ -1,0 +1,124 @@
+"""Join the axes of one gyro: one folder of C files with the runtime once, a table for each axis, and one page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from .. import __version__
+from ..common.errors import CheckFailed, InputError
+from ..common.texts import c_environment
+from ..model import Model, load_model
+from ..pages.report import axes_page
+from ..results.files import write_atomically, write_own
+from ..results.folder import scratch_folder
+from ..results.release import JointVerification, Verification
+from ..tables.emit import config_text, emitted_tables, runtime_texts
+from ..tables.record import RECORD, joint_record_text
+from ..tables.text import ARITHMETICS, example_period_us, example_samples
+from ..verify.emitted import file_entries
+from ..verify.toolchain import all_targets, compile_c, run_program
+
+AXES = ("x", "y", "z")
+_HOST = "host-gcc-O2"
+
+
+def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> None:
+    """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
+
+    `display`: as of `build`. Proves that all tables link and pass their self-tests in one image.
+
+    Raises:
+        CheckFailed: The image does not link, or a table does not pass its self-test in it.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in axes}
+    numerics = list(emitted_tables(folder / axes[0] / "c", models[axes[0]]))
+    c = folder / "c"
+    c.mkdir()
+    for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
+        write_own(c / name, data)
+    _run_together(c, [m.id for m in models.values()])
+    write_atomically(folder / "report.html", axes_page(folder, axes, display))
+
+
+def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Files of every axis's own `c/` by name."""
+    return {
+        axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()} for axis in axes
+    }
+
+
+def joint_texts(
+    models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]], numeric: str
+) -> dict[str, bytes]:
+    """All files of the `c/` of a unit by name.
+
+    Args:
+        models: Models by axis.
+        sources: Files of each axis's own `c/` by name.
+        numeric: The arithmetic that `main.c` uses.
+    """
+    headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
+    held = [n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers]  # of all axes
+    texts = runtime_texts(models.values(), held)
+    texts["gtc_config.h"] = config_text(list(models.values()))
+    for axis, model in models.items():
+        own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
+        texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
+    listed = list(models.values())
+    main = (
+        c_environment()
+        .get_template("main_axes.c.j2")
+        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]), samples=example_samples(listed[0]))
+    )
+    texts["main.c"] = main.encode("ascii")
+    texts[RECORD] = joint_record_text(models, texts)
+    return texts
+
+
+def axes_in(folder: Path) -> tuple[str, ...]:
+    """Axes of a result that `--axis all` made; none where the folder has a model of its own."""
+    if (folder / "model.json").is_file():
+        return ()
+    return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())
+
+
+def verify_axes(
+    folder: Path,
+    results: Mapping[str, Verification],
+    edited: Sequence[str] = (),
+) -> JointVerification:
+    """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
+
+    These must be those of the axes' own folders, which `results` judges.
+
+    Raises:
+        InputError: There is no emitted folder, or a model cannot be read.
+    """
+    models = {axis: load_model(folder / axis / "model.json") for axis in results}
+    if not (folder / "c").is_dir():
+        raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
+    numeric = next(iter(results.values())).errors[0].numeric
+    texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
+    emitted = tuple(file_entries(folder / "c", texts, edited))
+    wrong = sum(file.status == "fail" for file in emitted)
+    return JointVerification(
+        gyrotc_version=__version__,
+        serial=next(iter(results.values())).serial,
+        axis=None,
+        passed=sum(one.passed for one in results.values()),
+        failed=sum(one.failed for one in results.values()) + wrong,
+        missing=sum(one.missing for one in results.values()),
+        emitted=emitted,
+        axes=dict(results),
+    )
+
+
+def _run_together(c: Path, ids: Sequence[str]) -> None:
+    target = all_targets()[_HOST]
+    with scratch_folder() as work:
+        program = work / "main"
+        compile_c(target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c)
+        done = run_program(target, program)
+    if done.returncode != 0:
+        raise CheckFailed(f"the image of all axes ended with status {done.returncode}")
