@@ -142,7 +142,7 @@ def certificate(
     why = accepted(folder, units, accept_fail)
     first = units[0]
     stated = facts_of(first.model.meta, facts, number)
-    missing = list(_missing(stated, units))
+    missing = list(missing_facts(stated, units))
     if missing and not draft:
         raise InputError(
             str(folder), f"{len(missing)} things are missing for a certificate: " + "; ".join(missing),
@@ -210,7 +210,8 @@ def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> 
     return line
 
 
-def _missing(facts: LaboratoryFacts, units: list[UnitResults]) -> Iterator[str]:
+def missing_facts(facts: LaboratoryFacts, units: Sequence[UnitResults]) -> Iterator[str]:
+    """Yield what a certificate must state and nobody has stated, each with where to state it."""
     for name, what in _NEEDED.items():
         if getattr(facts, name) is None:
             yield f"{name} ({what})"

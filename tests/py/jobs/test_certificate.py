@@ -11,7 +11,7 @@ import pytest
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build_into
-from gyrotc.jobs.certificate import certificate, facts_of
+from gyrotc.jobs.certificate import certificate, facts_of, missing_facts
 from gyrotc.pages import certificate as printing
 from gyrotc.pages.display import digits_of
 from gyrotc.pages.unit import unit_in
@@ -136,7 +136,7 @@ def test_who_states_no_thermometer_is_sent_to_the_data_set(
     unit = unit_in(built)
     assert unit.budget is not None
     unit.budget = unit.budget.model_copy(update={"instruments": ()})
-    (line,) = printing._missing(facts_of({}, built.parent / "facts.toml", "1"), [unit])
+    (line,) = missing_facts(facts_of({}, built.parent / "facts.toml", "1"), [unit])
     assert "only dataset.toml states instruments: [[meta.instrument]]" in line and "build again" in line
     (tmp_path / "facts.toml").write_text("schema = 1\n[[instrument]]\nname = 'Pt100'\n")
     with pytest.raises(InputError, match="instrument"):
