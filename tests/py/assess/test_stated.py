@@ -50,7 +50,7 @@ certificate = "K-4711"
 quantity = "temperature"
 expanded_uncertainty = 0.04
 """
-PASSES = FAILS.replace("improvement = 1e6", "covered = 0.0")
+PASSES = FAILS.replace("improvement = 1e6", "covered = 0.0").replace('"f32", "q31"', '"q31"')
 
 
 def _built(folder: Path, limits: str) -> Path:
