@@ -102,7 +102,7 @@ def _text(name: str, text: str) -> Callable[[Path], object]:
 def _paper(s: Steps) -> None:
     """All that can be done with one unit without a compiler, and the plan of its campaign."""
     s.run("simulate", "paper", "--seed", 1, "--out", "data")
-    s.run("check", "data", "--json", "check.json", "--envelope", "-40:60,-5:5", "--plots", "check.html")
+    s.run("check", "data", "--json", "check.json", "--envelope", "-40:60,-5:5")
     s.run("fit", "data", "--out", "result", "--json", "fit.json")
     s.run("emit", "result/model.json", "--out", "result", "--json", "emit.json")
     s.run("evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json")
@@ -355,7 +355,6 @@ def _events(s: Steps) -> None:
         s.write(make, name=f"recordings: {name}")
         s.run("check", place, "--json", f"{place}.json", name=f"check: {name}")
         s.run("fit", place, "--out", f"{place}-result", name=f"fit: {name}")
-    s.run("check", "step", "--plots", "check.html", name="check with a page")
     for name in ("step", "spikes"):
         s.run("diagnose", name, "--json", f"{name}-found.json", name=f"diagnose: {name}")
     s.run("diagnose", "step", "--accept-events", "--json", "accepted.json", name="diagnose without the events")

@@ -25,7 +25,6 @@ from .base import (
     progress,
     tell,
     write_json,
-    written_place,
 )
 
 
@@ -261,16 +260,12 @@ def check(
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?")
     ] = None,
-    plots: Annotated[
-        Path | None,
-        typer.Option("--plots", callback=written_place, help="Write a page with a picture of every finding here."),
-    ] = None,
     display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Report all errors and warnings of recordings at once, also while they still grow.
 
-    Example: gyrotc check recordings --plots check.html
+    Example: gyrotc check recordings --envelope=-40:60,-5:5
     """
     from ..assess.changes import earlier_models
     from ..quality.check import check as run
@@ -286,12 +281,6 @@ def check(
             earlier=earlier_models(previous) if previous else None,
             progress=say,
         )
-        if plots is not None:
-            from ..pages.short import write_check_page
-            from ..quality.check import pictures_of
-
-            say("drawing")
-            write_check_page(plots, result.result(), pictures_of(dataset, result), str(dataset))
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

@@ -351,7 +351,7 @@ def _checked(
         found += rate_faults(layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0))
     for fault in found:
         place = lines[fault.row] if lines else file.place(fault.row)
-        mark = Mark(file.name, (fault.row + 1, fault.row + 1), column=fault.column)
+        mark = Mark(file.name, (fault.row + 1, fault.row + 1))
         problems.add(_problem(file, fault, place, units.get(fault.column)), mark)
     if len(time) < MIN_ROWS:
         problems.add(InputError(file.name, f"{len(time)} rows", f"at least {MIN_ROWS}"))

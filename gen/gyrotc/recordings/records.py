@@ -253,13 +253,11 @@ class Mark:
         file: Their file.
         rows: First and last of them, counted from 1.
         span_s: Their times on its clock, s: first row, row after the last; None where times are in disorder.
-        column: The column, where it is about one.
     """
 
     file: str
     rows: tuple[int, int] | None = None
     span_s: tuple[float, float] | None = None
-    column: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -324,7 +324,7 @@ def _replace(path: Path, *content: bytes) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuses to replace a file, named by `--json`, `--plots` or `--map`, that gyrotc did not write.
+    """Refuses to replace a file, named by `--json` or `--map`, that gyrotc did not write.
 
     Raises:
         InputError: There is such a file, a folder, or a link to a device or a pipe.

@@ -16,7 +16,7 @@ from recordings import columns, toml, write_csv
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
 
-PAGES = ("unit", "axes", "fleet", "diagnosis", "plan", "check")
+PAGES = ("unit", "axes", "fleet", "diagnosis", "plan")
 
 _CONTRAST = """(() => {
   const channel = v => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4 };
@@ -72,12 +72,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> dict[str
     found = {"unit": folder / "unit" / "report.html", "axes": folder / "axes" / "report.html"}
     gyrotc("diagnose", folder / "d" / "RLG-0", "--out", folder / "diagnosis")
     gyrotc("plan", scenario(folder), "--out", folder / "plan")
-    rows = columns(720, seed=9)
-    rows["temperature_c"][300:310] += 5.0
-    write_csv(folder / "e" / "run-01.csv", rows)
-    gyrotc("check", folder / "e", "--plots", folder / "check.html")
     found |= {name: folder / name / "report.html" for name in ("diagnosis", "plan")}
-    found |= {"fleet": folder / "fleet" / "fleet.html", "check": folder / "check.html"}
+    found |= {"fleet": folder / "fleet" / "fleet.html"}
     assert [name for name, page in found.items() if not page.is_file()] == []
     return found
 

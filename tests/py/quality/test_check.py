@@ -15,8 +15,7 @@ import pytest
 from conftest import Command
 from gyrotc.assess.changes import earlier_models
 from gyrotc.common.errors import InputError
-from gyrotc.pages.short import write_check_page
-from gyrotc.quality.check import CheckResult, check, envelope_of, pictures_of
+from gyrotc.quality.check import CheckResult, check, envelope_of
 from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.quality.findings import finding
 from gyrotc.recordings.plausibility import earth_rate
@@ -381,36 +380,6 @@ def test_every_warning_says_what_to_do_next() -> None:
     assert {id for id in ids if not finding(id, "").next} <= reported_in_text | of_events
 
 
-def test_the_page_has_a_picture_for_each_finding(tmp_path: Path) -> None:
-    folder, page = tmp_path / "R", tmp_path / "check.html"
-    for k in range(4):
-        table = columns(600, seed=k) if k != 1 else CHANGES["time_jumps"](columns(600, seed=k))
-        if k == 3:
-            table["rate_dph"] = -table["rate_dph"]
-        write_csv(folder / f"{k}.csv", table)
-    write_csv(folder / "b.csv", columns(600, seed=9))
-    lines = (folder / "b.csv").read_text().splitlines()
-    lines[7] = lines[6]
-    (folder / "b.csv").write_text("\n".join(lines))
-    result = check(folder)
-    assert len(result.problems) == 1
-    assert {d.id for d in result.warnings} == {
-        "time_jumps",
-        "sign_reversed",
-        "runs_contradict",
-        "earth_rate_not_stated",
-    }
-    write_check_page(page, result.result(), pictures_of(folder, result), folder.name)
-    text = page.read_text("utf-8")
-    assert text.count("<svg") == 1 + len(result.warnings)
-    assert text.count("<b>Next:</b>") >= 2
-    assert "b.csv: row 7" in text
-    write_check_page(page, result.result(), pictures_of(folder, result), folder.name)  # its own page is replaced ...
-    page.write_text("mine")
-    with pytest.raises(Exception, match="was not written by gyrotc"):  # ... and nobody else's
-        write_check_page(page, result.result(), pictures_of(folder, result), folder.name)
-
-
 def test_rows_and_what_to_do_next_stand_in_the_json(tmp_path: Path) -> None:
     write_csv(tmp_path / "R" / "a.csv", CHANGES["gaps"](columns(600)))
     [warning] = json.loads(json.dumps(check(tmp_path / "R").result().content()))["warnings"]
@@ -456,19 +425,13 @@ def test_rows_that_are_really_missing_are_gaps_and_no_coarse_stamps(lost: float,
     assert {d.id for d in check(tmp_path / "R").warnings} == {"gaps"}
 
 
-def test_the_command_draws_and_holds_against_an_earlier_result(
+def test_the_command_holds_recordings_against_an_earlier_result(
     calibrated: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
     write_csv(tmp_path / "RLG-0042" / "a.csv", swapped(three(5), "x -y z"))
-    page = tmp_path / "check.html"
-    command = ("check", tmp_path / "RLG-0042", "--axis", "all", "--previous", calibrated, "--plots", page)
-    done = gyrotc(*command)
+    done = gyrotc("check", tmp_path / "RLG-0042", "--axis", "all", "--previous", calibrated)
     assert done.returncode == 0, done.stderr
     assert "axis y stands with the other sign in the column of y" in done.stdout
-    assert page.read_text("utf-8").count("<svg") >= 1
-    page.write_text("mine")
-    assert gyrotc(*command).returncode == 2
-    assert page.read_text("utf-8") == "mine"
     (tmp_path / "RLG-0042").rename(tmp_path / "RLG-7")
     refused = gyrotc("check", tmp_path / "RLG-7", "--axis", "all", "--previous", calibrated)
     assert refused.returncode == 2
@@ -504,9 +467,6 @@ def test_questions_that_need_two_other_runs_are_said_not_testable_without_them(r
     lines = [line for line in result.lines() if line.startswith("not testable: ")]
     assert len(lines) == len(asked)
     assert all("takes two other" in line for line in lines)
-    page = tmp_path / "check.html"
-    write_check_page(page, result.result(), pictures_of(tmp_path / "R", result), "R")
-    assert page.read_text("utf-8").count("these recordings cannot tell:") == len(asked)
 
 
 def test_earths_rate_or_an_earlier_result_tells_the_axes_of_a_single_run(calibrated: Path, tmp_path: Path) -> None:

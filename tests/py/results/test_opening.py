@@ -63,7 +63,7 @@ def status(*arguments: str) -> int:
 
 
 COMMANDS = {
-    "check": ("check", "data/RLG-1", "--json", "c.json", "--plots", "p.html"),
+    "check": ("check", "data/RLG-1", "--json", "c.json"),
     "fit": ("fit", "data/RLG-1", "--method", "constant", "--out", "R"),
     "emit": ("emit", "fleet/RLG-1/model.json", "--out", "E", "--map", "map.csv"),
     "import": ("import", "data/RLG-1/run-01.csv", "--out", "I", "--serial", "A"),
