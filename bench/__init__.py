@@ -1,6 +1,10 @@
-"""gyrotc beside its peers: `make bench` runs this package in an environment of its own and rewrites docs/results.md."""
+"""Campaigns that measure gyrotc: `make bench` lists them, `make bench ONLY=name` runs one.
+
+Each is a module `bench.<name>` with `measure`, which gives its record, and `table`, which makes the table of
+docs/results.md from it.
+"""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "py"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "py"))  # recordings and builds that tests use too

@@ -1,184 +1,83 @@
-"""`python -m bench docs [--only PART]`: figures into docs/results/summary.json, sections of docs/results.md."""
+"""`python -m bench [NAME ...]`: run campaigns, keep their records, make docs/results.md; without names, list them."""
 
 from __future__ import annotations
 
 import argparse
-import platform
+import json
+import os
+import subprocess
 import sys
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
-from results import machine, recorded, write
+from . import page, records
+from .campaigns import CAMPAIGNS, Settings, module_of, say
 
-_PACKAGES = ("gyrotc", "numpy", "scipy", "scikit-learn", "fastcan", "sysidentpy", "minisom")
-
-
-def _machine() -> str:
-    return f"{machine()}, Python {platform.python_version()}"
+_PEERS = ("sklearn", "fastcan", "sysidentpy", "minisom", "pandas", "polars")
+_ENVIRONMENT = records.ROOT / "build" / "bench"
 
 
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+def main() -> int:
+    """Return 1 if a figure misses its aim."""
+    given = _arguments()
+    if not given.names:
+        _list()
+        return 0
+    if any(CAMPAIGNS[name].peers for name in given.names) and not all(map(find_spec, _PEERS)):
+        return _with_peers()
+    settings = Settings(given.quick, given.seed, given.base, given.sets, given.real.absolute(), given.workers)
+    missed = 0
+    for name in given.names:
+        say(f"{name}: {CAMPAIGNS[name].title}")
+        module = module_of(name)
+        record = json.loads(json.dumps(module.measure(settings)))
+        table = module.table(record)
+        print(table.markdown(), flush=True)
+        for row in table.missed():
+            missed += 1
+            print(f"missed: {row}", flush=True)
+        if CAMPAIGNS[name].keeps_record and not given.quick:
+            page.keep(given.docs, name, record)
+    return 1 if missed else 0
 
 
-def _training(docs: Path) -> None:
-    """Training beside its peers, which the environment of `make bench` has."""
-    from .accuracy import accuracy, invariance
-    from .page import section
-    from .speed import speed
-
-    result = {
-        "schema": "gyrotc.bench/1",
-        "machine": _machine(),
-        "versions": {name: version(name) for name in _PACKAGES},
-        "speed": speed(_say),
-        "accuracy": accuracy(_say),
-        "invariance": invariance(_say),
-    }
-    write(docs, "bench", result, section)
-
-
-def _raw(docs: Path) -> None:
-    """The job on raw recordings alone, which has no peer; the other figures of training stay."""
-    from .page import section
-    from .speed import raw
-
-    result = recorded(docs, "bench")
-    result["speed"]["raw"] = raw(_say)
-    write(docs, "bench", result, section)
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CAMPAIGNS))
+    parser.add_argument("--docs", type=Path, default=records.ROOT / "docs", help="folder of pages and records")
+    parser.add_argument("--quick", action="store_true", help="a first small part, to see that it works; keep nothing")
+    parser.add_argument("--seed", type=int, help="first seed of what is drawn")
+    parser.add_argument("--base", default="", help="oracle: the commit to compare with")
+    parser.add_argument("--sets", default="", help="take these sets of a campaign, with commas between")
+    parser.add_argument("--real", type=Path, default=Settings().real, help="folder of measured recordings")
+    parser.add_argument("--workers", type=int, default=Settings().workers, help="processes")
+    given = parser.parse_args()
+    given.names = [name for word in given.names for name in word.split()]
+    given.sets = tuple(filter(None, (name.strip() for name in given.sets.split(","))))
+    unknown = [name for name in given.names if name not in CAMPAIGNS]
+    if unknown:
+        parser.error(f"no campaign is called {', '.join(unknown)}; there are {', '.join(CAMPAIGNS)}")
+    if "oracle" in given.names and not given.base:
+        parser.error("oracle compares two commits: make bench ONLY=oracle BASE=COMMIT")
+    return given
 
 
-def _runtime(docs: Path) -> None:
-    """The C runtime, in emulators."""
-    from .runtime import runtime, section
-
-    write(docs, "runtime", runtime(_say), section)
-
-
-def _sigma(docs: Path) -> None:
-    """Whether the uncertainty of corrections holds, on simulated gyros."""
-    from .sigma import cost, coverage, section
-
-    write(docs, "sigma", {"cost": cost(), **coverage(_say)}, section)
+def _list() -> None:
+    print("make bench ONLY=name runs a campaign, keeps docs/results/name.json and makes docs/results.md:\n")
+    for name, campaign in CAMPAIGNS.items():
+        print(f"  {name:11} {campaign.title}; {campaign.takes}")
+    print("\nQUICK=1 tries a small part and keeps nothing; SEED=n draws again; SETS=a,b takes these sets.")
 
 
-def _faults(docs: Path) -> None:
-    """What the runtime says of itself when something fails."""
-    from .faults import faults, section
-
-    write(docs, "faults", faults(_say), section)
-
-
-def _sizes(docs: Path) -> None:
-    """Flash and RAM of whole programs."""
-    from .sizes import section, sizes
-
-    write(docs, "sizes", sizes(), section)
-
-
-def _costs(docs: Path) -> None:
-    """What each option of the runtime costs, for `gtc_config.h`."""
-    from .costs import write as write_costs
-
-    write_costs()
-
-
-def _fleet(docs: Path) -> None:
-    """A thousand gyros through `gyrotc fleet`."""
-    from .fleet import write_fleet
-
-    write_fleet(docs)
-
-
-def _lot(docs: Path) -> None:
-    """Faults planted in lots of 60 gyros."""
-    from .fleet import write_lot
-
-    write_lot(docs)
-
-
-def _lot_speed(docs: Path) -> None:
-    """Learning from 50 to 400 units."""
-    from .lot_learning import write_speed
-
-    write_speed(docs)
-
-
-def _lot_unrelated(docs: Path) -> None:
-    """What a run of 2.5 h can show of a foreign unit in a lot."""
-    from .lot_learning import write_unrelated
-
-    write_unrelated(docs)
-
-
-def _planted(docs: Path) -> None:
-    """Faults planted among 300 healthy gyros."""
-    from .planted import write_planted
-
-    write_planted(docs, _say)
-
-
-def _recalibration(docs: Path) -> None:
-    """Units that come back, changed in five ways or not at all."""
-    from .recalibration import write_recalibration
-
-    write_recalibration(docs, _say)
-
-
-def _growth(docs: Path) -> None:
-    """How the cost of commands grows with rows, runs, centers and units."""
-    from .growth import growth, section
-
-    write(docs, "growth", growth(_say), section)
-
-
-def _formats(docs: Path) -> None:
-    """From a file of ten formats to the report."""
-    from .formats import formats, section
-
-    write(docs, "formats", formats(_say), section)
-
-
-def _splits(docs: Path, sets: Path) -> None:
-    """Measured gyros with parts of their history left out."""
-    from .splits import write_splits
-
-    write_splits(docs, sets, _say)
-
-
-_PARTS = {"training": _training, "runtime": _runtime, "growth": _growth}
-_ALONE = {
-    "raw": _raw,
-    "sigma": _sigma,
-    "faults": _faults,
-    "sizes": _sizes,
-    "costs": _costs,
-    "fleet": _fleet,
-    "formats": _formats,
-    "lot": _lot,
-    "lot-speed": _lot_speed,
-    "planted": _planted,
-    "recalibration": _recalibration,
-    "lot-unrelated": _lot_unrelated,
-}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m bench")
-    parser.add_argument("docs", type=Path)
-    parser.add_argument("--only", choices=[*_PARTS, *_ALONE, "splits"])
-    parser.add_argument("--sets", type=Path, help="for splits: a folder with a folder for each measured set")
-    chosen = parser.parse_args()
-    if chosen.only == "splits":
-        if chosen.sets is None or not chosen.sets.is_dir():
-            parser.error("--only splits needs --sets FOLDER, a folder with a folder for each measured set")
-        _splits(chosen.docs, chosen.sets)
-        return
-    parts = _PARTS if chosen.only is None else {chosen.only: (_PARTS | _ALONE)[chosen.only]}
-    for part in parts.values():
-        part(chosen.docs)
-    print(chosen.docs / "results" / "summary.json")
+def _with_peers() -> int:
+    """Run the same in build/bench, which has gyrotc and the libraries that it is compared with."""
+    python = _ENVIRONMENT / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", _ENVIRONMENT], check=True)
+    install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "-e", "./gen[bench]"]
+    subprocess.run(install, cwd=records.ROOT, check=True)
+    os.execv(python, [str(python), "-m", "bench", *sys.argv[1:]])
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

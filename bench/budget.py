@@ -1,4 +1,4 @@
-"""`python -m bench.budget docs [UNITS]`: does the uncertainty that the page states hold? (`make uncertainty`)
+"""Does the uncertainty that the page states hold?
 
 Units that nothing was tuned on are calibrated as `gyrotc build` does it, with a thermometer and a reference whose
 errors are drawn from what their certificates state, and used at the end of the interval of a drift drawn from what
@@ -7,10 +7,7 @@ the limits file states. Covered is a block of their exam where |true bias − co
 
 from __future__ import annotations
 
-import json
-import sys
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,14 +15,17 @@ from typing import Any
 import numpy as np
 from gyrotc.assess.limits import load_limits
 from gyrotc.jobs.build import build_into
+from gyrotc.mirror.history import replay
 from gyrotc.recordings.load import load
 from gyrotc.results.base import read_result
 from gyrotc.results.release import Budget
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
-from gyrotc.mirror.history import replay
 from gyrotc.train.fitting import FitOptions
 
+from .campaigns import Settings, say
+from .page import Figure, ResultsTable
+from .records import Record
 from .sigma import CAMPAIGNS, exam_of
 
 FIRST_SEED = 300_000  # of gyros that nothing was tuned on
@@ -47,17 +47,12 @@ certificate = "R-1"
 quantity = "rate"
 expanded_uncertainty = {2.0 * _REFERENCE_DPH}
 """
-_SECTION = """## Does the stated uncertainty hold? (`make uncertainty`)
-
-{units} simulated units that nothing was tuned on (seeds from {seed} on), calibrated as `gyrotc build` does it, with
-a thermometer ({thermometer} C), a reference ({reference} deg/h; both 1 sigma) and a drift to the end of the interval
-(up to {drift} deg/h) drawn from what certificates and limits file state. Covered: |true bias − correction| ≤ U of the
-unit's budget, over all blocks of 10 s of its exam whose correction has no remark. ± is one standard error, units
-counted as independent.
-
-| campaign | units | covered, % | U, median, deg/h | k, median |
-| --- | --- | --- | --- | --- |
-{rows}
+_TEXT = """
+{units} simulated units that nothing was tuned on, calibrated as `gyrotc build` does it, with a thermometer
+({thermometer} C), a reference ({reference} deg/h; both 1 sigma) and a drift to the end of the interval (up to {drift}
+deg/h) drawn from what certificates and limits file state. Covered: |true bias − correction| ≤ U of the unit's budget,
+over all blocks of 10 s of its exam whose correction has status 0. ± is one standard error, units counted as
+independent.
 """
 
 
@@ -108,10 +103,10 @@ def coverage_of(number: int, seed: int) -> Covered:
     return Covered(campaign.name, within / blocks, budget.expanded_dph, budget.coverage_factor)
 
 
-def figures(units: int, say: Callable[[str], None]) -> dict[str, Any]:
-    """Coverage of each campaign and of all."""
+def measure(settings: Settings) -> Record:
+    """Return the coverage of each campaign and of all."""
     found = []
-    for number, seed in units_of(units):
+    for number, seed in units_of(5 if settings.quick else UNITS):
         found.append(coverage_of(number, seed))
         say(f"{found[-1].campaign}, {seed}: {100.0 * found[-1].share:.1f} %")
     names = dict.fromkeys(one.campaign for one in found)
@@ -131,30 +126,15 @@ def _row(name: str, found: list[Covered]) -> dict[str, Any]:
     }
 
 
-def section(result: dict[str, Any]) -> str:
-    """The section of docs/results.md."""
-    rows = "\n".join(
-        f"| {r['campaign']} | {r['units']} | {100.0 * r['covered']:.1f} ± {100.0 * r['error']:.1f} "
-        f"| {r['expanded_dph']:.2e} | {r['factor']:.2f} |"
-        for r in result["rows"]
-    )
-    return _SECTION.format(
-        units=result["units"], seed=FIRST_SEED, rows=rows, thermometer=_THERMOMETER_C, reference=_REFERENCE_DPH,
-        drift=_DRIFT_DPH,
-    )  # fmt: skip
-
-
-def main(arguments: list[str]) -> int:
-    """Status 1 where U does not hold 93 to 97 % together."""
-    from results import write
-
-    units = int(arguments[1]) if len(arguments) > 1 else UNITS
-    result = figures(units, lambda text: print(text, file=sys.stderr, flush=True))
-    print(json.dumps(result["rows"][-1]))
-    if units == UNITS:
-        write(Path(arguments[0]), "budget", result, section)
-    return int(not 0.93 <= result["rows"][-1]["covered"] <= 0.97)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+def table(record: Record) -> ResultsTable:
+    """Return the coverage of each campaign and of all, of which 93 to 97 % is the aim."""
+    text = _TEXT.format(units=record["units"], thermometer=_THERMOMETER_C, reference=_REFERENCE_DPH, drift=_DRIFT_DPH)
+    rows = []
+    for row in record["rows"]:
+        aims = {"at_least": 0.93, "at_most": 0.97} if row["campaign"] == "together" else {}
+        covered = Figure(row["covered"], ".1%", **aims)
+        rows.append(
+            (row["campaign"], row["units"], covered, f"{row['error']:.1%}", f"{row['expanded_dph']:.2e}",
+             f"{row['factor']:.2f}")
+        )  # fmt: skip
+    return ResultsTable(text, ("campaign", "units ", "covered ", "± ", "U, median, deg/h ", "k, median "), rows)

@@ -6,34 +6,35 @@ bit for bit (tests/py/mirror/test_sigma.py).
 
 from __future__ import annotations
 
-import math
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gyrotc.mirror.history import replay
+from gyrotc.mirror.recursions import FLOAT64, TermOutcome, recursion_of
+from gyrotc.mirror.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
 from gyrotc.model import Model, Term, load_model
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import campaign, simulate, with_noise
 from gyrotc.simulate.scenario import read
 from gyrotc.tables.emit import emit
 from gyrotc.tables.quantise import quantise
-from gyrotc.mirror.recursions import FLOAT64
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.recursions import TermOutcome, recursion_of
-from gyrotc.mirror.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
 from gyrotc.train.data import TrainingData, joined
 from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.uncertainty import start_sigma
 from gyrotc.verify.toolchain import all_targets, compile_c, run_program
 from numpy.typing import NDArray
-from results import table
 from scipy.special import ndtr
+
+from .campaigns import Settings, say
+from .page import ResultsTable
+from .records import Record
 
 Floats = NDArray[np.float64]
 
@@ -126,8 +127,6 @@ def _beside(terms: Sequence[Term], blocks: Any, part: TrainingData, block_s: flo
     columns["bias_dph"] = part.bias_dph - np.asarray(seen.added, dtype=np.float64)[k]
     return TrainingData(**columns)
 
-
-Say = Callable[[str], None]
 
 STATES = ("all", "plain", "held", "clamped", "clamped near the edge", "uncovered", "warming", "fallen back")
 _NEAR_C = 1.0  # beyond the envelope, where what a gradient adds is small beside the map's own error
@@ -290,19 +289,15 @@ def _add(
             found[state].append((error[masks[state]], sigma[masks[state]]))
 
 
-def coverage(say: Say, gyros: float = 1.0, workers: int | None = None) -> dict[str, Any]:
-    """Figures of every campaign and of all together.
-
-    Args:
-        gyros: Scales their numbers.
-        workers: Processes; None: as many as there are processors.
-    """
+def measure(settings: Settings) -> Record:
+    """Return figures of every campaign, of all together, and what a snapshot costs."""
     rows, every = [], {state: [] for state in STATES}
-    with ProcessPoolExecutor(workers) as pool:
+    with ProcessPoolExecutor(settings.workers) as pool:
         for number, campaign in enumerate(CAMPAIGNS):
             parts: list[dict[str, tuple[Floats, Floats]]] = []
-            count = max(1, round(gyros * campaign.gyros))
-            seeds = range(FIRST_SEED + 1000 * number, FIRST_SEED + 1000 * number + count)
+            count = 1 if settings.quick else campaign.gyros
+            first = FIRST_SEED if settings.seed is None else settings.seed
+            seeds = range(first + 1000 * number, first + 1000 * number + count)
             for seed, part in zip(seeds, pool.map(_looked_at, [campaign] * count, seeds), strict=True):
                 say(f"{campaign.name}, gyro {seed}")
                 parts.append(part)
@@ -311,7 +306,8 @@ def coverage(say: Say, gyros: float = 1.0, workers: int | None = None) -> dict[s
                 for state, pair in part.items():
                     every[state].append({state: pair})
     total = {state: pooled(parts)[state] for state, parts in every.items() if parts}
-    return {"campaigns": rows, "together": {"gyros": sum(r["gyros"] for r in rows), "states": total}}
+    together = {"gyros": sum(r["gyros"] for r in rows), "states": total}
+    return {"campaigns": rows, "together": together, "cost": cost()}
 
 
 def _looked_at(campaign: Campaign, seed: int) -> dict[str, tuple[Floats, Floats]]:
@@ -379,71 +375,29 @@ def cost() -> list[dict[str, Any]]:
     return rows
 
 
-_HEAD = """## How well the uncertainty of corrections holds (`python -m bench docs --only sigma`)
-
-True bias less correction, in units of the 1 sigma of the same moment's snapshot, on {gyros} simulated gyros that
-nothing was tuned on (seeds from 100000 on), every block of 10 s. *Held*: outages of 10 s to 5 min at random places;
-*warming*: started anew at random places; *fallen back*: outages of up to 10 min. Behind each figure its standard error,
-gyros counted as independent: errors of one gyro's blocks are not. A normal error has 68.3 %, 95.4 % and 1; aimed at
-were 68 and 95 % to 2 points, and 0.9 to 1.1.
-
-*By gyro*: the shares of normal errors of which each gyro's have the RMS that its own have; and that RMS over 1 sigma,
-which 10 and 90 % of the gyros stay below. If all gyros had the RMS of all, {alike:.1f} % of all blocks would lie within
-1 sigma; with the RMS of each it is {by_gyro:.1f} %: that much is a mixture of gyros whose sigma is too large and too
-small. An error of a map is a smooth curve with about a dozen free values, whose size a few runs do not tell better.
-Where fewer lie within 1 sigma, sigma is too small. *Near the edge*: the temperature is less than 1 C
-beyond the envelope, or only its slope is beyond; a cell of the grid has the mean variance of the samples in it, and
-the variance at the edge of the last cell is larger.
+_TEXT = """
+True bias less correction in units of the 1 sigma of the same moment's snapshot, on {gyros} simulated gyros that nothing
+was tuned on, every block of 10 s. Held: outages of 10 s to 5 min; warming: started again at random places; fallen back:
+outages of up to 10 min. A normal error has 68.3 and 95.4 %. By gyro: RMS of error over sigma that 10 and 90 % of the
+gyros stay below.
 """
-_COST = """### Instructions of a snapshot
-
-The table of `examples/nav_loop`, counted in QEMU at the level of each core; the map is not evaluated. Bits of sigma are
-part of the board test on every target.
-"""
-_COLUMNS = (
-    "state",
-    "gyros ",
-    "blocks ",
-    "within 1 sigma, % ",
-    "within 2 sigma, % ",
-    "squared ",
-    "by gyro: 1, 2 sigma, % ",
-    "RMS ",
-)
 
 
-def section(result: dict[str, Any]) -> str:
-    """The text and tables."""
-    every = result["together"]["states"]["all"]
-    parts = [
-        _HEAD.format(
-            gyros=result["together"]["gyros"],
-            alike=100.0 * math.erf(math.sqrt(0.5 / every["squared"])),
-            by_gyro=100.0 * every["normal_1"],
-        ),
-        table(_COLUMNS, _rows(result["together"]["states"])),
-    ]
-    for row in result["campaigns"]:
-        parts += [
-            f"### {row['campaign'].capitalize()}, {row['gyros']} gyros",
-            table(_COLUMNS, _rows(row["states"])),
-        ]
-    cost = [(r["core"], r["numeric"], f"{r['in_force']:.0f}", f"{r['held']:.0f}") for r in result["cost"]]
-    parts += [_COST, table(("core", "arithmetic", "in force ", "held "), cost)]
-    return "\n".join(parts)
+def table(record: Record) -> ResultsTable:
+    """Return how many errors lie within one and two sigma, by state and by campaign."""
+    head = ("corrections", "gyros ", "blocks ", "within 1 sigma, % ", "within 2 sigma, % ", "squared ", "by gyro ")
+    rows = [_row(state, figures) for state, figures in record["together"]["states"].items()]
+    rows += [_row(one["campaign"], one["states"]["all"]) for one in record["campaigns"]]
+    return ResultsTable(_TEXT.format(gyros=record["together"]["gyros"]), head, rows)
 
 
-def _rows(states: dict[str, dict[str, float]]) -> list[tuple[str, ...]]:
-    return [
-        (
-            state,
-            f"{f['gyros']:.0f}",
-            f"{f['blocks']:.0f}",
-            f"{100.0 * f['within_1']:.1f} ± {100.0 * f['within_1_se']:.1f}",
-            f"{100.0 * f['within_2']:.1f} ± {100.0 * f['within_2_se']:.1f}",
-            f"{f['squared']:.2f} ± {f['squared_se']:.2f}",
-            f"{100.0 * f['normal_1']:.1f}, {100.0 * f['normal_2']:.1f}",
-            f"{f['low']:.2f} ... {f['high']:.2f}",
-        )
-        for state, f in states.items()
-    ]
+def _row(name: str, f: dict[str, float]) -> tuple[str, ...]:
+    return (
+        name,
+        f"{f['gyros']:.0f}",
+        f"{f['blocks']:.0f}",
+        f"{100.0 * f['within_1']:.1f} ± {100.0 * f['within_1_se']:.1f}",
+        f"{100.0 * f['within_2']:.1f} ± {100.0 * f['within_2_se']:.1f}",
+        f"{f['squared']:.2f} ± {f['squared_se']:.2f}",
+        f"{f['low']:.2f} to {f['high']:.2f}",
+    )

@@ -1,4 +1,4 @@
-"""`python -m bench.signals docs [WORLDS] [SEED]`: what channels gain on simulated gyros that nothing was tuned on.
+"""What channels gain on simulated gyros that nothing was tuned on.
 
 Every world draws its own gyro: conductances, thermometers, differences of nodes, losses and expansion. Set 1 of the
 scenario `signals` trains, set 2, two weeks later, judges. The oracle knows the true bias: what it leaves is noise.
@@ -6,10 +6,7 @@ scenario `signals` trains, set 2, two weeks later, judges. The oracle knows the 
 
 from __future__ import annotations
 
-import json
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +18,7 @@ from gyrotc.model import Model
 from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Rows, joined_runs
 from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read
-from gyrotc.simulate.scenario import read_truth
+from gyrotc.simulate.scenario import read, read_truth
 from gyrotc.tables.quantise import applied_of, quantise
 from gyrotc.train.channels import seen_by_target
 from gyrotc.train.data import TrainingData, average, joined
@@ -30,68 +26,18 @@ from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, 
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
 from numpy.typing import NDArray
-from results import write
 
-ROOT = Path(__file__).resolve().parents[1]
+from .campaigns import Settings, say
+from .page import Figure, ResultsTable, figures_table
+from .records import Record
+
 Floats = NDArray[np.float64]
 
 _WORLDS = 3  # seven minutes each
 _SEEDS = 1000, 10**6  # drawn between; the method was tried on seeds below
 _USELESS = 4  # channels that wander and mean nothing
 _AIM = 0.95  # of the oracle's gain
-_SHAPES = {"line": "", "curve": " (bent)", "product": " (slope goes with T)"}
 _GPR_POINTS = 600  # its cost goes with the third power; with twice as many the RMS changed by less than 1 %
-_PAGE = """# Channels as inputs (`make signals`)
-
-A program wrote this page; nobody edits it by hand.
-
-{worlds} simulated gyros with three further thermometers and two signals of the laser (scenario `signals`,
-every gyro with conductances, thermometers, differences and laser of its own), seeds from {seed} on{drawn}. Trained on
-six runs of eight hours, judged on six others two weeks later: RMS of compensated 100-s means, deg/h, in the arithmetic
-of the target, with the table as it is emitted. The oracle takes off the true bias: noise is left. Gain: share of the
-oracle's lessening of the mean square that is reached, from one thermometer on. Of what is not reached: "map" is what a
-map that is fitted to the exam itself would take from the map of the table, "parts" what this map leaves beside the same
-parts of channels (it follows some of the exam's noise: below 0 the parts cost less than that), "rest" the start of
-runs, rounding and chance.
-
-| world | one thermometer | with channels | oracle | gain | lost: map | parts | rest | channels taken |
-| --- | --- | --- | --- | --- | --- | --- | --- | --- |
-{rows}
-
-Mean gain {mean:.1%} (aim: 95 %), reached in {reached} of {worlds} worlds. A channel is taken as a straight line; a bent
-line of two Gaussians, or a slope that depends on temperature, takes its place where history left out shows it
-(docs/training.md, section 5).
-
-A term takes 32 bytes of a table whatever its shape, so Gaussians take none beside the line;
-its fallback model is a network of 12 + 20 M bytes for M centers.
-
-## Useless channels
-
-With {useless} useless channels beside: RMS changes by {harm} in the worlds (aim: not worse by more than 0.2
-%); taken of {useless_all} useless channels: {useless_taken}.
-
-## A channel lost during the whole exam
-
-RMS against that of the table of one thermometer (aim: not more than 2 % worse). In the table: the fallback model
-of the term is added, a network of temperature and its rate; GTC_CHANNEL_LOST is set, and sigma has grown. Of all that
-are taken at once: "all".
-
-| channel lost | worlds | worse by, largest |
-| --- | --- | --- |
-{lost}
-
-## Beside other methods
-
-The same channels, temperature and rate as inputs, means over 50 s; sizes are parameters in 4 bytes each
-(nodes of trees: 8). Operations of one answer: multiplications (Gaussians: and exponentials; trees:
-comparisons). Median over the worlds.
-
-| method | RMS, deg/h | over the oracle | bytes | operations |
-| --- | --- | --- | --- | --- |
-{peers}
-
-{seconds:.0f} s in all.
-"""
 
 
 def scenario_of(seed: int) -> str:
@@ -212,9 +158,7 @@ def _others(dataset: Dataset, model: Model) -> dict[str, Any]:
         x, of = _table(train, inputs)
         z, judged = _table(exam, others)
         center, spread = x.mean(axis=0), x.std(axis=0)
-        answer, size, operations = run(
-            (x - center) / spread, (of.bias_dph - of.bias_dph.mean()) / of.bias_dph.std()
-        )
+        answer, size, operations = run((x - center) / spread, (of.bias_dph - of.bias_dph.mean()) / of.bias_dph.std())
         left = judged.bias_dph - of.bias_dph.mean() - of.bias_dph.std() * answer((z - center) / spread)
         peers[name] = {"rms": _means_rms(judged, left), "bytes": size, "operations": operations}
     return {"left": _left(model, exam, others), "peers": peers}
@@ -291,98 +235,49 @@ _PEERS = {
 }
 
 
-def section(found: list[dict[str, Any]], seconds: float, drawn: bool) -> str:
-    """The page."""
-
-    def gain(w: dict[str, Any], left: float) -> float:
-        return float((w["plain"] ** 2 - left**2) / (w["plain"] ** 2 - w["oracle"] ** 2))
-
-    def share(w: dict[str, Any], worse: float, better: float) -> float:
-        return float((worse**2 - better**2) / (w["plain"] ** 2 - w["oracle"] ** 2))
-
-    def row(w: dict[str, Any]) -> str:
-        of_map = share(w, w["left"]["map"], w["left"]["own map"])
-        of_parts = share(w, w["left"]["own map"], w["oracle"])
-        rest = 1.0 - gain(w, w["channels"]) - of_map - of_parts
-        taken = ", ".join(n + _SHAPES[w["shapes"][n]] for n in w["taken"]) or "–"
-        return (
-            f"| {w['seed']} | {w['plain']:.3e} | {w['channels']:.3e} | {w['oracle']:.3e} | "
-            f"{gain(w, w['channels']):.1%} | {of_map:.1%} | {of_parts:.1%} | {rest:+.1%} | {taken} |"
-        )
-
-    rows = "\n".join(map(row, found))
-    lost: dict[str, list[float]] = {}
-    for w in found:
-        for name, rms in w["lost"].items():
-            lost.setdefault(name, []).append(rms / w["plain"] - 1.0)
-    own = {
-        name: {
-            "rms": np.median([w[key] for w in found]),
-            "over": np.median([w[key] / w["oracle"] for w in found]),
-            "bytes": np.median([w["bytes"][name] for w in found]),
-            "operations": np.median([w["operations"][name] for w in found]),
-        }
-        for name, key in (("one thermometer", "plain"), ("with channels", "channels"))
-    }
-    peers = {
-        name: {
-            "rms": np.median([w["peers"][name]["rms"] for w in found]),
-            "over": np.median([w["peers"][name]["rms"] / w["oracle"] for w in found]),
-            "bytes": np.median([w["peers"][name]["bytes"] for w in found]),
-            "operations": np.median([w["peers"][name]["operations"] for w in found]),
-        }
-        for name in _PEERS
-    }
-    return _PAGE.format(
-        worlds=len(found),
-        seed=found[0]["seed"],
-        drawn=" (drawn for this page)" if drawn else "",
-        rows=rows,
-        mean=np.mean([gain(w, w["channels"]) for w in found]),
-        reached=sum(gain(w, w["channels"]) >= _AIM for w in found),
-        useless=_USELESS,
-        harm=", ".join(f"{w['useless'] / w['channels'] - 1.0:+.2%}" for w in found),
-        useless_all=_USELESS * len(found),
-        useless_taken=sum(w["useless_taken"] for w in found),
-        lost="\n".join(f"| {n} | {len(v)} | {max(v):+.1%} |" for n, v in sorted(lost.items())),
-        peers="\n".join(
-            f"| {n} | {v['rms']:.3e} | {v['over']:.3f} | {v['bytes']:.0f} | {v['operations']:.0f} |"
-            for n, v in (own | peers).items()
-        ),
-        seconds=seconds,
-    )
-
-
-def main(arguments: list[str]) -> int:
-    """Writes build/results/signals.md, and the figures of pages into docs/results/summary.json."""
-    worlds = int(arguments[1]) if len(arguments) > 1 else _WORLDS
-    drawn = len(arguments) < 3
-    seed = int(np.random.default_rng().integers(*_SEEDS)) if drawn else int(arguments[2])
-    start, found = time.monotonic(), []
-    for k in range(worlds):
+def measure(settings: Settings) -> Record:
+    """Train and judge each simulated gyro with one thermometer, with channels, with useless ones, and by peers."""
+    drawn = int(np.random.default_rng().integers(*_SEEDS)) if settings.seed is None else settings.seed
+    found = []
+    for seed in range(drawn, drawn + (1 if settings.quick else _WORLDS)):
+        say(f"gyro {seed}")
         with tempfile.TemporaryDirectory(prefix="gyrotc-signals-") as work:
-            found.append(world(seed + k, Path(work)))
-        print(json.dumps(found[-1]), flush=True)
-        text = section(found, time.monotonic() - start, drawn)
-        page = ROOT / "build" / "results" / "signals.md"
-        page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(text, "utf-8")
-    write(ROOT / arguments[0], "signals", headlines(found), lambda _: text)
-    return 0
-
-
-def headlines(found: list[dict[str, Any]]) -> dict[str, float]:
-    """What docs/results.md has of it."""
+            found.append(world(seed, Path(work)))
     gains = [(w["plain"] ** 2 - w["channels"] ** 2) / (w["plain"] ** 2 - w["oracle"] ** 2) for w in found]
     lost = [rms / w["plain"] - 1.0 for w in found for rms in w["lost"].values()]
+    over = {name: [w[key] / w["oracle"] for w in found] for name, key in _OWN.items()}
+    over |= {name: [w["peers"][name]["rms"] / w["oracle"] for w in found] for name in _PEERS}
     return {
+        "seed": drawn,
         "worlds": len(found),
-        "gain": round(float(np.mean(gains)), 4),
+        "gain": float(np.mean(gains)),
         "reached": sum(gain >= _AIM for gain in gains),
         "useless_taken": sum(w["useless_taken"] for w in found),
-        "lost_worst": round(max(lost), 4),
+        "lost_worst": max(lost, default=0.0),
+        "over_oracle": {name: float(np.median(ratios)) for name, ratios in over.items()},
+        "gyros": found,
     }
 
 
-if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+_OWN = {"gyrotc, one thermometer": "plain", "gyrotc with channels": "channels"}
+_TEXT = """
+{worlds} simulated gyros with three further thermometers and two signals of the laser, each with conductances,
+thermometers and laser of its own, trained on six runs and judged on six others two weeks later. Gain: share of the
+reachable reduction of the mean square that was reached, compared with one thermometer. Over the noise: RMS of
+compensated 100-s means over the RMS of the noise, median; peers get the same channels, temperature and rate.
+"""
+
+
+def table(record: Record) -> ResultsTable:
+    """Return what channels gain, what a lost channel costs, and other methods."""
+    rows = [
+        ("gain, mean", Figure(record["gain"], ".1%", at_least=_AIM)),
+        ("gyros that reach the aim", Figure(record["reached"], at_least=record["worlds"])),
+        ("useless channels taken", Figure(record["useless_taken"], at_most=0)),
+        (
+            "a channel lost for the whole test: RMS against one thermometer, worst",
+            Figure(record["lost_worst"], "+.1%", at_most=0.02),
+        ),
+    ]
+    rows += [(f"over the noise: {name}", Figure(ratio, ".3f")) for name, ratio in record.get("over_oracle", {}).items()]
+    return figures_table(_TEXT.format(**record), rows)

@@ -10,9 +10,9 @@ beside what it would emit without states, and an internal fault is kept as the s
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,10 @@ from gyrotc.train.data import TrainingData, average, joined, scaling_of, turning
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.simple import design, solve
 from numpy.typing import NDArray
-from results import table, write
+
+from .campaigns import Settings, say
+from .page import Figure, ResultsTable, figures_table
+from .records import Record
 
 TRIVIAL = ("constant", "cubic", "cubic_slope")
 AVERAGE_S = 100.0
@@ -38,7 +41,6 @@ _END = 0.25  # of a ramp, left out at either end; of the range of a cycle's temp
 _MIDDLE = (0.4, 0.65)  # shares of the time of a ramp
 _HALVES = (0.33, 0.67)  # shares of the time of a recording at one temperature
 _STILL_C = 2.0  # spans less: nothing is said about temperature
-Say = Callable[[str], None]
 Span = tuple[Path, float, float, bool]  # file, from, to, whether it is the exam
 
 
@@ -238,11 +240,11 @@ def counts(rows: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def write_splits(docs: Path, sets: Path, say: Say) -> None:
-    """Judges all splits of the sets in a folder, and keeps the counts and every row."""
+def measure(settings: Settings) -> Record:
+    """Judge and diagnose every split of the measured sets."""
     rows = []
     with tempfile.TemporaryDirectory() as work:
-        for split in splits(sets, Path(work)):
+        for split in islice(splits(settings.real, Path(work)), 1 if settings.quick else None):
             say(f"{split.name} without {split.left_out}")
             try:
                 rows += list(judged(split))
@@ -262,23 +264,32 @@ def write_splits(docs: Path, sets: Path, say: Say) -> None:
         }
         for row in rows
     ]
-    write(
-        docs,
-        "splits",
-        {"counts": counts(rows), "rows": named},
-        section,
-        lambda found: {"counts": found["counts"]},
+    return {"counts": counts(rows), "rows": named}
+
+
+_TEXT = """
+Every axis of four public sets ([real.md](real.md)) with each run, branch or end left out in turn. The best trivial
+correction is that of a constant, a cubic, and a cubic with dT/dt that is smallest on the part left out: a choice in
+hindsight.
+"""
+
+
+def table(record: Record) -> ResultsTable:
+    """Return how often what is emitted is as good as the best trivial correction, and how often it harms."""
+    count = record["counts"]
+    return figures_table(
+        _TEXT,
+        [
+            ("splits", Figure(count["splits"])),
+            ("at most 1.03 times the best trivial correction", Figure(count["good"])),
+            ("beyond, with a constant emitted and reported", Figure(count["constant"])),
+            ("neither", Figure(count["neither"], at_most=5)),
+            ("beyond 1.10 times through more than a constant", Figure(count["bad_through_richer"], at_most=4)),
+            ("worse than a constant by more than 3 %", Figure(count["worse_than_constant"], at_most=4)),
+            ("ratio to the best trivial correction, geometric mean", Figure(count["geometric_mean"], ".3f")),
+            ("diagnoses that end in a fault", Figure(count["faults"], at_most=0)),
+            ("extended by states", Figure(count["with_states"])),
+            ("... of these with the verdict not_testable", Figure(count["states_at_not_testable"], at_most=0)),
+            ("... of these more than 1.05 times worse than without", Figure(count["states_harm"], at_most=0)),
+        ],
     )
-
-
-def section(result: dict[str, Any]) -> str:
-    """The counts as a table, and each split: RMS without states, with them, and of the best trivial correction."""
-    counted = [(name.replace("_", " "), f"{count:.4g}") for name, count in result["counts"].items()]
-    rows = []
-    for row in result.get("rows", []):
-        without, with_states = row["emitted_dph"] or (row["rms_dph"], None)
-        cells = [f"{x:.4g}" if x else "" for x in (without, with_states, min(row["trivial_dph"].values()))]
-        rows.append((row["set"], row["left_out"], row["axis"], row["method"], *cells, row["verdict"]))
-    head = ("set", "left out", "axis", "method", "without ", "with states ", "best trivial ", "verdict")
-    title = "## Measured gyros, parts of their history left out (`python -m bench docs --only splits`)\n\n"
-    return title + table(("splits", "count "), counted) + "\n" + table(head, rows)

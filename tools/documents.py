@@ -29,8 +29,6 @@ _FENCE = re.compile(
     r"^```(?:console run(?: needs: (?P<needs>[\w -]+))?|\w+ file: (?P<file>[\w./-]+))\n(?P<body>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-_LINK = re.compile(r"(?<!!)\[[^\]\n]*\]\(([^)\s]+)\)|!\[[^\]\n]*\]\(([^)\s]+)\)")
-_OUTSIDE = re.compile(r"^[a-z]+:")
 
 
 @dataclass
@@ -119,30 +117,9 @@ def _copy(folder: Path) -> Path:
     return work
 
 
-def anchors(text: str) -> set[str]:
-    """Names that a link may have behind its `#`: headings as GitHub and MkDocs write them."""
-    headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
-    plain = [re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in plain}
-
-
-def dead_links(page: Path) -> Iterator[str]:
-    """Relative links of a page that lead nowhere: no such file, or no such heading in it."""
-    text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
-    for target in (a or b for a, b in _LINK.findall(text)):
-        if _OUTSIDE.match(target):
-            continue
-        name, _, anchor = target.partition("#")
-        path = page.parent / name if name else page
-        if not path.exists():
-            yield f"{page.relative_to(ROOT)}: {target}: no such file"
-        elif anchor and path.suffix == ".md" and anchor not in anchors(path.read_text("utf-8")):
-            yield f"{page.relative_to(ROOT)}: {target}: no such heading"
-
-
 def pages() -> list[Path]:
     """Every page of the sources."""
-    folders = ("docs", "examples", "packages", "libc")
+    folders = ("docs", "examples", "libc")
     return sorted([*ROOT.glob("*.md"), *(p for f in folders for p in (ROOT / f).rglob("*.md"))])
 
 

@@ -2,16 +2,13 @@
 
 Pages that stand beside `docs/` come along below `sources/`, as do files that a page links to, so that no link is dead;
 words behind the language of a block, which say how a test runs it, go; pages that are made from the code
-(tools/reference.py) are made by the Python of .venv; the drawing of the packages is made here, since what draws it on a
-server would be fetched by every reader.
+(tools/reference.py) are made by the Python of .venv.
 """
 
 from __future__ import annotations
 
-import html
 import os
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -19,23 +16,15 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import architecture
 import reference
 
-ROOT = architecture.ROOT
+ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PLACE = "sources"  # of what lies beside docs/
 _LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^)\s#]+)(#[^)\s]*)?\)")
 _OUTSIDE = re.compile(r"[a-z]+:|//")
 _BLOCK = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
 _WORDS = re.compile(r"^(```[a-z]+) .*$", re.MULTILINE)
-_PICTURE = re.compile(r"^```mermaid$.*?^```$", re.MULTILINE | re.DOTALL)
-_WIDTH, _HEIGHT, _ACROSS, _DOWN = (
-    84,
-    22,
-    100,
-    46,
-)  # of a box, and from one to the next, in points of the picture
 
 
 def place(path: Path) -> str | None:
@@ -95,56 +84,8 @@ def linked(text: str, page: Path, name: str) -> str:
     return re.sub(r"\0(\d+)\0", lambda m: parts[int(m[1])], _LINK.sub(link, whole))
 
 
-def drawn(block: str) -> dict[str, set[str]]:
-    """Packages by name, with those from which an arrow of the drawing leads to them."""
-    found = re.findall(r"^ *(\w+) --> (\w+)$", block, re.MULTILINE)
-    return {name: {a for a, b in found if b == name} for name in sorted({n for arrow in found for n in arrow})}
-
-
-def picture(graph: dict[str, set[str]]) -> str:
-    """The packages as an SVG drawing: each in the row below the last package that it imports."""
-    depth: dict[str, int] = {}
-    for name in sorted(graph, key=lambda n: len(architecture.reach(graph, n))):
-        depth[name] = max((depth[other] + 1 for other in graph[name]), default=0)
-    rows = [[n for n in graph if depth[n] == k] for k in range(max(depth.values()) + 1)]
-    columns = max(map(len, rows))
-    at = {
-        n: (4 + int(_ACROSS * (i + (columns - len(row)) / 2)), 4 + _DOWN * k)
-        for k, row in enumerate(rows)
-        for i, n in enumerate(row)
-    }
-    drawn = [_arrow(at[a], at[b]) for a, b in architecture.arrows(graph)]
-    drawn += [_box(n, *at[n]) for n in graph]
-    width, height = _ACROSS * columns, _DOWN * len(rows)
-    head = (
-        '<marker id="tip" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
-        '<path d="M0 0L8 4L0 8z" fill="currentColor"/></marker>'
-    )
-    return (
-        f'<svg role="img" aria-label="What leads to what" viewBox="0 0 {width} {height}" width="{width}"'
-        f' style="max-width:100%"><defs>{head}</defs>{"".join(drawn)}</svg>'
-    )
-
-
-def _arrow(a: tuple[int, int], b: tuple[int, int]) -> str:
-    x, y = a[0] + _WIDTH // 2, a[1] + _HEIGHT
-    u, v = b[0] + _WIDTH // 2, b[1]
-    bend = (v - y) // 2
-    way = f"M{x} {y}C{x} {y + bend} {u} {v - bend} {u} {v}"
-    return f'<path d="{way}" fill="none" stroke="currentColor" opacity="0.6" marker-end="url(#tip)"/>'
-
-
-def _box(name: str, x: int, y: int) -> str:
-    return (
-        f'<rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" rx="4" stroke="currentColor" fill="#fff"/>'
-        f'<text x="{x + _WIDTH // 2}" y="{y + 15}" text-anchor="middle" font-size="12" fill="currentColor">'
-        f"{html.escape(name)}</text>"
-    )
-
-
 def prepared(text: str, page: Path, name: str) -> str:
     """The text of a page as the site takes it."""
-    text = _PICTURE.sub(lambda block: picture(drawn(block[0])), text)
     return _WORDS.sub(r"\1", linked(text, page, name))
 
 
@@ -153,10 +94,7 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File
 
     with tempfile.TemporaryDirectory() as folder:
-        python = ROOT / ".venv" / "bin" / "python"
-        reference.write(Path(folder), python)
-        results = [python, ROOT / "tests" / "py" / "sections.py", Path(folder) / "results-all.md"]
-        subprocess.run(results, check=True)
+        reference.write(Path(folder), ROOT / ".venv" / "bin" / "python")
         for path in sorted(Path(folder).iterdir()):
             written = files.get_file_from_path(path.name)  # without tables
             if written is not None:

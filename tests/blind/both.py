@@ -1,49 +1,40 @@
-"""What a diagnosis must keep on fresh seeds of both worlds: one table from the rows of every recording, which are kept.
+"""What a diagnosis must keep on fresh seeds of both worlds: one table, the same questions of either world.
 
-docs/results/blind.jsonl has a row for every recording, and that table is made of nothing else. Beside it stand figures
-that one world alone has, from what is not kept of a row: limits of detection, parameters, gains, declared noise.
+The record holds further figures that one world alone has: limits of detection, parameters, gains, declared noise.
 """
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from gyrotc.pages.chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
-from gyrotc.paper.page import rounded
 from gyrotc.results.files import write_atomically
-from results import recorded, write
+
+from bench.page import ResultsTable, keep
+from bench.records import Record, rounded
 
 from . import table as own
 from .effects import FAMILY
 from .grade import Row, alarmed, family_right, wrong_family
 from .other import grade as other
-from .table import SAID, Check, markdown, proportion, reliability, worse_on_the_exam
+from .table import SAID, Check, proportion, reliability, worse_on_the_exam
 
-ROWS = Path("results", "blind.jsonl")
 RELIABILITY = "reliability.svg"
 WORLDS = {"own": ("own world", AFTER), "other": ("other world", BEFORE)}
 _SURE, _LEAST = 0.95, 0.01  # of stated probabilities: where a name is sure, and what is kept
 _STEEP = 1.2  # exponent of a spectrum from which on flicker noise, 1/f, no longer stands for it
 _DETAILS = {"own": own.table, "other": other.table}
-_HEAD = """## Hidden effects: fresh seeds of both worlds (`make blind`)
+_TEXT = """
+Seeds {seeds}, drawn after the method was finished; {recordings} recordings of each world. k = d / 6, d the
+matched-filter signal-to-noise ratio of the hidden effect after the best static map is taken out. Own world
+(tests/blind): an integration, maps, hysteresis and noise that use nothing of gyrotc's simulation. Other world
+(tests/blind/other, which imports nothing of gyrotc): heat by finite volumes, relays, waves, noise of other spectra,
+noise that is declared wrong in half of the recordings, and effects that the catalogue does not have.
 
-What is asked of the diagnosis on recordings drawn after it was finished, all seeds of a world together, then each.
-`docs/results/blind.jsonl` has every recording: what was hidden and how large, what was answered, and how surely.
-k = d / 6, d the matched-filter signal-to-noise ratio of the effect after the best static map is taken out, under the
-true noise. Limits: 95 %, binomial (Clopper and Pearson).
-
-Own world (tests/blind): an integration, maps, hysteresis and noise that use nothing of gyrotc's simulation.
-
-Other world (tests/blind/other, which imports nothing of gyrotc): heat by finite volumes through case, glass and mirror
-with properties that depend on temperature, a chamber that switches, relays of Preisach, an etalon's waves, noise of
-1/f^alpha with alpha from 0.5 to 1.5, converters with steps, rows of 1, 10 or 60 s, the noise declared wrong in half,
-parameters that may lie beyond what is searched, and a campaign of temperatures for each recording. Foreign effects are
-drawn from a grammar of operators (integrate, saturate, threshold, delay, relax, multiply); of none of them can one
-cause of the catalogue imitate more than half of the energy beside the map. The detector was not tuned on this world.
+![Stated probability against the share that is true, both worlds](reliability.svg)
 """
 
 
@@ -97,7 +88,7 @@ def kept(world: str, seed: int, row: Row) -> Row:
     return dict(rounded(out, 4))
 
 
-def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def checked(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Every requirement with its count, share and limits, and how often what was stated is true."""
     out: list[dict[str, Any]] = []
     for name, goal, select, hit, bound, kind in _CHECKS:
@@ -113,8 +104,8 @@ def tables(rows: Sequence[Row]) -> dict[str, Any]:
     for world in WORLDS:
         of = [row for row in rows if row["world"] == world]
         seeds = sorted({row["seed"] for row in of})
-        each = {str(seed): table([row for row in of if row["seed"] == seed]) for seed in seeds}
-        out[world] = {"recordings": len(of), "all": table(of), **each}
+        each = {str(seed): checked([row for row in of if row["seed"] == seed]) for seed in seeds}
+        out[world] = {"recordings": len(of), "all": checked(of), **each}
     return out
 
 
@@ -129,49 +120,43 @@ def answers(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
     return {name: dict(found[name].most_common()) for name in order if name in found}
 
 
-def rows_of(docs: Path) -> list[Row]:
-    """The rows that are kept."""
-    return [json.loads(line) for line in (docs / ROWS).read_text("utf-8").splitlines()]
-
-
 def write_both(docs: Path, head: dict[str, Any], rows: Sequence[tuple[str, int, Row]]) -> None:
-    """Keeps all rows, given with world and seed, their tables and the diagram of reliability."""
-    (docs / ROWS).parent.mkdir(parents=True, exist_ok=True)
+    """Keep the tables of all rows, which are given with world and seed, and the diagram of reliability."""
     short = [kept(*row) for row in rows]
-    write_atomically(docs / ROWS, "".join(json.dumps(row, ensure_ascii=False) + "\n" for row in short))
     details = {}
     for world, table_of in _DETAILS.items():
         of = [row for name, _, row in rows if name == world]
         details[world] = {"table": table_of(of), "answers": answers(of)}
-    write(docs, "blind", {**head, "worlds": tables(short), "details": details}, section)
-    write_atomically(docs / RELIABILITY, reliability_diagram(docs))
+    record = {**head, "worlds": tables(short), "details": details}
+    write_atomically(docs / RELIABILITY, reliability_diagram(record))
+    keep(docs, "blind", record)
 
 
-def section(record: dict[str, Any]) -> str:
-    """The tables as text."""
-    seeds = ", ".join(map(str, record["seeds"]))
-    parts = [_HEAD, f"Seeds {seeds}, commit {record['commit']}, code {record['code']}.", ""]
-    for world, found in record["worlds"].items():
-        for name, entries in found.items():
-            if name != "recordings":
-                title = f"all {found['recordings']} recordings" if name == "all" else f"seed {name}"
-                parts += [f"### {WORLDS[world][0].capitalize()}, {title}", "", markdown(entries), ""]
-    for world, more in record["details"].items():
-        parts += [f"### {WORLDS[world][0].capitalize()}, in detail", "", markdown(more["table"]), ""]
-        parts += ["| hidden | recordings | answers |", "| --- | --- | --- |"]
-        parts += [
-            f"| {name} | {sum(found.values())} | {', '.join(f'{k} {v}' for k, v in found.items())} |"
-            for name, found in more["answers"].items()
-        ]
-        parts.append("")
-    return "\n".join([*parts, ""])
+def table(record: Record) -> ResultsTable:
+    """Return every question with its answers in both worlds."""
+    worlds = record["worlds"]
+    text = _TEXT.format(seeds=", ".join(map(str, record["seeds"])), recordings=worlds["own"]["recordings"])
+    found = {name: {one["name"]: one for one in of["all"]} for name, of in worlds.items()}
+    rows = []
+    for name in dict.fromkeys(name for of in found.values() for name in of if not name.startswith(SAID)):
+        of_both = [of.get(name) for of in found.values()]
+        goal = next(one["goal"] for one in of_both if one)
+        rows.append((name, *(_counted(one) for one in of_both), goal))
+    return ResultsTable(text, ("question", *(f"{WORLDS[name][0]} " for name in worlds), "aim "), rows)
 
 
-def reliability_diagram(docs: Path) -> str:
+def _counted(one: dict[str, Any] | None) -> str:
+    if one is None:
+        return ""
+    text = f"{one['hits']} of {one['of']}"
+    return text if one["met"] in (True, None) else f"**{text}** (missed)"
+
+
+def reliability_diagram(record: Record) -> str:
     """How often what was said with a probability is true in each world, with limits of 95 %."""
     panel = Panel(x="probability that was stated", y="share that is true", x_range=(0, 1), y_range=(0, 1))
     panel.line([0.0, 1.0], [0.0, 1.0], COVERED, "as stated", dash="5 3")
-    for name, found in recorded(docs, "blind")["worlds"].items():
+    for name, found in record["worlds"].items():
         label, color = WORLDS[name]
         said = [row for row in found["all"] if row["name"].startswith(SAID)]
         at = [float(row["goal"].rstrip("%")) / 100.0 for row in said]

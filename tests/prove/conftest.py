@@ -1,6 +1,6 @@
 """The tests of `make prove`: Frama-C, Gappa, Z3 and some minutes. What needs a tool that is not there is skipped.
 
-`--results docs` writes what they found into the documentation. What a test found goes with its report, so that tests
+`--results docs` keeps what they found. What a test found goes with its report, so that tests
 may run in several processes (`-n 2`).
 """
 
@@ -16,15 +16,16 @@ import pytest
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/mirror"))]
 
-from prove_page import section  # noqa: E402
-from results import Results, machine, write  # noqa: E402
+from results import Results  # noqa: E402
+
+from bench.page import keep  # noqa: E402
 
 _FOUND: list[tuple[str, Any]] = []  # of a test: name of a list, its place, a record
 _SKIPPED: set[str] = set()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--results", type=Path, help="folder whose results/summary.json and results.md are written")
+    parser.addoption("--results", type=Path, help="folder whose results/ and results.md are written")
 
 
 class _OfATest(Results):
@@ -68,4 +69,4 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     found = Results()
     for name, (_, record) in sorted(_FOUND, key=lambda one: one[1][0]):
         found.add(name, record)
-    write(docs, "prove", {"schema": "gyrotc.prove/1", "machine": machine(), **found.lists}, section)
+    keep(docs, "prove", dict(found.lists))

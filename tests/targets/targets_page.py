@@ -1,91 +1,54 @@
-"""The section `targets` of docs/results.md."""
+"""The record of `make targets` and its table on docs/results.md."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from typing import Any
 
-from results import table
+from bench.page import Figure, ResultsTable, figures_table
+from bench.records import Record
 
-_HEAD = """## Every target, bit for bit (`make targets`)
-
+_TEXT = """
 {combinations} combinations of architecture, compiler and optimisation, {entries} with their arithmetics. Every result
-word of the emitted C (map, step functions, statuses) against the reference computed from `model.json`; recordings
-streamed through the step functions besides.
-"""
-_COSTS = """Cost with the golden model ({centers} centers): instructions of a map call, mean (largest); of a call of
-`sample`, the largest (it closes a block); bytes of code that a program with both links, of stack below the caller.
-Counted in emulators; AVR: cycles. float32 is not offered where the compiler does not keep to its arithmetic.
-"""
-_FUNCTIONS = """Public functions on {target} ({arithmetic}): bytes of code, of the function with all that it calls (what
-several call is linked once); of stack, by its graph of calls, the deepest one counted; both whatever terms a table has,
-without those of the compiler's own functions that are named. A program with the self-test, a state and its samples
-links {read_only} bytes of constants, the table's among them.
-"""
-_CONTROLS = """Negative controls: builds that are wrong on purpose. Each ran to its end; that many results differed.
-"""
-_NAV = """`examples/nav_loop`, firmware in the emulated board against the host: lines that differ, and the angle over
-20 minutes.
+word of the emitted C (map, step functions, statuses) is compared with the reference computed from `model.json`;
+recordings are streamed through the step functions. Negative controls are builds that are wrong on purpose. The
+self-test (`gtc_<n>_check`) is tried on {tables} tables under {builds} sets of flags that may break float32.
 """
 
 
-def section(result: dict[str, Any]) -> str:
-    """The section as text."""
-    golden = result["models"][0]
-    parts = [
-        _HEAD.format(combinations=golden["names"], entries=golden["targets"]),
-        table(
-            ["model", "networks ", "centers ", "terms", "targets × arithmetics ", "vectors each ", "mismatches ",
-             "rows replayed ", "rows that differ "],
-            [_model_row(m) for m in result["models"]],
-        ),
-        _COSTS.format(centers=golden["centers"]),
-        table(
-            ["target", "arithmetic", "compiler", "vectors ", "mismatches ", "map ", "sample ", "code ", "stack ",
-             "stack of sample "],
-            [_target_row(t) for t in result["targets"]],
-        ),
-        *_function_tables(result["targets"]),
-        _CONTROLS,
-        table(
-            ["control", "target", "arithmetic", "results ", "mismatches "],
-            [_control_row(c) for c in result["controls"]],
-        ),
-        _NAV,
-        table(
-            ["arithmetic", "lines ", "differing ", "measured, arcsec ", "compensated, arcsec "],
-            [
-                [n["numeric"], n["lines"], n["differing_lines"], f"{n['measured_arcsec']:.2f}",
-                 f"{n['compensated_arcsec']:.2f}"]
-                for n in result["nav_loop"]
-            ],
-        ),
-    ]  # fmt: skip
-    return "\n".join(parts)
-
-
-def _function_tables(targets: Sequence[dict[str, Any]]) -> list[str]:
-    parts: list[str] = []
-    for t in targets:
-        if "functions" in t:
-            head = {"target": t["name"], "arithmetic": t["numeric"], "read_only": t["read_only_bytes"]}
-            rows = [
-                [f"`{name}`", cost["code_bytes"], cost["stack_bytes"], ", ".join(cost["helpers"]) or "-"]
-                for name, cost in t["functions"].items()
-            ]
-            parts += [
-                _FUNCTIONS.format(**head),
-                table(["function", "code ", "stack ", "calls, not counted"], rows),
-            ]
-    return parts
+def table(record: Record) -> ResultsTable:
+    """Return how many targets agree in every bit, and what wrong builds were caught."""
+    models, builds = record["models"], [b for b in record["self_test"] if b["differ"] is not None]
+    golden = models[0]
+    text = _TEXT.format(
+        combinations=golden["names"], entries=golden["targets"], tables=record["tables"],
+        builds=len(record["self_test"]),
+    )  # fmt: skip
+    targets = sum(m["targets"] for m in models)
+    nav = max(n["differing_lines"] for n in record["nav_loop"])
+    controls = record["controls"]
+    return figures_table(
+        text,
+        [
+            ("targets × arithmetics × models that pass", Figure(sum(m["passed"] for m in models), at_least=targets)),
+            ("result words compared on each, least", Figure(min(m["smallest_vectors"] for m in models))),
+            ("result words that differ", Figure(sum(m["mismatches"] for m in models), at_most=0)),
+            ("rows of recordings replayed that differ", Figure(sum(m["rows_that_differ"] for m in models), at_most=0)),
+            (
+                f"negative controls caught, of {len(controls)}",
+                Figure(sum(c["mismatches"] > 0 for c in controls), at_least=len(controls)),
+            ),
+            ("builds whose results differ, of all tables", Figure(sum(b["differ"] for b in builds))),
+            ("... that pass the self-test", Figure(sum(b["differ"] - b["refused"] for b in builds), at_most=0)),
+            ("`examples/nav_loop` on the board against the host, lines that differ", Figure(nav, at_most=0)),
+        ],
+    )
 
 
 def quoted(result: dict[str, Any]) -> dict[str, Any]:
-    """What the page says: of every model its totals, of the golden one each target."""
+    """Return the totals of every model, each target of the golden one, controls and builds."""
     golden = [_quoted_target(t) for t in result["models"][0]["targets"]]
     controls = [{k: c[k] for k in ("control", "name", "numeric", "vectors", "mismatches")} for c in result["controls"]]
-    kept = {name: result[name] for name in ("schema", "machine", "nav_loop")}
+    kept = {name: result[name] for name in ("nav_loop", "self_test", "tables")}
     return kept | {"models": [_totals(m) for m in result["models"]], "targets": golden, "controls": controls}
 
 
@@ -114,38 +77,3 @@ def _totals(model: dict[str, Any]) -> dict[str, Any]:
         "rows": sum(r["rows"] for r in replayed),
         "rows_that_differ": sum(r["mismatches"] for r in replayed),
     }
-
-
-def _model_row(m: dict[str, Any]) -> list[object]:
-    counts = ("targets", "smallest_vectors", "mismatches", "rows", "rows_that_differ")
-    return [
-        m["name"],
-        m["networks"],
-        m["centers"],
-        ", ".join(m["terms"]) or "-",
-        *(m[name] for name in counts),
-    ]
-
-
-def _target_row(t: dict[str, Any]) -> list[object]:
-    cost = t.get("instructions") or t.get("cycles")
-    step = t.get("step_instructions") or t.get("step_cycles")
-    return [
-        t["name"],
-        t["numeric"],
-        t["compiler"],
-        t["vectors"],
-        t["mismatches"],
-        f"{cost['mean']:.0f} ({cost['max']})" if cost else "-",
-        step["max"] if step else "-",
-        t["code_bytes"],
-        t.get("stack_bytes", "-"),
-        t.get("step_stack_bytes", "-"),
-    ]
-
-
-def _control_row(c: dict[str, Any]) -> list[object]:
-    words = c["control"].rpartition("::")[2].removeprefix("test_")
-    name, _, case = words.partition("[")
-    text = re.sub(r"_", " ", name) + (f" ({case.rstrip(']')})" if case else "")
-    return [text, c["name"], c["numeric"], c["vectors"], c["mismatches"]]

@@ -5,7 +5,7 @@ no path, no host, no version, so one model gives the same bytes on every machine
 done in `tables.quantise`; here integers are printed.
 
 `gtc_config.h` names the smallest runtime that holds the tables, and what each of its options costs: the costs were
-measured (`python -m bench docs --only costs`) and stand in `costs.json`.
+measured (`make bench ONLY=runtime`) and stand in `costs.json`.
 """
 
 from __future__ import annotations

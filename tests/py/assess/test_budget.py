@@ -24,8 +24,6 @@ from gyrotc.results.training import Training
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.fitting import FitOptions
 
-from bench.budget import UNITS, coverage_of, units_of
-
 LIMITS = """schema = 1
 [interval]
 days = 730.5
@@ -125,15 +123,6 @@ def test_build_writes_the_budget_and_the_page_tells_it(built: Path) -> None:
     for one in budget.contributions:
         assert one.text in page
     assert "Not known, and so not in U:" in page
-
-
-@pytest.mark.slow
-def test_the_stated_uncertainty_holds_on_a_slice_of_the_simulated_units() -> None:
-    """`make uncertainty` looks at all 200, and keeps what it found; of six units the share scatters by 3 %."""
-    every = units_of(UNITS)
-    assert len(every) == UNITS and len(set(every)) == UNITS
-    shares = [coverage_of(*every[k]).share for k in range(0, UNITS, UNITS // 6)][:6]
-    assert 0.85 < sum(shares) / len(shares) <= 1.0, shares
 
 
 KNOWN = FigureUncertainty(standard=0.05, freedom=None, method="noise")

@@ -26,7 +26,8 @@ from gyrotc.results.marker import MARKER
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
-from tests.evidence.run import ABOUT, KINDS, found, tasks
+from bench.rows.evidence import ABOUT, found
+from bench.rows.sets import FAULTS
 
 SEED = 20
 FAILS = """schema = 1
@@ -273,21 +274,10 @@ def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None
 
 @pytest.mark.parametrize("number", range(2))
 def test_nothing_is_said_of_a_clean_set(number: int) -> None:
-    assert not found("clean", "clean", 2, number) & ABOUT
+    assert not found("clean", 2, number) & ABOUT
 
 
-@pytest.mark.parametrize("way", KINDS["faults"])
-def test_a_fault_of_one_run_is_named(way: str) -> None:
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_of_one_run_is_named(kind: str) -> None:
     """Before: held rates, a late temperature and a run turned over built at up to 2.78 times the floor in silence."""
-    assert found("faults", way, 2, 0) & ABOUT
-
-
-@pytest.mark.slow
-def test_a_tenth_of_the_campaign_keeps_to_its_shares() -> None:
-    """`make evidence` draws 500 clean sets, and 200 with a fault."""
-    print("seed 3")
-    counts = {"clean": 50, "faults": 20}
-    named = dict.fromkeys(counts, 0)
-    for kind, way, seed, number in tasks(counts, 3):
-        named[kind] += bool(found(kind, way, seed, number) & ABOUT)
-    assert named["clean"] <= 1 and named["faults"] >= 19, named
+    assert found(kind, 2, 0) & ABOUT

@@ -34,10 +34,10 @@ from gyrotc.recordings.records import Dataset, joined_runs
 from gyrotc.train.fitting import FitOptions
 from recordings import write_csv
 
+from bench.invariance import VARIATIONS, averaged
 from bench.splits import splits
 from tests.blind import campaign as blind
 from tests.blind.noise import Noise
-from tests.invariance import VARIATIONS, averaged
 
 SEED = 20260301
 LEVEL = Noise(7e-4, 3e-5)
@@ -153,7 +153,7 @@ SLOW = ("rate + 1000 deg/h", "each run twice", "rates in deg/s")
 
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_another_way_to_hand_over_the_recordings_changes_nothing(made: Callable[[str], Case], name: str) -> None:
-    """`make invariance` asks the same of whole diagnoses of many sets, with figures."""
+    """`make bench ONLY=invariance` asks the same of whole diagnoses of many sets, with figures."""
     case = made("hysteresis")
     same_answer(answer_of(VARIATIONS[name].change(load(case.folder))), case)
 

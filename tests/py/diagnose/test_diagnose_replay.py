@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import weakref
 from collections.abc import Callable
 from functools import partial
@@ -577,8 +576,8 @@ def test_the_unseen_branch_is_followed_by_a_map_of_t_alone(tmp_path: Path) -> No
 
 
 def test_clean_cycles_get_no_memory(tmp_path: Path) -> None:
-    """Gyros with a static map of (T, dT/dt); `make cycles` has 100 at four levels of the noise, here are a few."""
-    count = int(os.environ.get("GYROTC_CYCLES", "8"))
+    """Gyros with a static map of (T, dT/dt), at four levels of the noise."""
+    count = 8
     named = []
     for seed in range(count):
         found = cycle_of(clean_cycle(tmp_path, seed, NOISE[seed % len(NOISE)]))

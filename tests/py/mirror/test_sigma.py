@@ -80,7 +80,7 @@ def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> 
 
 @pytest.mark.slow
 def test_errors_of_a_few_gyros_are_as_large_as_sigma_says() -> None:
-    """A slice of `python -m bench docs --only sigma`: four gyros, whole runs and outages."""
+    """A slice of `make bench ONLY=sigma`: four gyros, whole runs and outages."""
     parts = [departures(gyro("paper", seed), seed) for seed in range(900_001, 900_005)]
     found = pooled(parts)
     for state in ("all", "held", "warming"):

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from gyrotc.common.errors import InputError
 from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
-from gyrotc.paper.experiment import FIGURES, METHODS, Series, checksum, draw
-from gyrotc.paper.page import departures, filled, keep, made_with, measured, page_of, record_of, stale
+
+from bench.paper.experiment import FIGURES, METHODS, Series, checksum, draw
+from bench.paper.page import departures, filled, made_with, measured, page_of, record_of, stale
+from bench.records import write_record
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "paper.md"
@@ -66,7 +68,7 @@ def test_a_figure_that_moves_is_reported_with_its_place(now: dict[str, Any]) -> 
 def test_a_page_or_a_figure_of_another_record_is_reported(tmp_path: Path) -> None:
     docs = tmp_path / "docs"
     (docs / "results").mkdir(parents=True)
-    for name in ("paper.md", "results/summary.json"):
+    for name in ("paper.md", "results/paper.json", "results/accuracy.json"):
         shutil.copy(DOCS / name, docs / name)
     assert all("figure" in line for line in stale(docs))
     shutil.copytree(DOCS / "paper", docs / "paper")
@@ -77,7 +79,7 @@ def test_a_page_or_a_figure_of_another_record_is_reported(tmp_path: Path) -> Non
     (line,) = stale(docs)
     assert "after, modified RBFNN" in line
     shutil.copy(PAGE, docs / "paper.md")
-    keep(docs, "paper", RECORD | {"figures": "sha256:another"})
+    write_record(docs, "paper", RECORD | {"figures": "sha256:another"})
     assert len(list(stale(docs))) == len(FIGURES)
 
 

@@ -17,13 +17,14 @@ import paper_reference as reference
 import pytest
 from gyrotc import _core
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
-from gyrotc.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
-from gyrotc.paper.page import recorded
 from gyrotc.simulate.campaign import simulate
 from gyrotc.train.data import average, scaling_of
 from gyrotc.train.methods import trained
 from gyrotc.train.result import Outcome
 from numpy.typing import NDArray
+
+from bench.paper.experiment import LITERAL_RHO, PaperGroup, groups_of
+from bench.records import read_record
 
 Floats = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[3]
@@ -158,7 +159,7 @@ def test_table_1_is_the_reference_s(
     gyro: tuple[int, Path], groups: list[PaperGroup], networks: dict[str, list[Both]]
 ) -> None:
     """Every cell of a paper's method that the record of docs/paper.md has of this gyro."""
-    record = recorded(ROOT / "docs", "paper")
+    record = read_record(ROOT / "docs", "paper")
     after = record["gyros"]["paper"][str(gyro[0])]["after"]
     worst: dict[str, float] = {}
     for number, group in enumerate(groups):

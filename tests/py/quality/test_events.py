@@ -28,8 +28,8 @@ from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
 from recordings import Columns, toml, write_csv
 
+from bench.rows.events import scores
 from tests.blind.other.record import draw_recording, write
-from tests.events import scores
 
 SEED, ROW_S, HOURS = 20261122, 10.0, 8
 NOISE_DPH = 2.2e-3  # of a row: 7e-4 deg/h of 100-s means

@@ -70,4 +70,4 @@ def test_the_site_has_every_page() -> None:
     listed = set(re.findall(r": ([\w/-]+\.md)$", text, re.MULTILINE))
     pages = {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}
     decisions = {p for p in pages if re.match(r"adr/\d", p)}  # listed by adr/README.md
-    assert listed == (pages | set(reference.PAGES) | {"results-all.md"}) - decisions
+    assert listed == (pages | set(reference.PAGES)) - decisions

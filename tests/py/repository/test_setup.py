@@ -106,7 +106,7 @@ def test_proofs_whose_tool_is_missing_are_skipped_by_its_name(tmp_path: Path) ->
 
 
 #: Stands in for every program: writes what it was called with.
-STUB = '#!/bin/sh\nprintf "%s\\n" "$(basename "$0")" "$@" ${GYROTC_ODD:+"ODD=$GYROTC_ODD"} >>"$CALLS"\n'
+STUB = '#!/bin/sh\nprintf "%s\\n" "$(basename "$0")" "$@" >>"$CALLS"\n'
 HOSTILE = (
     'x"; touch y; "',
     "x'; touch y; '",
@@ -133,7 +133,6 @@ def stubbed(tmp_path: Path) -> Path:
         "tools/setup.sh",
         ".venv/bin/gyrotc",
         ".venv/bin/python",
-        "build/bench/bin/python",
         "bin/cmake",
         "build/fuzz/fuzz_map_f32",
     ):
@@ -171,20 +170,20 @@ def test_values_reach_programs_as_they_are(value: str, stubbed: Path) -> None:
         status, calls = make(stubbed, "demo", *words, **given)
         assert status == 0
         assert calls[:2] == ["setup.sh", "gyrotc"] and calls[-3:] == [f"--axis={value}", "--", value]
-        for target in ("blind", "kills"):
-            status, calls = make(stubbed, target, *words, **given)
-            assert status == 0 and calls[-1] == f"--seed={value}"
+        status, calls = make(stubbed, "blind", *words, **given)
+        assert status == 0 and calls[-1] == f"--seed={value}"
         status, calls = make(stubbed, "real", *words, **given)
-        assert status == 0 and _after(calls, "tools/real.py") == value
+        assert status == 0 and _after(calls, "bench.real.page") == value
 
 
 @pytest.mark.parametrize("value", HOSTILE)
-def test_numbers_for_one_target_reach_it_as_they_are(value: str, stubbed: Path) -> None:
-    """Before: `make odd SETS='1; touch y'` ran what it said."""
-    for given in ({}, {"SETS": value, "MEGABYTES": value}):
-        words = [] if given else [f"SETS={value}", f"MEGABYTES={value}"]
-        assert make(stubbed, "odd", *words, **given)[1][-1] == f"ODD={value}"
-        assert make(stubbed, "bench-import", *words, **given)[1][-1] == value
+def test_what_is_set_for_a_campaign_reaches_it_as_it_is(value: str, stubbed: Path) -> None:
+    names = ("ONLY", "BASE", "SETS", "SEED")
+    for given in ({}, dict.fromkeys(names, value)):
+        words = [] if given else [f"{name}={value}" for name in names]
+        status, calls = make(stubbed, "bench", *words, **given)
+        assert status == 0
+        assert calls[-5:] == [f"--seed={value}", f"--sets={value}", f"--base={value}", "--", value]
 
 
 @pytest.mark.parametrize("value", [*HOSTILE, "-1", "0", "1e3", "20 30"])
@@ -197,8 +196,9 @@ def test_a_fuzzing_time_that_is_none_is_refused(value: str, stubbed: Path) -> No
 
 def test_values_left_out_are_the_defaults(stubbed: Path) -> None:
     assert make(stubbed, "blind", "SEED=")[1][-2:] == ["--docs", "docs"]
-    assert _after(make(stubbed, "real")[1], "tools/real.py") == "../shared/data/real"
-    assert make(stubbed, "bench-import")[1][-1] == "docs" and make(stubbed, "odd")[1][-1] == "ODD=2000"
+    assert _after(make(stubbed, "real")[1], "bench.real.page") == "../shared/data/real"
+    assert make(stubbed, "bench")[1][-2:] == ["--real=../shared/data/real", "--"]
+    assert make(stubbed, "bench", "QUICK=1", "ONLY=sigma")[1][-3:] == ["--quick", "--", "sigma"]
     calls = make(stubbed, "fuzz", "SECONDS=7")[1]
     assert "-max_total_time=7" in calls
     assert "-max_total_time=20" in make(stubbed, "fuzz")[1]

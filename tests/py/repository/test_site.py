@@ -10,7 +10,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-import architecture
 import pytest
 import reference
 import site_pages
@@ -57,16 +56,6 @@ def test_no_link_of_a_page_that_is_made_is_lost(name: str) -> None:
     links = site_pages._LINK.findall(site_pages._BLOCK.sub("", text))
     made = site_pages.prepared(text, ROOT / "docs" / name, name)
     assert len(site_pages._LINK.findall(site_pages._BLOCK.sub("", made))) == len(links)
-
-
-@pytest.mark.slow
-def test_the_picture_shows_every_room_and_no_reader_fetches_its_painter() -> None:
-    graph = architecture.packages()
-    page = ROOT / "docs" / "architecture.md"
-    text = site_pages.prepared(page.read_text("utf-8"), page, "architecture.md")
-    assert re.findall(r">([^<>]+)</text>", text) == list(graph)
-    assert text.count("marker-end") == len(list(architecture.arrows(graph)))
-    assert "mermaid" not in text
 
 
 class _References(HTMLParser):

@@ -1,4 +1,4 @@
-"""A short slice of `make faults`: in both arithmetics, whatever fails, sigma is true and the status says so."""
+"""A slice of `make bench ONLY=faults`: in both arithmetics, whatever fails, sigma is true and the status says so."""
 
 from __future__ import annotations
 

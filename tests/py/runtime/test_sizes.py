@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.sizes import PROGRAMS, size
+from bench.runtime.sizes import PROGRAMS, size
 
 FLASH, RAM = 4096, 256  # bytes: a correction that takes more is not worth it on the smallest parts
 

@@ -187,7 +187,7 @@ def test_the_options_of_several_tables_are_those_of_all(tmp_path: Path) -> None:
 
 
 def test_the_costs_of_options_are_those_of_all_three_cores() -> None:
-    """Flash, RAM and stack of every option, for M0, M4F and M7 at -Os and -O2: `python -m bench docs --only costs`."""
+    """Flash, RAM and stack of every option, for M0, M4F and M7 at -Os and -O2: `make bench ONLY=runtime`."""
     costs = json.loads(COSTS.read_text())
     assert costs["columns"] == [f"M{core} {level}" for core in ("0", "4F", "7") for level in ("-Os", "-O2")]
     assert {"GTC_MAX_SLOPE_BLOCKS", "GTC_MAX_TERMS", "GTC_WITH_BANK", *SWITCHES.values()} == {

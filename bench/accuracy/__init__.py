@@ -1,0 +1,89 @@
+"""Accuracy, size and speed of training on simulated gyros, beside other libraries.
+
+The default method is trained on set 1 of the paper's six environments and judged on set 2; selection of centers, whole
+methods, the Kohonen network and variable projection run beside scikit-learn, fastcan, SysIdentPy and MiniSom, each in a
+process of its own with one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.metadata import version
+from typing import Any
+
+from ..campaigns import Settings
+from ..page import Figure, ResultsTable, figures_table
+from ..records import Record
+from .gyros import accuracy, invariance
+from .speed import speed
+
+_PACKAGES = ("gyrotc", "numpy", "scipy", "scikit-learn", "fastcan", "sysidentpy", "minisom")
+_TEXT = """
+RMS of compensated means over 100 s, divided by the RMS of the noise that was simulated: 1 is the noise floor. Ten gyros
+of each scenario, trained on six runs and judged on six others. CPU seconds are of one process with one thread.
+"""
+_GRID, _ANY = "gyrotc, grid", "gyrotc, any candidates"
+
+
+def measure(settings: Settings) -> Record:
+    """Train and judge every method on every gyro, and time it."""
+    gyros = 1 if settings.quick else 10
+    record: Record = {"versions": {name: version(name) for name in _PACKAGES}, "accuracy": accuracy(gyros)}
+    record["invariance"] = invariance(1 if settings.quick else 5)
+    return record if settings.quick else record | {"speed": speed()}
+
+
+def table(record: Record) -> ResultsTable:
+    """Return accuracy, size and times of the default method with their aims."""
+    return figures_table(_TEXT, [*_accuracy(record), *(_speed(record["speed"]) if "speed" in record else ())])
+
+
+def _accuracy(record: Record) -> Iterator[tuple[str, Figure]]:
+    found = record["accuracy"]
+    smooth, *ripple = found["default"]
+    paper = next(method for method in found["methods"] if method["name"] == "paper: mrbf_paper")
+    changes = [abs(v) for one in found["more_centers"] for v in one["largest"].values()]
+    *ours, _ = record["invariance"]["rows"]
+    same = min(change["same"] for row in ours for change in row["changes"].values())
+    yield "smooth maps, median", Figure(smooth["ratio"]["median"], ".4f", at_most=1.006)
+    yield "smooth maps, worst", Figure(smooth["ratio"]["worst"], ".4f", at_most=1.015)
+    yield "maps with ripple, worst", Figure(max(x["ratio"]["worst"] for x in ripple), ".4f", at_most=1.02)
+    yield "the paper's own training, median", Figure(paper["ratio"]["median"], ".4f")
+    left_out = max(x["median"] for x in found["left_out"])
+    yield "a ramp rate left out of training, median", Figure(left_out, ".4f", at_most=1.03)
+    yield "up to 60 centers asked for, largest change", Figure(max(changes), ".4f", at_most=0.005)
+    predicted = max(abs(x["found_minus_predicted"] or 0.0) for x in found["default"])
+    yield "found less predicted, median", Figure(predicted, ".4f", at_most=0.002)
+    yield "bytes of a smooth map in float32, most", Figure(smooth["bytes"]["worst"], ".0f", at_most=144)
+    yield "bytes with ripple, most", Figure(max(x["bytes"]["worst"] for x in ripple), ".0f", at_most=264)
+    gyros = record["invariance"]["gyros"]
+    yield (
+        f"gyros of {gyros} that keep their centers in rad/s, shuffled, with every sample twice",
+        Figure(same, "d", at_least=gyros),
+    )
+    median_s = smooth["seconds"]["median"]
+    yield "CPU seconds of training, smooth maps, median", Figure(median_s, ".3f", at_most=0.06)
+    ripple_s = max(x["seconds"]["median"] for x in ripple)
+    yield "CPU seconds of training, maps with ripple, median", Figure(ripple_s, ".3f", at_most=0.25)
+
+
+def _speed(speed: dict[str, Any]) -> Iterator[tuple[str, Figure]]:
+    small = next(x for x in speed["selection"] if (x["samples"], x["widths"]) == (1728, 7))
+    large = next(x for x in speed["selection"] if x["samples"] == 172800)
+    grid, anywhere = (_row(large["rows"], name) for name in (_GRID, _ANY))
+    selection_s = _row(small["rows"], _GRID)["seconds"]
+    yield "CPU seconds of orthogonal least squares, paper size", Figure(selection_s, ".4f", at_most=0.01)
+    varpro_s = _row(speed["varpro"], "gyrotc")["seconds"]
+    yield "CPU seconds of variable projection, six Gaussians", Figure(varpro_s, ".4f", at_most=0.007)
+    yield "CPU seconds, 2,000 candidates on a grid, 172,800 samples", Figure(grid["seconds"], ".2f", at_most=0.3)
+    yield "CPU seconds, 2,000 candidates anywhere", Figure(anywhere["seconds"], ".2f", at_most=18.0)
+    yield "peak GiB of these two", Figure(max(grid["peak_gib"], anywhere["peak_gib"]), ".2f", at_most=0.5)
+    kohonen_s = _row(speed["kohonen"], "gyrotc")["seconds"]
+    yield "CPU seconds of the Kohonen network", Figure(kohonen_s, ".3f", at_most=0.1)
+    raw = speed["raw"]
+    yield "CPU seconds, six recordings of 2.88 million rows to verified C", Figure(raw["seconds"], ".1f", at_most=10)
+    yield "peak GiB of it", Figure(raw["peak_gib"], ".2f", at_most=0.5)
+
+
+def _row(rows: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    return next(row for row in rows if row["name"] == name)

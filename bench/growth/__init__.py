@@ -1,0 +1,85 @@
+"""Cost of whole commands, interpreter and imports included, as rows, runs, centers, units and files grow.
+
+Rows: twelve runs of 8 h up to 10^8 rows. Gradient: as many rows of a gyro whose diagnosis adds a state to the table.
+Runs: of 8 h in rows of 10 s. Centers: as many as are asked for. Units: serials of the paper's size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..campaigns import Settings
+from ..page import Figure, ResultsTable, figures_table
+from ..records import Record
+from .commands import growth, slope
+from .fleet import fleet
+from .formats import formats
+from .importing import importing
+
+_SERIALS, _MEGABYTES = 1000, 2000.0
+_TEXT = """
+Whole commands, interpreter and imports included, at the largest size of each series. Slope: of the logarithm of the
+cost over that of the size, between the two largest sizes; 1 is in proportion.
+"""
+_PEAK_MIB = 477.0
+_CPU_S = {("runs", "fit"): 3.0, ("centers", "fit"): 4.0, ("rows", "fit"): 30.0}
+_SLOPE = {"runs": 1.1, "centers": 1.3}
+
+
+def measure(settings: Settings) -> Record:
+    """Run every command at every size, a fleet, an import beside other readers, and a file of each format."""
+    if settings.quick:
+        return {**growth(quick=True), "fleet": fleet(2), "import": importing(2.0)}
+    return {
+        **growth(),
+        "fleet": fleet(_SERIALS),
+        "import": importing(_MEGABYTES),
+        "formats": formats(),
+    }
+
+
+def table(record: Record) -> ResultsTable:
+    """Return CPU seconds and peak memory with their aims."""
+    figures = [figure for row in record["rows"] for figure in _of_command(row)]
+    return figures_table(_TEXT, [*figures, *_of_a_build(record), *_of_a_fleet(record), *_of_an_import(record)])
+
+
+def _of_command(row: dict[str, Any]) -> Iterator[tuple[str, Figure]]:
+    what, command, largest = row["what"], row["command"], row["sizes"][-1]
+    words = f"`{command}` of {largest['size']:,.0f} {'rows with a state' if what == 'gradient' else what}"
+    yield f"{words}, CPU seconds", Figure(largest["seconds"], ".1f", at_most=_CPU_S.get((what, command)))
+    if what in ("rows", "gradient"):
+        yield f"{words}, peak MiB", Figure(largest["peak_mib"], ".0f", at_most=_PEAK_MIB)
+    if what in _SLOPE:
+        yield f"{words}, slope of CPU seconds", Figure(slope(row["sizes"], "seconds"), ".2f", at_most=_SLOPE[what])
+
+
+def _of_a_build(record: Record) -> Iterator[tuple[str, Figure]]:
+    whole = next(one for one in record["stages"] if one["stage"] == "all")
+    yield "first `build` of the paper's recordings, CPU seconds", Figure(whole["first_s"], ".1f", at_most=12.0)
+    yield "a later `build` of another gyro, CPU seconds", Figure(whole["later_s"], ".1f", at_most=6.0)
+
+
+def _of_a_fleet(record: Record) -> Iterator[tuple[str, Figure]]:
+    fleet = record["fleet"]
+    words = f"`fleet` of {fleet['serials']:,} serials"
+    yield f"{words}, elapsed seconds in {fleet['jobs']} processes", Figure(fleet["elapsed_s"], ".0f")
+    yield f"{words}, CPU seconds of a serial", Figure(fleet["cpu_s"] / fleet["serials"], ".2f")
+    yield f"{words}, serials that failed", Figure(fleet["failed"], "d", at_most=0)
+    yield (
+        f"{words}, RMS ÷ estimated noise floor, median",
+        Figure(fleet["rms_over_floor"]["median"], ".4f", at_most=1.01),
+    )
+    yield f"`lot` of {fleet['serials']:,} units, CPU seconds", Figure(fleet["lot_s"], ".1f", at_most=15.0)
+    yield f"`lot` of {fleet['serials']:,} units, peak MiB", Figure(fleet["lot_mib"], ".0f", at_most=381.0)
+
+
+def _of_an_import(record: Record) -> Iterator[tuple[str, Figure]]:
+    found = record["import"]
+    for name, one in found["readers"].items():
+        if "failed" not in one:
+            words = f"a CSV file of {found['rows']:,} rows by {name}"
+            yield f"{words}, elapsed seconds", Figure(one["elapsed_s"], ".0f")
+            aim = 1024.0 if name == "gyrotc import" else None
+            yield f"{words}, peak MiB", Figure(one["peak_mib"], ".0f", at_most=aim)

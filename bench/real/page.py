@@ -1,0 +1,283 @@
+"""Measured recordings with whole runs or spans left out: docs/real.md, pictures into docs/real/ (`make real`).
+
+Every axis of every set is judged: what plain `gyrotc build` emits against a constant, a cubic in T and a cubic with a
+slope in dT/dt, fitted to the same block samples, and against a Gaussian process of scikit-learn.
+
+usage: python -m bench.real.page FOLDER-OF-DATA-SETS DOCS WORK
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from gyrotc.assess.evaluate import evaluate
+from gyrotc.common.metrics import average
+from gyrotc.recordings.load import axes_of, load
+from gyrotc.tables.emit import emit
+from gyrotc.train.data import training_spans
+from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
+from matplotlib.figure import Figure
+
+from ..paper.experiment import AFTER, BEFORE, png
+from ..paper.page import filled
+from .peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others
+
+CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
+SPANS = (CYCLE, ISOTHERMAL, "pan-lsm6dsm-cold")  # one run each: its branches, or parts, are left out
+RUNS = ("atoms3-mpu6886-heating",)  # runs are left out whole
+PLOTTED = (CYCLE, ISOTHERMAL)  # with the last span left out
+PICTURE_S = 20.0  # shorter than the 100 s of the table, so that eleven minutes show something
+ALLOWED = 1.02
+
+
+@dataclass(frozen=True)
+class Case:
+    """A data set with a part of it as the exam."""
+
+    name: str
+    left_out: str
+    data: Path
+    plotted: bool
+
+
+@dataclass(frozen=True)
+class Result:
+    """One axis of one case: the JSON of `evaluate`, what others leave on the exam (deg/h), where traces lie."""
+
+    case: Case
+    axis: str
+    method: str
+    said: tuple[str, ...]
+    evaluation: dict[str, Any]
+    others: dict[str, float]
+    folder: Path
+
+    @property
+    def rms(self) -> float:
+        return float(self.evaluation["exam"]["after"]["rms_dph"])
+
+    @property
+    def best_trivial(self) -> float:
+        return min(self.others[name] for name in TRIVIAL)
+
+
+def cases(source: Path, work: Path) -> Iterator[Case]:
+    """Every set that is there with every run, or span of its only run, left out in turn."""
+    for name in (*SPANS, *RUNS):
+        if not (source / name).is_dir():
+            print(f"{name} is absent in {source}: skipped")
+        elif name in SPANS:
+            yield from _spans_out(source / name, work)
+        else:
+            yield from _runs_out(source / name, work)
+
+
+def _spans_out(source: Path, work: Path) -> Iterator[Case]:
+    data = next(source.glob("*.csv"))
+    plain = work / f"{source.name}-plain"
+    _described(plain, source.name, [data], ['power_on_s = "unknown"'])
+    runs = load(plain, axis=axes_of(plain)[0]).runs
+    front = front_end(runs, BLOCK_S)
+    spans = training_spans(runs, samples_of(front.blocks(runs[0]), front.block_s, 0))
+    for k, span in enumerate(spans):
+        folder = work / f"{source.name}-data-{k}"
+        before, after = f"to_s = {span.from_s!r}", f"from_s = {span.to_s!r}"
+        held = f'from_s = {span.from_s!r}\nto_s = {span.to_s!r}\nrole = "exam"'
+        parts = [*([before] if k else []), held, *([after] if k + 1 < len(spans) else [])]
+        _described(folder, source.name, [data] * len(parts), parts)
+        label = f"{span.kind} {span.from_s:.0f} ... {span.to_s:.0f} s"
+        yield Case(source.name, label, folder, source.name in PLOTTED and k + 1 == len(spans))
+
+
+def _runs_out(source: Path, work: Path) -> Iterator[Case]:
+    files = sorted(source.glob("*.csv"))
+    for k, held in enumerate(files):
+        folder = work / f"{source.name}-data-{k}"
+        _described(folder, source.name, files, [f'role = "{"exam" if f == held else "train"}"' for f in files])
+        yield Case(source.name, held.stem, folder, False)
+
+
+def with_exam(source: Path, folder: Path, cut_s: float) -> None:
+    """The recording of a set as two runs: before the cut to train on, after it for the exam."""
+    data = next(source.glob("*.csv"))
+    _described(folder, source.name, [data, data], [f"to_s = {cut_s!r}", f'from_s = {cut_s!r}\nrole = "exam"'])
+
+
+def _described(folder: Path, serial: str, files: Sequence[Path], runs: Sequence[str]) -> None:
+    """A data set of copies of files with a run of each description."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for file in files:
+        (folder / file.name).write_bytes(file.read_bytes())
+    text = [f'schema = 1\nserial = "{serial}"\n']
+    for file, run in zip(files, runs, strict=True):
+        power_on = "" if "power_on_s" in run else 'power_on_s = "unknown"\n'
+        text.append(f'[[run]]\nfile = "{file.name}"\n{power_on}{run}\n')
+    (folder / "dataset.toml").write_text("".join(text))
+
+
+def judged(case: Case, work: Path) -> Iterator[Result]:
+    """Every axis of a case: fitted and emitted as `gyrotc build` does it, judged through the compiled code."""
+    for axis in axes_of(case.data):
+        dataset = load(case.data, axis=axis)
+        out = work / "out" / case.data.name / axis
+        fitted = fit_dataset(dataset, FitOptions(average_s=AVERAGE_S))
+        out.mkdir(parents=True, exist_ok=True)
+        fitted.model.save(out / "model.json")
+        emit(fitted.model, out, numerics=("f32",))
+        trace = out / "trace" if case.plotted else None
+        result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()
+        said = tuple(finding["id"] for finding in result["findings"])
+        yield Result(case, axis, fitted.model.method, said, result, of_others(dataset, result["exam"]["samples"]), out)
+
+
+def table(results: Sequence[Result]) -> str:
+    """A row for each axis; RMS on what was left out, deg/h, means over 100 s."""
+    head = (
+        "set",
+        "left out",
+        "axis",
+        "emitted",
+        "ours",
+        *TRIVIAL,
+        GPR,
+        LSTM,
+        "ours ÷ best trivial",
+        "noise floor",
+        "findings",
+    )
+    lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
+    for r in results:
+        others = [f"{r.others[n]:.1f}" if n in r.others else "-" for n in (*TRIVIAL, GPR, LSTM)]
+        cells = [
+            *(r.case.name, r.case.left_out, r.axis, r.method, f"{r.rms:.1f}"),
+            *others,
+            f"{r.rms / r.best_trivial:.2f}",
+            f"{r.evaluation['noise_floor_dph']:.1f}",
+            ", ".join(f"`{name}`" for name in r.said),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def summary(results: Sequence[Result]) -> str:
+    """How many axes keep the promise, and which do not."""
+    good = [r for r in results if r.rms <= ALLOWED * r.best_trivial]
+    constant = [r for r in results if r not in good and r.method == "constant"]
+    harmed = [r for r in results if r not in good and r not in constant]
+    worse = [r for r in results if r.rms > ALLOWED * r.others["constant"]]
+    return (
+        f"Each axis of each set is judged with each part left out: {len(results)} in all. On {len(good)} ours is at "
+        f"most {ALLOWED} × the best of constant, cubic, and cubic with dT/dt; on {len(constant)} more a constant is "
+        f"emitted, and said. Neither holds on {len(harmed)}{_list(harmed, 'best trivial')}. Worse than a constant by "
+        f"more than 2 %: {len(worse)}{_list(worse, 'constant')}.\n"
+        + "\n".join(_of_peer(results, peer) for peer in (GPR, LSTM))
+    )
+
+
+def _of_peer(results: Sequence[Result], peer: str) -> str:
+    """How a peer does beside the best trivial correction and beside ours."""
+    known = [r for r in results if peer in r.others]
+    if not known:
+        return f"{peer}: not run, PyTorch is absent (`pip install -e 'gen[lstm]'`)."
+    worse = sum(r.others[peer] > ALLOWED * r.best_trivial for r in known)
+    than_ours = sum(r.others[peer] > r.rms for r in known)
+    return (
+        f"{peer} is worse than the best trivial correction by more than 2 % on {worse} of {len(known)}, at worst "
+        f"{max(r.others[peer] / r.best_trivial for r in known):.1f} times; worse than ours on {than_ours}."
+    )
+
+
+def _list(results: Sequence[Result], beside: str) -> str:
+    """Names with the ratio to another correction, in brackets."""
+    if not results:
+        return ""
+    under = [r.best_trivial if beside == "best trivial" else r.others[beside] for r in results]
+    named = (f"{_named(r)}: {r.rms / u:.2f}" for r, u in zip(results, under, strict=True))
+    return f" ({'; '.join(named)}; × {beside})"
+
+
+def _named(r: Result) -> str:
+    return f"{r.case.name} {r.axis} without {r.case.left_out} ({r.method})"
+
+
+def picture(results: Sequence[Result]) -> Figure:
+    """Before (without its mean in training) and after compensation over time, a panel for each axis."""
+    figure = Figure(figsize=(7.2, 1.9 * len(results)), layout="constrained")
+    panels = figure.subplots(len(results), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, result in zip(panels, results, strict=True):
+        mean = result.evaluation["train"]["before"]["mean_dph"]
+        for trace, run in zip(_traces(result), result.evaluation["runs"], strict=True):
+            minutes = trace[0] / 60.0
+            panel.plot(minutes, trace[1] - mean, color=BEFORE, lw=0.9, label="before")
+            panel.plot(minutes, trace[2], color=AFTER, lw=0.9, label="after")
+            if run["role"] == "exam":
+                panel.axvspan(run["from_s"] / 60.0, minutes[-1], color="#eeeeee", zorder=0)
+        panel.set_ylabel(f"{result.axis}, deg/h")
+    handles, labels = panels[0].get_legend_handles_labels()
+    panels[0].legend(handles[:2], labels[:2], ncols=2, loc="best")
+    panels[-1].set_xlabel("time, min (grey: left out of training)")
+    return figure
+
+
+def _traces(result: Result) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Times, rates before and after of every run in order of time, short means."""
+    parts = []
+    for path in (result.folder / "trace").glob("*.csv"):
+        rows = {name: column.to_numpy() for name, column in _columns(path)}
+        a = average(
+            rows["time_s"],
+            rows["temperature_c"],
+            rows["rate_dph"],
+            rows["compensated_dph"],
+            scored=np.ones(len(rows["time_s"]), dtype=bool),
+            average_s=PICTURE_S,
+        )
+        parts.append((a.time_s, a.before_dph, a.after_dph))
+    return sorted(parts, key=lambda part: float(part[0][0]))
+
+
+def _columns(path: Path) -> list[tuple[str, pa.ChunkedArray]]:
+    trace = pacsv.read_csv(path)
+    return list(zip(trace.column_names, trace.columns, strict=True))
+
+
+def main(source: Path, docs: Path, work: Path) -> None:
+    """Writes the tables and the pictures of every set that is there."""
+    results: list[Result] = []
+    (docs / "real").mkdir(exist_ok=True)
+    for case in cases(source, work):
+        of_case = list(judged(case, work))
+        for r in of_case:
+            print(f"{_named(r)}: {r.rms:.4g}, best trivial {r.best_trivial:.4g}", flush=True)
+        if case.plotted:
+            (docs / "real" / f"{case.name}.png").write_bytes(png(picture(of_case), dpi=125))
+        results += of_case
+    if results:
+        (work / "real.json").write_text(json.dumps([_entry(r) for r in results], indent=1) + "\n", "utf-8")
+        page = docs / "real.md"
+        parts = {"results": table(results), "summary": summary(results)}
+        page.write_text(filled(page.read_text("utf-8"), parts), "utf-8")
+
+
+def _entry(r: Result) -> dict[str, Any]:
+    return {
+        "set": r.case.name,
+        "left_out": r.case.left_out,
+        "axis": r.axis,
+        "method": r.method,
+        "rms_dph": r.rms,
+        "others_rms_dph": r.others,
+        "findings": list(r.said),
+    }
+
+
+if __name__ == "__main__":
+    main(*(Path(argument) for argument in sys.argv[1:4]))

@@ -1,0 +1,84 @@
+"""Instructions and bytes of the C runtime: the map in emulators, whole programs as the linker makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..campaigns import Settings
+from ..page import Figure, ResultsTable, figures_table
+from ..records import Record
+from . import options
+from .instructions import CORES, instructions
+from .sizes import sizes
+
+_TEXT = """
+{compiler}. Instructions are counted in QEMU for maps of 6 and 64 Gaussians with individual widths, as means over random
+inputs, each core with the level of the compiler that serves it best. Flash is everything that is linked with a table of
+{centers} Gaussians in float32 that holds uncertainties, coverage and known answers.
+"""
+_PROGRAMS = "Cortex-M4F -Os"
+_AIMS = {"init, sample, bias": 4096, "every function, default options": 12288}
+_M3, _M4, _M7 = "cortex-m3", "cortex-m4f", "cortex-m7"
+
+
+def measure(settings: Settings) -> Record:
+    """Count, link, and renew what `emit` prints about the cost of each option."""
+    record: Record = instructions(quick=settings.quick) | {"sizes": sizes()}
+    if not settings.quick:
+        options.write()
+    return record
+
+
+def table(record: Record) -> ResultsTable:
+    """Return instructions, bytes and errors with their aims."""
+    text = _TEXT.format(compiler=record["compiler"], centers=record["sizes"]["centers"])
+    of_map = _of_map(record) if {cost["core"] for cost in record["costs"]} == set(CORES) else ()
+    return figures_table(text, [*of_map, *_of_programs(record)])
+
+
+def _of_map(record: Record) -> Iterator[tuple[str, Figure]]:
+    for words, numeric, centers, cores, aim in (
+        ("fixed point, 6 Gaussians, Cortex-M3, M4F and M7", "q31", 6, (_M3, _M4, _M7), 180),
+        ("fixed point, 64 Gaussians, Cortex-M3", "q31", 64, (_M3,), 1420),
+        ("fixed point, 64 Gaussians, Cortex-M4F and M7", "q31", 64, (_M4, _M7), 1500),
+        ("fixed point, 6 Gaussians, Cortex-M0", "q31", 6, ("cortex-m0",), 830),
+        ("fixed point, 64 Gaussians, Cortex-M0", "q31", 64, ("cortex-m0",), 8300),
+        ("float32, 6 Gaussians, Cortex-M4F and M7", "f32", 6, (_M4, _M7), None),
+        ("float32, 64 Gaussians, Cortex-M4F and M7", "f32", 64, (_M4, _M7), 2000),
+    ):
+        count = _largest(record, numeric, centers, cores, lambda cost: cost["map"]["mean"])
+        yield f"instructions of one map: {words}", Figure(count, ".0f", at_most=aim)
+    for words, key, aim in (
+        ("bytes of the map's function", "map_bytes", 340),
+        ("bytes of its lookup table", "lookup_bytes", 256),
+        ("bytes of stack", "stack_bytes", 56),
+        ("bytes of writable static data", "ram_bytes", 0),
+    ):
+        count = _largest(record, "q31", 6, (_M3, _M4, _M7), lambda cost, key=key: cost[key])
+        yield f"fixed point, {words}", Figure(count, ".0f", at_most=aim)
+    for words, key, against, aim in (
+        ("proved error of the Gaussians ÷ Σ\\|w\\|", "gaussian_bound_dph", "sum_abs_weights_dph", 3.5e-8),
+        ("largest error found ÷ proved bound", "worst_dph", "bound_dph", 1.0),
+        ("error of the arithmetic ÷ that of naive float32", "arithmetic_dph", "naive_float32_dph", 1.0),
+    ):
+        ratio = max(e[key] / e[against] for e in record["errors"] if e["numeric"] == "q31")
+        yield f"fixed point, {words}", Figure(ratio, ".3g", at_most=aim)
+
+
+def _largest(record: Record, numeric: str, centers: int, cores: tuple[str, ...], figure: Any) -> float:
+    """Return the largest, over cores, of the smallest figure over the compiler's levels, without a coverage map."""
+    rows = [
+        cost for cost in record["costs"]
+        if not cost["coverage"] and (cost["numeric"], cost["centers"]) == (numeric, centers)
+    ]  # fmt: skip
+    return float(max(min(figure(cost) for cost in rows if cost["core"] == core) for core in cores))
+
+
+def _of_programs(record: Record) -> Iterator[tuple[str, Figure]]:
+    for row in record["sizes"]["rows"]:
+        flash, ram = row[_PROGRAMS]
+        words = f"{_PROGRAMS.replace(' -', ' `-')}`: {row['name']}"
+        yield f"bytes of flash, {words}", Figure(flash, "d", at_most=_AIMS.get(row["name"]))
+        if row["name"] == "init, sample, bias":
+            yield f"bytes of RAM, {words}", Figure(ram, "d", at_most=256)

@@ -1,1 +1,0 @@
-"""Faults that are planted in the generator, and who sees them."""

@@ -1,1 +1,0 @@
-"""Comparison of all results of the generator with those of a reference commit: `make oracle`."""
