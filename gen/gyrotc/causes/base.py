@@ -305,7 +305,6 @@ class Cause:
         needs: What recordings must offer.
         search: How diagnosis looks for it; None: it is simulated only.
         table: How it stands in a table; None: no table holds it.
-        finer_map: A finer map holds it.
         cavity: Simulation: temperature that the bias acts on instead of `scene.cavity_c`, C.
         bias: Simulation: what it adds to the bias, deg/h; may draw from the generator (once for each run).
         record: Simulation: what the sensor shows instead of `scene.sensed_c`, C.
@@ -332,7 +331,6 @@ class Cause:
     needs: Needs = Needs()
     search: SearchRule | None = None
     table: Tabled | None = None
-    finer_map: bool = False
     cavity: Callable[[Scene, Values], FloatArray] | None = None
     bias: Callable[[Scene, Values, np.random.Generator], FloatArray] | None = None
     record: Callable[[Scene, Values], FloatArray] | None = None
@@ -353,11 +351,6 @@ class Cause:
         """Unit of its size: of its amplitude, or of the parameter that changes the map's input; empty: it has none."""
         shown = self.parameters if self.kind == "input" else [p for p in self.parameters if p.linear]
         return next((parameter.unit for parameter in shown), "")
-
-    @property
-    def shipped(self) -> bool:
-        """Whether an extended model can hold it: as a term, or by a finer map."""
-        return self.table is not None or self.finer_map
 
 
 RATES = "ramps at two more rates with holds of an hour after each; a second thermometer at the cavity"

@@ -1,4 +1,4 @@
-"""Static structure finer than the map: looks like memory, is none; mended by more centers, not by a term.
+"""Static structure finer than any map of `train` resolves. It looks like memory, and no term of a table holds it.
 
 bias += A tanh((T − T0)/w)
 """
@@ -38,12 +38,12 @@ CAUSE = Cause(
         name="The static map is too coarse",
         short="map",
         signature="residual repeats over T, heating and cooling alike, finer than the map",
-        remedy="a finer map: narrow Gaussians over T beside the smooth ones",
+        remedy="no map follows it, and more centers do not help: count it in the error budget, or find its source in "
+        "the gyro, such as a relay, a resonance or the glass transition of an adhesive",
         experiment="one slow ramp over the full range in both directions",
         telling=Telling.STATIC,
     ),
     search=SearchRule(price=1, grid=anywhere, needed_d=9.0, planned=False),
-    finer_map=True,
     bias=_bias,
     features=_features,
 )

@@ -108,7 +108,7 @@ def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
     if extended is None:
         yield _not_shipped(diagnosis)
         return
-    added = ", ".join(extended.terms) or "a finer map"
+    added = ", ".join(extended.terms)
     without = f" (without: {diagnosis.baseline.centers})" if diagnosis.baseline else ""
     yield f"added: {added}; {extended.centers} centers{without}"
     yield from _gain_lines(extended.gain)
@@ -116,9 +116,11 @@ def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
 
 def _not_shipped(result: Diagnosed) -> str:
     """Why no extension is, chosen from what unseen runs say of the causes."""
+    if not result.physical:
+        return "no extension is shipped: no cause was named"
     gains = [cause.gain.shown for cause in result.physical if cause.gain is not None]
     if not gains:
-        return "no extension is shipped: no cause was named"
+        return "no extension is shipped: nothing corrects what is named"
     if not any(cause.sure for cause in result.physical):
         return "no extension is shipped: no cause is likelier than all others together"
     if "gain" in gains:

@@ -181,14 +181,12 @@ def _extended_model(
         return None, None
     runs, played = refitting.runs, refitting.train
     front = replace(refitting.front, stuck_s=stuck_after_s(max(run.longest_same_s for run in played)))
-    bumps = extension.bumps
-    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added, bumps)
+    plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
     stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
     entries = _entries(extension.shipped, stand_ins)
     left_out = extension.after if extension.measured_on == "left out" else None
     spans = training_spans(runs, extension.samples)
     training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
-    training = _of_whole_map(training, plain)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
     low, high = added_range(played, extension.shipped)
@@ -228,13 +226,6 @@ def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> lis
             entry["stand_in"] = stand_ins[effect.channel].network
         entries.append(entry)
     return entries
-
-
-def _of_whole_map(training: Training, plain: Model) -> Training:
-    """What training says of its map, with the bumps that have joined it."""
-    more = plain.n_centers - training.centers
-    sizes = {"centers": plain.n_centers, "table_bytes": training.table_bytes + 20 * more}
-    return training.model_copy(update={**sizes, "sum_abs_weights_dph": plain.sum_abs_weights_dph})
 
 
 def _with_terms(
@@ -279,7 +270,7 @@ def series_of(found: Diagnosis) -> DiagnosisSeries | None:
         residual = analysis.ensemble.residual
         named = _beyond_the_map(analysis.static, causes) if causes else None
         low, high = _band(records, analysis.ensemble.simulated)
-    scored = zip(extension.before, extension.after, strict=True) if extension.steps else ()
+    scored = zip(extension.before, extension.after, strict=True) if any(extension.steps) else ()
     return DiagnosisSeries(
         gyrotc_version=__version__,
         block_s=records.block_s,

@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..causes import CATALOGUE
 from ..common.arrays import BoolArray, Progress
 from ..common.metrics import Averages
 from ..model import Model
@@ -29,7 +30,6 @@ from ..train.channels import MOST_TERMS, StandIn, stand_in_of
 from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
-from ..train.mrbf import Bumps
 from ..train.result import Fit
 from ..train.selection import CandidateScores, compare_candidates
 from .attribution import choose
@@ -75,6 +75,11 @@ def stand_ins_of(
         if stand_in is not None:
             found[effect.channel] = stand_in
     return found
+
+
+def is_corrected(cause: Refined) -> bool:
+    """Test whether the effect of a cause can be taken off beside the map: not where it is structure of the map."""
+    return CATALOGUE[cause.candidate.id].kind != "static"
 
 
 Chain = list[list[Averages]]
@@ -152,11 +157,12 @@ class Refitting:
         whole = [known(run, all_of_them) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
 
-    def left_out(self, held: list[BoolArray], count: int) -> Chain:
-        """Residuals of held-out training samples; causes are chosen anew on the others."""
+    def left_out(self, held: list[BoolArray], causes: Sequence[Refined]) -> Chain:
+        """Residuals of held-out training samples; as many causes are chosen anew on the others."""
         kept = [~m for m in held]
-        effects = completed(self.train, [Effect.of(c) for c in self._chosen(held, count)], kept)
-        stages = (effects[:k] for k in range(count + 1))
+        chosen = filter(is_corrected, self._chosen(held, len(causes)))
+        effects = completed(self.train, [Effect.of(c) for c in chosen], kept)
+        stages = (effects[:k] for k in range(sum(map(is_corrected, causes)) + 1))
         scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
         return [self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)]
 
@@ -230,7 +236,7 @@ class Shipping:
 
 def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
     """Adds the effects that a table can hold one after the other; those of a single cycle all at once."""
-    able = [e for e in effects if e.term.shipped][:MOST_TERMS]
+    able = [e for e in effects if e.term.table is not None][:MOST_TERMS]
     best = _comparison(refitting, [])
     candidate = best.chosen()
     shipped: list[Effect] = []
@@ -267,7 +273,7 @@ class Extension:
     """What the extension gains.
 
     Attributes:
-        steps: Gain of every cause, taken one after the other.
+        steps: Gain of every cause, taken one after the other; None of one that cannot be corrected.
         total: Gain of all shipped causes together: on an exam that of the emitted tables; None if none is shipped.
         rate_left_out: Gain with one ramp rate left out of everything, and its environment.
         forward: Gain on runs later than everything that was learnt from; None without dates.
@@ -283,7 +289,7 @@ class Extension:
         before, after: Residuals of the scored runs without and with all causes.
     """
 
-    steps: tuple[Gain, ...]
+    steps: tuple[Gain | None, ...]
     total: Gain | None
     rate_left_out: tuple[str, Gain] | None
     forward: Gain | None
@@ -303,13 +309,7 @@ class Extension:
     @property
     def centers(self) -> int:
         """Number of centers of the extended map; 0 if none is shipped."""
-        own = len(self.bumps.centers_c) if self.bumps is not None else 0
-        return own + (self.extended.n_centers if self.extended is not None else 0)
-
-    @property
-    def bumps(self) -> Bumps | None:
-        """Those of a finer map, where one is shipped."""
-        return next((e.bumps for e in self.shipped if e.bumps is not None), None)
+        return self.extended.n_centers if self.extended is not None else 0
 
 
 def extend(
@@ -318,20 +318,21 @@ def extend(
     """Refits the model with the causes that are sure, and measures the gain of all over a noise floor, deg/h."""
     say("measuring the gain")
     single_cycle, average_s = refitting.single_cycle, refitting.average_s
-    effects = completed(refitting.train, [Effect.of(c) for c in causes])
+    correctable = [is_corrected(cause) for cause in causes]
+    effects = completed(refitting.train, [Effect.of(c) for c in itertools.compress(causes, correctable)])
     stages = [effects[:k] for k in range(len(effects) + 1)]
-    chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, len(effects))
+    chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, causes)
     if single_cycle and effects:  # found together: one alone is another model
         chain = [chain[0], *(chain[-1] for _ in effects)]
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
-    steps = [gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs]
-    crossed = shipping(refitting, list(itertools.compress(effects, sure)))
+    steps = iter([gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs])
+    crossed = shipping(refitting, list(itertools.compress(effects, itertools.compress(sure, correctable))))
     shipped, total = _shipped(refitting, effects, crossed.shipped, chain, floor)
     return Extension(
-        steps=tuple(steps),
+        steps=tuple(next(steps) if able else None for able in correctable),
         total=total,
-        rate_left_out=_rate_left_out(refitting, len(effects), floor) if effects else None,
-        forward=_forward(refitting, chain, len(effects), floor) if effects else None,
+        rate_left_out=_rate_left_out(refitting, causes, floor) if effects else None,
+        forward=_forward(refitting, chain, causes, floor) if effects else None,
         extended=refitting.fit(shipped) if shipped else None,
         shipped=tuple(shipped),
         crossed=crossed,
@@ -367,13 +368,13 @@ def _shipped(
     return (worthy, total) if total.positive else ([], None)
 
 
-def _crossed(refitting: Refitting, count: int) -> Chain:
+def _crossed(refitting: Refitting, causes: Sequence[Refined]) -> Chain:
     """Every training run (or branch of few runs) left out in turn, in a few groups."""
     folds = folds_of(refitting)
     if not folds:
-        return [_score_self(refitting)] * (count + 1)
-    chains = [refitting.left_out(held, count) for held in folds]
-    return [[a for chain in chains for a in chain[k]] for k in range(count + 1)]
+        return [_score_self(refitting)] * (sum(map(is_corrected, causes)) + 1)
+    chains = [refitting.left_out(held, causes) for held in folds]
+    return [[run for stage in stages for run in stage] for stages in zip(*chains, strict=True)]
 
 
 def _score_self(refitting: Refitting) -> list[Averages]:
@@ -381,7 +382,7 @@ def _score_self(refitting: Refitting) -> list[Averages]:
     return scored_means(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
 
 
-def _rate_left_out(refitting: Refitting, count: int, floor: float) -> tuple[str, Gain] | None:
+def _rate_left_out(refitting: Refitting, causes: Sequence[Refined], floor: float) -> tuple[str, Gain] | None:
     """All runs of the fastest environment left out of everything, where another moving one remains."""
     speeds: dict[str, float] = {}
     for run in refitting.train:
@@ -392,10 +393,10 @@ def _rate_left_out(refitting: Refitting, count: int, floor: float) -> tuple[str,
         return None
     fastest = max(moving, key=lambda e: speeds[e])
     held = [np.full(len(r.data.bias_dph), r.environment == fastest, dtype=bool) for r in refitting.train]
-    return fastest, _gain_without(refitting, held, count, floor)
+    return fastest, _gain_without(refitting, held, causes, floor)
 
 
-def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Gain | None:
+def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floor: float) -> Gain | None:
     """Later runs from earlier ones: the exam where it came last, else the last third of the training runs."""
     days = [run.day for run in refitting.train]
     later = [run.day for run in refitting.exam]
@@ -408,10 +409,10 @@ def _forward(refitting: Refitting, chain: Chain, count: int, floor: float) -> Ga
     held = [np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(refitting.train, known, strict=True)]
     if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
         return None
-    return _gain_without(refitting, held, count, floor)
+    return _gain_without(refitting, held, causes, floor)
 
 
-def _gain_without(refitting: Refitting, held: list[BoolArray], count: int, floor: float) -> Gain:
+def _gain_without(refitting: Refitting, held: list[BoolArray], causes: Sequence[Refined], floor: float) -> Gain:
     """Gain of all causes on held-out training samples."""
-    chain = refitting.left_out(held, count)
+    chain = refitting.left_out(held, causes)
     return gain_of(chain[0], chain[-1], floor, refitting.average_s)

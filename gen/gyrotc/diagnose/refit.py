@@ -1,8 +1,8 @@
 """The training runs as the target sees them, refitted with causes, with or without some of the samples.
 
-What a cause may have besides is looked for beside it and any smooth map (`train.mrbf`), each where BIC asks for it:
-overtones of a wave, the second and then the third, and a strength of loops that goes with temperature. Nothing of that
-has a part in naming the cause.
+Optional parts of a cause are tested with any smooth map projected out (`train.detrending`) and are kept if BIC supports
+them: the second and third harmonic of a ripple, and a hysteresis whose strength depends on temperature. They have no
+part in naming the cause.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from ..recordings.records import Dataset, Run
 from ..results.training import LeftOutRows
 from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
 from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned, joined, scaling_of
+from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_basis
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
-from ..train.mrbf import MEAN_S, BesideSmooth, Bumps, beside_smooth, find_bumps, smooth_basis
 from ..train.result import Fit, longest_same_s, predict
 from ..train.simple import without_rate
 from .candidates import searched
@@ -47,18 +47,18 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
     Raises:
         TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
     """
-    beside = None if term.overtone is None else beside_smooth(data, scaling_of(data))
-    if beside is None or term.overtone is None or term.amplitudes is None:
+    bins = None if term.overtone is None else detrend(data, scaling_of(data))
+    if bins is None or term.overtone is None or term.amplitudes is None:
         return ()
     able = [dict(term.overtone(values, number)) for number in range(2, MOST_OVERTONES + 2)]
-    columns = [_columns(beside, term, values)]
+    columns = [_columns(bins, term, values)]
     taken: list[dict[str, float]] = []
     for own in able:
-        more = _columns(beside, term, own)
-        if _energy(beside, [*columns, more]) - _energy(beside, columns) > beside.price(more.shape[1]):
+        more = _columns(bins, term, own)
+        if _energy(bins, [*columns, more]) - _energy(bins, columns) > bins.bic_penalty(more.shape[1]):
             columns.append(more)
             taken.append(own)
-    weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), beside.y, rcond=1e-9)[0], dtype=np.float64)
+    weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), bins.residual, rcond=1e-9)[0], dtype=np.float64)
     found, at = [], columns[0].shape[1]
     for own, column in zip(taken, columns[1:], strict=True):
         found.append({**own, **term.amplitudes(weights[at : at + column.shape[1]])})
@@ -66,15 +66,16 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
     return tuple(found)
 
 
-def _columns(beside: BesideSmooth, term: Cause, values: Values) -> FloatArray:
+def _columns(bins: DetrendedBins, term: Cause, values: Values) -> FloatArray:
     assert term.features is not None
-    history = History(time_s=np.arange(beside.t.size, dtype=np.float64), temperature_c=beside.t)
-    return beside.rest(term.features(history, values) * beside.root[:, None])
+    time_s = np.arange(bins.temperature_c.size, dtype=np.float64)
+    history = History(time_s=time_s, temperature_c=bins.temperature_c)
+    return bins.detrended(term.features(history, values) * bins.sqrt_weight[:, None])
 
 
-def _energy(beside: BesideSmooth, columns: list[FloatArray]) -> float:
+def _energy(bins: DetrendedBins, columns: list[FloatArray]) -> float:
     q = np.linalg.qr(np.column_stack(columns))[0]
-    return float(((q.T @ beside.y) ** 2).sum())
+    return float(((q.T @ bins.residual) ** 2).sum())
 
 
 _LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
@@ -83,12 +84,11 @@ _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """A cause with its fitted parameters, as the replay applies it; with a finer map's bumps, a wave's overtones."""
+    """A cause with its fitted parameters, as the replay applies it; of a ripple with its overtones."""
 
     id: str
     values: dict[str, float]
     channel: str | None = None
-    bumps: Bumps | None = None
     overtones: tuple[Effect, ...] = ()
 
     @staticmethod
@@ -216,9 +216,6 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
             temperature, slope = term.mended(data.time_s, temperature, slope, effect.values)
         elif term.kind == "add":
             added = added + _simulated(run, effect)
-    for effect in effects:  # of the temperature that the map sees
-        if effect.bumps is not None:
-            added = added + effect.bumps(temperature)
     return replace(data, temperature_c=temperature, slope_c_per_min=slope, bias_dph=data.bias_dph - added)
 
 
@@ -248,28 +245,24 @@ def _chosen(
 def completed(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
 ) -> list[Effect]:
-    """The effects, with a strength over T, the overtones of a wave and the bumps of a finer map as samples show them.
+    """The effects, with the strength over T of loops and the overtones of a ripple that the samples show.
 
-    Each is found beside the other effects, bumps last, on the samples `kept` (default: all).
+    Each is found beside the other effects, on the samples `kept` (default: all).
     """
     out = list(effects)
     for k, effect in enumerate(out):
         if effect.term.over_temperature is not None and len(runs) > 1:
             out[k] = _over_temperature(runs, effect, [e for e in out if e is not effect], kept)
-    waves = [k for k, e in enumerate(out) if e.term.overtone is not None]
-    finer = [k for k, e in enumerate(out) if e.term.finer_map]
-    for k in [*waves, *finer]:
-        effect = out[k]
+    for k, effect in enumerate(out):
+        if effect.term.overtone is None:
+            continue
         data = cleaned(_chosen(runs, [e for e in out if e is not effect], kept))
         try:
-            if effect.term.finer_map:
-                out[k] = replace(effect, bumps=find_bumps(data, scaling_of(data)))
-            else:
-                found = overtones_of(data, effect.term, effect.values)
-                room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
-                out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
+            found = overtones_of(data, effect.term, effect.values)
         except TrainingFailed:
             continue
+        room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
+        out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
     return out
 
 
@@ -289,7 +282,8 @@ class _Loops:
     ) -> None:
         data = _chosen(runs, others, kept)
         self._played = [(run, run.in_force[m]) for run, m in zip(runs, _masks(runs, others, kept), strict=True)]
-        number = data.run * (1 + int(data.time_s.max() / MEAN_S)) + (data.time_s / MEAN_S).astype(np.int64)
+        mean = (data.time_s / INDEPENDENT_S).astype(np.int64)
+        number = data.run * (1 + int(mean.max())) + mean
         _, self._index = np.unique(number, return_inverse=True)
         self._of_sample = data.weight
         weight = np.bincount(self._index, data.weight)

@@ -34,6 +34,7 @@ from .candidates import diagnosed, searched, shape_parameter
 from .detection import CauseLimit
 from .discrepancy import NoiseFinding
 from .extension import Extension
+from .gain import Gain
 from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .refine import Interval, Refined
@@ -339,10 +340,14 @@ def _single_cycle(cycle: Cycle, extension: Extension) -> CycleResult:
         map_rms_dph=cycle.rms_dph,
         turns=cycle.turns,
         not_testable=cycle.not_testable or None,
-        gain=extension.steps[-1].result() if extension.steps else None,
+        gain=_result(extension.steps[-1]) if extension.steps else None,
         static=tuple(static),
         tried=tuple(tried),
     )
+
+
+def _result(gain: Gain | None) -> GainOnUnseen | None:
+    return None if gain is None else gain.result()
 
 
 def _statistics(analysis: Analysis) -> Iterator[Statistic]:
@@ -368,7 +373,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         parameters={n: _estimate(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
         equivalent=rivals,
         separate_by=separate_by(id, rivals[0]) if rivals else None,
-        gain=extension.steps[k].result(),
+        gain=_result(extension.steps[k]),
         signature=shows_as(id, attribution.wide),
         remedy=words.remedy,
         separable_from_d=analysis.separations[k],

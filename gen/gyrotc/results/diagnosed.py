@@ -99,7 +99,7 @@ class NamedCause(Part):
         default=None,
         description="of this cause, of all others in its place, of something `unnamed` and of `nothing`, by id",
     )
-    gain: GainOnUnseen | None = Field(description="null for noise")
+    gain: GainOnUnseen | None = Field(description="null for noise and for structure of the map, which nothing corrects")
     signature: str = Field(description="how it shows")
     remedy: str = Field(description="what helps against it")
     repair: str | None = Field(default=None, description="line of `dataset.toml` that takes it out of the recordings")
@@ -129,7 +129,7 @@ class ExtendedModel(Part):
 
     exam_rms_dph: float = Field(description="RMS on runs it was not fitted to, deg/h")
     centers: Count = Field(description="of its networks")
-    terms: tuple[str, ...] = Field(description="ids of causes in its table; empty: a finer map")
+    terms: tuple[str, ...] = Field(description="ids of causes in its table")
     model: str | None = Field(description="its file; null where none was written")
     gain: GainOnUnseen = Field(description="over the static map")
     rate_left_out: WithoutRate | None = Field(description="null where there is one environment")

@@ -6,7 +6,7 @@ block, window and limits, and the refits with spans left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,6 @@ from .channels import chosen_channels, readings_alone, seen_by_target, with_chan
 from .data import Span, TrainingData, cleaned, joined, scaling_of, training_spans, whole_runs
 from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
-from .mrbf import Bumps
 from .options import AUTO, SIMPLE, BuildOptions
 from .result import AGREE_S, Fit, Prior, longest_same_s, predict, snapped, stuck_after_s, unit_means
 from .samples import Blocks, run_blocks
@@ -319,12 +318,10 @@ def model_of(
     front: FrontEnd,
     options: FitOptions,
     added: NDArray[np.float64] | float = 0.0,
-    bumps: Bumps | None = None,
 ) -> Model:
     """The model that `model.json` holds: the fit with front end, coverage, uncertainty and facts of the data.
 
-    `added`: what terms and bumps, which are not in it yet, add to the map at each sample, deg/h. `bumps`: those that
-    join the map.
+    `added`: what terms, which are not in it yet, add to the map at each sample, deg/h.
     """
     started = [run.started for run in runs if run.started is not None]
     meta = dict(dataset.meta)
@@ -354,7 +351,7 @@ def model_of(
             "scale": fitted.scale,
             "envelope": fitted.envelope,
             "coverage": coverage(data, fitted, _COVERAGE_CELLS),
-            "networks": [snapped(n, fitted.scale) for n in _joined(fitted, bumps)],
+            "networks": [snapped(n, fitted.scale) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,
             "stuck_s": front.stuck_s,
@@ -381,13 +378,6 @@ def _uncertainty(
         return uncertainty(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
     except TrainingFailed:
         return None
-
-
-def _joined(fitted: Fit, bumps: Bumps | None) -> Sequence[Mapping[str, Any]]:
-    """The networks, with bumps where there are any."""
-    if bumps is None:
-        return fitted.networks
-    return [bumps.beside(network, fitted.scaling.half_range_c) for network in fitted.networks]
 
 
 def _earth_rate(dataset: Dataset) -> str:

@@ -160,6 +160,19 @@ def test_nothing_is_found_in_a_plain_gyro(tmp_path: Path, gyrotc: Command) -> No
     assert not (tmp_path / "out" / "model-extended.json").exists()
 
 
+def test_structure_that_no_map_follows_is_named_and_not_corrected(tmp_path: Path, gyrotc: Command) -> None:
+    data = simulated(tmp_path, '[[cause]]\nid = "map_too_coarse"\nwidth_c = 2.0\nat_c = 12.0\namplitude_dph = 3e-3\n')
+    done = gyrotc("diagnose", data, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    result = read_json(tmp_path / "out" / "diagnose.json")
+    (cause,) = [c for c in result["causes"] if c["family"] != "noise"]
+    assert (cause["id"], cause["gain"], result["extended"]) == ("map_too_coarse", None, None)
+    assert cause["remedy"] in (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "no extension is shipped: nothing corrects what is named" in done.stdout
+    assert read_json(tmp_path / "out" / "series.json")["scored"] == []
+    assert not (tmp_path / "out" / "model-extended.json").exists()
+
+
 def test_a_constant_temperature_is_not_testable(tmp_path: Path, gyrotc: Command) -> None:
     data = tmp_path / "RLG-1"
     data.mkdir()

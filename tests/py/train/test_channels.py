@@ -1,4 +1,4 @@
-"""Recorded channels as inputs, bent lines and slopes that go with temperature, and bumps of a finer map."""
+"""Recorded channels as inputs, and bent lines and slopes that go with temperature."""
 
 from __future__ import annotations
 
@@ -23,11 +23,9 @@ from gyrotc.simulate.scenario import read_truth
 from gyrotc.tables.quantise import applied_of
 from gyrotc.train import fitting
 from gyrotc.train.channels import SHAPES, chosen_channels, seen_by_target, shape_of
-from gyrotc.train.data import TrainingData, cleaned, scaling_of
+from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.methods import fit
-from gyrotc.train.mrbf import Bumps, find_bumps
-from gyrotc.train.result import channel_guard, predict
+from gyrotc.train.result import channel_guard
 from gyrotc.train.samples import Blocks
 from numpy.typing import NDArray
 
@@ -450,87 +448,3 @@ def test_the_correction_is_better_than_that_of_straight_lines_and_one_thermomete
         assert rms_of(model, [without(r, name) for r in exam], tmp_path) <= 1.02 * plain
         rows = [without(r, name) for r in rows]
     assert rms_of(model, rows, tmp_path) <= 1.02 * plain
-
-
-SEED_OF_BUMPS, BLOCK_S, NOISE_DPH = 20261123, 10.0, 3e-3
-HIDDEN = ((-20.0, 1.5, 6e-3), (15.0, 2.0, -4e-3), (40.0, 2.5, 4e-3))  # C, C, deg/h
-
-
-def smooth(t: np.ndarray, r: np.ndarray) -> np.ndarray:
-    return np.asarray(0.01 + 1e-4 * t + 2e-3 * np.tanh((t - 10.0) / 30.0) + 2e-4 * r * (1.0 + t / 100.0))
-
-
-def samples(rng: np.random.Generator, *, bumps: bool) -> TrainingData:
-    """Four runs of eight hours between −40 and 60 C at 1, 2, 3 and 5 C/min, with a hold at the end of each."""
-    parts = []
-    for run, speed in enumerate((1.0, 2.0, 3.0, 5.0)):
-        time = np.arange(0.0, 8 * 3600.0, BLOCK_S)
-        phase = np.minimum(speed * time / 60.0, 600.0) % 200.0
-        t = -40.0 + np.where(phase < 100.0, phase, 200.0 - phase)
-        r = np.gradient(t, time) * 60.0
-        y = smooth(t, r) + NOISE_DPH * rng.standard_normal(t.size)
-        if bumps:
-            y = y + sum(h * np.exp(-(((t - c) / w) ** 2)) for c, w, h in HIDDEN)
-        one = np.ones(t.size)
-        parts.append(TrainingData(t, r, y, one, np.full(t.size, run), time, BLOCK_S * one))
-    names = TrainingData.__slots__
-    return cleaned(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
-
-
-def test_bumps_have_their_place_and_width_and_mend_what_a_smooth_map_cannot() -> None:
-    print("seed", SEED_OF_BUMPS)
-    data = samples(np.random.default_rng(SEED_OF_BUMPS), bumps=True)
-    found = find_bumps(data, scaling_of(data))
-    assert len(found.centers_c) == len(HIDDEN), found
-    order = np.argsort(found.centers_c)
-    for k, (center, width, height) in zip(order, HIDDEN, strict=True):
-        assert abs(found.centers_c[k] - center) < 0.3, found
-        assert abs(found.widths_c[k] / width - 1.0) < 0.3, found
-        assert abs(found.heights_dph[k] / height - 1.0) < 0.3, found
-    t, r = data.temperature_c, data.slope_c_per_min
-    truth = smooth(t, r) + sum(h * np.exp(-(((t - c) / w) ** 2)) for c, w, h in HIDDEN)
-    plain = fit(data)
-    finer = fit(replace(data, bias_dph=data.bias_dph - found(t)))
-    before = np.sqrt(np.mean((predict(plain, t, r) - truth) ** 2))
-    after = np.sqrt(np.mean((predict(finer, t, r) + found(t) - truth) ** 2))
-    print(f"error of the map {before:.2e} -> {after:.2e} deg/h")
-    assert after < 0.5 * before
-    whole = replace(finer, outcome=replace(finer.outcome, networks=[_beside(found, finer)]))
-    assert np.allclose(predict(whole, t, r), predict(finer, t, r) + found(t), atol=1e-9), "one network holds both"
-
-
-def test_bumps_that_move_onto_each_other_become_one() -> None:
-    """Two in one place had heights of 2,387 and -2,387 deg/h, which no table holds; `diagnose` ended with exit 3."""
-    data = samples(np.random.default_rng(1), bumps=False)
-    height, x = 4e-3, (data.temperature_c + 5.0) / 0.9
-    with_dip = data.bias_dph + height * (1.0 - 2.0 * x**2) * np.exp(-(x**2))
-    found = find_bumps(replace(data, bias_dph=with_dip), scaling_of(data))
-    assert found.centers_c and sum(map(abs, found.heights_dph)) < 10.0 * height, found
-
-
-def test_steps_far_above_the_noise_leave_a_smooth_map_to_the_rest() -> None:
-    """Two of 40 noises: of the rest a polynomial of degree 5 leaves a third of the noise; beside bumps alone, twice."""
-    print("seed", SEED_OF_BUMPS)
-    data = samples(np.random.default_rng(SEED_OF_BUMPS), bumps=False)
-    t = data.temperature_c
-    steps = 0.08 * np.tanh((t + 12.0) / 2.0) - 0.06 * np.tanh((t - 30.0) / 1.5)
-    found = find_bumps(replace(data, bias_dph=data.bias_dph + steps), scaling_of(data))
-    assert len(found.centers_c) == 20, found
-    near = np.abs(t - 8.0) < 40.0
-    left = (steps - found(t))[near]
-    wide = np.vander(t[near] / 40.0, 6)
-    rough = left - wide @ np.linalg.lstsq(wide, left, rcond=None)[0]
-    assert np.std(rough) < 0.3 * NOISE_DPH, np.std(rough)
-
-
-def _beside(found: Bumps, finer) -> dict:  # type: ignore[no-untyped-def]
-    return found.beside(finer.networks[0], finer.scaling.half_range_c)
-
-
-@pytest.mark.slow
-def test_a_smooth_map_gets_no_bumps() -> None:
-    rng = np.random.default_rng(SEED_OF_BUMPS + 1)
-    counts = [
-        len(find_bumps(data, scaling_of(data)).centers_c) for data in (samples(rng, bumps=False) for _ in range(6))
-    ]
-    assert sum(counts) <= 1, counts
