@@ -139,7 +139,7 @@ def _gyrotc(task: Task, make: Callable[[float], _core.EqualGaussians]) -> float:
     bic, _, best = _least([path.rest for _, path in paths], len(y))
     dictionary, path = paths[best[0]]
     places = dictionary.centers[np.array(path.chosen[1 : best[1] + 1], dtype=np.int64) - 1]
-    gaussians = np.concatenate([places, np.full((len(places), 2), dictionary.width_t)], axis=1)
+    gaussians = np.concatenate([places, np.full((len(places), 2), widths[best[0]])], axis=1)
     weights = _core.least_squares(samples, gaussians, 1e-8 * len(y))
     assert np.isfinite(weights).all() and np.isfinite(bic)
     return float(np.sqrt(path.rest[best[1]] / len(y)))
@@ -295,8 +295,6 @@ METHODS: dict[str, Learner] = {
     "paper: mrbf_paper": _method("mrbf_paper"),
     "paper: rbf_random": _method("rbf_random"),
     "paper: mlr": _method("mlr"),
-    "polynomial in T": _method("poly"),
-    "polynomial in T and dT/dt, by BIC": _method("poly_slope"),
     "polynomial of order 5": _poly5,
     "scikit-learn GPR": _gpr,
     "scikit-learn SVR": _svr,

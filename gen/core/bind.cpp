@@ -178,25 +178,18 @@ NB_MODULE(_core, m) {
             "t_first"_a, "t_step"_a, "t_count"_a, "r_first"_a, "r_step"_a, "r_count"_a, "width_t"_a, "width_r"_a)
         .def_static("at", &EqualGaussians::at, "centers"_a, "width_t"_a, "width_r"_a)
         .def("add", &EqualGaussians::add, "samples"_a)
-        .def("subtract", &EqualGaussians::subtract, "part"_a)
-        .def("copy", [](const EqualGaussians &self) { return EqualGaussians(self); })
         .def_prop_ro("centers", &EqualGaussians::centers)
-        .def_prop_ro("width_t", &EqualGaussians::width_t)
-        .def_prop_ro("width_r", &EqualGaussians::width_r)
         .def_prop_ro("samples", &EqualGaussians::samples);
     nb::class_<OlsPath>(m, "OlsPath")
         .def_ro("chosen", &OlsPath::chosen)
         .def_ro("reduction", &OlsPath::reduction)
-        .def_ro("rest", &OlsPath::rest)
-        .def_ro("factor", &OlsPath::factor)
-        .def_ro("orthogonal", &OlsPath::orthogonal);
+        .def_ro("rest", &OlsPath::rest);
     m.def(
         "select_columns",
         [](const NormalEquations &dictionary, Eigen::Index max_columns, double rho, double guard, Eigen::Index given,
            bool in_order) { return select_columns(dictionary, {max_columns, rho, guard, given, in_order}); },
         "dictionary"_a, "max_columns"_a, nb::kw_only(), "rho"_a = 0.0, "guard"_a = 1e-7, "given"_a = 1,
         "in_order"_a = false);
-    m.def("errors_along", &errors_along, "path"_a, "dictionary"_a, "samples"_a);
     m.def("least_squares", &least_squares, "samples"_a, "gaussians"_a, "ridge"_a);
     m.def(
         "posteriors",

@@ -180,16 +180,6 @@ void EqualGaussians::add(const Samples &samples) {
     energy_ += samples.weight.dot(samples.y.cwiseAbs2());
 }
 
-void EqualGaussians::subtract(const EqualGaussians &part) {
-    pairs_ -= part.pairs_;
-    ones_ -= part.ones_;
-    targets_ -= part.targets_;
-    samples_ -= part.samples_;
-    total_ -= part.total_;
-    total_y_ -= part.total_y_;
-    energy_ -= part.energy_;
-}
-
 double EqualGaussians::interpolate(const RowMatrix &values, const Axis &t, const Axis &r, double at_t,
                                    double at_r) const {
     const double a = (at_t - t.first) / t.step, b = (at_r - r.first) / r.step;

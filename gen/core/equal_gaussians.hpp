@@ -48,13 +48,9 @@ class EqualGaussians final : public NormalEquations {
     static EqualGaussians at(const Eigen::MatrixXd &centers, double width_t, double width_r);
 
     void add(const Samples &samples);
-    // Takes away what was added to `part`, a dictionary made the same way.
-    void subtract(const EqualGaussians &part);
 
     Eigen::Index size() const override { return centers_.rows() + 1; }
     const Eigen::MatrixXd &centers() const { return centers_; }
-    double width_t() const { return width_t_; }
-    double width_r() const { return width_r_; }
     double energy() const override { return energy_; }
     double samples() const { return samples_; }
 

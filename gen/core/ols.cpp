@@ -19,7 +19,6 @@ OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &r
     OlsPath path;
     path.reduction.resize(limit);
     path.rest.resize(limit);
-    path.orthogonal.resize(limit);
     double left = energy;
     Index m = 0;
     for (; m < limit; ++m) {
@@ -46,7 +45,6 @@ OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &r
         rows.col(m) = l;
         open[static_cast<std::size_t>(best)] = 0;
         path.chosen.push_back(best);
-        path.orthogonal[m] = coefficient;
         left = std::max(left - coefficient * coefficient, 0.0);
         path.rest[m] = left;
         path.reduction[m] = energy > 0.0 ? coefficient * coefficient / energy : 0.0;
@@ -57,35 +55,7 @@ OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &r
     }
     path.reduction.conservativeResize(m);
     path.rest.conservativeResize(m);
-    path.orthogonal.conservativeResize(m);
-    path.factor = MatrixXd::Zero(m, m);
-    for (Index i = 0; i < m; ++i)
-        path.factor.row(i).head(i + 1) = rows.row(path.chosen[static_cast<std::size_t>(i)]).head(i + 1);
     return path;
-}
-
-VectorXd errors_along(const OlsPath &path, const EqualGaussians &dictionary, const Samples &samples) {
-    const Index m = static_cast<Index>(path.chosen.size()), n = samples.t.size();
-    MatrixXd columns(n, m);
-    for (Index k = 0; k < m; ++k) {
-        const Index j = path.chosen[static_cast<std::size_t>(k)] - 1;
-        if (j < 0) {
-            columns.col(k).setOnes();
-            continue;
-        }
-        const double c = dictionary.centers()(j, 0), d = dictionary.centers()(j, 1);
-        columns.col(k) = (-((samples.t.array() - c) / dictionary.width_t()).square() -
-                          ((samples.r.array() - d) / dictionary.width_r()).square())
-                             .exp();
-    }
-    VectorXd errors(m), residual = samples.y;
-    for (Index k = 0; k < m; ++k) {
-        columns.col(k).noalias() -= columns.leftCols(k) * path.factor.row(k).head(k).transpose();
-        columns.col(k) /= path.factor(k, k);
-        residual -= path.orthogonal[k] * columns.col(k);
-        errors[k] = samples.weight.dot(residual.cwiseAbs2());
-    }
-    return errors;
 }
 
 VectorXd least_squares(const Samples &samples, const MatrixXd &gaussians, double ridge) {

@@ -32,8 +32,6 @@ struct OlsPath {
     std::vector<Eigen::Index> chosen;  // columns in order of selection
     Eigen::VectorXd reduction;         // error-reduction ratio of each, of y'y
     Eigen::VectorXd rest;              // residual sum of squares after each
-    Eigen::MatrixXd factor;            // lower triangular: Gram of the chosen = factor factor'
-    Eigen::VectorXd orthogonal;        // coefficients on the orthonormal columns
 };
 
 struct SelectionRule {
@@ -47,10 +45,6 @@ struct SelectionRule {
 
 // Selects columns until the rule ends it or nothing can be chosen.
 OlsPath select_columns(const NormalEquations &dictionary, const SelectionRule &rule);
-
-// Weighted sum of squared errors on other samples of every model on the path (its first 1, 2, ... columns), with the
-// weights that the path's own samples gave.
-Eigen::VectorXd errors_along(const OlsPath &path, const EqualGaussians &dictionary, const Samples &samples);
 
 // Least-squares weights (w0, w_1 ... w_M) of Gaussians (rows c_t, c_r, width_t, width_r), by QR over blocks of samples,
 // with the ridge on w_1 ... w_M only.

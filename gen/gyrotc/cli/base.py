@@ -22,7 +22,7 @@ from typer.core import TyperGroup
 from .. import __version__
 from ..common.inputs import CEILINGS, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..train.options import AUTO, DEFAULTS, NETWORK_METHODS, BuildOptions, flag_of, help_of
+from ..train.options import AUTO, DEFAULTS, METHODS, BuildOptions, flag_of, help_of
 
 if TYPE_CHECKING:
     from ..recordings.records import Applied
@@ -238,7 +238,7 @@ AxisOption = Annotated[
 
 def _of_build(name: str) -> Any:
     """An option of `BuildOptions`, which knows its meaning and refuses what is out of range."""
-    words = completing((AUTO, *NETWORK_METHODS)) if name == "method" else None
+    words = completing((AUTO, *METHODS)) if name == "method" else None
     return typer.Option(flag_of(name), help=help_of(name), autocompletion=words)
 
 

@@ -46,7 +46,7 @@ from ..tables.quantise import applied_of
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit
-from ..train.options import DEFAULTS, METHODS, BuildOptions
+from ..train.options import COMPARED, DEFAULTS, BuildOptions
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify
@@ -324,7 +324,7 @@ def compare(
     dataset: Dataset,
     options: BuildOptions = DEFAULTS,
     *,
-    methods: Sequence[str] = METHODS,
+    methods: Sequence[str] = COMPARED,
     progress: Progress | None = None,
 ) -> Comparison:
     """Trains and judges every method.

@@ -113,13 +113,9 @@ def quantise_all(model: Model, numerics: Sequence[str] | None, say: Callable[[st
     """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
 
     Raises:
-        InputError: An unknown arithmetic, or a method that has no table.
+        InputError: An unknown arithmetic.
         CheckFailed: An arithmetic asked for by name is refused, or none remains.
     """
-    if model.method in ("poly", "poly_slope"):
-        raise InputError(
-            "model.json, field method", f"{model.method!r} is for comparison only", "a network (mrbf, ...)"
-        )
     unknown = sorted(set(numerics or ()) - set(NUMERICS))
     if unknown:
         raise InputError("--numeric", repr(unknown[0]), " or ".join(NUMERICS))

@@ -7,37 +7,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
 from ..common.metrics import LEAST_SPAN_C
+from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
-from .evidence import TrainingFailed, floor_dph
+from .evidence import floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
-from .options import AUTO, DEFAULTS, METHODS, NETWORK_METHODS, SIMPLE, BuildOptions
-from .paper_methods import RIDGE, SIZE_RULES, fit_bank, fit_mlr, fit_ols, fit_poly, fit_poly_slope
+from .ols import RIDGE, fit_ols
+from .options import AUTO, DEFAULTS, SIMPLE, BuildOptions
 from .result import Fit, Outcome, Prior, network, objection, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
-from .uncertainty import coverage, uncertainty
-
-__all__ = [
-    "AUTO",
-    "METHODS",
-    "NETWORK_METHODS",
-    "SIMPLE",
-    "SIZE_RULES",
-    "Fit",
-    "Outcome",
-    "TrainingData",
-    "TrainingFailed",
-    "coverage",
-    "fit",
-    "predict",
-    "trained",
-    "uncertainty",
-]
+from .stepwise import fit_mlr
 
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
-_POLYNOMIALS = {"mlr": fit_mlr, "poly": fit_poly, "poly_slope": fit_poly_slope}
 _GUARDED = ("mrbf", "mrbf_t")
 
 
@@ -48,7 +30,6 @@ def fit(
     seed: int = DEFAULTS.seed,
     centers: int | None = None,
     rho: float | None = None,
-    size_rule: str | None = None,
     average_s: float = DEFAULTS.average_s,
     power_on: NDArray[np.int64] | None = None,
     prior: Prior | None = None,
@@ -58,12 +39,11 @@ def fit(
 
     Args:
         data: Samples; exact duplicates by run and time count once.
-        method: One of `METHODS` or `NETWORK_METHODS`, taken as asked; or `AUTO`: model selection, unless a number
-            of centers or ρ is asked for.
+        method: One of `METHODS`, taken as asked; or `AUTO`: model selection, unless a number of centers or ρ is asked
+            for.
         seed: Whatever is drawn at random (start of the Kohonen network, random centers) follows from it.
         centers: Number of centers, fewer where more would gain nothing; None: chosen from the data.
         rho: Threshold of eq. (16) of Ding et al. 2014, for the methods by orthogonal least squares.
-        size_rule: One of `SIZE_RULES`, for the same methods; None: the method's own.
         average_s: Averaging of RMS figures, s.
         power_on: For model selection: number of the power-on of each run, by its index; None: each run is one.
         prior: What units of the type share, or the unit's earlier model; for `AUTO` and "mrbf" without a number of
@@ -75,8 +55,7 @@ def fit(
         TrainingFailed: The equations of a method that was asked for by name cannot be solved.
     """
     method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
-    _check_method(method)
-    BuildOptions(seed=seed, centers=centers, rho=rho, average_s=average_s)
+    BuildOptions(method=method, seed=seed, centers=centers, rho=rho, average_s=average_s)
     samples = cleaned(data)
     scaling = scaling_of(samples)
     findings: list[dict[str, object]] = []
@@ -101,9 +80,8 @@ def fit(
         findings += found.findings
     else:
         outcome = trained(
-            method, samples, scaling, seed=seed, centers=centers, rho=rho, size_rule=size_rule, average_s=average_s,
-            power_on=power_on,
-        )  # fmt: skip
+            method, samples, scaling, seed=seed, centers=centers, rho=rho, average_s=average_s, power_on=power_on
+        )
         against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
         if against:
             findings.append(_beyond(method, against))
@@ -118,13 +96,6 @@ def fit(
     )  # fmt: skip
 
 
-def _check_method(method: str) -> None:
-    """Beside the methods of a build those that are there to be compared."""
-    known = (AUTO, *dict.fromkeys((*METHODS, *NETWORK_METHODS)))
-    if method not in known:
-        raise InputError("method", repr(method), "one of " + ", ".join(known))
-
-
 def trained(
     method: str,
     data: TrainingData,
@@ -133,7 +104,6 @@ def trained(
     seed: int = DEFAULTS.seed,
     centers: int | None = None,
     rho: float | None = None,
-    size_rule: str | None = None,
     average_s: float = DEFAULTS.average_s,
     ridge: float = RIDGE,
     power_on: NDArray[np.int64] | None = None,
@@ -145,28 +115,17 @@ def trained(
         power_on: Of each run, for "mixed".
 
     Raises:
-        InputError: A size rule that does not exist.
         TrainingFailed: The equations cannot be solved.
     """
-    if method in _POLYNOMIALS:
-        return _POLYNOMIALS[method](data, scaling, average_s)
+    if method == "mlr":
+        return fit_mlr(data, scaling, average_s)
     if method == "mixed":
         return fit_mixed(data, scaling, power_on, average_s)
     if method in SIMPLE:
         return fit_simple(method, data, scaling, average_s)
     if method in _MAPS:
         return _MAPS[method](data, scaling, seed=seed, centers=centers, average_s=average_s)
-    return fit_ols(
-        method,
-        data,
-        scaling,
-        seed=seed,
-        centers=centers,
-        rho=rho,
-        size_rule=size_rule,
-        average_s=average_s,
-        ridge=ridge,
-    )
+    return fit_ols(method, data, scaling, seed=seed, centers=centers, rho=rho, average_s=average_s, ridge=ridge)
 
 
 def _constant(samples: TrainingData) -> Outcome:

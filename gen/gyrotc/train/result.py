@@ -38,7 +38,6 @@ class Outcome:
         curves: For `training.json`.
         predicted_rms_ratio: Predicted RMS over noise floor, None if withheld.
         withheld: Why, empty if it is not.
-        polynomial: Further summands (power of z_T, power of z_r, deg/h), for comparison only.
         process: The evidence model that the networks follow, where the method has one.
     """
 
@@ -46,7 +45,6 @@ class Outcome:
     curves: Mapping[str, Any]
     predicted_rms_ratio: float | None = None
     withheld: str = "the method predicts nothing"
-    polynomial: Sequence[tuple[int, int, float]] = ()
     process: Process | None = None
 
 
@@ -120,9 +118,8 @@ class Fit:
 
     @property
     def table_bytes(self) -> int:
-        """Parameters of the map as 32-bit words: 24 + 20 M for one network, 4 for each further summand."""
-        parts = sum(12 + 20 * len(network["weights"]) for network in self.networks)
-        return 12 + parts + 4 * len(self.outcome.polynomial)
+        """Parameters of the map as 32-bit words: 24 + 20 M for one network."""
+        return 12 + sum(12 + 20 * len(network["weights"]) for network in self.networks)
 
     @property
     def sum_abs_weights(self) -> float:
@@ -181,11 +178,7 @@ def predict(fit: Fit, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> F
     t = np.clip(np.asarray(temperature_c, dtype=np.float64), *s.temperature_c)
     r = np.clip(np.asarray(slope_c_per_min, dtype=np.float64), *s.slope_c_per_min)
     t, r = np.broadcast_arrays(t, r)
-    bias = networks_dph(fit.networks, s, t, r)
-    z_t, z_r = s.normalise(t, r)
-    for power_t, power_r, weight in fit.outcome.polynomial:
-        bias = bias + weight * z_t**power_t * z_r**power_r
-    return bias
+    return networks_dph(fit.networks, s, t, r)
 
 
 def networks_dph(

@@ -299,7 +299,6 @@ def test_names_that_are_no_names(tmp_path: Path) -> None:
         'datasets = [""]',
         'numeric = []\ndatasets = ["*"]',
         'datasets = ["*"]\n[options]\nmethod = "magic"',
-        'datasets = ["*"]\n[options]\nmethod = "poly"',
         'datasets = ["*"]\n[options]\nseed = true',
         'datasets = ["*"]\n[options]\nblock_s = "10"',
         'datasets = ["*"]\n[options]\nblock_s = nan',

@@ -71,13 +71,6 @@ def test_emit_deletes_no_folder_of_somebody_else(tmp_path: Path) -> None:
     assert [p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")] == ["c", "c/firmware.c"]
 
 
-def test_methods_for_comparison_are_refused(model_dict: dict[str, Any], tmp_path: Path) -> None:
-    model = Model.from_dict(model_dict | {"method": "poly"})
-    with pytest.raises(InputError, match="comparison"):
-        emit(model, tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
 def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: Path) -> None:
     model = load_model(EXAMPLE / "model.json")
     emit(model, tmp_path)

@@ -119,34 +119,6 @@ def test_columns_that_the_chosen_ones_span_are_passed_over() -> None:
     assert sorted(_core.select_columns(dictionary, 7).chosen) == [0, 1, 6]
 
 
-def test_subtracting_a_part_is_never_having_added_it() -> None:
-    t, r, y, weight = cloud(3)
-    first, second = slice(0, 250), slice(250, 400)
-    for make in (lambda: grid(0.4, 0.6), lambda: scattered(3, 0.4, 0.6)):
-        whole, part, rest = make(), make(), make()
-        whole.add(_core.Samples(t, r, y, weight))
-        part.add(_core.Samples(t[second], r[second], y[second], weight[second]))
-        rest.add(_core.Samples(t[first], r[first], y[first], weight[first]))
-        whole.subtract(part)
-        np.testing.assert_allclose(whole.column(3), rest.column(3), atol=1e-10)
-        assert _core.select_columns(whole, 8).chosen == _core.select_columns(rest, 8).chosen
-
-
-def test_errors_on_other_samples_are_those_of_least_squares_on_the_chosen_columns() -> None:
-    t, r, y, weight = cloud(4)
-    here, there = slice(0, 300), slice(300, 400)
-    dictionary = grid(0.5, 0.5)
-    dictionary.add(_core.Samples(t[here], r[here], y[here], weight[here]))
-    path = _core.select_columns(dictionary, 8)
-    errors = _core.errors_along(path, dictionary, _core.Samples(t[there], r[there], y[there], weight[there]))
-    p = design(t, r, dictionary.centers, 0.5, 0.5)[:, path.chosen]
-    root = np.sqrt(weight[here])
-    for size in range(1, len(path.chosen) + 1):
-        w = np.linalg.lstsq(root[:, None] * p[here, :size], root * y[here], rcond=None)[0]
-        expected = float(np.sum(weight[there] * (y[there] - p[there, :size] @ w) ** 2))
-        assert errors[size - 1] == pytest.approx(expected, rel=1e-6)
-
-
 @pytest.mark.parametrize("n", [30, 2047, 2048, 2049, 5000])
 def test_weights_by_qr_are_least_squares(n: int) -> None:
     """Block borders of the streamed QR included; with a ridge, the minimum of the penalised sum."""
