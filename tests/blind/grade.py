@@ -104,15 +104,16 @@ def _gain(
 ) -> dict[str, float] | None:
     """Squares before and after on the exam runs, and of the noise that was really added.
 
-    Where nothing is named nothing is gained: what was hidden counts, not what was named.
+    Where nothing that can be corrected is named nothing is gained: what was hidden counts, not what was named.
     """
-    if result.get("baseline") is None or not all(c["gain"] for c in physical):
+    if result.get("baseline") is None:
         return None
     exam = [k for k, role in enumerate(campaign.roles) if role == "exam"]
     noise = np.concatenate([mean_of(hidden.noise_rows[k], _AVERAGE) for k in exam])
     before = result["baseline"]["exam_rms_dph"]
-    if physical:  # a mended record leaves out what it does not have: both of the same samples
-        before, after = (physical[k]["gain"][f"exam_rms_{w}_dph"] for k, w in ((0, "before"), (-1, "after")))
+    gains = [c["gain"] for c in physical if c["gain"]]
+    if gains:  # a mended record leaves out what it does not have: both of the same samples
+        before, after = gains[0]["exam_rms_before_dph"], gains[-1]["exam_rms_after_dph"]
     else:
         after = before
     return {
