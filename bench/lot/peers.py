@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gyrotc.train.result import UnitMeans
+from gyrotc.train.prior.unit_means import UnitMeans
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.evidence import fit_process
 from gyrotc.train.prior.learn import FALSE_ALARM, sums_of
 from gyrotc.train.prior.use import LotPrior
-from gyrotc.train.result import unit_means
+from gyrotc.train.prior.unit_means import unit_means
 from scipy.stats import norm
 
 Floats = NDArray[np.float64]

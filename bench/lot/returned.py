@@ -28,7 +28,8 @@ from gyrotc.train.prior.earlier import (
     stated_sigma_dph,
     widened,
 )
-from gyrotc.train.result import Fit, predict, unit_means
+from gyrotc.train.prior.unit_means import unit_means
+from gyrotc.train.result import Fit, predict
 from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray
 

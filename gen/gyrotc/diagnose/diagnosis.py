@@ -31,7 +31,7 @@ from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.data import TrainingData, training_spans
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_of, training_of
-from ..train.result import channel_guard, readings_of, stuck_after_s
+from ..train.plausibility import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .attribution import LEVEL, Attribution
 from .blocks import Records, centred_slope, name_of, records_of

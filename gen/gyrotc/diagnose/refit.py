@@ -30,7 +30,8 @@ from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_bas
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
-from ..train.result import Fit, longest_same_s, predict
+from ..train.plausibility import longest_same_s
+from ..train.result import Fit, predict
 from ..train.simple import without_rate
 from .candidates import searched
 from .refine import Refined

@@ -19,8 +19,8 @@ from ..results.marker import check_intact
 from ..results.training import Training
 from ..train.evidence import MEAN_S
 from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, folds_of, learn
+from ..train.prior.unit_means import UnitMeans, means_of
 from ..train.prior.use import prior_of, process_result, rounded
-from ..train.result import UnitMeans, means_of
 
 _CELLS = (33, 13)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read

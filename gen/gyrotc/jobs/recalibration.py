@@ -19,8 +19,8 @@ from ..results.training import MapMeans, Training
 from ..train.fitting import FitOptions
 from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
 from ..train.prior.learn import FALSE_ALARM
+from ..train.prior.unit_means import means_of
 from ..train.prior.use import MapPosterior, prior_of
-from ..train.result import means_of
 
 
 def prior_from(

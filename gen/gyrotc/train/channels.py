@@ -40,8 +40,10 @@ from ..results.training import ChannelTried
 from .data import Scaling, TrainingData, scaling_of
 from .evidence import Process, TrainingFailed, conditioned, fit_process
 from .methods import fit
+from .networks import rescaled, snapped
 from .parts import Parts, PartsTrial, bent_parts, chosen_parts
-from .result import channel_guard, predict, rescaled, snapped
+from .plausibility import channel_guard
+from .result import predict
 from .samples import Blocks
 from .uncertainty import of_few
 

@@ -29,8 +29,12 @@ from .channels import chosen_channels, readings_alone, seen_by_target, with_chan
 from .data import Span, TrainingData, cleaned, joined, scaling_of, training_spans, whole_runs
 from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
+from .networks import snapped
 from .options import AUTO, SIMPLE, BuildOptions
-from .result import AGREE_S, Fit, Prior, longest_same_s, predict, snapped, stuck_after_s, unit_means
+from .plausibility import AGREE_S, longest_same_s, stuck_after_s
+from .prior.given import Prior
+from .prior.unit_means import unit_means
+from .result import Fit, predict
 from .samples import Blocks, run_blocks
 from .uncertainty import coverage, rezero_dph, uncertainty
 

@@ -12,9 +12,12 @@ from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
 from .evidence import floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
+from .networks import network
+from .objection import objection
 from .ols import RIDGE, fit_ols
 from .options import AUTO, DEFAULTS, SIMPLE, BuildOptions
-from .result import Fit, Outcome, Prior, network, objection, predict
+from .prior.given import Prior
+from .result import Fit, Outcome, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .stepwise import fit_mlr

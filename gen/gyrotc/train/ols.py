@@ -23,7 +23,8 @@ from .. import _core
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
 from .evidence import floor_dph
-from .result import Outcome, network
+from .networks import network
+from .result import Outcome
 
 RIDGE = 1e-8
 """Ridge of the weights, as a share of the weight of all samples: slight, for candidates that nearly coincide."""

@@ -49,7 +49,8 @@ from .data import (
 )
 from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, difference_sigma, fit_process
 from .mrbf import fit_mrbf
-from .result import Outcome, objection
+from .objection import objection
+from .result import Outcome
 from .simple import Mixed, all_solved, fit_mixed_model, fit_simple, outcome_of, powers_of, triangle_of
 
 _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")

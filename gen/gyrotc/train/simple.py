@@ -25,8 +25,9 @@ from ..common.arrays import FloatArray
 from ..common.metrics import median
 from .data import Scaling, TrainingData, average, cells_of, edges_of, turning_points
 from .evidence import GRID, MEAN_S, TrainingFailed, floor_dph
+from .networks import Network, network
 from .options import SIMPLE
-from .result import Network, Outcome, network
+from .result import Outcome
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 _POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average
-from .result import Outcome, network
+from .networks import network
+from .result import Outcome
 
 _Powers = tuple[int, int]
 

@@ -23,7 +23,8 @@ from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.methods import fit
 from gyrotc.train.prior.departures import Departures, Hypothesis, revised, updated, within
 from gyrotc.train.prior.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
-from gyrotc.train.result import UnitMeans, predict, unit_means
+from gyrotc.train.prior.unit_means import UnitMeans, unit_means
+from gyrotc.train.result import predict
 from numpy.typing import NDArray
 from recordings import write_csv
 

@@ -23,8 +23,9 @@ from gyrotc.train.prior import basis as lot_basis
 from gyrotc.train.prior.basis import PRIOR_LOG, LotBasis
 from gyrotc.train.prior.earlier import widened
 from gyrotc.train.prior.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
+from gyrotc.train.prior.unit_means import UnitMeans
 from gyrotc.train.prior.use import LotPrior, MapPosterior, MapPrior, prior_of
-from gyrotc.train.result import UnitMeans, predict
+from gyrotc.train.result import predict
 from gyrotc.train.uncertainty import coverage, uncertainty
 from models import random_model
 from numpy.typing import NDArray

@@ -15,7 +15,7 @@ from gyrotc.mirror.q31 import GAUSS_ERROR, exp2_table
 from gyrotc.mirror.table import CHANNEL_LOST, CLAMPED
 from gyrotc.model import Guard, Term
 from gyrotc.tables.quantise import quantise
-from gyrotc.train.result import longest_same_s, stuck_after_s
+from gyrotc.train.plausibility import longest_same_s, stuck_after_s
 from libc_build import runtime
 from models import random_channels, random_history, random_model, random_terms
 

@@ -25,7 +25,7 @@ from gyrotc.train import fitting
 from gyrotc.train.channels import SHAPES, chosen_channels, seen_by_target, shape_of
 from gyrotc.train.data import TrainingData
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.result import channel_guard
+from gyrotc.train.plausibility import channel_guard
 from gyrotc.train.samples import Blocks
 from numpy.typing import NDArray
 

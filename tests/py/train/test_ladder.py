@@ -30,8 +30,9 @@ from gyrotc.train.data import (
 from gyrotc.train.evidence import conditioned, fit_process
 from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
 from gyrotc.train.methods import fit
+from gyrotc.train.objection import objection
 from gyrotc.train.options import SIMPLE
-from gyrotc.train.result import Fit, objection, predict
+from gyrotc.train.result import Fit, predict
 from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
 from gyrotc.train.simple import all_solved, design, fit_mixed_model, fit_simple, powers_of, solve, triangle_of
 from recordings import toml, write_csv

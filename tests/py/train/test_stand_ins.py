@@ -19,7 +19,7 @@ from gyrotc.recordings.records import Rows
 from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import NUMERICS, channels_of, quantise
 from gyrotc.train.fitting import FitOptions, fit_dataset
-from gyrotc.train.result import rescaled
+from gyrotc.train.networks import rescaled
 from libc_build import runtime
 from models import random_guards, random_history, random_model, random_stand_in, random_uncertainty
 

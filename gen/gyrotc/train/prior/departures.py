@@ -22,9 +22,9 @@ from ...common.errors import InputError
 from ...common.metrics import LEAST_SPAN_C
 from ...results.evaluation import At, MapDifference
 from ...results.training import ChangeKind, CheckedCell, MapChange
-from ..result import UnitMeans
 from .basis import PRIOR_LOG
 from .learn import FALSE_ALARM
+from .unit_means import UnitMeans
 from .use import MapPosterior, MapPrior
 
 Span = tuple[float, float]

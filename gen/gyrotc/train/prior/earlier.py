@@ -21,10 +21,11 @@ from ...results.fleet import KnownMap
 from ...results.training import ChangeKind, EarlierUse, Training, TriedChange
 from ..data import Scaling, TrainingData
 from ..evidence import Asked
-from ..result import Given, UnitMeans, means_of
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
+from .given import Given
 from .learn import Envelope, sums_of, that_count
+from .unit_means import UnitMeans, means_of
 from .use import MapPosterior, MapPrior, check_positive, curve_of, followed, known_map, processed, seen_alone, triangle
 
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's

@@ -23,8 +23,8 @@ from scipy.special import fdtrc, gammaincc
 
 from ..._core import posteriors
 from ...common.arrays import FloatArray, Progress
-from ..result import UnitMeans
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
+from .unit_means import UnitMeans
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
 _STRANGE = 16.0  # an unrelated unit's variance over the lot's, where the test has most power: four times as far away

@@ -18,9 +18,12 @@ from ...results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
 from ..data import Bins, Scaling, TrainingData, average
 from ..evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
 from ..mrbf import fit_mrbf
-from ..result import Given, Outcome, UnitMeans, objection, unit_means
+from ..objection import objection
+from ..result import Outcome
 from .basis import PARAMETERS, LotBasis
+from .given import Given
 from .learn import FALSE_ALARM, evidence, freedom_of, of_few, p_value, scores, sums_of
+from .unit_means import UnitMeans, unit_means
 
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 

@@ -1,0 +1,82 @@
+"""Means of a fully calibrated unit: what a lot is learnt from, and what an earlier map is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...common.arrays import FloatArray
+from ...common.errors import InputError
+from ...results.training import MapMeans
+from ..data import Scaling, TrainingData, average, gather
+from ..evidence import MEAN_S, Process, difference_sigma
+
+_SPREAD_GRID = 2.0**30  # of a spread: as many digits as a file holds
+
+
+@dataclass(frozen=True, slots=True)
+class UnitMeans:
+    """A fully calibrated unit.
+
+    Attributes:
+        temperature_c, slope_c_per_min, bias_dph: Gathered means, shape (means,).
+        count: Means behind each, the same shape.
+        sigma_dph: Noise of a mean of count 1, deg/h.
+    """
+
+    temperature_c: FloatArray
+    slope_c_per_min: FloatArray
+    bias_dph: FloatArray
+    count: FloatArray
+    sigma_dph: float
+
+
+def unit_means(samples: TrainingData, scaling: Scaling, process: Process | None) -> tuple[UnitMeans, float]:
+    """Means over 50 s of cleaned samples, gathered into cells of 1/50 of each half range; and their length, s.
+
+    Args:
+        scaling: Normalisation of the cells.
+        process: What the outliers were found by and the noise is known from; None: nothing is left out, and the noise
+            is that of differences. Noise that differences do not show (a drift) shows in what a process leaves.
+    """
+    means = average(samples, MEAN_S)
+    weight = means.weight / np.median(means.weight)
+    sigma = difference_sigma(means, means.bias_dph, weight)
+    kept = np.ones(len(means), dtype=bool)
+    if process is not None and len(process.kept) == len(means):
+        kept, sigma = process.kept, max(sigma, process.noise_dph)
+    t, r = scaling.normalise(means.temperature_c[kept], means.slope_c_per_min[kept])
+    bias = means.bias_dph[kept]
+    bins = gather(t, r, bias, weight[kept])
+    sigma = sigma or max(float(np.std(bias)), abs(float(bias[0])) / _SPREAD_GRID, 1e-12)  # a record without noise
+    found = UnitMeans(
+        temperature_c=bins.t * scaling.half_range_c + scaling.center_c,
+        slope_c_per_min=bins.r * scaling.half_range_c_per_min,
+        bias_dph=bins.mean,
+        count=bins.count,
+        sigma_dph=sigma,
+    )
+    return found, float(np.median(means.duration_s))
+
+
+def means_of(means: MapMeans | None, where: Path) -> UnitMeans:
+    """Means of a unit as arrays.
+
+    Args:
+        where: The `training.json` that they are of.
+
+    Raises:
+        InputError: There are none, or they do not go together.
+    """
+    if means is None:
+        raise InputError(
+            str(where),
+            "has no means (an extended model, or an earlier gyrotc)",
+            "a unit as gyrotc fleet or build makes it: give that command again",
+        )
+    arrays = [np.array(x) for x in (means.temperature_c, means.slope_c_per_min, means.bias_dph, means.count)]
+    if len({len(x) for x in arrays}) != 1 or len(arrays[0]) == 0 or arrays[3].min() <= 0.0:
+        raise InputError(f"{where}, field means", "lists that do not go together", "one of each a mean")
+    return UnitMeans(arrays[0], arrays[1], arrays[2], arrays[3], means.sigma_dph)
