@@ -10,17 +10,33 @@ from numpy.typing import NDArray
 from ..common.metrics import LEAST_SPAN_C
 from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned, scaling_of
-from .evidence import floor_dph
+from .evidence import TrainingFailed, floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .networks import network
 from .objection import objection
 from .ols import RIDGE, fit_ols
-from .options import AUTO, DEFAULTS, SIMPLE, BuildOptions
+from .options import AUTO, DEFAULTS, METHODS, SIMPLE, BuildOptions
 from .prior.given import Prior
 from .result import Fit, Outcome, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .stepwise import fit_mlr
+from .uncertainty import coverage, uncertainty
+
+__all__ = [
+    "AUTO",
+    "METHODS",
+    "SIMPLE",
+    "Fit",
+    "Outcome",
+    "TrainingData",
+    "TrainingFailed",
+    "coverage",
+    "fit",
+    "predict",
+    "trained",
+    "uncertainty",
+]
 
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
 _GUARDED = ("mrbf", "mrbf_t")
