@@ -26,8 +26,8 @@ from gyrotc.train.data import TrainingData, cleaned, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.prior.learn import learn
-from gyrotc.train.prior.use import LotPrior
 from gyrotc.train.prior.unit_means import UnitMeans, unit_means
+from gyrotc.train.prior.use import LotPrior
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.uncertainty import uncertainty
 from numpy.typing import NDArray

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gyrotc.train.prior.unit_means import UnitMeans
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -15,8 +14,8 @@ if TYPE_CHECKING:
 from gyrotc.train.data import TrainingData, cleaned, scaling_of
 from gyrotc.train.evidence import fit_process
 from gyrotc.train.prior.learn import FALSE_ALARM, sums_of
+from gyrotc.train.prior.unit_means import UnitMeans, unit_means
 from gyrotc.train.prior.use import LotPrior
-from gyrotc.train.prior.unit_means import unit_means
 from scipy.stats import norm
 
 Floats = NDArray[np.float64]
