@@ -49,12 +49,12 @@ test:
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@ctest --test-dir build/fuzz -j2 --output-on-failure
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile -m "not slow" tests/py
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile -m "not slow"
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
 targets:
 	@tools/setup.sh targets
-	@$(PYTHON) -m pytest -q -rs tests/targets tests/py/verify/test_negative_controls.py --results docs
+	@$(PYTHON) -m pytest -q -rs tests/targets tests/cases/verify/test_negative_controls.py --results docs
 
 ## every input of a table, no run-time error, rounding bounds (Frama-C, Gappa, Z3; minutes): docs/results.md
 prove:
@@ -68,10 +68,10 @@ check:
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools bench
 	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/check_libc
-	@$(PYTHON) -m pytest -q tests/py/repository/test_examples.py -k notebook
+	@$(PYTHON) -m pytest -q tests/journeys/repository/test_examples.py -k notebook
 	@$(PYTHON) -m bench.paper.page docs --check
-	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/py/paper/test_paper_reference.py
-	@$(PYTHON) -m pytest -q -n 2 tests/py/diagnose/test_diagnose_fixed.py -k "eighty or fresh"
+	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/cases/paper/test_paper_reference.py
+	@$(PYTHON) -m pytest -q -n 2 tests/cases/diagnose/test_diagnose_fixed.py -k "eighty or fresh"
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:
@@ -91,7 +91,7 @@ fuzz:
 	    -print_final_stats=1 build/corpus/$$target $$(ls -d tests/fuzz/corpus/$$target 2>/dev/null) || exit 1; \
 	done
 	@for numeric in f32 q31; do build/fuzz/storm_image_$$numeric "$$SET_STORM" "$${SET_SEED:-1}" || exit 1; done
-	@$(PYTHON) tests/py/mutants.py --count 20000 --seed "$${SET_SEED:-1}"
+	@$(PYTHON) tests/support/mutants.py --count 20000 --seed "$${SET_SEED:-1}"
 
 ## the paper's table and figures again: docs/paper.md
 paper:

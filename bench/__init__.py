@@ -7,4 +7,6 @@ docs/results.md from it.
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "py"))  # recordings and builds that tests use too
+sys.path.append(
+    str(Path(__file__).resolve().parents[1] / "tests" / "support")
+)  # recordings and builds that tests use too

@@ -30,7 +30,7 @@ from .records import Record
 
 Floats = NDArray[np.float64]
 
-SAMPLE, SAMPLE_AT, MISSED, REZERO, POWER_CYCLE, INIT = range(6)  # calls of tests/py/libc_shim.c
+SAMPLE, SAMPLE_AT, MISSED, REZERO, POWER_CYCLE, INIT = range(6)  # calls of tests/support/libc_shim.c
 FIRST_SEED = 300_000  # of gyros that nothing was tuned on
 _GYROS = 60
 _PERIOD_S = 1.0

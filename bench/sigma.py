@@ -1,7 +1,7 @@
 """Does the uncertainty of a correction hold? True bias less correction, in units of the sigma of its snapshot.
 
 Gyros that nothing was tuned on; the table's answers are those of the reference, which are those of the compiled code
-bit for bit (tests/py/mirror/test_sigma.py).
+bit for bit (tests/cases/mirror/test_sigma.py).
 """
 
 from __future__ import annotations

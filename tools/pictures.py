@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "py"))
+sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 from browser import browser  # noqa: E402
 from lot import Lot  # noqa: E402

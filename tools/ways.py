@@ -1,7 +1,7 @@
 """Every way to install or use gyrotc that this machine allows, tried: `make packages`.
 
 Makes the archives, installs the generator by each way of pip and emits C with it (of the wheel a whole build with its
-report), builds a program with each package of the C library (tests of tests/py/repository), and weighs what an
+report), builds a program with each package of the C library (tests of tests/journeys/repository), and weighs what an
 installation and each extra bring. Prints the tables; `--docs docs` keeps the figures in docs/results/summary.json;
 `--only PART` tries a part and keeps it beside the others. What the machine lacks is named.
 """
@@ -26,7 +26,7 @@ import archives
 import packages
 
 ROOT = archives.ROOT
-sys.path[:0] = [str(ROOT / "tests" / "py")]
+sys.path[:0] = [str(ROOT / "tests" / "support")]
 
 MODEL = ROOT / "examples" / "minimal" / "model.json"
 #: Extras that a user asks for; the others are for developers.
@@ -125,7 +125,7 @@ def _ran(command: Sequence[str | Path], work: Path) -> str:
 def library(work: Path) -> Iterator[dict[str, Any]]:
     """Every package of the C library and every example, by their tests."""
     report = work / "report.xml"
-    tests = [f"tests/py/repository/test_{name}.py" for name in ("packages", "examples")]
+    tests = [f"tests/journeys/repository/test_{name}.py" for name in ("packages", "examples")]
     command = [sys.executable, "-m", "pytest", "-q", f"--junitxml={report}", *tests]
     subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
     for case in ElementTree.parse(report).iter("testcase"):

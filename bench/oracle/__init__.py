@@ -88,7 +88,7 @@ def _earlier(commit: str, names: list[str], settings: Settings) -> Path:
 def _digest_of_sets() -> str:
     """Return a hash of everything that makes the recordings and commands."""
     own = (Path(__file__).with_name(f"{name}.py") for name in ("normalise", "run", "sets", "steps"))
-    files = [*own, *sorted((ROOT / "tests" / "py").glob("*.py"))]
+    files = [*own, *sorted((ROOT / "tests" / "support").glob("*.py"))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:8]
 
 

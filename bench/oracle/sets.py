@@ -19,7 +19,7 @@ import numpy as np
 
 from .steps import Steps
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "py"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, truth

@@ -7,4 +7,4 @@ methods, so that an error of the tool cannot hide behind the same error in its t
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "py"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))

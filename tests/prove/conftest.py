@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/mirror"))]
+sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("support", "cases/mirror", "properties/mirror"))]
 
 from results import Results  # noqa: E402
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("py", "py/verify"))]
+sys.path[:0] = [str(HERE), *(str(HERE.parent / folder) for folder in ("support", "cases/verify"))]
 
 import targets_page  # noqa: E402
 from emitted import CAUGHT  # noqa: E402

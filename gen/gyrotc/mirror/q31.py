@@ -20,7 +20,7 @@ CUT = 32 << 24  # u in 2^-24
 _H = np.uint64(1557473452)  # 2^-24
 _G = np.uint64(558709134)  # 2^-16
 _TOP = 2052389455  # 2^-29 of one, at the top of the table: docs/numerics.md, section 3
-#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u (all u: tests/py/mirror/test_reference.py)
+#: |2^-29 exp2(u) - 2^-v| for every v that truncates to u (all u: tests/cases/mirror/test_reference.py)
 GAUSS_ERROR = 2.9e-8
 
 _FULL_SHARE = 2**24  # one, in 2^-24

@@ -2,7 +2,7 @@
 
 Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
 every word; this package computes with a `Table`, `tables` makes one and prints it. The status bits are those of
-`include/gtc.h`; tests/py/mirror/test_reference.py compares the two.
+`include/gtc.h`; tests/cases/mirror/test_reference.py compares the two.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The ranges are read from the runtime's own text, libc/gtc_limits.inl, so that the generator cannot emit what
 `gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_table.inl;
-tests/py/mirror/test_reference.py holds both sides against each other.
+tests/cases/mirror/test_reference.py holds both sides against each other.
 
 In float32 they are chosen, among many, to come out otherwise where a compiler fuses a product into a sum, whichever
 sum it is: the self-test of the target must not pass by luck.

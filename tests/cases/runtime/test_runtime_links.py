@@ -357,7 +357,7 @@ def test_the_cplusplus_face_gives_what_c_gives_and_refuses_swapped_units(compile
 @pytest.mark.slow
 def test_the_rule_of_the_header_is_free_of_races_and_a_breach_is_seen(broken: bool, tmp_path: Path) -> None:
     include = [f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}", f"-I{MINIMAL}"]
-    files = [str(ROOT / "tests" / "py" / "threads.c"), *SOURCES, str(MINIMAL / "gtc_rlg_0042.c")]
+    files = [str(ROOT / "tests" / "support" / "threads.c"), *SOURCES, str(MINIMAL / "gtc_rlg_0042.c")]
     flags = ["-std=gnu99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=thread", "-pthread"]
     extra = ["-DBREAK_THE_RULE"] if broken else []
     subprocess.run(["clang", *flags, *extra, *include, *files, "-o", "threads"], cwd=tmp_path, check=True)

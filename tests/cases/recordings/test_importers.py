@@ -65,7 +65,7 @@ def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
 
 
 def test_the_table_in_the_manual_is_that_of_the_tests() -> None:
-    """Made again by `python tests/py/logger_table.py`."""
+    """Made again by `python tests/support/logger_table.py`."""
     page = PAGE.read_text("utf-8")
     assert filled(page) == page
     assert len(cases()) >= 30

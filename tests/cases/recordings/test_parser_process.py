@@ -188,7 +188,7 @@ def test_a_server_that_was_ended_is_one_message_and_started_again(file: Path) ->
     opened("reads_the_file", file).close()
 
 
-TESTS = ROOT / "tests" / "py"
+TESTS = ROOT / "tests" / "support"
 SEED = 26
 MOST_S, MOST_MIB = 30.0, 4096.0
 _CALL = re.compile(r'\b(\w+)\((?:AT_FDCWD, |\d+(?:<[^>]*>)?, )?"([^"]*)"(.*)\) = (-?\d+)')

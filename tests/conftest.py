@@ -28,8 +28,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 os.environ["COLUMNS"] = "200"  # rich asks once, when the command line is imported
 
-ROOT = Path(__file__).resolve().parents[2]
-GOLDEN = Path(__file__).resolve().parent / "golden"
+ROOT = Path(__file__).resolve().parents[1]
+GOLDEN = Path(__file__).resolve().parent / "cases" / "golden"
 EXAMPLE = ROOT / "examples" / "minimal"
 #: Options of a build whose targets are not the point: one arithmetic, one compiler.
 HOST = ("--numeric", "f32", "--target", "host-gcc-O2")

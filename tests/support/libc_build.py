@@ -205,8 +205,8 @@ def runtime(compiler: str = "gcc", options: tuple[str, ...] = ("-O2",)) -> Runti
 def _compiled(compiler: str, options: tuple[str, ...]) -> Runtime:
     folder = Path(tempfile.mkdtemp(prefix="gyrotc-test-"))
     library = folder / "libgtc.so"
-    sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "py" / "libc_shim.c"]
-    folders = [f"-I{ROOT / name}" for name in ("include", "libc", "tests/py")]
+    sources = [*sorted((ROOT / "libc").glob("*.c")), ROOT / "tests" / "support" / "libc_shim.c"]
+    folders = [f"-I{ROOT / name}" for name in ("include", "libc", "tests/support")]
     command = [compiler, *FLAGS, *ALL, *options, "-shared", "-fPIC", *folders, "-o", str(library)]
     subprocess.run([*command, *map(str, sources)], check=True)
     return Runtime(ctypes.CDLL(str(library)))
