@@ -1,6 +1,6 @@
 """Hostile files of every format through `gyrotc import`, in one process: statuses, times, memory, files that it opens.
 
-`python tests/support/hostile_files.py FOLDER COUNT SEED` writes a line of JSON for each; a file is made again by its number.
+`python tests/support/hostile_files.py FOLDER COUNT SEED` writes a line of JSON for each; its number makes a file again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The table of docs/import.md: every file that the tests import. `python tests/support/logger_table.py` makes it again."""
+"""The table of docs/import.md, every file that the tests import: `python tests/support/logger_table.py` makes it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Damaged and hostile files through every reader: a message or a result, never another exception, a hang, or 2 GiB.
 
-`python tests/support/mutants.py --count 20000 --seed 1` (`make fuzz`). Workers have a limit of memory; a mutant has 10 s.
+`python tests/support/mutants.py --count 20000 --seed 1` (`make fuzz`). Workers have a limit of memory, mutants 10 s.
 A failure is printed with its number: `--seed S --only K` makes it again.
 """
 
