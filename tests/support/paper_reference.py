@@ -31,16 +31,16 @@ EXCESS = 1.02  # rho by rule: so much above the noise
 
 
 def inputs(temperature_c: Floats) -> tuple[Floats, Floats]:
-    """T in C and dT/dt in C/min that are known in each row of 10 s but the first, from the rows before it.
+    """T in C and dT/dt in C/min that are known in each row of 10 s but the first two, from the rows before it.
 
     dT/dt is the slope of a line through the last 100 s, 0 until there are as many; T is the last row's, led by it to
-    the row that it is for. The first reading counts only once a second one agrees with it: the second row has its own.
+    the row that it is for. The first reading counts only once two others agree with it: the third row has its own.
     """
     n = len(temperature_c)
-    t, slope = temperature_c[np.r_[1, 1 : n - 1]], np.zeros(n - 1)
+    t, slope = temperature_c[np.r_[2, 2 : n - 1]], np.zeros(n - 2)
     k = np.arange(ROWS) - (ROWS - 1) / 2
-    for row in range(ROWS + 1, n):
-        slope[row - 1] = k @ temperature_c[row - ROWS : row] / (k @ k)
+    for row in range(ROWS + 2, n):
+        slope[row - 2] = k @ temperature_c[row - ROWS : row] / (k @ k)
     return t + slope, slope * 6.0
 
 

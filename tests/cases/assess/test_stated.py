@@ -56,7 +56,9 @@ PASSES = FAILS.replace("improvement = 1e6", "covered = 0.0").replace('"f32", "q3
 
 def _built(folder: Path, limits: str) -> Path:
     data, out = folder / "RLG-1", folder / "out"
-    write_csv(data / "run-01.csv", columns(720, seed=1))
+    table = columns(720, seed=1)
+    table["rate_dph"] = 20.0 + 2.0 * (table["rate_dph"] - 20.0)  # noise well above the rounding of float32
+    write_csv(data / "run-01.csv", table)
     head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"\n[meta]\ncalibrated_on = "2026-03-07"'
     (data / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
     (folder / "limits.toml").write_text(limits)

@@ -203,7 +203,7 @@ def test_a_difference_of_columns_is_formed_by_its_name() -> None:
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("channels")
     (folder / "short.toml").write_text(up_and_down("signals", 4), "utf-8")
-    simulate(folder / "short.toml", seed=5, out=folder / "data")
+    simulate(folder / "short.toml", seed=9, out=folder / "data")
     return folder / "data"
 
 
