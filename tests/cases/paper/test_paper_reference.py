@@ -91,7 +91,7 @@ def each(networks: dict[str, list[Both]]) -> Iterator[tuple[str, Both]]:
 
 
 def left(group: PaperGroup, predicted: Floats) -> float:
-    """RMS of set 2 after compensation: means over 100 s from the start of the run, of which the first lacks two rows."""
+    """RMS of set 2 after compensation: means over 100 s from the start of the run, the first without two rows."""
     after = np.r_[np.nan, np.nan, group.exam.bias_dph - predicted].reshape(-1, reference.ROWS)
     return float(np.sqrt(np.mean(np.nanmean(after, axis=1) ** 2)))
 
