@@ -21,7 +21,7 @@ from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read, read_truth
 from gyrotc.tables.quantise import applied_of, quantise
 from gyrotc.train.channels import seen_by_target
-from gyrotc.train.data import TrainingData, average, joined
+from gyrotc.train.data import TrainingData, average_samples, joined
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
@@ -165,13 +165,13 @@ def _others(dataset: Dataset, model: Model) -> dict[str, Any]:
 
 
 def _table(data: TrainingData, inputs: Mapping[str, Floats]) -> tuple[Floats, TrainingData]:
-    means = average(data, 50.0)
-    raw = [average(replace(data, bias_dph=v), 50.0).bias_dph for v in inputs.values()]
+    means = average_samples(data, 50.0)
+    raw = [average_samples(replace(data, bias_dph=v), 50.0).bias_dph for v in inputs.values()]
     return np.stack([means.temperature_c, means.slope_c_per_min, *raw], axis=1), means
 
 
 def _means_rms(data: TrainingData, left: Floats) -> float:
-    means = average(replace(data, bias_dph=left), 100.0).bias_dph
+    means = average_samples(replace(data, bias_dph=left), 100.0).bias_dph
     return float(np.sqrt(np.mean(means**2)))
 
 

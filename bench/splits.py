@@ -21,9 +21,9 @@ from gyrotc.common.errors import GyrotcError
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.recordings.records import Dataset
-from gyrotc.train.data import TrainingData, average, joined, scaling_of, turning_points
+from gyrotc.train.data import TrainingData, average_samples, joined, scaling_of, turning_points
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
-from gyrotc.train.simple import design, solve
+from gyrotc.train.simple import design, solve_least_squares
 from numpy.typing import NDArray
 
 from .campaigns import Settings, say
@@ -195,7 +195,7 @@ def of_trivial(train: TrainingData, name: str, exam: TrainingData) -> NDArray[np
     """A trivial correction fitted to training samples, at those of the exam, held at the ends of what it saw, deg/h."""
     scaling = scaling_of(train)
     z = scaling.normalise(train.temperature_c, train.slope_c_per_min)
-    weights = solve(design(name, *z), train.bias_dph, train.weight)
+    weights = solve_least_squares(design(name, *z), train.bias_dph, train.weight)
     t = np.clip(exam.temperature_c, *scaling.temperature_c)
     r = np.clip(exam.slope_c_per_min, *scaling.slope_c_per_min)
     return np.asarray(design(name, *scaling.normalise(t, r)) @ weights)
@@ -212,7 +212,7 @@ def samples(dataset: Dataset) -> tuple[TrainingData, TrainingData]:
 
 
 def _rms(exam: TrainingData, correction: NDArray[np.float64]) -> float:
-    left = average(replace(exam, bias_dph=exam.bias_dph - correction), AVERAGE_S)
+    left = average_samples(replace(exam, bias_dph=exam.bias_dph - correction), AVERAGE_S)
     return float(np.sqrt(np.average(left.bias_dph**2, weights=left.weight)))
 
 

@@ -18,7 +18,7 @@ from gyrotc import _core
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import read_truth
-from gyrotc.train.data import TrainingData, average
+from gyrotc.train.data import TrainingData, average_samples
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
@@ -59,7 +59,7 @@ def gyro(scenario: str, seed: int) -> Gyro:
 
 def means(data: TrainingData) -> tuple[Floats, Floats, Floats]:
     """Temperature, its rate and bias of 100-s means: what the peers are trained on."""
-    m = average(data, AVERAGE_S)
+    m = average_samples(data, AVERAGE_S)
     return m.temperature_c, m.slope_c_per_min, m.bias_dph
 
 

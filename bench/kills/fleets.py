@@ -15,7 +15,7 @@ from gyrotc.fleet.manifest import load_manifest
 from gyrotc.fleet.unit import Task, do_unit
 from gyrotc.results.cache import program_of
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import faults
+from gyrotc.results.marker import result_faults
 
 from .driver import run
 from .jobs import GYROTC, Case, command
@@ -91,8 +91,8 @@ def _untrue(unit: Path, status: str, figures: Mapping[str, str]) -> list[str]:
         return [f"figures of {unit.name}, which is unfinished"] if figures else []
     if status == "failed":
         return []
-    if faults(unit):
-        return [f"{unit.name} is {status}, and {faults(unit)}"]
+    if result_faults(unit):
+        return [f"{unit.name} is {status}, and {result_faults(unit)}"]
     entry = json.loads((unit / "entry.json").read_text())
     reported = {name: f"{entry[name]:.4g}" if name.endswith("_dph") else str(entry[name]) for name in figures}
     return [] if reported == figures and figures else [f"{unit.name}: {figures}, and its result says {reported}"]

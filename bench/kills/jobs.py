@@ -14,7 +14,7 @@ from pathlib import Path
 
 from gyrotc.results.files import write_atomically
 from gyrotc.results.folder import result_folder, write_result
-from gyrotc.results.marker import MARKER, faults, read_marker
+from gyrotc.results.marker import MARKER, read_marker, result_faults
 
 from .driver import Job
 
@@ -68,7 +68,7 @@ def content(result: Path) -> Content:
 def wrong(result: Path) -> list[str]:
     """What keeps a result that is there from being complete."""
     if result.is_dir():
-        return faults(result)
+        return result_faults(result)
     try:
         json.loads(result.read_bytes())
     except FileNotFoundError:

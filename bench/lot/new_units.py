@@ -22,7 +22,7 @@ from gyrotc.results.fleet import Lot
 from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read, read_truth
-from gyrotc.train.data import TrainingData, cleaned, joined, scaling_of
+from gyrotc.train.data import TrainingData, cleaned_samples, joined, scaling_of
 from gyrotc.train.fitting import front_end, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.prior.learn import learn
@@ -94,7 +94,8 @@ def measured(case: Case, seed: int, unseen: int) -> dict[str, Any]:
     own = [u for u in units if u.lot and not u.lot.unrelated]
     strange = [u for u in units if u.lot and u.lot.unrelated]
     taught = [
-        unit_means(cleaned(data), scaling_of(data), None)[0] for data, _ in recordings_of(own[:_UNITS], exam=False)
+        unit_means(cleaned_samples(data), scaling_of(data), None)[0]
+        for data, _ in recordings_of(own[:_UNITS], exam=False)
     ]
     before = time.process_time()
     prior = learnt(taught)
@@ -110,7 +111,11 @@ def measured(case: Case, seed: int, unseen: int) -> dict[str, Any]:
         powers.append(best_power(prior, seen(programmes(data)[0][1]), seen(data)))
         for name, part in programmes(data):
             use = fit(part, method="auto", prior=prior).lot if name != "six runs" else None
-            p = use.p_value if use else prior.with_runs(unit_means(cleaned(part), scaling_of(part), None)[0]).p_value
+            p = (
+                use.p_value
+                if use
+                else prior.with_runs(unit_means(cleaned_samples(part), scaling_of(part), None)[0]).p_value
+            )
             refused[name].append(p < 0.01)
     lot = prior.lot
     return {
@@ -194,7 +199,7 @@ def _unit(data: TrainingData, exam: Exam, prior: LotPrior, taught: list[UnitMean
         }
         if name == "2.5 h":
             ways["auto"] = lambda p=part: predict(fit(p, method="auto"), exam.temperature_c, exam.slope_c_per_min)
-            ways |= peers(taught, unit_means(cleaned(part), scaling_of(part), None)[0], exam)
+            ways |= peers(taught, unit_means(cleaned_samples(part), scaling_of(part), None)[0], exam)
         assert with_lot.lot is not None
         row[name] = {way: exam.judged(run()) for way, run in ways.items()}
         row[name] |= {"p_value": with_lot.lot.p_value, "accepted": with_lot.lot.accepted}

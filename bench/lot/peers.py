@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from .new_units import Exam
-from gyrotc.train.data import TrainingData, cleaned, scaling_of
+from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
 from gyrotc.train.evidence import fit_process
 from gyrotc.train.prior.learn import FALSE_ALARM, sums_of
 from gyrotc.train.prior.unit_means import UnitMeans, unit_means
@@ -132,7 +132,7 @@ def _cells(unit: UnitMeans) -> tuple[Floats, Floats]:
 
 def seen(data: TrainingData) -> UnitMeans:
     """Means of samples, as a fit has them."""
-    samples = cleaned(data)
+    samples = cleaned_samples(data)
     scaling = scaling_of(samples)
     return unit_means(samples, scaling, fit_process(samples, scaling))[0]
 

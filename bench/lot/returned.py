@@ -20,7 +20,7 @@ import numpy as np
 from gyrotc.simulate.campaign import SimulatedGyro, with_noise
 from gyrotc.simulate.lot import LotOrder, draw_lot
 from gyrotc.simulate.scenario import read
-from gyrotc.train.data import TrainingData, cleaned, scaling_of
+from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
 from gyrotc.train.methods import fit
 from gyrotc.train.prior.earlier import (
     EarlierPrior,
@@ -133,7 +133,7 @@ def _changed(data: TrainingData, change: Change, replaced: Fit | None) -> Traini
 
 def _prior(early: TrainingData, known: Fit) -> EarlierPrior:
     """As `jobs.recalibration` reads it from a result."""
-    samples = cleaned(early)
+    samples = cleaned_samples(early)
     scaling = scaling_of(samples)
     means = unit_means(samples, scaling, known.outcome.process)[0]
     stated = uncertainty(samples, known)

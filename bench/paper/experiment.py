@@ -17,12 +17,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from gyrotc.common.arrays import FloatArray
-from gyrotc.common.metrics import average, statistics
-from gyrotc.pages.chart import COLOURS
+from gyrotc.common.metrics import average_rows, statistics
+from gyrotc.pages.chart import LINE_COLOURS
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.recordings.load import load
 from gyrotc.results.files import write_atomically
-from gyrotc.simulate.campaign import Noise, simulate
+from gyrotc.simulate.campaign import NoiseLevel, simulate
 from gyrotc.simulate.gyro import CELL_S
 from gyrotc.simulate.instrument import SimulatedRecord
 from gyrotc.simulate.scenario import simulated_floor
@@ -112,7 +112,7 @@ def _figures(values: FloatArray) -> dict[str, Any]:
     return {name: found[name] for name in ("mean_dph", "std_dph", "rms_dph")}
 
 
-def experiment(seed: int, noise: Noise, folder: Path) -> Experiment:
+def experiment(seed: int, noise: NoiseLevel, folder: Path) -> Experiment:
     """Simulates the paper's two sets for one gyro into `folder`, trains and judges every method."""
     simulate("paper", seed=seed, out=folder, noise=noise)
     groups, floor = groups_of(folder)
@@ -172,7 +172,7 @@ def _cell(group: PaperGroup, fitted: Fit) -> Cell:
 def _means(group: PaperGroup, predicted: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measured and compensated bias of set 2 as means over 100 s."""
     exam = group.exam
-    means = average(
+    means = average_rows(
         exam.time_s,
         exam.temperature_c,
         exam.bias_dph,
@@ -184,7 +184,7 @@ def _means(group: PaperGroup, predicted: FloatArray) -> tuple[FloatArray, FloatA
     return means.before_dph, means.after_dph
 
 
-BEFORE, AFTER, COVERED = (COLOURS[name][0] for name in ("before", "after", "covered"))
+BEFORE, AFTER, COVERED = (LINE_COLOURS[name][0] for name in ("before", "after", "covered"))
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
@@ -301,8 +301,8 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
     """Writes one simulated run: temperatures, and the bias under its noise, over hours."""
     path.parent.mkdir(parents=True, exist_ok=True)
     hours = CELL_S * np.arange(len(record.cavity_c)) / 3600.0
-    average = round(AVERAGE_S / CELL_S)
-    measured, true = (np.diff(angle[::average]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec))
+    average_rows = round(AVERAGE_S / CELL_S)
+    measured, true = (np.diff(angle[::average_rows]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)
@@ -310,8 +310,10 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         above.plot(hours[:-1], record.reading_c, color=BEFORE, linewidth=1.2, label="sensor on the block")
         above.plot(hours, record.cavity_c, color=AFTER, linewidth=0.8, linestyle="--", label="cavity")
         above.set_ylabel("C")
-        below.plot(hours[average::average], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s")
-        below.plot(hours[average::average], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
+        below.plot(
+            hours[average_rows::average_rows], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s"
+        )
+        below.plot(hours[average_rows::average_rows], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
         below.set_ylabel("1e-3 deg/h")
         below.set_xlabel("time, h")
         for ax in (above, below):

@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from gyrotc.assess.evaluate import evaluate
-from gyrotc.common.metrics import average
+from gyrotc.common.metrics import average_rows
 from gyrotc.recordings.load import axes_of, load
 from gyrotc.tables.emit import emit
 from gyrotc.train.data import training_spans
@@ -232,7 +232,7 @@ def _traces(result: Result) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     parts = []
     for path in (result.folder / "trace").glob("*.csv"):
         rows = {name: column.to_numpy() for name, column in _columns(path)}
-        a = average(
+        a = average_rows(
             rows["time_s"],
             rows["temperature_c"],
             rows["rate_dph"],

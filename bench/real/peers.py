@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gyrotc.common.metrics import average
+from gyrotc.common.metrics import average_rows
 from gyrotc.recordings.records import Dataset, Run
 from gyrotc.train.data import TrainingData, joined
-from gyrotc.train.data import average as means_of
+from gyrotc.train.data import average_samples as means_of
 from gyrotc.train.fitting import FrontEnd, front_end, samples_of
 from gyrotc.train.samples import Blocks
 
@@ -77,7 +77,7 @@ def _rms(exam: Sequence[ExamRows], peer: Correction) -> float:
 def _means(part: ExamRows, correction: np.ndarray) -> np.ndarray:
     """What a correction of each block leaves, means of the scored rows."""
     after = part.rate_dph - np.nan_to_num(correction)[part.block]
-    return average(
+    return average_rows(
         part.time_s,
         part.temperature_c,
         part.rate_dph,

@@ -39,7 +39,7 @@ from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, 
 from .results.files import digest_of, json_text, write_atomically
 
 __all__ = [
-    "SCHEMA",
+    "MODEL_SCHEMA",
     "Coverage",
     "DataFile",
     "Envelope",
@@ -55,7 +55,7 @@ __all__ = [
     "table_id",
 ]
 
-SCHEMA = "gyrotc.model/1"
+MODEL_SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
 _MAX_NETWORKS = 16  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
@@ -70,8 +70,8 @@ Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
 CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Dph = Annotated[float, Field(ge=-7.5e6, le=7.5e6)]
 Width = Annotated[float, Field(ge=1e-3, le=1e3)]
-Positive = Annotated[float, Field(gt=0.0, le=1e6)]
-Cells = tuple[Annotated[int, Field(ge=1, le=256)], Annotated[int, Field(ge=1, le=256)]]
+PositiveAmount = Annotated[float, Field(gt=0.0, le=1e6)]
+CellCounts = tuple[Annotated[int, Field(ge=1, le=256)], Annotated[int, Field(ge=1, le=256)]]
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
@@ -93,8 +93,8 @@ class _Frozen(BaseModel):
 class Scale(_Frozen):
     """Normalisation of the inputs: z_T = (T − center)/half_range, z_r = r/slope_c_per_min."""
 
-    temperature_c: tuple[Celsius, Positive]
-    slope_c_per_min: Positive
+    temperature_c: tuple[Celsius, PositiveAmount]
+    slope_c_per_min: PositiveAmount
 
 
 class Envelope(_Frozen):
@@ -107,7 +107,7 @@ class Envelope(_Frozen):
 class Coverage(_Frozen):
     """Where training data was: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
 
-    cells: Cells
+    cells: CellCounts
     rows: tuple[Annotated[str, Field(pattern="^[01]+$")], ...]
 
     @model_validator(mode="after")
@@ -117,7 +117,7 @@ class Coverage(_Frozen):
         return self
 
 
-Amount = Annotated[float, Field(ge=0.0, le=7.5e6)]
+BiasAmount = Annotated[float, Field(ge=0.0, le=7.5e6)]
 
 
 class Rules(_Frozen):
@@ -137,18 +137,18 @@ class Rules(_Frozen):
         terms: Of what each term does not know of the time before it began, deg/h (`hysteresis`: deg/h/C).
     """
 
-    hold_dph_per_c: Amount
-    rest_dph_per_min: Amount
-    slope_dph_per_c_per_min: Amount
-    start_dph: Amount
-    beyond_dph_per_c: Amount
-    beyond_dph_per_c_per_min: Amount
-    fallback_dph: Amount
-    none_dph: Amount
-    between_dph: Amount
-    noise_deg_per_sqrt_h: Amount
+    hold_dph_per_c: BiasAmount
+    rest_dph_per_min: BiasAmount
+    slope_dph_per_c_per_min: BiasAmount
+    start_dph: BiasAmount
+    beyond_dph_per_c: BiasAmount
+    beyond_dph_per_c_per_min: BiasAmount
+    fallback_dph: BiasAmount
+    none_dph: BiasAmount
+    between_dph: BiasAmount
+    noise_deg_per_sqrt_h: BiasAmount
     correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)]
-    terms: tuple[Amount, ...] = ()
+    terms: tuple[BiasAmount, ...] = ()
 
 
 class Uncertainty(_Frozen):
@@ -158,9 +158,9 @@ class Uncertainty(_Frozen):
     say how uncertain its corrections are.
     """
 
-    cells: Cells
-    rows: tuple[tuple[Amount, ...], ...]
-    uncovered: tuple[tuple[Amount, ...], ...] | None = None
+    cells: CellCounts
+    rows: tuple[tuple[BiasAmount, ...], ...]
+    uncovered: tuple[tuple[BiasAmount, ...], ...] | None = None
     rules: Rules | None = None
 
     @model_validator(mode="after")
@@ -299,8 +299,8 @@ class Model(_Frozen):
     hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
     stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
     agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
-    max_step_c: Positive
-    max_rate_c_per_min: Positive
+    max_step_c: PositiveAmount
+    max_rate_c_per_min: PositiveAmount
     guards: dict[str, Guard] = {}
     noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None
     noise_floor_source: Literal["estimated"] | None
@@ -519,9 +519,9 @@ def load_model(path: Path) -> Model:
     if path.is_dir():
         path = path / "model.json"
     raw = read_json(path, "a model.json", ceiling_name="text_mib")
-    if not isinstance(raw, dict) or raw.get("schema") != SCHEMA:
+    if not isinstance(raw, dict) or raw.get("schema") != MODEL_SCHEMA:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-        raise InputError(f"{path}, field schema", repr(found), repr(SCHEMA))
+        raise InputError(f"{path}, field schema", repr(found), repr(MODEL_SCHEMA))
     checksum = raw.pop(CHECKSUM, None)
     try:
         model = Model.from_dict(raw)

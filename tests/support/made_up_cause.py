@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 from gyrotc.causes.base import (
-    RATES,
+    ADVICE_MORE_RATES,
     Cause,
+    CauseValues,
     History,
     Parameter,
     Scene,
     SearchRule,
     Tabled,
-    Values,
     Wording,
     geometric,
     lagged,
@@ -29,16 +29,16 @@ from gyrotc.mirror.recursions import TableKind, first_order
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     z = first_order(values["tau_s"], scene.time_s, scene.node_c)
     return np.asarray(values["slope_dph_min_per_c"] * (scene.node_c - z) * 60.0 / values["tau_s"])
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return lagged(history, values["tau_s"])[:, 1:]
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     amplitude = -60.0 * values["slope_dph_min_per_c"] / values["tau_s"]
     return [memory_gain(block_s, values["tau_s"]), amplitude, 0.0]
 
@@ -59,7 +59,7 @@ CAUSE = Cause(
         short="slow",
         signature="residual follows the ramp and fades in holds",
         remedy="one first-order state and a linear term",
-        experiment=RATES,
+        experiment=ADVICE_MORE_RATES,
     ),
     search=SearchRule(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True, shown=(900.0,)),
     table=Tabled(TableKind.MEMORY, _record),

@@ -18,11 +18,11 @@ from gyrotc.assess.changes import Earlier, changes_since
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.assess.limits import held_against, load_limits
 from gyrotc.common.errors import InputError
-from gyrotc.common.metrics import average
+from gyrotc.common.metrics import average_rows
 from gyrotc.diagnose import signature_bank
 from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.diagnosis import diagnose, series_of
-from gyrotc.diagnose.signature_bank import build
+from gyrotc.diagnose.signature_bank import build_bank
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages.diagnosis import write_diagnosis_page
@@ -249,7 +249,7 @@ def _used(folder: Path, axis: str | None = None) -> None:
         blocks = run_blocks(rows, run, block_s=10.0, slope_blocks=6, max_step_c=0.5, max_rate_c_per_min=20.0)
         assert len(blocks.valid)
         inside = run.in_span(rows.time_s)
-        average(
+        average_rows(
             rows.time_s[inside], rows.temperature_c[inside], rows.rate_dph[inside], rows.rate_dph[inside],
             scored=np.ones(int(inside.sum()), dtype=bool), average_s=100.0,
         )  # fmt: skip
@@ -404,7 +404,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
     path = seeds / "bank"
     if not path.exists():
         records = records_of(load(seeds / "data"), "train", block_s=600.0, average_s=600.0)
-        bank = build(records, 0)
+        bank = build_bank(records, 0)
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
         small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
         content = pickle.dumps(replace(bank, **small), protocol=5)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gyrotc.causes.base import History
-from gyrotc.diagnose.blocks import Record, Records
+from gyrotc.diagnose.blocks import Records, RunRecord
 from gyrotc.diagnose.noise import Colour
 from gyrotc.diagnose.search import Search, open_search
-from gyrotc.diagnose.signature_bank import SignatureBank, build
+from gyrotc.diagnose.signature_bank import SignatureBank, build_bank
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -79,11 +79,11 @@ def small_records() -> Records:
             day=float(k),
         )
         usable = np.ones(time.size, dtype=bool)
-        runs.append(Record(f"run-{k}", history, np.zeros(time.size), usable, f"environment {k}"))
+        runs.append(RunRecord(f"run-{k}", history, np.zeros(time.size), usable, f"environment {k}"))
     return Records(tuple(runs), BLOCK_S)
 
 
 def small_campaign() -> Campaign:
     records = small_records()
     temperature = records.average([run.history.temperature_c for run in records.runs])
-    return Campaign(records, build(records, 0), temperature)
+    return Campaign(records, build_bank(records, 0), temperature)

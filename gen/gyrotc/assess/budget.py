@@ -35,11 +35,11 @@ from .limits import Limits, coverage_factor, instruments_in, last_day
 _STEP = 0.01  # of the range of temperatures, for the map's gradient
 DAYS_A_YEAR = 365.25  # the Julian year
 AGEING: Final = "ageing"  # the contribution of that name
-Known = tuple[float, float | None]
+KnownFigure = tuple[float, float | None]
 """A contribution, deg/h, and its degrees of freedom (None: many)."""
 
 
-def combined(parts: Sequence[Known]) -> Known:
+def combined(parts: Sequence[KnownFigure]) -> KnownFigure:
     """Combined standard uncertainty and effective degrees of freedom (JCGM 100:2008, 5.1.2 and G.2b)."""
     variance = math.fsum(u**2 for u, _ in parts)
     few = math.fsum(u**4 / freedom for u, freedom in parts if freedom is not None)

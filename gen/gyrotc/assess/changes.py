@@ -61,7 +61,7 @@ def as_found(earlier: Earlier, dataset: Dataset, limits: Limits | None, average_
     return AsFound(judged_on="exam" if exam else "train", figures=figures, limits=held), ""
 
 
-def history_of(
+def calibration_history(
     earlier: Earlier,
     model: Model,
     evaluation: Evaluation,
@@ -182,7 +182,7 @@ def changes_since(
         files=_changed_hashes(*(_emitted(m) for m in (earlier.manifest, manifest))),
         as_found=found,
         as_found_missing=missing,
-        history=history_of(earlier, model, evaluation, found, moved, stated_day(model) or started_on(dataset)),
+        history=calibration_history(earlier, model, evaluation, found, moved, stated_day(model) or started_on(dataset)),
     )
 
 

@@ -27,7 +27,7 @@ from ..mirror.history import Replay
 from ..mirror.table import Table, Words
 from ..model import Model, load_model
 from ..quality.check import findings_of_run
-from ..quality.findings import RunFacts, facts_of
+from ..quality.findings import RunFacts, run_facts
 from ..quality.outliers import departing_rows
 from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Rows, Run
@@ -46,7 +46,7 @@ from ..results.files import create
 from ..results.training import Training
 from ..simulate.scenario import simulated_floor
 from ..tables.emit import emitted_tables
-from ..verify.replay import history_of, replay_on, replay_program
+from ..verify.replay import replay_case_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
@@ -236,7 +236,7 @@ def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
 ) -> Iterator[AnsweredRows]:
     """Feeds all rows of a file to the compiled code and to the reference, and compares every step; part by part."""
-    history = history_of(rows, run, model, table)
+    history = replay_case_of(rows, run, model, table)
     if program is None:
         for part in history.parts():
             known = history.reference.rows(part)
@@ -297,7 +297,7 @@ def _one_run(
             plain = (status == 0) & scored
             squares.append(squares_of(None if part.sigma_dph is None else part.sigma_dph[span][plain]))
             wrong = None if part.mismatches is None else (wrong or 0) + part.mismatches
-    facts, together = facts_of(run, rows), squares_in_all(squares)
+    facts, together = run_facts(run, rows), squares_in_all(squares)
     found = tuple(findings_of_run(run, rows, facts, wild))
     return _Part(run, averager.averages(), wrong, facts, found, together, robust.averages(), int(wild.size))
 

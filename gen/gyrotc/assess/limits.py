@@ -23,7 +23,7 @@ from scipy.special import stdtrit
 from .. import __version__
 from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
-from ..model import Model, RuntimePart
+from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
 from ..results.evaluation import Evaluation, FigureUncertainty
 from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict, Verification
 from ..verify.toolchain import all_targets
@@ -168,7 +168,7 @@ def last_day(calibrated_on: str | None, days: float | None) -> str | None:
         return None
 
 
-Finding = Literal[
+FindingName = Literal[
     "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
@@ -176,7 +176,7 @@ Finding = Literal[
     "shared_rows", "shared_axes", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
     "sign_reversed", "axes_exchanged", "gain_changed", "unit_changed", "thermometer_changed", "stuck_temperature",
 ]  # fmt: skip
-Amount = Annotated[float, Field(ge=0.0, le=1e12)] | None
+UpperBound = Annotated[float, Field(ge=0.0, le=1e12)] | None
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
@@ -189,8 +189,6 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-Celsius = Annotated[float, Field(ge=-200.0, le=400.0)]
-CelsiusPerMin = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Temperatures = Annotated[tuple[Celsius, Celsius], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
 Slopes = Annotated[tuple[CelsiusPerMin, CelsiusPerMin], BeforeValidator(_as_tuple), AfterValidator(_ordered)]
 
@@ -203,27 +201,27 @@ class _Part(BaseModel):
 class AtMost(_Part):
     """Upper limits. RMS and the like of compensated means, on exam runs, else on spans left out, else in training."""
 
-    rms_dph: Amount = None
-    std_dph: Amount = None
-    mean_dph: Amount = None  # of its absolute value
-    max_abs_dph: Amount = None
-    rms_over_floor: Amount = None
-    rms_30min_dph: Amount = None  # of the worst run
-    angle_1h_arcsec: Amount = None  # of the worst run
-    first_10min_rms_dph: Amount = None  # of the worst run
-    uncertainty_dph: Amount = None  # largest 1 sigma over the envelope
-    error_bound_dph: Amount = None
-    centers: Amount = None
-    table_bytes: Amount = None
-    rom_bytes: Amount = None
-    ram_bytes: Amount = None
-    rows_left_out: Amount = None  # rows of training that were spikes or bursts
+    rms_dph: UpperBound = None
+    std_dph: UpperBound = None
+    mean_dph: UpperBound = None  # of its absolute value
+    max_abs_dph: UpperBound = None
+    rms_over_floor: UpperBound = None
+    rms_30min_dph: UpperBound = None  # of the worst run
+    angle_1h_arcsec: UpperBound = None  # of the worst run
+    first_10min_rms_dph: UpperBound = None  # of the worst run
+    uncertainty_dph: UpperBound = None  # largest 1 sigma over the envelope
+    error_bound_dph: UpperBound = None
+    centers: UpperBound = None
+    table_bytes: UpperBound = None
+    rom_bytes: UpperBound = None
+    ram_bytes: UpperBound = None
+    rows_left_out: UpperBound = None  # rows of training that were spikes or bursts
 
 
 class AtLeast(_Part):
     """Lower limits."""
 
-    improvement: Amount = None
+    improvement: UpperBound = None
     covered: Annotated[float, Field(ge=0.0, le=1.0)] | None = None  # share of the envelope with training data
 
 
@@ -239,7 +237,7 @@ class Required(_Part):
 
     arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
     targets: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()  # bit for bit, in all their arithmetics
-    no_findings: Annotated[tuple[Finding, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
+    no_findings: Annotated[tuple[FindingName, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen
     # Parts of tables and runtime; what is false is left out.
     uncertainty: bool = True
@@ -261,7 +259,7 @@ class Recalibration(_Part):
     """How long a calibration is meant to hold, and what the bias of the type does in that time."""
 
     days: Annotated[float, Field(gt=0.0, le=36525.0)]
-    drift_dph_per_year: Amount = None  # the most that units of the type do
+    drift_dph_per_year: UpperBound = None  # the most that units of the type do
 
 
 class Limits(_Part):

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, History, Needs, Parameter, Reach, Scene, SearchRule, Telling, Values, Wording, weights_of
+from .base import Cause, CauseValues, History, Needs, Parameter, Reach, Scene, SearchRule, Telling, Wording, weights_of
 
 _STRAIGHT = math.inf
 
@@ -20,18 +20,18 @@ def _passed(day: float, d0_day: float) -> float:
     return day if math.isinf(d0_day) else d0_day * math.log1p(day / d0_day)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     amount = values["slope_dph_per_day"] * _passed(scene.day, values["d0_day"])
     return np.full(len(scene.time_s), amount)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """0 for a run without a date: nothing is known of it."""
     amount = _passed(history.day, values.get("d0_day", _STRAIGHT)) if history.day is not None else 0.0
     return np.full((len(history.time_s), 1), amount)
 
 
-def _grid(reach: Reach) -> list[Values]:
+def _grid(reach: Reach) -> list[CauseValues]:
     """A straight line, and a course that is logarithmic from the second day on."""
     return [{"d0_day": _STRAIGHT}, {"d0_day": 2.0}]
 

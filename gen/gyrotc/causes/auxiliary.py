@@ -12,6 +12,7 @@ from ..common.errors import InputError
 from ..mirror.recursions import TableKind
 from .base import (
     Cause,
+    CauseValues,
     History,
     Needs,
     Parameter,
@@ -19,7 +20,6 @@ from .base import (
     SearchRule,
     Tabled,
     Telling,
-    Values,
     Wording,
     anywhere,
 )
@@ -36,12 +36,12 @@ def channel_of(channel: FloatArray | None) -> FloatArray:
     return channel
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     departure = channel_of(scene.channel) - values["reference"]
     return np.asarray(values["slope_dph_per_unit"] * departure)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """The channel as it is; its reference is a constant that the map holds."""
     return channel_of(history.channel)[:, None]
 
@@ -50,7 +50,7 @@ def _amplitudes(weights: FloatArray) -> dict[str, float]:
     return {"slope_dph_per_unit": float(weights[0]), "reference": 0.0}
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     return [values["slope_dph_per_unit"], values["reference"]]
 
 

@@ -15,28 +15,28 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..mirror.recursions import TableKind
 from .auxiliary import channel_of
-from .base import Cause, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording, weights_of
+from .base import Cause, CauseValues, History, Needs, Parameter, Scene, Tabled, Telling, Wording, weights_of
 
 _OCTAVES = math.sqrt(math.log2(math.e))  # exp(−x²) = 2^−(this x)²
 
 
-def _columns(channel: FloatArray, values: Values) -> FloatArray:
+def _columns(channel: FloatArray, values: CauseValues) -> FloatArray:
     """The line and both Gaussians, shape (n, 3)."""
     away = channel - values["reference"]
     bells = [np.exp(-((d / values["width"]) ** 2)) for d in (away, channel - values["second_center"])]
     return np.stack([away, *bells], axis=1)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     weights = [values[name] for name in _LINEAR]
     return np.asarray(_columns(channel_of(scene.channel), values) @ weights)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return _columns(channel_of(history.channel), values)
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     slope, first, second = (values[name] for name in _LINEAR)
     gain = _OCTAVES / values["width"]
     return [slope, gain, values["reference"], first, values["second_center"], second]

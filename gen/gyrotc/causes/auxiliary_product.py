@@ -10,27 +10,27 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..mirror.recursions import TableKind
 from .auxiliary import channel_of
-from .base import Cause, History, Needs, Parameter, Scene, Tabled, Telling, Values, Wording, weights_of
+from .base import Cause, CauseValues, History, Needs, Parameter, Scene, Tabled, Telling, Wording, weights_of
 
 _LINEAR = ("slope_dph_per_unit", "slope_dph_per_unit_per_c")
 
 
-def _columns(temperature_c: FloatArray, channel: FloatArray, values: Values) -> FloatArray:
+def _columns(temperature_c: FloatArray, channel: FloatArray, values: CauseValues) -> FloatArray:
     """The line, and the line times the temperature, shape (n, 2)."""
     away = channel - values["reference"]
     return np.stack([away, (temperature_c - values["reference_c"]) * away], axis=1)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     weights = [values[name] for name in _LINEAR]
     return np.asarray(_columns(scene.cavity_c, channel_of(scene.channel), values) @ weights)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return _columns(history.temperature_c, channel_of(history.channel), values)
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     slope, growth = (values[name] for name in _LINEAR)
     return [slope, values["reference"], growth, values["reference_c"]]
 

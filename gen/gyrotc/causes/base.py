@@ -202,9 +202,9 @@ OVERTONES = "overtones"
 
 MOST_OVERTONES = 2  # with the wave itself they leave one of the four terms of a table to something else
 
-Values = Mapping[str, float]
+CauseValues = Mapping[str, float]
 
-Kind = Literal["input", "add", "random", "static", "record"]
+CauseKind = Literal["input", "add", "random", "static", "record"]
 """How a cause enters a model.
 
 input: the map sees another temperature; add: columns are added to the map; random: one draw for each run;
@@ -323,7 +323,7 @@ class Cause:
     id: str
     family: str
     rank: int
-    kind: Kind
+    kind: CauseKind
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
@@ -331,16 +331,16 @@ class Cause:
     needs: Needs = Needs()
     search: SearchRule | None = None
     table: Tabled | None = None
-    cavity: Callable[[Scene, Values], FloatArray] | None = None
-    bias: Callable[[Scene, Values, np.random.Generator], FloatArray] | None = None
-    record: Callable[[Scene, Values], FloatArray] | None = None
-    features: Callable[[History, Values], FloatArray] | None = None
+    cavity: Callable[[Scene, CauseValues], FloatArray] | None = None
+    bias: Callable[[Scene, CauseValues, np.random.Generator], FloatArray] | None = None
+    record: Callable[[Scene, CauseValues], FloatArray] | None = None
+    features: Callable[[History, CauseValues], FloatArray] | None = None
     amplitudes: Callable[[FloatArray], dict[str, float]] | None = None
-    mended: Callable[[FloatArray, FloatArray, FloatArray, Values], tuple[FloatArray, FloatArray]] | None = None
-    over_temperature: Callable[[Values, float, float, float], Values] | None = None
-    overtone: Callable[[Values, float], Values] | None = None
-    unseen_s: Callable[[Values], float] | None = None
-    repair: Callable[[Values], str] | None = None
+    mended: Callable[[FloatArray, FloatArray, FloatArray, CauseValues], tuple[FloatArray, FloatArray]] | None = None
+    over_temperature: Callable[[CauseValues, float, float, float], CauseValues] | None = None
+    overtone: Callable[[CauseValues, float], CauseValues] | None = None
+    unseen_s: Callable[[CauseValues], float] | None = None
+    repair: Callable[[CauseValues], str] | None = None
 
     def nonlinear(self) -> tuple[Parameter, ...]:
         """Parameters that `features` takes."""
@@ -353,7 +353,7 @@ class Cause:
         return next((parameter.unit for parameter in shown), "")
 
 
-RATES = "ramps at two more rates with holds of an hour after each; a second thermometer at the cavity"
+ADVICE_MORE_RATES = "ramps at two more rates with holds of an hour after each; a second thermometer at the cavity"
 CORNERS = "steps or 5 C/min corners recorded with 10-s rows; a synchronisation pulse in both recordings"
 COLD_STARTS = "a cold start at a constant chamber temperature, at two temperatures; a hot restart"
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 from ..common.arrays import FloatArray
 from ..mirror.recursions import TableKind, first_order
 from .base import (
-    RATES,
+    ADVICE_MORE_RATES,
     Cause,
+    CauseValues,
     History,
     Parameter,
     Scene,
     SearchRule,
     Tabled,
-    Values,
     Wording,
     blocks_per_tau,
     geometric,
@@ -24,18 +24,18 @@ from .base import (
 )
 
 
-def _cavity(scene: Scene, values: Values) -> FloatArray:
+def _cavity(scene: Scene, values: CauseValues) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.cavity_c)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return lagged(history, values["tau_s"])
 
 
 _TAU = Parameter("tau_s", "s", 60.0, 4000.0)
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     return [memory_gain(block_s, values["tau_s"]), 0.0, blocks_per_tau(block_s, values["tau_s"])]
 
 
@@ -52,7 +52,7 @@ CAUSE = Cause(
         short="lag",
         signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
         remedy="one first-order state: the map sees the cavity's temperature",
-        experiment=RATES,
+        experiment=ADVICE_MORE_RATES,
     ),
     search=SearchRule(price=2, grid=geometric(_TAU, 22), over=_TAU.name, imitates=True, shown=(300.0, 900.0)),
     table=Tabled(TableKind.MEMORY, _record),

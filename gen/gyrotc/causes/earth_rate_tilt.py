@@ -13,13 +13,12 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..mirror.recursions import first_order
-from .base import Cause, Parameter, Scene, Telling, Values, Wording
+from ..recordings.plausibility import EARTH_RATE_DPH
+from .base import Cause, CauseValues, Parameter, Scene, Telling, Wording
 from .power_on_temperature import ROOM_C
 
-EARTH_RATE_DPH = 15.041067  # deg/h: 7.292115e-5 rad/s (WGS 84)
 
-
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     fixture_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     latitude = math.radians(values["latitude_deg"])
     arcsec_per_c = math.cos(latitude) * values["twist_arcsec_per_c"] + math.sin(latitude) * values["tilt_arcsec_per_c"]

@@ -15,6 +15,7 @@ from ..common.arrays import FloatArray
 from ..mirror.recursions import TableKind, play
 from .base import (
     Cause,
+    CauseValues,
     History,
     Parameter,
     Scene,
@@ -22,25 +23,24 @@ from .base import (
     SingleCycle,
     Tabled,
     Telling,
-    Values,
     Wording,
     geometric,
     weights_of,
 )
 
 
-def strength(values: Values, temperature_c: FloatArray) -> FloatArray:
+def strength(values: CauseValues, temperature_c: FloatArray) -> FloatArray:
     """Of the loop at temperatures, deg/h/C."""
     growth, away = values.get("amplitude_dph_per_c_per_c", 0.0), temperature_c - values.get("reference_c", 0.0)
     return np.asarray(values["amplitude_dph_per_c"] + growth * away)
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     z = play(values["width_c"], scene.cavity_c)
     return np.asarray(strength(values, scene.cavity_c) * (z - scene.cavity_c))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return (play(values["width_c"], history.temperature_c) - history.temperature_c)[:, None]
 
 
@@ -48,12 +48,12 @@ _WIDTH = Parameter("width_c", "C", 0.5, 40.0)
 _BOTH_SIDES = "the same hold temperature reached from both sides, at two rates, and nested shrinking loops"
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     growth = values.get("amplitude_dph_per_c_per_c", 0.0)
     return [values["width_c"], values["amplitude_dph_per_c"], growth, values.get("reference_c", 0.0)]
 
 
-def _over_temperature(values: Values, strength: float, growth: float, reference_c: float) -> Values:
+def _over_temperature(values: CauseValues, strength: float, growth: float, reference_c: float) -> CauseValues:
     linear = {"amplitude_dph_per_c": strength, "amplitude_dph_per_c_per_c": growth}
     return {"width_c": values["width_c"], "reference_c": reference_c, **linear}
 

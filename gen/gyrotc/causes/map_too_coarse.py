@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, History, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
+from .base import Cause, CauseValues, History, Parameter, Scene, SearchRule, Telling, Wording, anywhere
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * np.tanh((scene.cavity_c - values["at_c"]) / values["width_c"]))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """Hat functions of T, one each `width_c` over −60 ... 100 C: any shape of that fineness is in their span."""
     nodes = np.arange(-60.0, 100.0, values["width_c"])
     distance = np.abs(history.temperature_c[:, None] - nodes) / values["width_c"]

@@ -18,6 +18,7 @@ from ..mirror.recursions import TableKind
 from .base import (
     OVERTONES,
     Cause,
+    CauseValues,
     History,
     Parameter,
     Reach,
@@ -25,18 +26,17 @@ from .base import (
     SearchRule,
     Tabled,
     Telling,
-    Values,
     Wording,
     turns,
 )
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     phase = 2.0 * math.pi * scene.cavity_c / values["period_c"] + values["phase_rad"]
     return np.asarray(values["amplitude_dph"] * np.cos(phase))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     angle = 2.0 * math.pi * history.temperature_c / values["period_c"]
     numbers = range(1, 2 + int(values.get(OVERTONES, 0)))
     columns = [wave(number * angle) for number in numbers for wave in (np.cos, np.sin)]
@@ -54,7 +54,7 @@ def _amplitudes(weights: FloatArray) -> dict[str, float]:
 _PERIOD = Parameter("period_c", "C", 3.0, 60.0)
 
 
-def _grid(reach: Reach) -> list[Values]:
+def _grid(reach: Reach) -> list[CauseValues]:
     """Even in waves over the range: from 0.7 of it on a wave is no longer distinguished from the map."""
     longest = min(_PERIOD.high, 0.7 * reach.span_c)
     if longest <= _PERIOD.low:
@@ -63,11 +63,11 @@ def _grid(reach: Reach) -> list[Values]:
     return [{_PERIOD.name: float(1.0 / w)} for w in waves]
 
 
-def _overtone(values: Values, number: float) -> dict[str, float]:
+def _overtone(values: CauseValues, number: float) -> dict[str, float]:
     return {_PERIOD.name: values[_PERIOD.name] / number}
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     return [1.0 / values["period_c"], turns(values["phase_rad"]), values["amplitude_dph"]]
 
 

@@ -8,18 +8,30 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere, weights_of
+from .base import (
+    Cause,
+    CauseValues,
+    History,
+    Needs,
+    Parameter,
+    Scene,
+    SearchRule,
+    Telling,
+    Wording,
+    anywhere,
+    weights_of,
+)
 
 _REPEATED = "the same hold after power-ons at three temperatures, each twice"
 ROOM_C = 20.0  # room temperature: where an offset counts as none, and a fixture is aligned
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     found_c = scene.node_c[int(np.argmax(scene.on_s >= 0.0))]
     return np.full(len(scene.time_s), values["slope_dph_per_c"] * (found_c - ROOM_C))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """The first reading stands for the temperature at power-on: a run that was soaked before it had the same."""
     found_c = float(history.temperature_c[0])
     return np.full((len(history.time_s), 1), found_c - ROOM_C)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from ..common.arrays import FloatArray
 from ..mirror.recursions import first_order
-from .base import RATES, Cause, Parameter, Scene, Values, Wording
+from .base import ADVICE_MORE_RATES, Cause, CauseValues, Parameter, Scene, Wording
 
 
-def _record(scene: Scene, values: Values) -> FloatArray:
+def _record(scene: Scene, values: CauseValues) -> FloatArray:
     return first_order(values["tau_s"], scene.time_s, scene.sensed_c)
 
 
@@ -29,7 +29,7 @@ CAUSE = Cause(
         short="sensor",
         signature="none: a static map absorbs it",
         remedy="none is needed",
-        experiment=RATES,
+        experiment=ADVICE_MORE_RATES,
     ),
     record=_record,
 )

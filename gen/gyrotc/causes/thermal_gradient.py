@@ -14,15 +14,15 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..mirror.recursions import TableKind, first_order
 from .base import (
-    RATES,
+    ADVICE_MORE_RATES,
     Cause,
+    CauseValues,
     History,
     Parameter,
     Scene,
     SearchRule,
     SingleCycle,
     Tabled,
-    Values,
     Wording,
     geometric,
     half_block_before,
@@ -32,19 +32,19 @@ from .base import (
 )
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     second_c = first_order(values["tau_s"], scene.time_s, scene.node_c)
     return np.asarray(values["amplitude_dph_per_c"] * (second_c - scene.node_c))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     return lagged(history, values["tau_s"])[:, :1] - history.temperature_c[:, None]
 
 
 _TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     tau_s = values["tau_s"]
     return [memory_gain(block_s, tau_s), values["amplitude_dph_per_c"] * half_block_before(block_s, tau_s), 0.0]
 
@@ -63,7 +63,7 @@ CAUSE = Cause(
         short="gradient",
         signature="residual follows the ramp with the same size at every temperature and fades in holds",
         remedy="one first-order state and a linear term",
-        experiment=RATES,
+        experiment=ADVICE_MORE_RATES,
         advice="A fixture that tilts with a temperature of its own shows the same through Earth's rate (5e-5 deg/h for "
         "each arcsec at 45 degrees): repeat a run with the gyro rotated by 180 degrees; what then changes its sign is "
         "the fixture's.",

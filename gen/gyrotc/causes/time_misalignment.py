@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..mirror.recursions import delayed
-from .base import CORNERS, RATES, Cause, History, Parameter, Reach, Scene, SearchRule, Values, Wording
+from .base import ADVICE_MORE_RATES, CORNERS, Cause, CauseValues, History, Parameter, Reach, Scene, SearchRule, Wording
 
 _NEAR_S = 50.0 * np.arange(1, 13)  # of the grid, to either side
 _FAR_S = np.arange(700.0, 1201.0, 100.0)
@@ -18,23 +18,23 @@ _FAR_SHARE = 0.1  # of the longest run: farther shifts put too much of a run's e
 _MARGIN_S = 150.0  # beside the shift itself: half the window of dT/dt, and a block
 
 
-def _record(scene: Scene, values: Values) -> FloatArray:
+def _record(scene: Scene, values: CauseValues) -> FloatArray:
     return delayed(values["shift_s"], scene.time_s, scene.sensed_c)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     true_c = delayed(-values["shift_s"], history.time_s, history.temperature_c)
     return np.column_stack((true_c, 60.0 * np.gradient(true_c, history.time_s)))
 
 
-def _grid(reach: Reach) -> list[Values]:
+def _grid(reach: Reach) -> list[CauseValues]:
     most = _FAR_SHARE * reach.longest_s
     steps = np.concatenate([_NEAR_S, [s for s in _FAR_S if s <= most]])
     return [{"shift_s": float(s)} for s in np.concatenate([-steps[::-1], steps])]
 
 
 def _mended(
-    time_s: FloatArray, temperature_c: FloatArray, slope: FloatArray, values: Values
+    time_s: FloatArray, temperature_c: FloatArray, slope: FloatArray, values: CauseValues
 ) -> tuple[FloatArray, FloatArray]:
     """Not a number where the temperature of that time was not recorded."""
     later = time_s + values["shift_s"]
@@ -42,11 +42,11 @@ def _mended(
     return true_c, true_slope
 
 
-def _unseen_s(values: Values) -> float:
+def _unseen_s(values: CauseValues) -> float:
     return abs(values["shift_s"]) + _MARGIN_S
 
 
-def _repair(values: Values) -> str:
+def _repair(values: CauseValues) -> str:
     return f"temperature_late_s = {values['shift_s']:.0f}"
 
 
@@ -63,7 +63,7 @@ CAUSE = Cause(
         short="shift",
         signature="residual follows the second derivative of T at the corners of ramps",
         remedy="mend the clocks or the filter of the recording; no term on the target",
-        experiment=RATES,
+        experiment=ADVICE_MORE_RATES,
         beside={"cavity_lag": CORNERS, "thermal_gradient": CORNERS},
         advice="Mend the clocks or filters of the recording; no term on the target stands for them, where the "
         "thermometer is read in time.",

@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .base import Cause, History, Needs, Parameter, Scene, SearchRule, Telling, Values, Wording, anywhere
+from .base import Cause, CauseValues, History, Needs, Parameter, Scene, SearchRule, Telling, Wording, anywhere
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     return np.full(len(scene.time_s), rng.normal(0.0, values["std_dph"]))
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """One column for each run, 1 in its own: weights of one common variance (a random effect), not free."""
     columns = np.zeros((len(history.time_s), history.runs))
     columns[:, history.run] = 1.0

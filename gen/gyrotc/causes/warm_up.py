@@ -12,6 +12,7 @@ from ..mirror.recursions import TableKind
 from .base import (
     COLD_STARTS,
     Cause,
+    CauseValues,
     History,
     Needs,
     Parameter,
@@ -19,7 +20,6 @@ from .base import (
     SearchRule,
     Tabled,
     Telling,
-    Values,
     Wording,
     geometric,
     half_block_before,
@@ -28,7 +28,7 @@ from .base import (
 )
 
 
-def _bias(scene: Scene, values: Values, rng: np.random.Generator) -> FloatArray:
+def _bias(scene: Scene, values: CauseValues, rng: np.random.Generator) -> FloatArray:
     return np.asarray(values["amplitude_dph"] * _fading(scene.on_s, values["tau_s"]))
 
 
@@ -36,7 +36,7 @@ def _fading(on_s: FloatArray, tau_s: float) -> FloatArray:
     return np.where(on_s >= 0.0, np.exp(-np.maximum(on_s, 0.0) / tau_s), 0.0)
 
 
-def _features(history: History, values: Values) -> FloatArray:
+def _features(history: History, values: CauseValues) -> FloatArray:
     """0 where the time of power-on is not known, or so long before the run that nothing is left of a warm-up."""
     on_s, tau_s = history.on_s, values["tau_s"]
     if on_s is None or on_s[0] > _OVER * tau_s:
@@ -48,7 +48,7 @@ _OVER = 7.0  # time constants after which less than a thousandth is left: what f
 _TAU = Parameter("tau_s", "s", 200.0, 8000.0)
 
 
-def _record(values: Values, block_s: float) -> list[float]:
+def _record(values: CauseValues, block_s: float) -> list[float]:
     tau_s = values["tau_s"]
     middle = 1.0 / half_block_before(block_s, tau_s)  # the target counts to the start of a block
     return [octaves_per_block(block_s, tau_s), values["amplitude_dph"] * middle]

@@ -45,7 +45,7 @@ from .results import (
     evaluation_table,
     limit_lines,
     not_installed_lines,
-    summary,
+    summary_line,
     training_lines,
     verified_line,
     verify_table,
@@ -279,7 +279,7 @@ def _print_built(result: Built) -> None:
         *(limit_lines(shown(result.limits)) if result.limits else ()),
         *(change_lines(shown(result.changes)) if result.changes else ()),
         *(f"finding {finding.id}: {finding.text}" for finding in evaluation.findings),
-        summary(evaluation),
+        summary_line(evaluation),
     ):
         tell(line)
 
@@ -349,7 +349,7 @@ def diagnose(
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
-    from ..jobs.diagnosis import diagnosed
+    from ..jobs.diagnosis import diagnose_dataset
     from ..model import load_model
     from ..recordings.load import asked_axes, load
     from ..recordings.records import Dataset
@@ -368,7 +368,7 @@ def diagnose(
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
         with progress(DIAGNOSE) as say:
-            results[name or ""] = diagnosed(
+            results[name or ""] = diagnose_dataset(
                 recordings,
                 into,
                 model=known,

@@ -203,7 +203,7 @@ def _difference_text(file: VerifiedFile) -> str:
     )
 
 
-def summary(result: Evaluation) -> str:
+def summary_line(result: Evaluation) -> str:
     """One line that says what was gained: about zero, what of it a constant alone gives, and about the mean.
 
     The paper's own figure stands beside it for the paper's scenario.

@@ -26,8 +26,8 @@ __all__ = [
     "MAD_TO_SIGMA",
     "Averager",
     "Averages",
-    "Parts",
-    "average",
+    "ReadParts",
+    "average_rows",
     "median",
     "median_of_parts",
     "median_step",
@@ -72,7 +72,7 @@ def median(values: NDArray[Any], overwrite_input: bool = False) -> float:
     return float((ordered[middle - 1] + ordered[middle]) / 2)
 
 
-Parts = Callable[[], Iterable[FloatArray]]
+ReadParts = Callable[[], Iterable[FloatArray]]
 """Numbers part by part, each time they are asked for: arrays of float64, none of them NaN."""
 
 _TOGETHER = 2**18  # numbers that are put in order at once: 2 MiB
@@ -80,7 +80,7 @@ _NOT_SIGN = 2**63 - 1  # every bit of a float64 but its sign
 _DIGIT_BITS = 16  # of a float64: its numbers are in the order of their keys (`_keys`), so four digits find one
 
 
-def median_of_parts(parts: Parts) -> float:
+def median_of_parts(parts: ReadParts) -> float:
     """`median` of numbers that do not fit in memory together, to the bit."""
     return sum(_middle(parts, lambda count: ((count - 1) // 2, count // 2))) / 2
 
@@ -90,7 +90,7 @@ def median_step(time_s: FloatArray) -> float:
     return median_of_parts(lambda: (np.diff(time_s[p.start : p.stop + 1]) for p in parts_of(len(time_s) - 1)))
 
 
-def quantile_of_parts(parts: Parts, share: float) -> float:
+def quantile_of_parts(parts: ReadParts, share: float) -> float:
     """`np.quantile` of numbers that do not fit in memory together, to the bit."""
     fraction = 0.0
 
@@ -102,7 +102,7 @@ def quantile_of_parts(parts: Parts, share: float) -> float:
     return float(np.quantile(_middle(parts, ranks), fraction))
 
 
-def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
+def _middle(parts: ReadParts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
     """The numbers of two ranks that follow each other (or are one), counted from 0, by digits of their bits."""
     together: list[FloatArray] = []
     for part in parts():
@@ -117,7 +117,7 @@ def _middle(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[f
     return _farthest(parts, ranks_of)
 
 
-def _farthest(parts: Parts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
+def _farthest(parts: ReadParts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
     """As `_middle`, of many: counts their leading digits, goes on with those that have the digits of the ranks."""
     lowest, below, ranks = -(2 ** (_DIGIT_BITS - 1)), 0, None
     for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):
@@ -221,7 +221,7 @@ class Averager:
         return Averages(time_s, before, after, temperature)
 
 
-def average(
+def average_rows(
     time_s: FloatArray,
     temperature_c: FloatArray,
     before_dph: FloatArray,

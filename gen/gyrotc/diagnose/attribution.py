@@ -14,7 +14,7 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
-from ..results.diagnosed import LIKELIER
+from ..results.diagnosed import LIKELIER_THAN_ALL_ELSE
 from .candidates import Candidate, searched
 from .detection import Found, detect
 from .joined import Held
@@ -70,7 +70,10 @@ class Attribution:
     @property
     def sure(self) -> list[bool]:
         """Whether each cause is likelier than all else in its place."""
-        return [place[c.candidate.id] > LIKELIER for c, place in zip(self.causes, self.probabilities, strict=True)]
+        return [
+            place[c.candidate.id] > LIKELIER_THAN_ALL_ELSE
+            for c, place in zip(self.causes, self.probabilities, strict=True)
+        ]
 
     @property
     def columns(self) -> FloatArray:

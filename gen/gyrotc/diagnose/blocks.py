@@ -23,7 +23,7 @@ _SLOPE_SPAN_S = 200.0  # window of dT/dt, centred: no delay that a lag could sta
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class RunRecord:
     """One run.
 
     Attributes:
@@ -60,7 +60,7 @@ class Records:
             of its rows are usable.
     """
 
-    runs: tuple[Record, ...]
+    runs: tuple[RunRecord, ...]
     block_s: float
     index: tuple[NDArray[np.int64], ...] = field(init=False)
     kept: tuple[NDArray[np.int64], ...] = field(init=False)
@@ -123,7 +123,7 @@ class Records:
         tried = Records(tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s)
         return Records(tried.long_enough(), self.block_s)
 
-    def long_enough(self) -> tuple[Record, ...]:
+    def long_enough(self) -> tuple[RunRecord, ...]:
         """The runs that have two blocks at least, numbered anew: of fewer a run shows no course of time."""
         left = [r for r, kept in zip(self.runs, self.kept, strict=True) if kept.size > 1]
         return tuple(replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left))
@@ -198,14 +198,14 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
     return Records(tuple(centred), records.block_s)
 
 
-def _in_blocks(runs: tuple[Record, ...], block_s: float, average_s: float) -> Records:
+def _in_blocks(runs: tuple[RunRecord, ...], block_s: float, average_s: float) -> Records:
     """The runs that are long enough for blocks of a length that is chosen for them alone."""
     records = Records(runs, block_length(runs, block_s, average_s) if runs else block_s)
     left = records.long_enough()
     return records if len(left) == len(runs) else _in_blocks(left, block_s, average_s)
 
 
-def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> float:
+def block_length(runs: Sequence[RunRecord], block_s: float, average_s: float) -> float:
     """Length of a block, s."""
     row = max(run.row_s for run in runs)
     total = sum(float(r.usable.sum()) * r.row_s for r in runs)
@@ -213,7 +213,7 @@ def block_length(runs: Sequence[Record], block_s: float, average_s: float) -> fl
     return max(round(wanted / row), 1) * row
 
 
-def _record(run: Run, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float) -> Record:
+def _record(run: Run, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float) -> RunRecord:
     rows = run.rows()
     usable = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
     for name in channels:
@@ -225,7 +225,7 @@ def _record(run: Run, channels: Sequence[str], number: int, count: int, day: flo
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: _bridged(rows.time_s, rows.channels[name]) for name in channels}
-    return Record(name_of(run), history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
+    return RunRecord(name_of(run), history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
 
 
 def name_of(run: Run) -> str:

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from ..causes import CATALOGUE
-from ..causes.base import OVERTONES, Cause, History, Parameter, Reach, SearchRule, Values
+from ..causes.base import OVERTONES, Cause, CauseValues, History, Parameter, Reach, SearchRule
 from ..common.arrays import FloatArray
 from ..mirror.recursions import first_order
 from .blocks import Records, centred_slope
@@ -204,7 +204,7 @@ def _creep(history: History) -> FloatArray:
     return np.asarray(direction * np.log1p(since / _GRAIN_S))
 
 
-Role = Literal["columns", "input", "variance", "structure"]
+CandidateRole = Literal["columns", "input", "variance", "structure"]
 CandidateKey = tuple[str, tuple[tuple[str, float], ...], str | None]
 
 
@@ -222,7 +222,7 @@ class Candidate:
 
     id: str
     values: dict[str, float]
-    role: Role
+    role: CandidateRole
     channel: str | None = None
 
     @property
@@ -231,14 +231,14 @@ class Candidate:
         return self.id, tuple(sorted(self.values.items())), self.channel
 
 
-def diagnosed() -> dict[str, Cause]:
+def diagnosable_causes() -> dict[str, Cause]:
     """The causes of the catalogue that diagnosis looks for, in the order in which results list them."""
     return {id: term for id, term in CATALOGUE.items() if term.search is not None}
 
 
 def planned() -> list[str]:
     """Those of which a profile without rates says something."""
-    return [id for id in diagnosed() if searched(id).planned]
+    return [id for id in diagnosable_causes() if searched(id).planned]
 
 
 def searched(cause: str) -> SearchRule:
@@ -265,7 +265,7 @@ def reach_of(records: Records) -> Reach:
     return Reach(span, max(float(np.ptp(r.history.time_s)) for r in records.runs))
 
 
-def columns_of(records: Records, cause: str, values: Values) -> FloatArray:
+def columns_of(records: Records, cause: str, values: CauseValues) -> FloatArray:
     """Block means of the columns that a cause adds, shape (N, k)."""
     features = CATALOGUE[cause].features
     assert features is not None

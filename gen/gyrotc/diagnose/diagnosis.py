@@ -15,7 +15,7 @@ from ..common.arrays import FloatArray, Progress
 from ..common.metrics import HALF_HOUR_S, LEAST_SPAN_C, Averages
 from ..common.statistics import running_mean
 from ..model import Model
-from ..quality.events import accepted, found_events
+from ..quality.events import found_events, without_events
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.base import Finding
 from ..results.diagnosed import (
@@ -25,7 +25,7 @@ from ..results.diagnosed import (
     RunSeries,
     ScoredRun,
     SearchScores,
-    Values,
+    SeriesValues,
 )
 from ..results.training import Training
 from ..train.channels import StandIn
@@ -35,7 +35,7 @@ from ..train.plausibility import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .attribution import LEVEL, Attribution
 from .blocks import Records, centred_slope, name_of, records_of
-from .candidates import diagnosed
+from .candidates import diagnosable_causes
 from .detection import Found
 from .extension import Extension, Refitting, extend, stand_ins_of
 from .gain import emitted_means, floor_of, gain_of
@@ -95,7 +95,7 @@ def diagnose(
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
     events = found_events(dataset)
-    found = _diagnosed(accepted(whole, events) if accept_events else whole, options or _options_of(model), say)
+    found = _diagnosed(without_events(whole, events) if accept_events else whole, options or _options_of(model), say)
     reported = {"events": tuple(events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
@@ -282,7 +282,7 @@ def series_of(found: Diagnosis) -> DiagnosisSeries | None:
     )
 
 
-def _values(numbers: NDArray[np.floating[Any]]) -> Values:
+def _values(numbers: NDArray[np.floating[Any]]) -> SeriesValues:
     return tuple(float(f"{x:.6g}") for x in numbers.tolist())
 
 
@@ -297,7 +297,7 @@ def _run(
     run = records.runs[number]
     span, history = records.spans()[number], run.history
 
-    def mean(rows: FloatArray) -> Values:
+    def mean(rows: FloatArray) -> SeriesValues:
         return _values(records.average_run(number, rows))
 
     return RunSeries(
@@ -373,4 +373,4 @@ def _best_scores(found: Sequence[Found]) -> dict[str, float]:
     for f in found:
         if np.isfinite(f.log_p):
             out[f.candidate.id] = max(out.get(f.candidate.id, 0.0), float(f"{f.log_p:.6g}"))
-    return {id: out[id] for id in diagnosed() if id in out}
+    return {id: out[id] for id in diagnosable_causes() if id in out}

@@ -21,7 +21,7 @@ from ..results.diagnosed import ComparedStatistic
 from .blocks import Records, centred_slope
 from .detection import project
 from .joined import ROUNDING, p_values, score
-from .noise import COLOURS, Declared, Whitener
+from .noise import NOISE_COLOURS, Declared, Whitener
 from .search import Search, View
 
 _LEVEL_P = 1e-3  # one in a thousand campaigns with noise as declared is reported to have another level
@@ -48,7 +48,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
         declared: Noise as the data set declares it.
         causes: Whether causes were found; if so, what the declared noise makes visible is theirs.
     """
-    colour = declared.colour(search.records.block_s) if declared else COLOURS[0]
+    colour = declared.colour(search.records.block_s) if declared else NOISE_COLOURS[0]
     view = search.view_of(colour)
     freedom = search.freedom
     found: list[NoiseFinding] = []
@@ -138,7 +138,7 @@ def ensemble_of(
     elif declared is not None:
         colour, scale = declared.colour(records.block_s), 1.0
     else:
-        colour, scale = COLOURS[0], search.view_of(COLOURS[0]).scale
+        colour, scale = NOISE_COLOURS[0], search.view_of(NOISE_COLOURS[0]).scale
     whiten = Whitener(colour, records.kept, records.block_s, search.sigma)
     normal = np.random.default_rng(_SEED).standard_normal((records.size, _MEMBERS))
     noise = scale * whiten.colour(normal)

@@ -27,7 +27,7 @@ from ..recordings.records import Dataset
 from ..results.diagnosed import ShippingTrial
 from ..results.fleet import LotUse
 from ..train.channels import MOST_TERMS, StandIn, stand_in_of
-from ..train.data import TrainingData, cleaned, joined, scaling_of, training_spans
+from ..train.data import TrainingData, cleaned_samples, joined, scaling_of, training_spans
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
 from ..train.result import Fit
@@ -193,7 +193,7 @@ class Refitting:
         return () if fits_exactly(rest) else choose(search_of(rest), count)
 
 
-def folds_of(refitting: Refitting) -> list[list[BoolArray]]:
+def held_out_masks(refitting: Refitting) -> list[list[BoolArray]]:
     """Held-out masks: groups of runs, or spans of few runs."""
     sizes = [len(run.data.bias_dph) for run in refitting.train]
     if len(refitting.train) >= _FOLDS:
@@ -254,7 +254,7 @@ def shipping(refitting: Refitting, effects: Sequence[Effect]) -> Shipping:
 
 def _comparison(refitting: Refitting, effects: Sequence[Effect]) -> CandidateScores:
     """Every candidate beside the effects, without each piece of history."""
-    data: TrainingData = cleaned(joined([samples(run, effects) for run in refitting.train]))
+    data: TrainingData = cleaned_samples(joined([samples(run, effects) for run in refitting.train]))
     scaling = scaling_of(data)
     try:
         process = fit_process(data, scaling)
@@ -370,7 +370,7 @@ def _shipped(
 
 def _crossed(refitting: Refitting, causes: Sequence[Refined]) -> Chain:
     """Every training run (or branch of few runs) left out in turn, in a few groups."""
-    folds = folds_of(refitting)
+    folds = held_out_masks(refitting)
     if not folds:
         return [_score_self(refitting)] * (sum(map(is_corrected, causes)) + 1)
     chains = [refitting.left_out(held, causes) for held in folds]

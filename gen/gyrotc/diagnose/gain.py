@@ -15,7 +15,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray, parts_of, those
 from ..common.metrics import HALF_HOUR_S, HOUR_S, MAD_TO_SIGMA, Averager, Averages, time_statistics, window_means
-from ..mirror.history import FollowedHistory, followed
+from ..mirror.history import FollowedHistory, follow_history
 from ..mirror.table import Table
 from ..model import Model
 from ..recordings.records import Run
@@ -23,7 +23,7 @@ from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emit import quantise_all
 from ..train.evidence import steps_of, stretches
-from ..verify.replay import inputs_of
+from ..verify.replay import replay_inputs
 from .blocks import Records
 
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
@@ -122,9 +122,9 @@ def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
     So what a call of `sample` returns is not known; corrections, and which blocks are valid, are.
     """
     rows = replace(run.rows(), rate_dph=np.zeros(0))
-    channels, missed, per_block = inputs_of(rows, run, model, table)
+    channels, missed, per_block = replay_inputs(rows, run, model, table)
     del rows
-    history = followed(table, channels, missed=missed, samples_per_block=per_block)
+    history = follow_history(table, channels, missed=missed, samples_per_block=per_block)
     stream, corrections = history.stream, history.corrections
     return replace(
         history,

@@ -25,9 +25,9 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
-from .candidates import Candidate, CandidateKey, diagnosed, price_of
+from .candidates import Candidate, CandidateKey, diagnosable_causes, price_of
 from .profile_likelihood import CauseSet, Gains, Point, best_of
-from .rivals import LOOKED_AT, Kinds, Rival, kind_of, kinds_of, odds_of
+from .rivals import LOOKED_AT, Kinds, Rival, kinds_of, odds_of, rival_key
 
 _Near = dict[Kinds, list[Point]]
 
@@ -82,7 +82,7 @@ class MarginalLikelihood:
         reported = []
         for rival in ranked:
             place = (rival.id, rival.channel or "")
-            found = weighed.get(tuple(sorted([*map(kind_of, chosen[:k]), place, *map(kind_of, chosen[k + 1 :])])))
+            found = weighed.get(tuple(sorted([*map(rival_key, chosen[:k]), place, *map(rival_key, chosen[k + 1 :])])))
             if found is None:
                 reported.append(replace(rival, distance=rival.distance + shift))
                 continue
@@ -212,6 +212,6 @@ def _hides(cause: str) -> bool:
 
 def _behind(kinds: Kinds) -> list[Kinds]:
     """A model with one of its memories replaced by each cause that hides blocks, and so gained nothing on these."""
-    hiding = [(id, "") for id in diagnosed() if _hides(id)]
+    hiding = [(id, "") for id in diagnosable_causes() if _hides(id)]
     memories = [k for k, (id, _) in enumerate(kinds) if CATALOGUE[id].family == "thermal_memory"]
     return [tuple(sorted([*kinds[:k], other, *kinds[k + 1 :]])) for k in memories for other in hiding]

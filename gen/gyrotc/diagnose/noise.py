@@ -85,7 +85,7 @@ def _grid() -> tuple[Colour, ...]:
     return tuple(out)
 
 
-COLOURS: tuple[Colour, ...] = _grid()
+NOISE_COLOURS: tuple[Colour, ...] = _grid()
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,8 @@ from ..mirror.front_end import samples_per_block
 from ..quality.findings import SPIKE_SIGMAS
 from ..quality.outliers import BLOCK_S, departing
 from .attribution import Attribution, attribute, overlap
-from .blocks import Record, Records, centred_slope
-from .candidates import Candidate, columns_of, diagnosed, searched
+from .blocks import Records, RunRecord, centred_slope
+from .candidates import Candidate, columns_of, diagnosable_causes, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .joined import ROUNDING, Channels
@@ -118,7 +118,7 @@ def _separations(search: Search, causes: Sequence[Refined]) -> tuple[dict[str, f
     """For every cause, d from which it can be distinguished from each that imitates it."""
     if not causes:
         return ()
-    gains, imitators = Gains(search), [id for id in diagnosed() if searched(id).imitates]
+    gains, imitators = Gains(search), [id for id in diagnosable_causes() if searched(id).imitates]
     return tuple(overlap(gains, cause, [id for id in imitators if id != cause.candidate.id]) for cause in causes)
 
 
@@ -130,7 +130,7 @@ def search_of(
 ) -> Search:
     """The search with the coarsest map that the data do not reject."""
     checked = screen(records) if screened is None else screened
-    y, empty = cleaned(records, checked)
+    y, empty = cleaned_means(records, checked)
     left_out = np.eye(records.size)[:, empty] if empty.size else None
     channels = _channels(records)
     for level in range(len(LEVELS)):
@@ -151,7 +151,7 @@ def _channels(records: Records) -> Channels | None:
     for name in names:
         column = records.average([r.channels[name] for r in records.runs])
         if np.ptp(column) > ROUNDING * (1.0 + np.abs(column).max()):
-            for cause in (id for id, term in diagnosed().items() if term.needs.channel):
+            for cause in (id for id, term in diagnosable_causes().items() if term.needs.channel):
                 columns.append(column - column.mean())
                 candidates.append(Candidate(cause, {}, "columns", name))
     return (np.column_stack(columns), candidates) if columns else None
@@ -228,7 +228,7 @@ def screen(records: Records) -> Screened:
     return Screened(masks, sigma, tuple(NoiseFinding(id, p, values, NOISE_WORDS[id]) for id, p, values in findings))
 
 
-def _without_outliers(run: Record) -> NDArray[np.bool_]:
+def _without_outliers(run: RunRecord) -> NDArray[np.bool_]:
     """Usable rows of a run that are no spikes and no parts of bursts, by the rule that training has."""
     keep: NDArray[np.bool_] = run.usable.copy()
     at = np.flatnonzero(keep)
@@ -320,7 +320,7 @@ def _temperature_step(records: Records) -> float | None:
     return float(np.median(steps)) if len(steps) * 2 > len(records.runs) else None
 
 
-def cleaned(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[np.int64]]:
+def cleaned_means(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[np.int64]]:
     """Block means without the outliers, and the blocks of which nothing is left (their value is 0).
 
     The blocks themselves stay the same, so that a bank of the temperature records stays valid.

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, History, Scene, Values
+from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, CauseValues, History, Scene
 from ..common.arrays import FloatArray, give_back
-from ..common.metrics import Averages, average
+from ..common.metrics import Averages, average_rows
 from ..mirror.front_end import blocks_since_power_on
 from ..mirror.recursions import Course, CourseChannel, TermOutcome
 from ..quality.outliers import stretches_left_out
 from ..recordings.records import Dataset, Run
 from ..results.training import LeftOutRows
 from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
-from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned, joined, scaling_of
+from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned_samples, joined, scaling_of
 from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_basis
 from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
@@ -37,7 +37,7 @@ from .candidates import searched
 from .refine import Refined
 
 
-def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[str, float], ...]:
+def overtones_of(data: TrainingData, term: Cause, values: CauseValues) -> tuple[dict[str, float], ...]:
     """Parameters of each overtone that the samples ask for; none of a cause that has none.
 
     Args:
@@ -67,7 +67,7 @@ def overtones_of(data: TrainingData, term: Cause, values: Values) -> tuple[dict[
     return tuple(found)
 
 
-def _columns(bins: DetrendedBins, term: Cause, values: Values) -> FloatArray:
+def _columns(bins: DetrendedBins, term: Cause, values: CauseValues) -> FloatArray:
     assert term.features is not None
     time_s = np.arange(bins.temperature_c.size, dtype=np.float64)
     history = History(time_s=time_s, temperature_c=bins.temperature_c)
@@ -257,7 +257,7 @@ def completed(
     for k, effect in enumerate(out):
         if effect.term.overtone is None:
             continue
-        data = cleaned(_chosen(runs, [e for e in out if e is not effect], kept))
+        data = cleaned_samples(_chosen(runs, [e for e in out if e is not effect], kept))
         try:
             found = overtones_of(data, effect.term, effect.values)
         except TrainingFailed:
@@ -392,7 +392,7 @@ def levelled(data: TrainingData, std_dph: float) -> TrainingData:
     count = np.bincount(index)
     for _ in range(_LEVELLINGS):
         try:
-            samples = cleaned(out)
+            samples = cleaned_samples(out)
             process = fit_process(samples, scaling_of(samples))
         except TrainingFailed:
             break
@@ -448,7 +448,7 @@ def scored_means(
             left = _re_zeroed(left, data.time_s, effects)
         rest[seen] = left
         out.append(
-            average(
+            average_rows(
                 run.data.time_s,
                 run.data.temperature_c,
                 run.data.bias_dph,

@@ -41,8 +41,8 @@ UNNAMED, NOTHING = "unnamed", "nothing"
 
 _BEFOREHAND = 3.0  # odds of either before the recordings speak: each is more common than any one cause
 
-Kind = tuple[str, str]  # cause and channel ("" for none)
-Kinds = tuple[Kind, ...]  # of a model, sorted
+RivalKey = tuple[str, str]  # cause and channel ("" for none)
+Kinds = tuple[RivalKey, ...]  # of a model, sorted
 _T = TypeVar("_T")
 
 
@@ -95,7 +95,7 @@ def ranked_rivals(
     singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
 ) -> tuple[tuple[Rival, ...], ...]:
     """Other causes in the place of each chosen one, everything else kept in kind: all of them, nearest first."""
-    kinds = [kind_of(c) for c in chosen]
+    kinds = [rival_key(c) for c in chosen]
     pool = singles if len(chosen) == 1 else pairs
     if len(chosen) > 2:
         return tuple(() for _ in chosen)
@@ -106,7 +106,7 @@ def ranked_rivals(
     own = best[kinds_of(chosen)]
     out = []
     for k in range(len(kinds)):
-        near: dict[Kind, float] = {}
+        near: dict[RivalKey, float] = {}
         for key, value in best.items():
             kind = _beside(key, kinds[:k] + kinds[k + 1 :])
             if kind is not None and kind != kinds[k]:
@@ -116,14 +116,14 @@ def ranked_rivals(
     return tuple(out)
 
 
-def kind_of(candidate: Candidate) -> Kind:
+def rival_key(candidate: Candidate) -> RivalKey:
     """Cause and channel."""
     return candidate.id, candidate.channel or ""
 
 
 def kinds_of(members: Sequence[Candidate]) -> Kinds:
     """Of a model, sorted."""
-    return tuple(sorted(map(kind_of, members)))
+    return tuple(sorted(map(rival_key, members)))
 
 
 def _beside(members: Sequence[_T], others: Sequence[_T]) -> _T | None:
@@ -161,7 +161,7 @@ def calibrated(
     if not near:
         return tuple(ranked)
     others = (*chosen[:k], *chosen[k + 1 :])
-    kinds = [kind_of(chosen[k]), *((r.id, r.channel or "") for r in near)]
+    kinds = [rival_key(chosen[k]), *((r.id, r.channel or "") for r in near)]
     place = _Place(gains, others)
     models = {kind: [place.model(c) for c in _points(pool, others, kind)] for kind in kinds}
     simulated = _Simulated(place, {kind: found for kind, found in models.items() if found})
@@ -173,12 +173,12 @@ def calibrated(
     return tuple(sorted(reported, key=lambda r: -odds_of(r)))
 
 
-def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: Kind) -> list[Candidate]:
+def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: RivalKey) -> list[Candidate]:
     """The best points of a cause's grid beside the others."""
     found: list[tuple[float, Candidate]] = []
     for point in pool:
         own = _beside(point.members, others)
-        if own is not None and kind_of(own) == kind and all(own != c for _, c in found):
+        if own is not None and rival_key(own) == kind and all(own != c for _, c in found):
             found.append((point.gain, own))
     found.sort(key=lambda entry: -entry[0])
     return [c for gain, c in found[:_MOST_POINTS] if gain >= found[0][0] - _REACH]
@@ -252,7 +252,7 @@ class _Place:
 class _Simulated:
     """Simulated recordings of every cause in a place, and how well each cause explains them."""
 
-    def __init__(self, place: _Place, models: dict[Kind, list[_Model]]) -> None:
+    def __init__(self, place: _Place, models: dict[RivalKey, list[_Model]]) -> None:
         self.models = models
         self.target = place.gains.target
         every = [m for found in models.values() for m in found]
@@ -262,7 +262,7 @@ class _Simulated:
         self.measured = self._criteria(self._all.T @ self.target[:, None])
         self.drawn = {kind: self._criteria(self._of(found[0])) for kind, found in models.items()}
 
-    def odds(self, named: Kind, rival: Kind) -> float:
+    def odds(self, named: RivalKey, rival: RivalKey) -> float:
         """How much likelier a lead like the measured one is where the rival acts than where the named cause does.
 
         At most 1: the rival has the worse criterion. Densities are of normal kernels (Silverman 1986, eq. 3.28) at the
@@ -281,9 +281,9 @@ class _Simulated:
         found = (self._all.T @ mean)[:, None] + self._noise
         return np.asarray(found if weights is None else found + (self._all.T @ model.plus) @ weights)
 
-    def _criteria(self, products: FloatArray) -> dict[Kind, FloatArray]:
+    def _criteria(self, products: FloatArray) -> dict[RivalKey, FloatArray]:
         """The criterion of every cause at its best point, shape (draws,) each."""
-        out: dict[Kind, FloatArray] = {}
+        out: dict[RivalKey, FloatArray] = {}
         at = 0
         for kind, found in self.models.items():
             best = np.full(products.shape[1], -np.inf)

@@ -17,7 +17,7 @@ from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_TWO
 from .blocks import Records
 from .joined import Channels, Joined, join
-from .noise import COLOURS, Colour, Whitener
+from .noise import NOISE_COLOURS, Colour, Whitener
 from .signature_bank import SignatureBank
 
 _MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
@@ -91,9 +91,9 @@ def possible_effects(bank: SignatureBank, joined: Joined, size: int) -> FloatArr
 
 
 def view_of_bank(question: Question, number: int) -> View:
-    """The view under a colour of `COLOURS`, of which the bank knows the inner products."""
+    """The view under a colour of `NOISE_COLOURS`, of which the bank knows the inner products."""
     bank = question.bank
-    return _view(question, COLOURS[number], bank.grams[number], float(bank.log_dets[number]))
+    return _view(question, NOISE_COLOURS[number], bank.grams[number], float(bank.log_dets[number]))
 
 
 def view_of(question: Question, colour: Colour) -> View:
@@ -160,7 +160,7 @@ class Search(Question):
         channels: Columns of the auxiliary channels, as they were given.
         beside: Columns that are in every model beside the map (blocks left out, causes found), shape (N, b).
         declared: Covariance of block means that is declared, (deg/h)²; None: nothing is.
-        views: Of the colours that the data allow, by number in `COLOURS`; the declared one comes after the last.
+        views: Of the colours that the data allow, by number in `NOISE_COLOURS`; the declared one comes after the last.
         best: Number of the likeliest colour.
         allowed: Numbers of the colours that the data allow (95 %: ratio and correlation time are free).
         cautious: Whether a cause must be significant under every colour, not on their average.
@@ -241,7 +241,7 @@ def open_search(
     """
     joined = join(bank, y, channels, beside)
     question = Question(records, bank, y, sigma, joined, possible_effects(bank, joined, records.size))
-    count = len(COLOURS)
+    count = len(NOISE_COLOURS)
     numbers = range(count + (declared is not None)) if colours is None else colours
     views = {
         k: view_of_bank(question, k) if k < count or declared is None else view_of(question, declared) for k in numbers

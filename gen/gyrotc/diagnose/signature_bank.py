@@ -26,8 +26,18 @@ from ..common.arrays import FloatArray
 from ..mirror.recursions import play
 from ..results import cache
 from .blocks import Records
-from .candidates import Candidate, Role, columns_of, diagnosed, late, reach_of, searched, shapes_of, testable
-from .noise import COLOURS, Whitener
+from .candidates import (
+    Candidate,
+    CandidateRole,
+    columns_of,
+    diagnosable_causes,
+    late,
+    reach_of,
+    searched,
+    shapes_of,
+    testable,
+)
+from .noise import NOISE_COLOURS, Whitener
 from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
 
 # In steps of a factor 2.5, over what a day of recordings shows.
@@ -102,7 +112,7 @@ class SignatureBank:
         return replace(self, grams=grams, log_dets=log_dets)
 
 
-def build(records: Records, level: int) -> SignatureBank:
+def build_bank(records: Records, level: int) -> SignatureBank:
     """Computes the bank of the map of a level (`static_map.LEVELS`)."""
     basis, static = make_basis(records, level)
     groups, columns, untestable = _columns(records)
@@ -170,7 +180,7 @@ def _grams(
     """Inner products and log determinants under every colour."""
     both = np.column_stack([static, signatures])
     grams, log_dets = [], []
-    for colour in COLOURS:
+    for colour in NOISE_COLOURS:
         whiten = Whitener(colour, records.kept, records.block_s, sigma)
         white = whiten(both)
         grams.append(white.T @ white)
@@ -201,7 +211,7 @@ def _columns(records: Records) -> tuple[list[Signature], list[FloatArray], dict[
         columns.append(block)
         at += block.shape[1]
 
-    for cause, term in diagnosed().items():
+    for cause, term in diagnosable_causes().items():
         if term.kind == "input" or term.needs.channel:
             continue
         reason = testable(records, cause)
@@ -212,7 +222,7 @@ def _columns(records: Records) -> tuple[list[Signature], list[FloatArray], dict[
             if term.kind == "static":
                 add(Candidate(cause, {}, "variance"), fine_columns(records))
             else:
-                role: Role = "variance" if term.kind == "random" else "columns"
+                role: CandidateRole = "variance" if term.kind == "random" else "columns"
                 add(Candidate(cause, dict(values), role), columns_of(records, cause, values))
     add(Candidate("structure", {}, "structure"), _dictionary(records))
     return groups, columns, untestable
@@ -260,7 +270,7 @@ def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _:
     bank = cache.kept(f"{digest}.bank", _bank)
     if bank is None:
         say("computing the signatures of all causes")
-        bank = build(records, level)
+        bank = build_bank(records, level)
         cache.keep(f"{digest}.bank", pickle.dumps(bank, protocol=5))
     return bank
 
@@ -288,5 +298,5 @@ def _code() -> str:
     """Hash of the code that makes a bank: a new version makes new banks."""
     package = Path(__file__).parents[1]
     files = [path for name in _MAKERS for path in sorted((package / name).rglob("*.py"))]
-    files += [Path(inspect.getfile(t.features)) for t in diagnosed().values() if t.features is not None]
+    files += [Path(inspect.getfile(t.features)) for t in diagnosable_causes().values() if t.features is not None]
     return hashlib.sha256(b"".join(path.read_bytes() for path in dict.fromkeys(files))).hexdigest()

@@ -29,7 +29,7 @@ from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
 from ..train.data import turning_points
 from .attribution import Attribution
 from .blocks import Records, centred_slope
-from .candidates import Candidate, columns_of, diagnosed, price_of, searched, shape_parameter
+from .candidates import Candidate, columns_of, diagnosable_causes, price_of, searched, shape_parameter
 from .profile_likelihood import SEPARATION
 from .refine import Interval, Refined
 from .rivals import EQUIVALENT, Rival
@@ -38,13 +38,13 @@ _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
 _ROUNDS, _AROUND, _FINE = 4, 1.5, 1e-4  # of a walk to the optimum: steps of the grid to either side, end in logarithms
 _POWERS = ((0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (0, 3))  # of (T, dT/dt): of each set the first ones
-RATES: tuple[tuple[tuple[int, int], ...], ...] = tuple(_POWERS[:count] for count in (1, 2, 3, 4, 6))
+POWERS_OF_RATE: tuple[tuple[tuple[int, int], ...], ...] = tuple(_POWERS[:count] for count in (1, 2, 3, 4, 6))
 """Powers of (T, dT/dt) beside a map of T: g(T) dT/dt, and flows that saturate or have no sign (docs/simulation.md)."""
 
 
 def memories() -> dict[str, SingleCycle]:
     """Causes that are looked for in a single cycle."""
-    found = {id: searched(id).cycle for id in diagnosed()}
+    found = {id: searched(id).cycle for id in diagnosable_causes()}
     return {id: cycle for id, cycle in found.items() if cycle is not None}
 
 
@@ -322,10 +322,10 @@ def cycle_of(records: Records) -> Cycle:
     states = memories()
     kinds = [(k,) for k in states] + list(itertools.combinations_with_replacement(states, 2))
     best = [fits.polished(_members(fits, k)) for k in kinds]
-    left = [fits.left(members) for members in best] + [fits.without_rate(powers) for powers in RATES]
+    left = [fits.left(members) for members in best] + [fits.without_rate(powers) for powers in POWERS_OF_RATE]
     effective = _effective_size(records, min(left, key=lambda e: float(e @ e)))
     tried = tuple(sorted((_tried(fits, m, effective) for m in best), key=lambda t: t.criterion))
-    static = tuple(sorted((_static(fits, p, effective) for p in RATES), key=lambda t: t.criterion))
+    static = tuple(sorted((_static(fits, p, effective) for p in POWERS_OF_RATE), key=lambda t: t.criterion))
     rows = [(r.history.time_s[r.usable], r.history.temperature_c[r.usable]) for r in records.runs]
     turns = sum(len(turning_points(*of_run)) for of_run in rows)
     rms = float(np.sqrt(np.mean(fits.rest**2)))

@@ -15,7 +15,7 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..train.data import MIN_HALF_RANGE_C, MIN_HALF_RANGE_C_PER_MIN
 from .blocks import Records, centred_slope
-from .candidates import Candidate, diagnosed, reach_of, searched
+from .candidates import Candidate, diagnosable_causes, reach_of, searched
 
 LEVELS: tuple[tuple[int, int, int], ...] = ((9, 5, 3), (13, 6, 3))
 """Gaussians over T alone, and over T × dT/dt, from coarse to fine: finer maps are named, not taken in silence."""
@@ -115,7 +115,7 @@ def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], 
     """Map of the changed inputs for every candidate of kind "input"."""
     reach = reach_of(records)
     candidates, maps, knowns = [], [], []
-    for cause in (i for i, term in diagnosed().items() if term.kind == "input"):
+    for cause in (i for i, term in diagnosable_causes().items() if term.kind == "input"):
         for values in searched(cause).grid(reach):
             candidates.append(Candidate(cause, dict(values), "input"))
             block, known = replaced_map(records, basis, candidates[-1])

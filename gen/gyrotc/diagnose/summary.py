@@ -11,7 +11,7 @@ from ..causes import CATALOGUE, separate_by
 from ..recordings.records import Dataset
 from ..results.base import Estimate
 from ..results.diagnosed import (
-    LIKELIER,
+    LIKELIER_THAN_ALL_ELSE,
     Baseline,
     ComparedStatistic,
     ConsideredCause,
@@ -30,7 +30,7 @@ from ..results.diagnosed import (
 from ..results.recordings import DetectionLimit
 from ..train.fitting import FitOptions, front_end
 from .attribution import Attribution
-from .candidates import diagnosed, searched, shape_parameter
+from .candidates import diagnosable_causes, searched, shape_parameter
 from .detection import CauseLimit
 from .discrepancy import NoiseFinding
 from .extension import Extension
@@ -181,7 +181,7 @@ def _likely(probabilities: Mapping[str, float]) -> bool:
     named, *others = probabilities
     family = [id for id in others if id in CATALOGUE and CATALOGUE[id].family == CATALOGUE[named].family]
     share = sum(probabilities[id] for id in (named, *family))
-    return probabilities[named] > probabilities[UNNAMED] and share > LIKELIER
+    return probabilities[named] > probabilities[UNNAMED] and share > LIKELIER_THAN_ALL_ELSE
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
@@ -235,7 +235,7 @@ def not_testable(dataset: Dataset, options: FitOptions, text: str) -> Diagnosed:
         estimated_noise=None,
         baseline=None,
         extended=None,
-        considered=tuple(_untested(i, text) for i in diagnosed()),
+        considered=tuple(_untested(i, text) for i in diagnosable_causes()),
         missing=(text,),
         measured_on=None,
         single_cycle=None,
@@ -446,7 +446,7 @@ def _considered(analysis: Analysis, untestable: Mapping[str, str]) -> list[Consi
     out = {"structure", *untestable}
     every = [_tested(analysis, *key, p_value) for key, p_value in best.items() if key[0] not in out]
     every += [_untested(id, why) for id, why in untestable.items()]
-    order = list(diagnosed())
+    order = list(diagnosable_causes())
     return sorted(every, key=lambda cause: order.index(cause.id))
 
 

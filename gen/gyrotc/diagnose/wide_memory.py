@@ -25,8 +25,8 @@ from ..causes.base import History, Parameter, SearchRule
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from ..mirror.recursions import first_order, play
-from .blocks import Record, Records
-from .candidates import diagnosed, reach_of, searched, shape_parameter
+from .blocks import Records, RunRecord
+from .candidates import diagnosable_causes, reach_of, searched, shape_parameter
 from .joined import ratio_of
 from .profile_likelihood import Gains
 from .rivals import EQUIVALENT
@@ -127,7 +127,7 @@ def _families(gains: Gains, beside: Sequence[FloatArray]) -> tuple[_Family, _Fam
 
 def _parameter(looked_for: Callable[[SearchRule], bool]) -> Parameter:
     """The parameter of the first cause that is so looked for."""
-    return next(p for id in diagnosed() if looked_for(searched(id)) and (p := shape_parameter(id)) is not None)
+    return next(p for id in diagnosable_causes() if looked_for(searched(id)) and (p := shape_parameter(id)) is not None)
 
 
 class _Family:
@@ -217,7 +217,7 @@ def _occupied(records: Records, nodes: FloatArray, state: Callable[[History], Fl
     return np.concatenate(parts)
 
 
-def _thinned(run: Record, every: int) -> History:
+def _thinned(run: RunRecord, every: int) -> History:
     """Every so many rows of a run."""
     h = run.history
     return replace(h, time_s=h.time_s[::every], temperature_c=h.temperature_c[::every])

@@ -32,7 +32,7 @@ PROFILE_S = 600.0  # s between two temperatures of a run that are compared
 _POINTS = 160  # of the residual that a picture shows
 
 
-def facts_of(runs: Sequence[tuple[str, Averages]]) -> Facts:
+def gyro_facts(runs: Sequence[tuple[str, Averages]]) -> Facts:
     """Facts of a gyro from the means of its runs, each with its file."""
     used = [(file, a) for file, a in runs if a.time_s.size]
     steps = [step_in(a.after_dph) for _, a in used]

@@ -21,13 +21,13 @@ from ..jobs.build import Built, build_into
 from ..quality.events import found_events
 from ..recordings.load import load
 from ..recordings.records import Dataset
-from ..results.cache import inputs_of, program_of
+from ..results.cache import input_hashes, program_of
 from ..results.files import Lock, digest_of, json_text, write_atomically
 from ..results.fleet import Facts, FleetEntry
 from ..results.folder import clean, leftovers, result_folder
-from ..results.marker import KINDS, faults, read_marker, survey
+from ..results.marker import KINDS, read_marker, result_faults, survey_folder
 from .manifest import Fleet, Unit, printable
-from .outliers import facts_of
+from .outliers import gyro_facts
 
 
 def move_away(place: Path) -> str:
@@ -43,7 +43,7 @@ def move_away(place: Path) -> str:
         return ""
     with suppress(InputError):  # the marker itself is damaged
         marker = read_marker(place)
-        if marker is None or not survey(place, marker)[1]:
+        if marker is None or not survey_folder(place, marker)[1]:
             return ""
     lock = Lock(place, "fleet")
     try:
@@ -110,7 +110,7 @@ class Task:
         prior = self.fleet.options.prior
         plain = asdict(replace(self.fleet.options, prior=None)) | {"prior": prior.key if prior else None}
         options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
-        return digest_of([self.program, options, inputs_of(self.unit.dataset)])
+        return digest_of([self.program, options, input_hashes(self.unit.dataset)])
 
 
 def made_before(task: Task) -> FleetEntry | None:
@@ -123,7 +123,7 @@ def made_before(task: Task) -> FleetEntry | None:
         return None
     try:
         entry = checked(FleetEntry, read_json(task.out / ENTRY, "the entry of a gyro"), ENTRY)
-        if entry.key != task.key or entry.model_hash is None or faults(task.out):
+        if entry.key != task.key or entry.model_hash is None or result_faults(task.out):
             return None
     except (GyrotcError, OSError, ValueError, RecursionError):
         return None
@@ -236,7 +236,7 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
 
 def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> Facts | None:
     """What the gyro is compared by; where more than noise is left also what its runs show by themselves."""
-    facts = facts_of(runs)
+    facts = gyro_facts(runs)
     if not built.evaluation.structure_left:
         return facts
     named = (f for f in built.evaluation.findings if f.id == "run_outlier")

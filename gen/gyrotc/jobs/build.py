@@ -27,7 +27,7 @@ from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
 from ..common.arrays import Progress
 from ..common.errors import InputError
-from ..common.metrics import Averages, average
+from ..common.metrics import Averages, average_rows
 from ..model import Model, load_model
 from ..pages.display import check_display
 from ..pages.report import write_report
@@ -264,9 +264,9 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
 
 def _extended(dataset: Dataset, work: Path, options: FitOptions, say: Progress) -> tuple[Fitted | None, Diagnosed]:
     """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
-    from .diagnosis import diagnosed
+    from .diagnosis import diagnose_dataset
 
-    found = diagnosed(dataset, work / "diagnosis", options=options, progress=say)
+    found = diagnose_dataset(dataset, work / "diagnosis", options=options, progress=say)
     extended = found.result.extended
     if extended is None or extended.model is None or found.training is None:
         return None, found.result
@@ -414,7 +414,7 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
         unseen = whole if part.seen.all() else _fit(method, data.select(part.seen), options)
         s = part.samples
         after = s.bias_dph - predict(unseen, s.temperature_c, s.slope_c_per_min)
-        means = average(
+        means = average_rows(
             s.time_s,
             s.temperature_c,
             s.bias_dph,

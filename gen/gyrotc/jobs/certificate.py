@@ -29,7 +29,7 @@ from .axes import axes_in
 
 _LONGEST = 300  # characters of a reason: a line or two of a certificate
 _EXPECTED = "a facts file (docs/delivery.md)"
-Line = Annotated[str, Field(min_length=1, max_length=300)]
+StatedLine = Annotated[str, Field(min_length=1, max_length=300)]
 _NEEDED = {
     "number": "number of the certificate (--number)",
     "laboratory": "name of the laboratory",
@@ -66,23 +66,23 @@ class LaboratoryFacts(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    number: Line | None = None
-    laboratory: Line | None = None
-    city: Line | None = None
+    number: StatedLine | None = None
+    laboratory: StatedLine | None = None
+    city: StatedLine | None = None
     country: Country | None = None
-    operator: Line | None = None
-    approved_by: Line | None = None
-    customer: Line | None = None
-    customer_city: Line | None = None
+    operator: StatedLine | None = None
+    approved_by: StatedLine | None = None
+    customer: StatedLine | None = None
+    customer_city: StatedLine | None = None
     customer_country: Country | None = None
-    manufacturer: Line | None = None
-    type: Line | None = None
-    procedure: Line | None = None
-    environment: Line | None = None
+    manufacturer: StatedLine | None = None
+    type: StatedLine | None = None
+    procedure: StatedLine | None = None
+    environment: StatedLine | None = None
     calibrated_on: Day | None = None
     issued: Day | None = None
     place: Literal["laboratory", "customer", "other"] = "laboratory"
-    accreditation: Line | None = None
+    accreditation: StatedLine | None = None
 
 
 _NEVER_REWRITTEN = ("model.json", "training.json", "limits.json")  # by any command but build
@@ -96,7 +96,7 @@ class Certified:
     pdf: bool
 
 
-def facts_of(meta: Mapping[str, Any], path: Path | None, number: str | None) -> LaboratoryFacts:
+def laboratory_facts(meta: Mapping[str, Any], path: Path | None, number: str | None) -> LaboratoryFacts:
     """What is known: the facts file before `[meta]`, the number of the command line before both.
 
     Raises:
@@ -139,9 +139,9 @@ def certificate(
     """
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     units = [unit_of(place) for place in places]
-    why = accepted(folder, units, accept_fail)
+    why = reason_of_release(folder, units, accept_fail)
     first = units[0]
-    stated = facts_of(first.model.meta, facts, number)
+    stated = laboratory_facts(first.model.meta, facts, number)
     missing = list(missing_facts(stated, units))
     if missing and not draft:
         raise InputError(
@@ -188,7 +188,7 @@ def unit_of(folder: Path) -> UnitResults:
     return unit
 
 
-def accepted(folder: Path, units: Sequence[UnitResults], reason: str | None) -> str | None:
+def reason_of_release(folder: Path, units: Sequence[UnitResults], reason: str | None) -> str | None:
     """The reason for which a unit is released whose verdict is FAIL or CONDITIONAL PASS; None where it is neither.
 
     Raises:

@@ -13,7 +13,7 @@ from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
 from ..model import Model
-from ..pages.diagnosis import PICTURES, SERIES, draw, write_diagnosis_page
+from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
 from ..results.files import json_text, write_atomically
@@ -23,7 +23,7 @@ from ..train.fitting import FitOptions
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
 
 
-def diagnosed(
+def diagnose_dataset(
     dataset: Dataset,
     out: Path | None = None,
     *,
@@ -61,7 +61,7 @@ def _saved(out: Path, found: Diagnosis, progress: Progress | None = None) -> Dia
         write_atomically(out / _SCENARIO, scenario)
         names["scenario"] = _SCENARIO
     series = series_of(found)
-    drawn = {} if series is None else draw(result, series)
+    drawn = {} if series is None else diagnosis_pictures(result, series)
     for name, svg in drawn.items():
         write_atomically(out / PICTURES / f"{name}.svg", svg)
     names["pictures"] = tuple(f"{PICTURES}/{name}.svg" for name in drawn)

@@ -18,9 +18,9 @@ from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotClust
 from ..results.marker import check_intact
 from ..results.training import Training
 from ..train.evidence import MEAN_S
-from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, folds_of, learn
+from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, fold_count, learn
 from ..train.prior.unit_means import UnitMeans, means_of
-from ..train.prior.use import prior_of, process_result, rounded
+from ..train.prior.use import file_numbers, prior_of, process_result
 
 _CELLS = (33, 13)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read
@@ -157,22 +157,24 @@ def lot_from(
         text=_in_words(names, found),
         temperature_c=envelope[0],
         slope_c_per_min=envelope[1],
-        occupancy=tuple(rounded(row) for row in _occupancy(inside, envelope)),
+        occupancy=tuple(file_numbers(row) for row in _occupancy(inside, envelope)),
         center_dph=found.center_dph,
         unit_dph=found.unit_dph,
         functions=state.basis.result(),
         clusters=tuple(
-            LotCluster(units=int(n), mean=rounded(m), covariance=tuple(rounded(r[: k + 1]) for k, r in enumerate(c)))
+            LotCluster(
+                units=int(n), mean=file_numbers(m), covariance=tuple(file_numbers(r[: k + 1]) for k, r in enumerate(c))
+            )
             for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
         ),
-        directions=tuple(rounded(d) for d in state.directions.T),
+        directions=tuple(file_numbers(d) for d in state.directions.T),
         rest=process_result(state.rest),
         of_mean=process_result(state.of_mean),
         noise_dph=float(np.median([u.sigma_dph for u in inside])),
         mean_s=mean_s,
         between_dph=between_dph,
         cross_validation=CrossValidation(
-            folds=folds_of(len(inside)),
+            folds=fold_count(len(inside)),
             spread_scale=found.scale,
             left_rms_dph=found.left_out_dph[0],
             constant_rms_dph=found.left_out_dph[1],
@@ -201,9 +203,9 @@ def _at_rest(lot: Lot) -> AtRest:
     values = prior.basis.values(t, np.zeros(_CURVE))
     spread = np.sqrt(np.sum((values @ prior.covariances[0]) * values, axis=1))
     return AtRest(
-        temperature_c=rounded(t),
-        mean_dph=rounded(lot.center_dph + lot.unit_dph * (values @ prior.means[0])),
-        spread_dph=rounded(lot.unit_dph * spread),
+        temperature_c=file_numbers(t),
+        mean_dph=file_numbers(lot.center_dph + lot.unit_dph * (values @ prior.means[0])),
+        spread_dph=file_numbers(lot.unit_dph * spread),
     )
 
 

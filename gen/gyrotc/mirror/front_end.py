@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from ..common.arrays import steps_are
 from ..common.inputs import need_memory
-from .recursions import Arithmetic, Course, Numbers
-from .samples import HELD, RESTART, Guarded, judge_readings
+from .recursions import Arithmetic, Course, NumberArray
+from .samples import READING_HELD, READING_RESTART, Guarded, judge_readings
 from .table import WARMING
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
 
-MAP, KEEP, FALLBACK = 0, 1, 2  # any three numbers
+FROM_MAP, FROM_KEPT, FROM_FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
@@ -57,13 +57,13 @@ class Steps:
     accepted: NDArray[np.bool_]
     at: NDArray[np.int64]
     kind: NDArray[np.int8]
-    temperature: Numbers
-    slope: Numbers
+    temperature: NumberArray
+    slope: NumberArray
     remarks: NDArray[np.int32]
     is_restart: NDArray[np.bool_]
     missing: NDArray[np.int64]
     valid: NDArray[np.bool_]
-    mean: Numbers
+    mean: NumberArray
 
     def led(self, blocks: int) -> Steps:
         """The same corrections with every mean where its slope brings it within `blocks` (0 or 1) blocks.
@@ -72,7 +72,7 @@ class Steps:
         """
         if blocks == 0:
             return self
-        slope = np.where(self.kind == MAP, self.slope, self.slope.dtype.type(0))
+        slope = np.where(self.kind == FROM_MAP, self.slope, self.slope.dtype.type(0))
         temperature = self.temperature + slope
         if np.issubdtype(temperature.dtype, np.integer):
             temperature = np.clip(temperature, -_LARGEST, _LARGEST)
@@ -120,7 +120,7 @@ def _number_type(samples: int) -> type[np.integer]:
     return np.int32 if samples < 2**31 else np.int64
 
 
-def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.integer] | None) -> Numbers:
+def with_missing(arithmetic: Arithmetic, x: NumberArray, position: NDArray[np.integer] | None) -> NumberArray:
     """Samples at their positions, missing ones between them; None: there are none."""
     if position is None:
         return x
@@ -129,12 +129,12 @@ def with_missing(arithmetic: Arithmetic, x: Numbers, position: NDArray[np.intege
     return samples
 
 
-def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
+def follow(arithmetic: Arithmetic, x: NumberArray, settings: Settings) -> Steps:
     """Follows samples x, shape (n,), from the start of a state on."""
     verdict, fallback = _accepted(arithmetic, x, settings)
     x = settings.guard.limited(x)
     valid, mean, count = _block_means(arithmetic, x, verdict, settings.samples_per_block)
-    restarts = np.flatnonzero(verdict == RESTART)
+    restarts = np.flatnonzero(verdict == READING_RESTART)
     # A block closes when the next sample arrives.
     n_closed = max(0, x.size - 1) // settings.samples_per_block
     closings = _closings(arithmetic, valid[:n_closed], mean, count, fallback, restarts, settings)
@@ -149,9 +149,9 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
     # Stable: a block closes before the sample that opens the next one is judged.
     order = np.argsort(np.concatenate([closings.at, starts.at]), kind="stable")
     kind = np.concatenate([closings.kind, starts.kind])[order]
-    made = order[np.maximum.accumulate(np.where(kind == MAP, np.arange(kind.size), 0))]
+    made = order[np.maximum.accumulate(np.where(kind == FROM_MAP, np.arange(kind.size), 0))]
     return Steps(
-        accepted=verdict != HELD,
+        accepted=verdict != READING_HELD,
         at=np.concatenate([closings.at, starts.at])[order],
         kind=kind,
         temperature=np.concatenate([closings.temperature, starts.temperature])[made],
@@ -168,15 +168,15 @@ def follow(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> Steps:
 class _Corrections:
     at: NDArray[np.int64]
     kind: NDArray[np.int8]
-    temperature: Numbers
-    slope: Numbers
+    temperature: NumberArray
+    slope: NumberArray
     remarks: NDArray[np.int32]
     missing: NDArray[np.int64]
 
 
 def _block_means(
-    arithmetic: Arithmetic, x: Numbers, verdict: NDArray[np.int8], n: int
-) -> tuple[NDArray[np.bool_], Numbers, NDArray[np.int64]]:
+    arithmetic: Arithmetic, x: NumberArray, verdict: NDArray[np.int8], n: int
+) -> tuple[NDArray[np.bool_], NumberArray, NDArray[np.int64]]:
     """Which blocks are valid, their means (0 where no sample was accepted), and how many were."""
     used = _used(verdict, n)
     step = n * max(1, _PART // n)
@@ -189,8 +189,8 @@ def _block_means(
 
 
 def _means(
-    arithmetic: Arithmetic, x: Numbers, used: NDArray[np.bool_], n: int
-) -> tuple[NDArray[np.bool_], Numbers, NDArray[np.int64]]:
+    arithmetic: Arithmetic, x: NumberArray, used: NDArray[np.bool_], n: int
+) -> tuple[NDArray[np.bool_], NumberArray, NDArray[np.int64]]:
     """`_block_means` of a part that begins with a block."""
     blocks = -(-x.size // n)
     if blocks == 1:
@@ -212,7 +212,7 @@ def _is_enough(count: NDArray[np.integer], n: int) -> NDArray[np.bool_]:
     return np.asarray((2 * count >= n) | (count >= 2))
 
 
-def _accepted(arithmetic: Arithmetic, x: Numbers, settings: Settings) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+def _accepted(arithmetic: Arithmetic, x: NumberArray, settings: Settings) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     """Verdict on every sample, and blocks after which the fallback is in force.
 
     What is accepted after a loss depends on when the blocks made it one: judged again from each loss on.
@@ -240,7 +240,7 @@ def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
     count = np.count_nonzero(used[:whole].reshape(-1, n), axis=1)
     valid = _is_enough(np.append(count, np.count_nonzero(used[whole:]))[:blocks], n)
     restarted = np.zeros(blocks, dtype=np.bool_)
-    restarted[np.flatnonzero(verdict == RESTART) // n] = True
+    restarted[np.flatnonzero(verdict == READING_RESTART) // n] = True
     fallback = np.zeros(blocks, dtype=np.bool_)
     held, previous = 0, -2
     for block in np.flatnonzero(~valid).tolist():
@@ -254,8 +254,8 @@ def _fallen(verdict: NDArray[np.int8], settings: Settings) -> NDArray[np.bool_]:
 
 def _used(verdict: NDArray[np.int8], n: int) -> NDArray[np.bool_]:
     """Samples that count for their block: accepted, and none before a restart in it."""
-    used: NDArray[np.bool_] = verdict != HELD
-    for i in np.flatnonzero(verdict == RESTART):  # what came before in the block is dropped
+    used: NDArray[np.bool_] = verdict != READING_HELD
+    for i in np.flatnonzero(verdict == READING_RESTART):  # what came before in the block is dropped
         used[i - i % n : i] = False
     return used
 
@@ -263,7 +263,7 @@ def _used(verdict: NDArray[np.int8], n: int) -> NDArray[np.bool_]:
 def _closings(
     arithmetic: Arithmetic,
     valid: NDArray[np.bool_],
-    mean: Numbers,
+    mean: NumberArray,
     count: NDArray[np.int64],
     fallback: NDArray[np.bool_],
     restarts: NDArray[np.int64],
@@ -287,11 +287,11 @@ def _closings(
     slope[full] = np.where(sure, steep, slope.dtype.type(0))
     warming = ~full
     warming[full] = ~sure
-    kind = np.where(good, MAP, np.where(fallback[blocks], FALLBACK, KEEP)).astype(np.int8)
+    kind = np.where(good, FROM_MAP, np.where(fallback[blocks], FROM_FALLBACK, FROM_KEPT)).astype(np.int8)
     none = np.zeros(before.size)
     return _Corrections(
         at=(np.concatenate([before, blocks]) + 1) * n,
-        kind=np.concatenate([none + FALLBACK, kind]).astype(np.int8),
+        kind=np.concatenate([none + FROM_FALLBACK, kind]).astype(np.int8),
         temperature=np.concatenate([none.astype(mean.dtype), mean[blocks]]),
         slope=np.concatenate([none.astype(slope.dtype), slope]),
         remarks=np.concatenate([none, np.where(good & warming, WARMING, 0)]).astype(np.int32),
@@ -313,14 +313,14 @@ _MAX_ELAPSED = 0xFFFFFF  # blocks since power-on that a target counts
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class SampleStream:
     """Samples, missing ones among them.
 
     `samples`: temperatures; `placed[k]`: sample number of row k, None where that is k; `missed[k]`: samples missed
     before it, shortened, and `dropped[k]`: whole blocks that were left out of them.
     """
 
-    samples: Numbers
+    samples: NumberArray
     placed: NDArray[np.integer] | None
     missed: NDArray[np.int64]
     dropped: NDArray[np.int64]
@@ -353,10 +353,10 @@ class Stream:
     def of_rows(
         arithmetic: Arithmetic,
         settings: Settings,
-        temperature: Numbers,
+        temperature: NumberArray,
         missed: NDArray[np.int64],
         where: str = "the recording",
-    ) -> Stream:
+    ) -> SampleStream:
         """Samples of rows, shape (n,), with `missed` samples before each.
 
         Raises:
@@ -368,7 +368,7 @@ class Stream:
         dropped = np.broadcast_to(np.int64(0), missed.shape)  # takes no memory
         if shortened is not missed:
             dropped = (missed - shortened) // settings.samples_per_block
-        return Stream(samples, position, shortened, dropped)
+        return SampleStream(samples, position, shortened, dropped)
 
     def course(self, steps: Steps, samples_per_block: int, blocks_before: int = 0) -> Course:
         """The corrections as terms see them, `blocks_before` blocks after power-on at the first sample."""

@@ -16,14 +16,24 @@ from numpy.typing import NDArray
 
 from . import f32, q31
 from . import table as status_bits
-from .front_end import FALLBACK, KEEP, MAP, Settings, Steps, Stream, follow, period_us, with_missing
+from .front_end import (
+    FROM_FALLBACK,
+    FROM_KEPT,
+    FROM_MAP,
+    SampleStream,
+    Settings,
+    Steps,
+    follow,
+    period_us,
+    with_missing,
+)
 from .recursions import (
     F32,
     Q31,
     Arithmetic,
     Bells,
     CourseChannel,
-    Numbers,
+    NumberArray,
     Operations,
     Recursion,
     TableKind,
@@ -49,17 +59,17 @@ _FAR = 6 * 2**28  # an argument whose square is 36 octaves: a Gaussian ends at 3
 class _F32(Operations):
     """float32: the same operations, one by one, on numpy's float32; exponential and cosine are its own."""
 
-    def scalars(self, x: Numbers) -> Sequence[Any]:
+    def scalars(self, x: NumberArray) -> Sequence[Any]:
         return list(x)
 
-    def array(self, x: Sequence[Any]) -> Numbers:
+    def array(self, x: Sequence[Any]) -> NumberArray:
         return np.array(x, dtype=np.float32)
 
-    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> Numbers:
+    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> NumberArray:
         u = blocks.astype(np.float32) * gain
         return np.asarray(amplitude * f32.gauss(u))
 
-    def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
+    def wave(self, x: NumberArray, frequency: Any, phase: Any, amplitude: Any) -> NumberArray:
         turns = x * frequency
         turns = turns + phase
         whole = turns + _ROUND
@@ -75,11 +85,11 @@ class _F32(Operations):
         h = h * t
         return np.asarray(amplitude * h)
 
-    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+    def bells(self, x: NumberArray, gain: Any, bells: Bells) -> NumberArray:
         first, second = (self._bell(x, gain, center, weight) for center, weight in bells)
         return np.asarray(first + second)
 
-    def _bell(self, x: Numbers, gain: Any, center: Any, weight: Any) -> Numbers:
+    def _bell(self, x: NumberArray, gain: Any, center: Any, weight: Any) -> NumberArray:
         u = x - center
         u = u * gain
         u = u * u
@@ -89,31 +99,31 @@ class _F32(Operations):
 class _Q31(Operations):
     """Fixed point: Python integers one by one, int64 in arrays; no product leaves 63 bits."""
 
-    def array(self, x: Sequence[Any]) -> Numbers:
+    def array(self, x: Sequence[Any]) -> NumberArray:
         return np.array(x, dtype=np.int64)
 
     def settle(self, x: Any) -> Any:
         return x << 16
 
-    def reading(self, z: Numbers) -> Numbers:
+    def reading(self, z: NumberArray) -> NumberArray:
         return np.asarray(z >> 16)
 
     def follow(self, z: Any, x: Any, gain: Any) -> Any:
         d = (x << 16) - z
         return z + (((d >> 10) * gain) >> 21)
 
-    def scaled_difference(self, a: Numbers, b: Any, factor: Any) -> Numbers:
+    def scaled_difference(self, a: NumberArray, b: Any, factor: Any) -> NumberArray:
         return np.asarray(((a - b) * factor) >> 16)
 
-    def slope_of(self, a: Numbers, b: Numbers, rate: Any) -> Numbers:
+    def slope_of(self, a: NumberArray, b: NumberArray, rate: Any) -> NumberArray:
         return np.asarray(np.clip(((a - b) * rate) >> 24, -_LARGEST, _LARGEST))
 
-    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> Numbers:
+    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> NumberArray:
         u = (blocks * gain) >> 4
         power = q31.exp2(np.minimum(u, q31.CUT - 1).astype(np.uint64)).astype(np.int64)
         return np.where(u >= q31.CUT, 0, (amplitude * power) >> 29)
 
-    def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
+    def wave(self, x: NumberArray, frequency: Any, phase: Any, amplitude: Any) -> NumberArray:
         part = (((x * frequency) >> 16) + phase) & 0xFFFFFFFF
         t = 2**30 - np.where(part > 2**31, 2**32 - part, part)
         s = (t * t) >> 30
@@ -123,14 +133,14 @@ class _Q31(Operations):
         h = (h * t) >> 30
         return np.asarray((amplitude * h) >> 30)
 
-    def limited(self, x: Numbers) -> Numbers:
+    def limited(self, x: NumberArray) -> NumberArray:
         return np.clip(x, -_PART, _PART)
 
-    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+    def bells(self, x: NumberArray, gain: Any, bells: Bells) -> NumberArray:
         first, second = (weight * self._bell(x, gain, center) for center, weight in bells)
         return np.asarray((first + second) >> 29)
 
-    def _bell(self, x: Numbers, gain: Any, center: Any) -> Numbers:
+    def _bell(self, x: NumberArray, gain: Any, center: Any) -> NumberArray:
         """2^-((x - center) gain)^2 in 2^-29."""
         argument = ((x - center) * gain) >> 12
         far = np.abs(argument) > _FAR
@@ -152,13 +162,13 @@ def recursions(table: Table) -> list[Recursion]:
     return made
 
 
-__all__ = ["FollowedHistory", "Replay", "answers", "evaluate_map", "followed", "replay"]
+__all__ = ["FollowedHistory", "Replay", "answers", "evaluate_map", "follow_history", "replay"]
 
 _WINDOW = 2  # blocks: the slope of a channel is of no use
 
 
 def channel_at(
-    arithmetic: Arithmetic, readings: Numbers, guard: Guarded, fallback: Any, settings: Settings, steps: Steps
+    arithmetic: Arithmetic, readings: NumberArray, guard: Guarded, fallback: Any, settings: Settings, steps: Steps
 ) -> CourseChannel:
     """Mean of a channel and remarks at every correction.
 
@@ -177,15 +187,15 @@ def channel_at(
     mean = np.concatenate([own.temperature[:0], [fallback], own.temperature]).astype(own.temperature.dtype)
     remarks = np.zeros(own.at.size + 1, dtype=np.int32)
     remarks[0] = HELD
-    remarks[1:] = np.where(clamped, CLAMPED, 0) | np.where(own.kind == KEEP, HELD, 0)
-    fallen = 1 + np.flatnonzero(own.kind == FALLBACK)
+    remarks[1:] = np.where(clamped, CLAMPED, 0) | np.where(own.kind == FROM_KEPT, HELD, 0)
+    fallen = 1 + np.flatnonzero(own.kind == FROM_FALLBACK)
     mean[fallen], remarks[fallen] = fallback, HELD | CHANNEL_LOST
     is_away = np.zeros(own.at.size + 1, dtype=np.bool_)
     is_away[0] = is_away[fallen] = True
     return CourseChannel(mean[k + 1], remarks[k + 1], is_away[k + 1])
 
 
-def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[np.bool_]:
+def _clamped(readings: NumberArray, guard: Guarded, own: Steps, n: int) -> NDArray[np.bool_]:
     """Whether the mean of each correction has a reading that was taken as the edge of the range."""
     edge = own.accepted & (guard.limited(readings) != readings)
     restarts = own.at[own.is_restart]
@@ -197,7 +207,7 @@ def _clamped(readings: Numbers, guard: Guarded, own: Steps, n: int) -> NDArray[n
     found = np.where(own.is_restart, edge[np.minimum(own.at, readings.size - 1)], blocks[own.at // n - 1])
     if not found.size:
         return found
-    source = np.maximum.accumulate(np.where(own.kind == MAP, np.arange(own.kind.size), 0))
+    source = np.maximum.accumulate(np.where(own.kind == FROM_MAP, np.arange(own.kind.size), 0))
     return np.asarray(found[source])
 
 
@@ -234,7 +244,7 @@ class FollowedHistory:
             None where the table has no uncertainties.
     """
 
-    stream: Stream
+    stream: SampleStream
     corrections: Steps
     samples_per_block: int
     status: NDArray[np.int32]
@@ -268,11 +278,13 @@ class FollowedHistory:
         )
 
 
-def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> FollowedHistory:
+def follow_history(
+    table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int
+) -> FollowedHistory:
     """Front end, terms, map and uncertainty over a history; arguments as of `replay`."""
     settings, arithmetic = _settings(table, samples_per_block), F32 if table.numeric == "f32" else Q31
     readings = table.numbers(channels)
-    stream = Stream.of_rows(arithmetic, settings, readings[:, 0], missed)
+    stream = SampleStream.of_rows(arithmetic, settings, readings[:, 0], missed)
     steps = follow(arithmetic, stream.samples, settings)
     led = steps.led(table.lead_blocks)
     seen = np.clip(led.temperature, *table.numbers(table.envelope)[:2])
@@ -308,9 +320,9 @@ def followed(table: Table, channels: Words, *, missed: NDArray[np.int64], sample
     )
 
 
-def _stand_in(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> Numbers:
+def _stand_in(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> NumberArray:
     """What a term adds without its channel, where that is asked for; else 0."""
-    asked = np.flatnonzero((shown.is_away | ((shown.remarks & CLAMPED) != 0)) & (steps.kind == MAP))
+    asked = np.flatnonzero((shown.is_away | ((shown.remarks & CLAMPED) != 0)) & (steps.kind == FROM_MAP))
     found = np.zeros_like(outcome.added)
     found[asked] = stand_in(table, number, outcome.temperature[asked], outcome.slope[asked])
     return found
@@ -318,23 +330,25 @@ def _stand_in(table: Table, number: int, outcome: TermOutcome, shown: CourseChan
 
 def _corrections(table: Table, steps: Steps, outcome: TermOutcome) -> tuple[NDArray[np.int32], Words]:
     """Status and bits of every correction."""
-    made = np.flatnonzero(steps.kind == MAP)
+    made = np.flatnonzero(steps.kind == FROM_MAP)
     inputs = table.bits(np.stack([outcome.temperature, outcome.slope], axis=1))
     status = np.zeros(steps.kind.size, dtype=np.int32)
     bits = np.zeros(steps.kind.size, dtype=np.uint32)
     status[made], plain = evaluate_map(table, inputs[made])
     bits[made], remarks = _total(table, plain, outcome.added[made], outcome.remarks[made])
     status[made] |= remarks
-    source = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), 0))
+    source = np.maximum.accumulate(np.where(steps.kind == FROM_MAP, np.arange(steps.kind.size), 0))
     status, bits = status[source], bits[source]
-    status[steps.kind == KEEP] |= HELD
-    fallen = steps.kind == FALLBACK
+    status[steps.kind == FROM_KEPT] |= HELD
+    fallen = steps.kind == FROM_FALLBACK
     status[fallen] = HELD | status_bits.FALLBACK
     bits[fallen] = table.fallback
     return status, bits
 
 
-def _total(table: Table, bits: Words, added: Numbers, remarks: NDArray[np.int32]) -> tuple[Words, NDArray[np.int32]]:
+def _total(
+    table: Table, bits: Words, added: NumberArray, remarks: NDArray[np.int32]
+) -> tuple[Words, NDArray[np.int32]]:
     """Bits of the map's results with what the terms add, each within its bounds, and the remarks of the terms."""
     if not table.terms.size:
         return bits, remarks
@@ -398,7 +412,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
         samples_per_block: What the target gives to `gtc_<n>_init`.
     """
     missed = np.asarray(missed, dtype=np.int64)
-    found = followed(table, np.asarray(channels), missed=missed, samples_per_block=samples_per_block)
+    found = follow_history(table, np.asarray(channels), missed=missed, samples_per_block=samples_per_block)
     return found.rows(slice(None))
 
 
@@ -425,7 +439,7 @@ def _step_answers(table: Table, calls: Calls, samples_per_block: int) -> NDArray
     if waiting:  # the history ends with missing samples: one more holds their place
         absent = np.full((1, table.n_channels), table.encode_inputs(np.nan), dtype=np.uint32)
         channels, missed = np.concatenate([channels, absent]), np.append(missed, waiting)
-    found = followed(table, channels, missed=missed, samples_per_block=samples_per_block)
+    found = follow_history(table, channels, missed=missed, samples_per_block=samples_per_block)
     stream, steps, status = found.stream, found.corrections, found.status
     bits = found.bits if found.sigma is None else found.bits + found.sigma * _SPREAD
     position = stream.position

@@ -117,7 +117,7 @@ class Course:
         elapsed: Blocks since power-on, shape (n,).
     """
 
-    temperature: Numbers
+    temperature: NumberArray
     closes: NDArray[np.bool_]
     elapsed: NDArray[np.int64]
 
@@ -134,10 +134,10 @@ class CourseChannel:
             None: the effect of `mean`.
     """
 
-    mean: Numbers
+    mean: NumberArray
     remarks: NDArray[np.int32]
     is_away: NDArray[np.bool_]
-    stand_in: Numbers | None = None
+    stand_in: NumberArray | None = None
 
 
 @dataclass(slots=True)
@@ -148,12 +148,12 @@ class TermOutcome:
     readings at the edge of their range, beyond what they add without a reading, as magnitudes.
     """
 
-    temperature: Numbers
-    slope: Numbers
-    added: Numbers
+    temperature: NumberArray
+    slope: NumberArray
+    added: NumberArray
     remarks: NDArray[np.int32]
     away: list[NDArray[np.bool_]] = field(default_factory=list)
-    edge: Numbers = field(init=False)
+    edge: NumberArray = field(init=False)
 
     def __post_init__(self) -> None:
         self.edge = np.zeros_like(self.added)
@@ -184,7 +184,7 @@ class _Memory(Recursion):
             outcome.temperature, outcome.slope = z, self.do.slope_of(x, z, rate)
         outcome.added = outcome.added + self.do.scaled_difference(z, x, amplitude)
 
-    def _states(self, course: Course) -> Numbers:
+    def _states(self, course: Course) -> NumberArray:
         follow, gain, z = self.do.follow, self.p[0], None
         states = []
         for x, closes in zip(self.do.scalars(course.temperature), course.closes.tolist(), strict=True):
@@ -240,14 +240,14 @@ class _OfChannel(Recursion):
         outcome.remarks = outcome.remarks | channel.remarks
         outcome.away.append(channel.remarks != 0)
 
-    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+    def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
         raise NotImplementedError
 
 
 class _Auxiliary(_OfChannel):
     """Adds slope (mean - reference)."""
 
-    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+    def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
         slope, reference = self.p[:2]
         return self.do.scaled_difference(mean, reference, slope)
 
@@ -255,7 +255,7 @@ class _Auxiliary(_OfChannel):
 class _Curve(_OfChannel):
     """Adds slope (mean - reference) and two Gaussians of one gain, the first of them at the reference."""
 
-    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+    def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
         slope, gain, reference, first, center, second = self.p[:6]
         x = self.do.limited(mean)
         line = self.do.scaled_difference(x, reference, slope)
@@ -265,7 +265,7 @@ class _Curve(_OfChannel):
 class _Product(_OfChannel):
     """Adds (slope + growth (T - middle)) (mean - reference)."""
 
-    def _added(self, mean: Numbers, temperature: Numbers) -> Numbers:
+    def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
         slope, reference, growth, middle = self.p[:4]
         return self.do.scaled_difference(mean, reference, self.do.over_temperature(slope, growth, temperature, middle))
 
@@ -286,18 +286,18 @@ def recursion_of(kind: TableKind, do: Operations, parameters: Sequence[Any]) -> 
     return _RECURSIONS[kind](do, parameters)
 
 
-Numbers = NDArray[Any]
+NumberArray = NDArray[Any]
 Bells = tuple[tuple[Any, Any], tuple[Any, Any]]
 
 
 class Operations:
     """Operations of float64, one by one; those of the target, each rounded as there, are its subclasses."""
 
-    def scalars(self, x: Numbers) -> Sequence[Any]:
+    def scalars(self, x: NumberArray) -> Sequence[Any]:
         """Numbers one by one, of the type that `follow` takes."""
         return list(x.tolist())
 
-    def array(self, x: Sequence[Any]) -> Numbers:
+    def array(self, x: Sequence[Any]) -> NumberArray:
         return np.array(x, dtype=np.float64)
 
     def settle(self, x: Any) -> Any:
@@ -308,33 +308,33 @@ class Operations:
         """A memory after a block of mean x."""
         return z + gain * (x - z)
 
-    def reading(self, z: Numbers) -> Numbers:
+    def reading(self, z: NumberArray) -> NumberArray:
         """The numbers that a memory shows."""
         return z
 
-    def scaled_difference(self, a: Numbers, b: Any, factor: Any) -> Numbers:
+    def scaled_difference(self, a: NumberArray, b: Any, factor: Any) -> NumberArray:
         return np.asarray(factor * (a - b))
 
-    def over_temperature(self, value: Any, growth: Any, temperature: Numbers, middle: Any) -> Numbers:
+    def over_temperature(self, value: Any, growth: Any, temperature: NumberArray, middle: Any) -> NumberArray:
         """A parameter that goes with the temperature: value + growth (T - middle)."""
         return self.limited(value + self.scaled_difference(temperature, middle, growth))
 
-    def slope_of(self, a: Numbers, b: Numbers, rate: Any) -> Numbers:
+    def slope_of(self, a: NumberArray, b: NumberArray, rate: Any) -> NumberArray:
         """(a - b) rate, per block."""
         return self.scaled_difference(a, b, rate)
 
-    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> Numbers:
+    def fading(self, blocks: NDArray[np.int64], gain: Any, amplitude: Any) -> NumberArray:
         """amplitude 2^-(blocks gain)."""
         return np.asarray(amplitude * np.exp2(-gain * blocks))
 
-    def wave(self, x: Numbers, frequency: Any, phase: Any, amplitude: Any) -> Numbers:
+    def wave(self, x: NumberArray, frequency: Any, phase: Any, amplitude: Any) -> NumberArray:
         return np.asarray(amplitude * np.cos(2.0 * np.pi * (x * frequency + phase)))
 
-    def limited(self, x: Numbers) -> Numbers:
+    def limited(self, x: NumberArray) -> NumberArray:
         """The nearest number that may be multiplied."""
         return x
 
-    def bells(self, x: Numbers, gain: Any, bells: Bells) -> Numbers:
+    def bells(self, x: NumberArray, gain: Any, bells: Bells) -> NumberArray:
         """Sum of weight 2^-((x - center) gain)^2 over two (center, weight)."""
         first, second = (weight * np.exp2(-(((x - center) * gain) ** 2)) for center, weight in bells)
         return np.asarray(first + second)
@@ -352,14 +352,14 @@ class Arithmetic:
     Fixed point has its own.
     """
 
-    def numbers(self, x: ArrayLike) -> Numbers:
+    def numbers(self, x: ArrayLike) -> NumberArray:
         return np.asarray(x, dtype=np.float32)
 
-    def missing(self, n: int) -> Numbers:
+    def missing(self, n: int) -> NumberArray:
         """n samples that did not arrive."""
         return np.full(n, np.nan, dtype=np.float32)
 
-    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+    def is_missing(self, x: NumberArray) -> NDArray[np.bool_]:
         return ~np.isfinite(x)
 
     def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
@@ -370,16 +370,16 @@ class Arithmetic:
     def is_near(self, a: Any, b: Any, limit: Any) -> Any:
         return np.abs(a - b) <= limit
 
-    def running_sum(self, d: Numbers) -> Numbers:
+    def running_sum(self, d: NumberArray) -> NumberArray:
         """Last of the running sums along axis 1, added from left to right."""
         # accumulate is sequential by definition: r[i] = r[i-1] + d[i]
         return np.asarray(np.add.accumulate(d, axis=1, dtype=np.float32)[:, -1])
 
-    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+    def mean(self, base: NumberArray, total: NumberArray, n: NDArray[np.int64]) -> NumberArray:
         quotient = total / n.astype(np.float32)
         return np.asarray(base + quotient)
 
-    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+    def slope(self, d: NumberArray, used: NDArray[np.bool_]) -> NumberArray:
         """Least-squares slope of differences d at abscissae 0, 1, ... where `used`; 0 where under two are.
 
         Args:
@@ -413,25 +413,25 @@ def moments(used: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int6
 class _Q31(Arithmetic):
     """Temperatures in 2^-16 C, held in int64; every result fits 32 bits, sums and products 64."""
 
-    def numbers(self, x: ArrayLike) -> Numbers:
+    def numbers(self, x: ArrayLike) -> NumberArray:
         return np.asarray(x, dtype=np.int64)
 
-    def missing(self, n: int) -> Numbers:
+    def missing(self, n: int) -> NumberArray:
         return np.full(n, _MISSING_Q31, dtype=np.int64)
 
-    def is_missing(self, x: Numbers) -> NDArray[np.bool_]:
+    def is_missing(self, x: NumberArray) -> NDArray[np.bool_]:
         return np.asarray(x == _MISSING_Q31)
 
     def limit(self, max_step: Any, max_rate: Any, us: int) -> Any:
         return min(int(max_step) + ((int(max_rate) * us) >> 24), 2**32 - 1)
 
-    def running_sum(self, d: Numbers) -> Numbers:
+    def running_sum(self, d: NumberArray) -> NumberArray:
         return np.asarray(np.add.accumulate(d, axis=1)[:, -1])
 
-    def mean(self, base: Numbers, total: Numbers, n: NDArray[np.int64]) -> Numbers:
+    def mean(self, base: NumberArray, total: NumberArray, n: NDArray[np.int64]) -> NumberArray:
         return np.asarray(base + divided(total, n))
 
-    def slope(self, d: Numbers, used: NDArray[np.bool_]) -> Numbers:
+    def slope(self, d: NumberArray, used: NDArray[np.bool_]) -> NumberArray:
         sum_d, sum_kd = np.zeros_like(d[0]), np.zeros_like(d[0])
         for abscissa, one in enumerate(d * used):
             sum_d += one

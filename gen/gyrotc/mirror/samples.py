@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .recursions import Arithmetic, Numbers
+from .recursions import Arithmetic, NumberArray
 
-HELD, ACCEPTED, RESTART = 0, 1, 2  # any three numbers
+READING_HELD, READING_ACCEPTED, READING_RESTART = 0, 1, 2  # any three numbers
 PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond: libc/gtc_num_f32.h
 _PART = 2**18  # readings that are looked at together: bounds memory
 _LONGEST_US = 2**32 - 1  # that the target counts
@@ -46,13 +46,13 @@ class Guarded:
     missing_blocks: int
     takes_edge: bool = False
 
-    def limited(self, x: Numbers) -> Numbers:
+    def limited(self, x: NumberArray) -> NumberArray:
         """Readings as they are judged; missing ones may be anything."""
         return np.clip(x, self.low, self.high) if self.takes_edge else x
 
 
 def judge_readings(
-    arithmetic: Arithmetic, x: Numbers, guard: Guarded, *, period_us: int, block_us: int, lost: Sequence[int] = ()
+    arithmetic: Arithmetic, x: NumberArray, guard: Guarded, *, period_us: int, block_us: int, lost: Sequence[int] = ()
 ) -> NDArray[np.int8]:
     """Verdict on every reading: HELD, ACCEPTED, or RESTART (readings that agreed with one another for long enough).
 
@@ -85,17 +85,17 @@ def judge_readings(
             continue
         verdict[i] = judge.take(judged[i])
         i += 1
-        if verdict[i - 1] != HELD:
+        if verdict[i - 1] != READING_HELD:
             k = np.searchsorted(events, i)
             event = int(events[k]) if k < events.size else x.size
-            verdict[i:event] = ACCEPTED
+            verdict[i:event] = READING_ACCEPTED
             judge.last = judged[event - 1]
             i = event
     return verdict
 
 
 def _events(
-    arithmetic: Arithmetic, x: Numbers, sound: NDArray[np.bool_], near: Any, lost: Sequence[int]
+    arithmetic: Arithmetic, x: NumberArray, sound: NDArray[np.bool_], near: Any, lost: Sequence[int]
 ) -> NDArray[np.intp]:
     """Readings that are not accepted just because their predecessor is."""
     regular = np.zeros(x.size, dtype=np.bool_)
@@ -107,7 +107,7 @@ def _events(
     return np.flatnonzero(~regular)
 
 
-def _sound(x: Numbers, there: NDArray[np.bool_], guard: Guarded, period_us: int) -> NDArray[np.bool_]:
+def _sound(x: NumberArray, there: NDArray[np.bool_], guard: Guarded, period_us: int) -> NDArray[np.bool_]:
     """Readings that are there, in their range or taken as its edge, and not stuck."""
     with np.errstate(invalid="ignore"):
         sound = there.copy()
@@ -167,12 +167,12 @@ class _Judge:
     def take(self, x: Any) -> int:
         """Decides on a reading that is there and sound."""
         if self._follows(x):
-            return self._accepted(x, ACCEPTED)
+            return self._accepted(x, READING_ACCEPTED)
         if self._confirms(x):
-            return self._accepted(x, RESTART)
+            return self._accepted(x, READING_RESTART)
         self._candidate, self._candidate_gap = x, 0
         self.hold(1)
-        return HELD
+        return READING_HELD
 
     def _follows(self, x: Any) -> bool:
         if self.last is None:

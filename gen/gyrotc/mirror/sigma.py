@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from . import f32, q31
-from .front_end import FALLBACK as FALLEN
-from .front_end import MAP, Steps
-from .recursions import Course, Numbers, TableKind, TermOutcome
+from .front_end import FROM_FALLBACK as FALLEN
+from .front_end import FROM_MAP, Steps
+from .recursions import Course, NumberArray, TableKind, TermOutcome
 from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
@@ -34,32 +34,32 @@ _HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)  # in floa
 class Squares:
     """Operations of float32, element by element, each rounded as on the target; fixed point has its own."""
 
-    def squared(self, x: Numbers) -> Numbers:
+    def squared(self, x: NumberArray) -> NumberArray:
         x = np.asarray(x, dtype=np.float32)
         return np.asarray(x * x)
 
-    def plus(self, a: Numbers, b: Numbers) -> Numbers:
+    def plus(self, a: NumberArray, b: NumberArray) -> NumberArray:
         return np.asarray(a + b)
 
-    def per_c(self, a: Numbers, b: Any, word: Any) -> Numbers:
+    def per_c(self, a: NumberArray, b: Any, word: Any) -> NumberArray:
         return np.asarray(word * (a - b))
 
-    def times(self, k: NDArray[np.int64], x: Any) -> Numbers:
+    def times(self, k: NDArray[np.int64], x: Any) -> NumberArray:
         """k x, x of magnitude 2^30 at most in fixed point."""
         return np.asarray(np.asarray(k).astype(np.float32) * x)
 
-    def part(self, k: NDArray[np.int64], n: int, x: Any) -> Numbers:
+    def part(self, k: NDArray[np.int64], n: int, x: Any) -> NumberArray:
         """k x / n"""
         return np.asarray(self.times(k, x) / np.float32(n))
 
-    def limited(self, x: Numbers) -> Numbers:
+    def limited(self, x: NumberArray) -> NumberArray:
         return x
 
-    def estimate(self, mean: Numbers, start: Numbers, blocks: NDArray[np.int64]) -> Numbers:
+    def estimate(self, mean: NumberArray, start: NumberArray, blocks: NDArray[np.int64]) -> NumberArray:
         """The slope of a front end that began at `start`."""
         return np.asarray((_TWO * (mean - start)) / (2 * blocks - 1).astype(np.float32))
 
-    def root(self, x: Numbers) -> Numbers:
+    def root(self, x: NumberArray) -> NumberArray:
         x = np.asarray(x, dtype=np.float32)
         there = x > 0
         safe = np.where(there, x, _ONE)
@@ -68,7 +68,7 @@ class Squares:
             y = _HALF * (y + safe / y)
         return np.asarray(np.where(there, y, np.float32(0.0)))
 
-    def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> Numbers:
+    def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> NumberArray:
         left = np.array([self._left(gain, int(n)) for n in np.asarray(blocks).reshape(-1)], dtype=np.float32)
         return np.asarray(word * (_ONE - left))
 
@@ -84,38 +84,38 @@ class Squares:
                 blocks = 0
         return _ONE - left
 
-    def unsettled(self, width: Any, low: Numbers, high: Numbers, word: Any) -> Numbers:
+    def unsettled(self, width: Any, low: NumberArray, high: NumberArray, word: Any) -> NumberArray:
         left = word * ((width + width) - (high - low))
         return np.asarray(np.where(left > 0, left, np.float32(0.0)))
 
 
 class _Q31(Squares):
-    def squared(self, x: Numbers) -> Numbers:
+    def squared(self, x: NumberArray) -> NumberArray:
         magnitude = np.abs(self.limited(np.asarray(x, dtype=np.int64))).astype(np.uint64)
         return np.asarray(magnitude * magnitude)
 
-    def plus(self, a: Numbers, b: Numbers) -> Numbers:
+    def plus(self, a: NumberArray, b: NumberArray) -> NumberArray:
         total = np.asarray(a + b)
         return np.where(total >= a, total, np.uint64(2**64 - 1))
 
-    def per_c(self, a: Numbers, b: Any, word: Any) -> Numbers:
+    def per_c(self, a: NumberArray, b: Any, word: Any) -> NumberArray:
         return np.asarray(((a - b) * int(word)) >> 16)
 
-    def times(self, k: NDArray[np.int64], x: Any) -> Numbers:
+    def times(self, k: NDArray[np.int64], x: Any) -> NumberArray:
         return np.asarray(np.asarray(k, dtype=np.int64) * x)
 
-    def part(self, k: NDArray[np.int64], n: int, x: Any) -> Numbers:
+    def part(self, k: NDArray[np.int64], n: int, x: Any) -> NumberArray:
         product = self.times(k, x)
         return np.asarray(np.sign(product) * ((np.abs(product) + n // 2) // n))
 
-    def limited(self, x: Numbers) -> Numbers:
+    def limited(self, x: NumberArray) -> NumberArray:
         return np.asarray(np.clip(x, -_PART, _PART))
 
-    def estimate(self, mean: Numbers, start: Numbers, blocks: NDArray[np.int64]) -> Numbers:
+    def estimate(self, mean: NumberArray, start: NumberArray, blocks: NDArray[np.int64]) -> NumberArray:
         num, den = 2 * (mean - start), 2 * blocks - 1
         return np.asarray(np.sign(num) * ((np.abs(num) + den // 2) // den))
 
-    def root(self, x: Numbers) -> Numbers:
+    def root(self, x: NumberArray) -> NumberArray:
         rest = np.atleast_1d(np.asarray(x, dtype=np.uint64)).copy()
         root = np.zeros_like(rest)
         for shift in range(62, -1, -2):
@@ -125,7 +125,7 @@ class _Q31(Squares):
             root = np.where(more, (root >> np.uint64(1)) + bit, root >> np.uint64(1))
         return np.asarray(np.minimum(root, np.uint64(_LARGEST)).astype(np.int64).reshape(np.shape(x)))
 
-    def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> Numbers:
+    def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> NumberArray:
         left = [self._left(int(gain), int(n)) for n in np.asarray(blocks).reshape(-1)]
         return np.asarray((int(word) * np.array(left, dtype=np.int64)) >> 31)
 
@@ -138,7 +138,7 @@ class _Q31(Squares):
             blocks >>= 1
         return left
 
-    def unsettled(self, width: Any, low: Numbers, high: Numbers, word: Any) -> Numbers:
+    def unsettled(self, width: Any, low: NumberArray, high: NumberArray, word: Any) -> NumberArray:
         left = self.limited(2 * int(width) - (high - low))
         return np.asarray(np.where(left > 0, (left * int(word)) >> 16, 0))
 
@@ -170,18 +170,18 @@ class SigmaEvidence:
     """
 
     status: NDArray[np.int32]
-    at: Numbers
-    slope: Numbers
-    drift: Numbers
+    at: NumberArray
+    slope: NumberArray
+    drift: NumberArray
     sure: NDArray[np.bool_]
     age: IntArray
     missing: IntArray
     samples: int
     since: IntArray
-    low: Numbers
-    high: Numbers
+    low: NumberArray
+    high: NumberArray
     away: tuple[NDArray[np.bool_], ...]
-    edge: Numbers
+    edge: NumberArray
 
     def __len__(self) -> int:
         return int(self.status.size)
@@ -201,7 +201,7 @@ def evidence_of(
     """
     n = steps.kind.size
     index = np.arange(n)
-    is_made = steps.kind == MAP
+    is_made = steps.kind == FROM_MAP
     made = np.maximum.accumulate(np.where(is_made, index, 0))
     began = np.maximum.accumulate(np.where(steps.is_restart, index, 0))
     closings = np.cumsum(~steps.is_restart)
@@ -227,14 +227,14 @@ def evidence_of(
     )
 
 
-def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Numbers:
+def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> NumberArray:
     """Lowest or highest temperature since the terms began last."""
     starts = np.flatnonzero(is_restart)
     parts = np.split(course.temperature, starts[starts > 0])
     return np.concatenate([of.accumulate(part) for part in parts])
 
 
-def _drift(table: Table, steps: Steps, began: IntArray, blocks: IntArray) -> tuple[NDArray[np.bool_], Numbers]:
+def _drift(table: Table, steps: Steps, began: IntArray, blocks: IntArray) -> tuple[NDArray[np.bool_], NumberArray]:
     """Whether the slope is known, and it: that of the window, or from the start of the front end on."""
     warming = (steps.remarks & WARMING) != 0
     young = (blocks >= 2) & (blocks < table.slope_blocks)
@@ -256,7 +256,7 @@ def sigma_bits(table: Table, evidence: SigmaEvidence) -> Words:
     return table.bits(do.root(squares))
 
 
-def variances(table: Table, evidence: SigmaEvidence) -> Numbers:
+def variances(table: Table, evidence: SigmaEvidence) -> NumberArray:
     """Variance of every correction without that of the constant of the power-on."""
     do, rules = SQUARES[table.numeric], _rules(table)
     total = do.plus(_of_map(table, evidence), _of_age(table, evidence))
@@ -270,13 +270,13 @@ def variances(table: Table, evidence: SigmaEvidence) -> Numbers:
     return np.where(fallen, do.squared(rules[Rule.FALLBACK]), total)
 
 
-def _rules(table: Table) -> Numbers:
+def _rules(table: Table) -> NumberArray:
     """Rules, then the words of the terms."""
     cells = table.sigma_cells[0] * table.sigma_cells[1]
     return table.numbers(table.sigma)[2 * cells :]
 
 
-def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
+def _of_map(table: Table, evidence: SigmaEvidence) -> NumberArray:
     low, high = table.numbers(table.envelope).reshape(2, 2).T
     is_late = ((evidence.status & WARMING) != 0) & evidence.sure
     slope = np.where(is_late, evidence.drift, evidence.slope)
@@ -291,33 +291,33 @@ def _of_map(table: Table, evidence: SigmaEvidence) -> Numbers:
     return SQUARES[table.numeric].squared(table.numbers(table.sigma)[index])
 
 
-def _of_age(table: Table, evidence: SigmaEvidence) -> Numbers:
+def _of_age(table: Table, evidence: SigmaEvidence) -> NumberArray:
     do, rules = SQUARES[table.numeric], _rules(table)
     moved = do.limited(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.HOLD]))
     gone = do.squared(_without_readings(do, evidence, moved))
     return np.asarray(do.plus(gone, do.squared(_without_readings(do, evidence, rules[Rule.REST]))))
 
 
-def _without_readings(do: Squares, evidence: SigmaEvidence, x: Any) -> Numbers:
+def _without_readings(do: Squares, evidence: SigmaEvidence, x: Any) -> NumberArray:
     """What x, of a block, comes to while the correction is held, and in what its block lacks of readings."""
     return np.asarray(do.times(evidence.age, x) + do.part(evidence.missing, evidence.samples, x))
 
 
-def _of_start(table: Table, evidence: SigmaEvidence) -> Numbers:
+def _of_start(table: Table, evidence: SigmaEvidence) -> NumberArray:
     do, rules = SQUARES[table.numeric], _rules(table)
     known = do.squared(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.SLOPE]))
     square = np.where(evidence.sure, known, do.squared(rules[Rule.START]))
     return np.where((evidence.status & WARMING) != 0, square, np.zeros_like(square))
 
 
-def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> Numbers:
+def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> NumberArray:
     do, rules = SQUARES[table.numeric], _rules(table)
     x = (evidence.at, evidence.slope)[k]
     low, high = table.numbers(table.envelope)[2 * k : 2 * k + 2]
     return do.squared(do.per_c(x, np.clip(x, low, high), rules[Rule.BEYOND + k]))
 
 
-def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[Numbers]:
+def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[NumberArray]:
     """What each term does not know of the time before it began, or of a channel that is not read."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)

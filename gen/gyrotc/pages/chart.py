@@ -1,8 +1,8 @@
-"""Charts as SVG text: panels with scales, marks, ticks and a legend; no library, no dates, the same bytes each time.
+"""Draw charts as SVG text: panels with scales, marks, ticks and a legend; the same data give the same bytes.
 
-Colours are names (`COLOURS`), so that a style sheet within the picture turns them for a dark screen. Coordinates are
-in points of a picture that is 960 wide over a whole page; browsers scale it. Values over two axes are colours, an image
-within the chart.
+Colours are names (`LINE_COLOURS`), so that a style sheet within the picture turns them for a dark screen. Coordinates
+are in points of a picture that is 960 wide over a whole page; browsers scale it. Values over two axes are colours, an
+image within the chart.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..common.arrays import FloatArray
 from ..common.texts import checked_svg, picture_text, pictures_in_rows
 from .display import power
-from .marks import AxisScale, Box, Drawn, mark_svg, sample, scale_of, text_svg
+from .marks import AxisScale, Box, Drawn, legend_sample, mark_svg, scale_of, text_svg
 
 _CIVIDIS = ("#00224e", "#35456c", "#666970", "#948e77", "#c8b866", "#fee838")
 """Steps of cividis, which looks alike to people who see few colours (Nuñez, Anderton and Renslow 2018)."""
@@ -103,7 +103,7 @@ def _hatched(hidden: NDArray[np.bool_], x: float, y: float, w: float, h: float) 
 
 FULL, HALF, THIRD = 960.0, 470.0, 310.0  # widths of a picture over the page, and of two and three in a row
 BEFORE, AFTER, COVERED, ACCENT = "before", "after", "covered", "accent"
-COLOURS = {
+LINE_COLOURS = {
     BEFORE: ("#b4552d", "#f08c5e"),
     AFTER: ("#1f6f8b", "#62bbd9"),
     COVERED: ("#7a7a7a", "#9aa0a6"),
@@ -123,9 +123,9 @@ _SIZE = re.compile(r'viewBox="0 0 ([\d.]+) ([\d.]+)"')
 def _style() -> str:
     def rules(k: int) -> str:
         named = "".join(
-            f".gy .s-{n}{{stroke:{c[k]}}}.gy .f-{n},.gy text.f-{n}{{fill:{c[k]}}}" for n, c in COLOURS.items()
+            f".gy .s-{n}{{stroke:{c[k]}}}.gy .f-{n},.gy text.f-{n}{{fill:{c[k]}}}" for n, c in LINE_COLOURS.items()
         )
-        return f".gy text{{fill:{COLOURS[ACCENT][k]}}}.gy .grid{{stroke:{_GRID[k]}}}" + named
+        return f".gy text{{fill:{LINE_COLOURS[ACCENT][k]}}}.gy .grid{{stroke:{_GRID[k]}}}" + named
 
     still = (
         ".gy{font:11px system-ui,'DejaVu Sans',sans-serif}.gy path,.gy line{fill:none;stroke-linejoin:round}"
@@ -355,7 +355,7 @@ def _legend(panels: Sequence[Panel], width: float) -> tuple[str, float]:
         need = 26.0 + _wide(text) + 16.0
         if x > 4.0 and x + need > width:
             x, y = 4.0, y + _LINE
-        parts.append(sample(mark, x, y - 4.0) + text_svg(x + 26.0, y, text))
+        parts.append(legend_sample(mark, x, y - 4.0) + text_svg(x + 26.0, y, text))
         x += need
     return "".join(parts), y + 6.0 if entries else 2.0
 

@@ -25,8 +25,8 @@ from ..results.diagnosed import (
     RunSeries,
     ScoredRun,
     SearchScores,
+    SeriesValues,
     Statistic,
-    Values,
 )
 from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from .display import rate_unit, shown, words
@@ -58,7 +58,7 @@ def write_diagnosis_page(folder: Path) -> Path:
                 noise=result.noise,
                 gains=list(_gains(result)),
                 limits=[c for c in result.considered if c.detection_limit],
-                pictures=draw(result, series) if series is not None else {},
+                pictures=diagnosis_pictures(result, series) if series is not None else {},
             )
         )
     return write_page(folder, text)
@@ -84,7 +84,7 @@ _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not fou
 _MOST_PANELS = 6  # runs with events that are drawn
 
 
-def draw(result: Diagnosed, series: DiagnosisSeries) -> dict[str, Markup]:
+def diagnosis_pictures(result: Diagnosed, series: DiagnosisSeries) -> dict[str, Markup]:
     """All pictures of a diagnosis by name."""
     cycle = result.single_cycle is not None
     width = max(round(HALF_HOUR_S / series.block_s), 1)
@@ -156,7 +156,7 @@ def _cycle_over_time(runs: Sequence[RunSeries]) -> Markup:
     return drawing([upper, lower], heights=(190.0, 95.0), share_x=True)
 
 
-def _smooth(values: Values, width: int) -> FloatArray:
+def _smooth(values: SeriesValues, width: int) -> FloatArray:
     return running_mean(np.array(values), width)
 
 

@@ -158,7 +158,7 @@ class Drawn:
     texts: tuple[str, ...] = ()
 
 
-def sample(mark: Drawn, x: float, y: float) -> str:
+def legend_sample(mark: Drawn, x: float, y: float) -> str:
     if mark.kind in ("band", "span", "bars"):
         kind = "" if mark.kind == "bars" else ' class="area"'
         return f'<g{kind}><rect class="f-{mark.color}" x="{x:g}" y="{y - 5:g}" width="20" height="10"/></g>'

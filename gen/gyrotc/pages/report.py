@@ -24,7 +24,7 @@ from ..causes import CATALOGUE
 from ..common.arrays import BoolArray, FloatArray, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
-from ..common.metrics import Averages, average
+from ..common.metrics import Averages, average_rows
 from ..common.texts import file_stem, html_environment
 from ..model import Model
 from ..recordings.description import exclude_line
@@ -358,7 +358,7 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     scored = np.ones(len(time_s), dtype=bool)
     del time_s
     # Popped, so that a full-rate trace is not in memory twice.
-    return average(*(np.concatenate(columns.pop(0)) for _ in names), scored=scored, average_s=average_s)
+    return average_rows(*(np.concatenate(columns.pop(0)) for _ in names), scored=scored, average_s=average_s)
 
 
 def _times(value: float | None) -> str:

@@ -18,7 +18,7 @@ from .. import __version__
 from ..causes import CATALOGUE, separate_by
 from ..common.errors import InputError
 from ..common.statistics import orthonormal
-from ..diagnose.blocks import Record
+from ..diagnose.blocks import RunRecord
 from ..diagnose.candidates import searched
 from ..diagnose.profile_likelihood import Gains
 from ..results.recordings import (
@@ -36,7 +36,7 @@ from ..results.recordings import (
     ThermometerPlace,
     TriedRun,
 )
-from ..simulate.campaign import Noise
+from ..simulate.campaign import NoiseLevel
 from .sensitivity import Row, Sensitivity, additions, node_temperatures, programme_of, separability
 
 __all__ = ["places", "plan", "shortest"]
@@ -98,7 +98,7 @@ _D_FOUND = 6.0  # about where most causes are found, as in `sensitivity`
 _LEAST_C = 1e-4  # no thermometer tells less than this
 
 
-def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: Noise, seed: int) -> list[ThermometerPlace]:
+def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: NoiseLevel, seed: int) -> list[ThermometerPlace]:
     """Every node but the sensor's own, the most telling first.
 
     Raises:
@@ -146,7 +146,7 @@ _HARD = 10.0  # d above which two causes count as hard to separate
 def plan(
     scenario: str | Path,
     *,
-    noise: Noise = "paper",
+    noise: NoiseLevel = "paper",
     seed: int = 1,
     required: Mapping[str, float] | None = None,
     pair: tuple[str, str] | None = None,
@@ -215,7 +215,7 @@ def plan(
     return result if found is None else result.model_copy(update={"thermometers": found})
 
 
-def _temperature(run: Record) -> Temperature:
+def _temperature(run: RunRecord) -> Temperature:
     """The run's temperature for a picture."""
     step = max(run.history.time_s.size // _PICTURE_POINTS, 1)
     return Temperature(

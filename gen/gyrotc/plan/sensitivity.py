@@ -20,14 +20,14 @@ from ..causes.base import History
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.statistics import orthonormal
-from ..diagnose.blocks import Record, Records, block_length, singled_out
+from ..diagnose.blocks import Records, RunRecord, block_length, singled_out
 from ..diagnose.candidates import Candidate, columns_of, planned, searched, shape_parameter
 from ..diagnose.detection import CauseLimit, amplitude_energy, limit_of
-from ..diagnose.noise import COLOURS, Declared, Whitener
+from ..diagnose.noise import NOISE_COLOURS, Declared, Whitener
 from ..diagnose.profile_likelihood import Gains
 from ..diagnose.search import Search, open_search
 from ..diagnose.signature_bank import SignatureBank, bank_of
-from ..simulate.campaign import Noise, campaign, with_noise
+from ..simulate.campaign import NoiseLevel, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, Thermometer, read
 
 _BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
@@ -56,7 +56,7 @@ class Programme:
     bias_range_dph: tuple[float, float]
 
 
-def programme_of(scenario: str | Path, *, noise: Noise, seed: int, added: Sequence[str] = ()) -> Programme:
+def programme_of(scenario: str | Path, *, noise: NoiseLevel, seed: int, added: Sequence[str] = ()) -> Programme:
     """The training runs of a scenario (all runs where none is for training), and further ones from the library.
 
     Args:
@@ -105,7 +105,7 @@ class NodeTemperatures:
     there: frozenset[str]
 
 
-def node_temperatures(scenario: str | Path, *, noise: Noise, seed: int) -> NodeTemperatures:
+def node_temperatures(scenario: str | Path, *, noise: NoiseLevel, seed: int) -> NodeTemperatures:
     """The nodes of the gyro over the runs of `programme_of`. Raises as that."""
     _, plan = read(scenario)
     there = frozenset(one.node for one in plan.thermometer)
@@ -141,7 +141,7 @@ def _with_added(plan: Scenario, added: Sequence[str]) -> Scenario:
     return plan.model_copy(update={"profile": profiles, "set": [*plan.set, further]})
 
 
-def _records(plan: Scenario, seed: int) -> Iterator[Record]:
+def _records(plan: Scenario, seed: int) -> Iterator[RunRecord]:
     names = [(name, s, k) for s in plan.set for k, name in enumerate(s.profiles)]
     first = min(s.started for s in plan.set)
     for number, ((name, run_set, k), made) in enumerate(zip(names, campaign(plan, seed), strict=True)):
@@ -155,7 +155,7 @@ def _records(plan: Scenario, seed: int) -> Iterator[Record]:
             runs=len(names),
             day=(run_set.started - first).total_seconds() / 86400.0 + k * run_set.every_h / 24.0,
         )
-        yield Record(name, history, _rows(made.bias_dph[:n]), np.ones(time_s.size, dtype=bool), name)
+        yield RunRecord(name, history, _rows(made.bias_dph[:n]), np.ones(time_s.size, dtype=bool), name)
 
 
 def _rows(values: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ class Sensitivity:
             quantum=colour.quantum * factor,
         )
         self.bank: SignatureBank = bank_of(records, 0)
-        search = open_search(records, self.bank, records.target(), declared=relative, colours=(len(COLOURS),))
+        search = open_search(records, self.bank, records.target(), declared=relative, colours=(len(NOISE_COLOURS),))
         self.search = replace(search, views={search.best: replace(search.likeliest, scale=self.sigma)})
         self.candidates, columns, self.at = _columns(self.search)
         whiten = Whitener(relative, records.kept, records.block_s)
@@ -341,7 +341,7 @@ def _by_inputs(gains: Gains, total: FloatArray, energy: FloatArray) -> Iterator[
 
 
 def additions(
-    scenario: str | Path, pair: tuple[str, str], *, noise: Noise, seed: int
+    scenario: str | Path, pair: tuple[str, str], *, noise: NoiseLevel, seed: int
 ) -> list[tuple[str, float, float]]:
     """Profiles by how far one run more of them brings the d at which two causes part, best first.
 

@@ -20,21 +20,21 @@ from scipy.special import stdtrit
 from ..common.arrays import FloatArray
 from ..common.metrics import median_step
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
+from .findings import ValueWithLimits
 from .fits import (
     LEAST_ENERGY,
     LONGEST_GAP_S,
-    Noise,
-    Rows,
+    CellNoise,
+    RowArrays,
     RunCells,
     SmoothFit,
-    cells_of,
     knots_of,
     likeliest_noise,
     maps_of,
+    run_cells,
 )
 
-Kind = Literal["step", "transition", "drift", "gain"]
-Limits = tuple[float, float, float]
+ChangeKind = Literal["step", "transition", "drift", "gain"]
 
 FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
@@ -81,10 +81,10 @@ class Change:
     """
 
     run: int
-    kind: Kind
-    time_s: Limits
+    kind: ChangeKind
+    time_s: ValueWithLimits
     duration_s: float
-    size: Limits
+    size: ValueWithLimits
     sigmas: float
     gap_s: float = 0.0
 
@@ -94,7 +94,7 @@ class _At:
     """A change as the search has it: beginning (s), duration (s)."""
 
     run: int
-    kind: Kind
+    kind: ChangeKind
     begin_s: float
     duration_s: float = 0.0
 
@@ -122,7 +122,7 @@ class _At:
         return np.asarray(np.clip(since / self.duration_s, 0.0, 1.0))
 
 
-def changes_of(runs: Sequence[Rows]) -> list[Change]:
+def changes_of(runs: Sequence[RowArrays]) -> list[Change]:
     """Changes of all runs, by run in order of time.
 
     Args:
@@ -131,8 +131,8 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     lengths = [_length_s(runs[k]) for k in range(len(runs))]  # by number: no run is held while the next one is read
     cell_s = max(_CELL_S, sum(length for length, _ in lengths) / _MOST_CELLS)
     long = [k for k, (length, row) in enumerate(lengths) if length > _LEAST_LENGTH * max(row, cell_s)]
-    fine = [cells_of(runs[k], cell_s) for k in long]
-    coarse = [cells_of(runs[k], max(_COARSE_S, cell_s)) for k in long]
+    fine = [run_cells(runs[k], cell_s) for k in long]
+    coarse = [run_cells(runs[k], max(_COARSE_S, cell_s)) for k in long]
     if sum(len(one) for one in coarse) < _LEAST_CELLS:
         return []
     knots_c = knots_of(coarse)
@@ -152,7 +152,7 @@ def changes_of(runs: Sequence[Rows]) -> list[Change]:
     return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
 
 
-def _length_s(rows: Rows) -> tuple[float, float]:
+def _length_s(rows: RowArrays) -> tuple[float, float]:
     """How long a run and one of its rows are, s; of one whose rate does not move at all 0."""
     return (float(np.ptp(rows[0])), median_step(rows[0])) if np.ptp(rows[2]) > 0.0 else (0.0, 0.0)
 
@@ -179,7 +179,7 @@ class _Search:
     """Runs with the noise that their changes are judged against."""
 
     def __init__(
-        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: Noise, curves: list[FloatArray]
+        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: CellNoise, curves: list[FloatArray]
     ) -> None:
         self._cells, self._maps, self._noise, self._curves = cells, maps, noise, curves
         self._looks = _KINDS * sum(len(one) for one in cells)
@@ -390,7 +390,7 @@ class _Search:
         """Standard deviation of what is white of a run."""
         return self._louder[run] * self._scale[_STEP]
 
-    def change(self, at: _At, found: Sequence[_At], rows: Rows) -> Change | None:
+    def change(self, at: _At, found: Sequence[_At], rows: RowArrays) -> Change | None:
         """The change with its limits; None where it falls into a gap over which the noise may move as far."""
         cells, others = self._cells[at.run], [o for o in found if o is not at and o.run == at.run]
         fit, white = self._fit([o for o in found if o.run != at.run]), self._white(at.run)
@@ -427,7 +427,7 @@ class _Search:
         gaps = [(float(t[k]), gap) for k, gap in self._cells[at.run].behind_gap]
         return next((gap for end, gap in gaps if end - gap - cell_s < at.middle_s <= end + cell_s), 0.0)
 
-    def _begins(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> Limits:
+    def _begins(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> ValueWithLimits:
         """The beginning of a drift, or the place of a change of gain, with the times that are nearly as likely.
 
         A cell more on either side: it may be in the midst of one, and rows bear the time of their end or their start.
@@ -441,14 +441,14 @@ class _Search:
         return float(near[int(np.argmax(gains))]), float(likely[0]) - 2.0 * cell_s, float(likely[-1]) + cell_s
 
 
-def _across_gap(at: _At, rows: Rows, around_s: float) -> Limits:
+def _across_gap(at: _At, rows: RowArrays, around_s: float) -> ValueWithLimits:
     """First row behind the longest gap near a change, and the rows on both sides of it."""
     first, end = np.searchsorted(rows[0], (at.middle_s - around_s, at.middle_s + around_s))
     behind = int(first) + int(np.argmax(np.diff(rows[0][first : max(end, first + 2)]))) + 1
     return float(rows[0][behind]), float(rows[0][behind - 1]), float(rows[0][behind])
 
 
-def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> Limits:
+def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> ValueWithLimits:
     """First row behind a step, and the times between which it lies: where two levels leave least of rows."""
     first, end = np.searchsorted(time, (at.middle_s - around_s, at.middle_s + around_s))
     y, t = rate[first:end], time[first:end]

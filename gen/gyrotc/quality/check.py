@@ -17,7 +17,7 @@ from .. import __version__
 from ..common.errors import InputError
 from ..model import Model
 from ..recordings.description import Problems
-from ..recordings.load import asked_axes, survey
+from ..recordings.load import asked_axes, load_reporting
 from ..recordings.plausibility import TRUSTED
 from ..recordings.records import Applied, Dataset, Mark, Rows, Run
 from ..results.base import Finding, MarkedRows
@@ -30,9 +30,9 @@ from .findings import (
     copied_channel_findings,
     counter_findings,
     earth_rate_findings,
-    facts_of,
     finding,
     held_findings,
+    run_facts,
     shared_axes_findings,
     shared_rows_findings,
     temperature_findings,
@@ -152,7 +152,7 @@ def check(
     for one in axes:
         reported = Problems(collect=True)
         progress("reading")
-        dataset = survey(folder, reported, axis=one, applied=applied, trust_units=trust_units)
+        dataset = load_reporting(folder, reported, axis=one, applied=applied, trust_units=trust_units)
         problems |= {str(problem): problem for problem in reported.found}
         marks |= reported.marks
         if dataset is not None:
@@ -257,7 +257,7 @@ def findings_of_data_set(
 def _looked_at(run: Run) -> tuple[RunFacts, list[Finding]]:
     """Facts of a run, and the warnings that its rows alone raise."""
     rows = run.rows()
-    f = facts_of(run, rows)
+    f = run_facts(run, rows)
     coarse = list(coarse_rate_findings(run, rows))
     found = [
         *constant_findings(f, rows, coarse=bool(coarse)),

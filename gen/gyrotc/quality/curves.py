@@ -22,7 +22,7 @@ from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark, Run
 from ..results.base import Finding
-from .findings import Limits, RunFacts, finding
+from .findings import RunFacts, ValueWithLimits, finding
 from .fits import evidence_beside_memories
 
 _NEXT = (
@@ -169,7 +169,7 @@ class _Way:
         return "; ".join(parts)
 
 
-_Found = tuple[str, str, Limits]  # id, text, factor with its limits
+_Found = tuple[str, str, ValueWithLimits]  # id, text, factor with its limits
 
 
 def _orientation(dataset: Dataset, curve: Curve, earlier: Mapping[str, Model]) -> _Found | None:

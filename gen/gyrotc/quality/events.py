@@ -18,7 +18,7 @@ from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
 from ..results.base import Finding
 from .changes import Change, changes_of
 from .curves import curve_findings
-from .findings import RunFacts, facts_of, finding
+from .findings import RunFacts, finding, run_facts
 from .outliers import departing_rows, spike_findings
 from .thermometers import temperature_findings_of
 
@@ -28,7 +28,7 @@ _LOST_S = 60.0  # no rows for longer
 def found_events(dataset: Dataset) -> list[Finding]:
     """Events of the training runs, those of whole runs first; of such a run nothing else is said."""
     whole = [run for run in joined_runs(dataset.runs) if run.role == "train"]
-    facts = [facts_of(run, run.rows()) for run in whole]
+    facts = [run_facts(run, run.rows()) for run in whole]
     training = {run.file for run in whole}
     of_runs = [found for found in curve_findings(dataset, facts) if found.file in training]
     files = {found.file for found in of_runs}
@@ -107,7 +107,7 @@ class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
         return self._read[1]
 
 
-def accepted(dataset: Dataset, events: Sequence[Finding]) -> Dataset:
+def without_events(dataset: Dataset, events: Sequence[Finding]) -> Dataset:
     """The data set without what the events say to leave out."""
     whole = {event.file for event in events if event.whole_run}
     kept = [run for run in dataset.runs if run.role != "train" or run.file not in whole]

@@ -19,7 +19,7 @@ from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, EarthRate, Mark, Rows, Run
 from ..results.base import ADVICE, Estimate, Finding, MarkedRows, Size
 
-Limits = tuple[float, float, float]
+ValueWithLimits = tuple[float, float, float]
 """A figure and its 95 % limits."""
 
 _LINES = 20  # stretches that a line holds: more are a fault of the recording
@@ -51,8 +51,8 @@ def finding(
     run: _OfFile | str | None = None,
     *,
     marks: Sequence[Mark] = (),
-    time_s: Limits | None = None,
-    size: tuple[Limits, str] | None = None,
+    time_s: ValueWithLimits | None = None,
+    size: tuple[ValueWithLimits, str] | None = None,
     leave_out: Sequence[tuple[float, float]] = (),
     whole_run: bool = False,
     advice: str | None = None,
@@ -314,7 +314,7 @@ class RunFacts:
     earth: EarthRate | None
 
 
-def facts_of(run: Run, rows: Rows) -> RunFacts:
+def run_facts(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
     time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)

@@ -127,7 +127,7 @@ def _one_error(expected: str) -> WrapValidator:
 
 Seconds = Annotated[float, Field(ge=-1e10, le=1e10)]
 PowerOn = Annotated[Seconds | Literal["unknown"], _one_error('a number of seconds or "unknown"')]
-Name = Annotated[str, Field(min_length=1, max_length=256)]
+Label = Annotated[str, Field(min_length=1, max_length=256)]
 Level = Annotated[float, Field(ge=0.0, le=7.5e6)]
 PerAxis = Annotated[
     float | dict[Literal["x", "y", "z"], float],
@@ -143,9 +143,9 @@ class _Part(BaseModel):
 class Columns(_Part):
     """Names of the columns."""
 
-    time: Name = "time_s"
-    temperature: Name = "temperature_c"
-    rate: Name = "rate_dph"
+    time: Label = "time_s"
+    temperature: Label = "temperature_c"
+    rate: Label = "rate_dph"
 
 
 class NoiseEntry(_Part):
@@ -184,7 +184,7 @@ class ExcludeEntry(_Part):
 class RunEntry(_Part):
     """One `[[run]]`."""
 
-    file: Annotated[Name, AfterValidator(_plain_name)]
+    file: Annotated[Label, AfterValidator(_plain_name)]
     role: Literal["train", "exam"] = "train"
     environment: str = ""
     started: Instant | None = None
@@ -210,7 +210,7 @@ class Description(_Part):
     pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
     temperature_late_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
     columns: Columns = Columns()
-    units: dict[Name, Name] = {}
+    units: dict[Label, Label] = {}
     trust_units: bool = False
     source: Sources = ()
     meta: Annotated[dict[str, Any], BeforeValidator(_json_value)] = {}
@@ -329,7 +329,7 @@ def exclude_line(spans_s: Iterable[tuple[float, float]], reason: str) -> str:
 
 
 PULSES = "pulses"
-AXES = {"rate_x_dph": "x", "rate_y_dph": "y", "rate_z_dph": "z"}
+AXIS_OF_COLUMN = {"rate_x_dph": "x", "rate_y_dph": "y", "rate_z_dph": "z"}
 _LONGEST_NAME = 64  # characters: fits a line of a page and of a terminal
 
 
@@ -367,7 +367,7 @@ def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problem
             found = f"no column {name} among {_list(names)}"
             expected = f"the {kind} in {name}, or [columns] {kind} = ... (`gyrotc import` finds it)"
             problems.add(InputError(f"{file}, line 1", found, expected))
-    axes = {axis: name for name, axis in AXES.items() if name in names and name != columns.rate}
+    axes = {axis: name for name, axis in AXIS_OF_COLUMN.items() if name in names and name != columns.rate}
     given = [columns.rate] * (columns.rate in names) + [PULSES] * (PULSES in names)
     given += [", ".join(axes.values())] * bool(axes)
     if len(given) > 1:
@@ -425,7 +425,7 @@ class Fault:
     expected: str
 
 
-def faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator[Fault]:
+def column_faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator[Fault]:
     """Faults of the numbers of one file, at most one for each column and kind."""
     good_time = True
     for name, values in columns.items():

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from .records import Run
 
-Words = NDArray[np.uint64]
+RowHashes = NDArray[np.uint64]
 
 _PART, _PARTS = 16, 8  # rows of a part, parts of a window
 _RARE = 2  # a part that occurs more often in a recording says nothing
@@ -41,7 +41,7 @@ _INVERSE_GOLDEN = np.uint64(pow(int(_GOLDEN), -1, 2**64))
 class Fingerprints:
     """What is kept of a recording's rows: increasing hashes of windows, shape (n,), first and last row, their times."""
 
-    hash: Words
+    hash: RowHashes
     first: NDArray[np.int32]
     last: NDArray[np.int32]
     first_s: FloatArray
@@ -73,7 +73,7 @@ def fingerprints_of(time_s: FloatArray, temperature_c: FloatArray, rates: Sequen
 
 def _windows_of(
     temperature_c: FloatArray, rates: Sequence[FloatArray]
-) -> tuple[Words, NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[RowHashes, NDArray[np.int64], NDArray[np.int64]]:
     """Return hash, first and last row of every window whose parts are all rare."""
     known = np.flatnonzero(np.all([np.isfinite(values) for values in rates], axis=0))
     of_rates = _hash_of([values[known] for values in rates])
@@ -96,7 +96,7 @@ def _windows_of(
     return hashes[window], at[window], at[window + size - 1]
 
 
-def _rolling(words: Words, length: int) -> Words:
+def _rolling(words: RowHashes, length: int) -> RowHashes:
     """Return a hash of each window of `length` words, in order: polynomials modulo 2^64."""
     power = np.full(len(words), _GOLDEN)
     power[0] = 1
@@ -106,7 +106,7 @@ def _rolling(words: Words, length: int) -> Words:
     return _mixed((sums[length:] - sums[:-length]) * np.cumprod(shift))
 
 
-def _hash_of(columns: Sequence[FloatArray]) -> Words:
+def _hash_of(columns: Sequence[FloatArray]) -> RowHashes:
     """Return a hash of each row of columns of one length."""
     words = np.zeros(len(columns[0]), dtype=np.uint64)
     for values in columns:
@@ -114,26 +114,26 @@ def _hash_of(columns: Sequence[FloatArray]) -> Words:
     return words
 
 
-def _bits_of(values: FloatArray) -> Words:
+def _bits_of(values: FloatArray) -> RowHashes:
     """Return values as float32, as whole numbers; 0 and -0 are one, and so is all that is beyond float32."""
     with np.errstate(over="ignore"):
         narrow = values.astype(np.float32) + np.float32(0.0)
     return np.asarray(narrow.view(np.uint32).astype(np.uint64))
 
 
-def _mixed(words: Words) -> Words:
+def _mixed(words: RowHashes) -> RowHashes:
     words = (words ^ (words >> np.uint64(30))) * _MIX
     words = (words ^ (words >> np.uint64(27))) * _GOLDEN
     return np.asarray(words ^ (words >> np.uint64(31)))
 
 
-def _are_rare(ordered: Words) -> NDArray[np.bool_]:
+def _are_rare(ordered: RowHashes) -> NDArray[np.bool_]:
     """Test of ordered words whether they occur at most `_RARE` times."""
     often = np.diff(np.flatnonzero(np.r_[_are_new(ordered), True]))
     return np.repeat(often <= _RARE, often)
 
 
-def _are_new(ordered: Words) -> NDArray[np.bool_]:
+def _are_new(ordered: RowHashes) -> NDArray[np.bool_]:
     """Test of ordered words whether they differ from the one before."""
     new = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=new[1:])

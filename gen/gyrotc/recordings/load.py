@@ -21,7 +21,7 @@ from .overlap import counted_once, shared_rows
 from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
 from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run, SharedAxes, inside
-from .units import NATIVE
+from .units import NATIVE_UNITS
 
 __all__ = [
     "asked_axes",
@@ -33,9 +33,9 @@ __all__ = [
     "in_entry",
     "judge",
     "load",
+    "load_reporting",
     "of_axis",
     "place_of",
-    "survey",
     "suspected",
     "suspected_of_earth",
 ]
@@ -129,7 +129,7 @@ def check_channel_units(description: Description, recordings: Mapping[str, Recor
     """Checks that every unit is that of a column: a typing error must not pass."""
     channels = {name for r in recordings.values() for name in r.layout.channels}
     for name in description.units:
-        if name not in NATIVE and name not in channels:
+        if name not in NATIVE_UNITS and name not in channels:
             expected = f"rate, time, temperature or a channel ({', '.join(sorted(channels)) or 'there is none'})"
             problems.add(InputError(f"{FILE}, field units.{name}", "no such column", expected))
 
@@ -208,7 +208,7 @@ def load(
         InputError: Something is wrong; the first thing found is reported.
     """
     problems = Problems(collect=False)
-    dataset = survey(
+    dataset = load_reporting(
         folder, problems, axis=axis, applied=applied, exam_only=exam_only, trust_units=trust_units, once=True
     )
     assert dataset is not None
@@ -247,7 +247,7 @@ def asked_axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
     return axes or (None,)
 
 
-def survey(
+def load_reporting(
     folder: Path,
     problems: Problems,
     *,

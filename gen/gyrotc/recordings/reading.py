@@ -14,7 +14,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import median_step
-from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, faults, rate_faults
+from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, column_faults, rate_faults
 from .files import CsvFile, Source
 from .fingerprints import Fingerprints, fingerprints_of
 from .parser_process import Parser, open_confined
@@ -346,7 +346,7 @@ def _checked(
             lines = [line for line, kept in zip(lines, keep.tolist(), strict=True) if kept]
     values = _converted(values, units)
     time = values[layout.time]
-    found = list(faults(values, layout))
+    found = list(column_faults(values, layout))
     if layout.pulses and not found:
         found += rate_faults(layout.value, rate_of_pulses(time, values[layout.value], pulse_weight_arcsec or 1.0))
     for fault in found:

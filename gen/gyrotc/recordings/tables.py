@@ -126,7 +126,7 @@ class LoggerFile:
     close: Callable[[], object] = lambda: None
 
 
-def library(path: Path, module: str, extra: str, what: str) -> ModuleType:
+def optional_library(path: Path, module: str, extra: str, what: str) -> ModuleType:
     """A library that only one format, that of the file at `path`, needs.
 
     Raises:
@@ -148,7 +148,7 @@ def numbers(values: Any) -> Array:
     return np.ascontiguousarray(array.reshape(-1))
 
 
-Part = Callable[[int, int], Any]
+ReadPart = Callable[[int, int], Any]
 """Gives the values of rows from a first to a last one (exclusive)."""
 
 
@@ -160,7 +160,7 @@ class ArrayTable(LoggerTable):
         parts: Reads a part of each column.
     """
 
-    parts: Mapping[str, Part] = field(default_factory=dict)
+    parts: Mapping[str, ReadPart] = field(default_factory=dict)
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
         """As `Table.chunks`."""
@@ -170,13 +170,13 @@ class ArrayTable(LoggerTable):
             yield Chunk(values or {"": np.zeros(last - first)}, first, last / self.rows)
 
 
-def part_of(values: Any) -> Part:
+def part_of(values: Any) -> ReadPart:
     """Reads an array that is in memory."""
     return lambda first, last: values[first:last]
 
 
 def grouped(
-    columns: Sequence[tuple[str, str, int, Column, Part]], rates: Mapping[str, tuple[float, str]]
+    columns: Sequence[tuple[str, str, int, Column, ReadPart]], rates: Mapping[str, tuple[float, str]]
 ) -> tuple[LoggerTable, ...]:
     """Tables of columns of one group and one length.
 
@@ -184,7 +184,7 @@ def grouped(
         columns: Group, name of the table, number of rows, column, and what reads it.
         rates: Rows per second by group, with the reason.
     """
-    found: dict[tuple[str, int], list[tuple[Column, Part]]] = {}
+    found: dict[tuple[str, int], list[tuple[Column, ReadPart]]] = {}
     names: dict[tuple[str, int], str] = {}
     for group, name, rows, column, part in columns:
         if rows > 1:

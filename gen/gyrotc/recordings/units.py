@@ -18,9 +18,9 @@ from typing import Literal
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 
-Kind = Literal["time", "temperature", "rate"]
+Quantity = Literal["time", "temperature", "rate"]
 
-NATIVE: Mapping[str, str] = {"time": "s", "temperature": "degC", "rate": "deg/h"}
+NATIVE_UNITS: Mapping[str, str] = {"time": "s", "temperature": "degC", "rate": "deg/h"}
 """gyrotc's own units."""
 
 _BASE = ("s", "deg", "K", "m", "kg", "A", "pi")
@@ -159,11 +159,11 @@ def conversion(text: str, kind: str) -> Conversion:
     Raises:
         UnitError: It is no such unit.
     """
-    given, wanted = _size(text), _size(NATIVE.get(kind, kind))
+    given, wanted = _size(text), _size(NATIVE_UNITS.get(kind, kind))
     if not given.named:
         raise UnitError(f"{text!r} is a number without a unit")
     if given.kind != wanted.kind:
-        raise UnitError(f"{text!r} is no unit of the kind {NATIVE.get(kind, kind)}")
+        raise UnitError(f"{text!r} is no unit of the kind {NATIVE_UNITS.get(kind, kind)}")
     turns = given.powers["pi"] - wanted.powers["pi"]
     try:
         factor = float(given.size / wanted.size) * math.pi ** max(turns, 0) / math.pi ** max(-turns, 0)
@@ -174,9 +174,9 @@ def conversion(text: str, kind: str) -> Conversion:
     return Conversion(text, factor, float((given.zero - wanted.zero) / wanted.size))
 
 
-def kind_of(text: str) -> Kind | None:
+def quantity_of(text: str) -> Quantity | None:
     """What is measured in a unit: time, temperature or rate; None for anything else or no unit at all."""
-    kinds: tuple[Kind, ...] = ("rate", "temperature", "time")
+    kinds: tuple[Quantity, ...] = ("rate", "temperature", "time")
     for kind in kinds:
         try:
             conversion(text, kind)
@@ -192,10 +192,10 @@ def channel_unit(name: str) -> str | None:
     return _CHANNEL_ENDINGS.get(ending.lower()) if head else None
 
 
-def channel_kind(name: str, declared: Mapping[str, str]) -> Kind | None:
+def channel_kind(name: str, declared: Mapping[str, str]) -> Quantity | None:
     """What an auxiliary channel measures, by its declared unit or by its name."""
     unit = declared.get(name) or channel_unit(name)
-    return kind_of(unit) if unit else None
+    return quantity_of(unit) if unit else None
 
 
 @cache
@@ -291,8 +291,8 @@ def declared(units: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> 
     """
     found = {}
     for key, text in units.items():
-        names = columns.get(key, ()) if key in NATIVE else [key] * (key in columns["channels"])
-        wanted = NATIVE.get(key)
+        names = columns.get(key, ()) if key in NATIVE_UNITS else [key] * (key in columns["channels"])
+        wanted = NATIVE_UNITS.get(key)
         for name in names:
             if not (to := wanted or channel_unit(name)):
                 continue  # a channel whose name says no unit is taken as it is
@@ -311,7 +311,7 @@ _LONGEST = 256  # characters of a name that is searched for a unit: the search t
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({<]\s*(?P<unit>[^\])}>]+?)\s*[\])}>]\s*$")
 _AFTER_SIGN = re.compile(r"^(?P<base>[^/,]*[^/,\s])\s*(?:/|,|\bin\b)\s*(?P<unit>\S.*)$")
 _WITH_SIGN = re.compile(r"^(?P<base>.*\S)\s+(?P<unit>[^\s/]+\s*/\s*[^\s/]+)$")  # Rate deg/h: not the hours of a name
-_SAID: tuple[tuple[str, Kind, str], ...] = (
+_SAID: tuple[tuple[str, Quantity, str], ...] = (
     ("s", "time", "s, sec, secs, seconds"),
     ("ms", "time", "ms, msec, millis"),
     ("us", "time", "us, usec, micros"),
@@ -367,14 +367,14 @@ class Meaning:
         axis: "x", "y", "z" or empty.
     """
 
-    kind: Kind | None
+    kind: Quantity | None
     unit: str | None
     why: str
     score: int
     axis: str
 
 
-def words(name: str) -> list[str]:
+def words_of_name(name: str) -> list[str]:
     """Lower-case words of a name: `GyrX_dps` gives gyr, x, dps."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?<![Pp][Tt])(?=\d{3,})", " ", name)
     return [w for w in re.split(r"[^0-9a-zäöüßµω°]+", spaced.lower()) if w]
@@ -387,16 +387,16 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
         return name, None, ""
     if found := _BRACKETS.match(name):
         unit = found["unit"]
-        before = split_unit(found["base"]) if kind_of(unit) is None and found["base"] else ("", None, "")
-        if before[1] and kind_of(before[1]):
+        before = split_unit(found["base"]) if quantity_of(unit) is None and found["base"] else ("", None, "")
+        if before[1] and quantity_of(before[1]):
             return before
-        if kind_of(unit) or not re.fullmatch(r"[xyzXYZ\d\s#:]+", unit):
+        if quantity_of(unit) or not re.fullmatch(r"[xyzXYZ\d\s#:]+", unit):
             return found["base"], unit, "in brackets in its name"
-    if (found := _WITH_SIGN.match(name)) and kind_of(found["unit"]) == "rate":
+    if (found := _WITH_SIGN.match(name)) and quantity_of(found["unit"]) == "rate":
         return found["base"].rstrip(" /,"), found["unit"], "the end of its name"
-    if (found := _AFTER_SIGN.match(name)) and kind_of(found["unit"]):
+    if (found := _AFTER_SIGN.match(name)) and quantity_of(found["unit"]):
         return found["base"], found["unit"], "after the sign in its name"
-    parts = words(name)
+    parts = words_of_name(name)
     for length in (3, 2, 1):
         ending = " ".join(parts[-length:])
         if ending in _ENDINGS and (len(parts) > length or len(ending) > 2):
@@ -409,13 +409,13 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
 def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
     """What a column of that name and (where the file gives one) that unit holds."""
     base, in_name, why = split_unit(name)
-    kind = kind_of(unit) if unit else None
+    kind = quantity_of(unit) if unit else None
     if unit is None and in_name is not None:
-        unit, kind = in_name, kind_of(in_name)
-    parts = words(base)
-    scores: dict[Kind, int] = dict.fromkeys([kind] if kind else [], 4)
-    around = set(parts) | set(words(table))
-    kinds: tuple[tuple[Kind, set[str]], ...] = (("time", _TIME), ("temperature", _TEMPERATURE), ("rate", _RATE))
+        unit, kind = in_name, quantity_of(in_name)
+    parts = words_of_name(base)
+    scores: dict[Quantity, int] = dict.fromkeys([kind] if kind else [], 4)
+    around = set(parts) | set(words_of_name(table))
+    kinds: tuple[tuple[Quantity, set[str]], ...] = (("time", _TIME), ("temperature", _TEMPERATURE), ("rate", _RATE))
     for one, known in kinds:
         hits = known & set(parts)
         if kind is None and unit is not None and in_name is None and one != "time":
@@ -443,7 +443,7 @@ def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
 def axis_of(name: str) -> str:
     """`x`, `y` or `z` at the end of a name without its unit, or alone; empty where there is none."""
     base, _, _ = split_unit(name)
-    last = (words(re.sub(r"[\[\]()]", " ", base)) or [""])[-1]
+    last = (words_of_name(re.sub(r"[\[\]()]", " ", base)) or [""])[-1]
     for form in (r"([xyz])", r"(?:gyro?|gyroscope|w|g|omega|rate|ω|ang(?:ular)?vel(?:ocity)?)_?([xyz])\d?"):
         if found := re.fullmatch(form, last):
             return found[1]

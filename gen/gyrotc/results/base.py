@@ -27,7 +27,7 @@ Positive = Annotated[float, Field(gt=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Axis = Annotated[str, Field(pattern="^[xyz]$")] | None
-Arithmetic = Literal["f32", "q31"]
+ArithmeticName = Literal["f32", "q31"]
 
 R = TypeVar("R", bound="Numbered")
 

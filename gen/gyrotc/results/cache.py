@@ -41,7 +41,7 @@ def program_of() -> str:
     return digest_of([*parts, sha256(Path(_core.__file__))])
 
 
-def inputs_of(dataset: Path) -> dict[str, str]:
+def input_hashes(dataset: Path) -> dict[str, str]:
     """Every file of a data set by its path in it, with the SHA-256 of its contents, or why it cannot be read."""
     found = {}
     for path in _regular(dataset):

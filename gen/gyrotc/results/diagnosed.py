@@ -82,7 +82,7 @@ class Statistic(ComparedStatistic):
     extended: ComparedStatistic | None = Field(description="null where nothing was found")
 
 
-LIKELIER = 0.5  # probability above which something is likelier than all else together
+LIKELIER_THAN_ALL_ELSE = 0.5  # probability above which something is likelier than all else together
 
 
 class NamedCause(Part):
@@ -114,7 +114,7 @@ class NamedCause(Part):
     @property
     def sure(self) -> bool:
         """Whether it is likelier than all else in its place, where probabilities are stated."""
-        return self.probabilities is None or self.probabilities[self.id] > LIKELIER
+        return self.probabilities is None or self.probabilities[self.id] > LIKELIER_THAN_ALL_ELSE
 
 
 class Baseline(Part):
@@ -242,7 +242,7 @@ class Diagnosed(UnitResult):
         return tuple(cause for cause in self.causes if cause.family == "noise")
 
 
-Values = tuple[float, ...]
+SeriesValues = tuple[float, ...]
 
 
 class RunSeries(Part):
@@ -252,29 +252,29 @@ class RunSeries(Part):
     file: str = Field(description="of the run")
     environment: str = Field(description="as the data set names it")
     first_s: float = Field(description="time of its first row on the file's clock, s")
-    hours: Values = Field(description="middles of the blocks since that row, h")
-    temperature_c: Values = Field(description="temperature, C")
-    slope_c_per_min: Values = Field(description="dT/dt, C/min")
-    rate_dph: Values = Field(description="rate less its mean over all training runs, deg/h")
-    residual_dph: Values = Field(description="what the static map leaves (of a single cycle: a map of T), deg/h")
-    simulated_low_dph: Values = Field(
+    hours: SeriesValues = Field(description="middles of the blocks since that row, h")
+    temperature_c: SeriesValues = Field(description="temperature, C")
+    slope_c_per_min: SeriesValues = Field(description="dT/dt, C/min")
+    rate_dph: SeriesValues = Field(description="rate less its mean over all training runs, deg/h")
+    residual_dph: SeriesValues = Field(description="what the static map leaves (of a single cycle: a map of T), deg/h")
+    simulated_low_dph: SeriesValues = Field(
         description="lower end of the middle 95 % of simulated residuals, means over half an hour, deg/h; empty of a "
         "single cycle"
     )
-    simulated_high_dph: Values = Field(description="upper end, deg/h")
-    named_dph: Values | None = Field(
+    simulated_high_dph: SeriesValues = Field(description="upper end, deg/h")
+    named_dph: SeriesValues | None = Field(
         description="what the named causes add that no map holds, deg/h; null where none is named"
     )
-    on_h: Values | None = Field(description="time since power-on, h; null where it is not known")
+    on_h: SeriesValues | None = Field(description="time since power-on, h; null where it is not known")
     day: Figure = Field(description="start since that of the first run, days; null where it is not stated")
 
 
 class ScoredRun(Part):
     """Means over `average_s` of a run that the extension was not fitted to."""
 
-    hours: Values = Field(description="since the first, h")
-    before_dph: Values = Field(description="what the model without the causes leaves, deg/h")
-    after_dph: Values = Field(description="what the model with them leaves, deg/h")
+    hours: SeriesValues = Field(description="since the first, h")
+    before_dph: SeriesValues = Field(description="what the model without the causes leaves, deg/h")
+    after_dph: SeriesValues = Field(description="what the model with them leaves, deg/h")
 
 
 class ParameterLikelihood(Part):
@@ -282,8 +282,8 @@ class ParameterLikelihood(Part):
 
     cause: str = Field(description="name of the cause, in words")
     parameter: str = Field(description="name of the parameter")
-    values: Values = Field(description="of the parameter, ascending")
-    gain: Values = Field(description="twice the log-likelihood less its largest")
+    values: SeriesValues = Field(description="of the parameter, ascending")
+    gain: SeriesValues = Field(description="twice the log-likelihood less its largest")
     low: Figure = Field(description="lower end of the 95 % interval")
     high: Figure = Field(description="upper end")
 

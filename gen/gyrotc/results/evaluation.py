@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics
-from .base import Amount, Arithmetic, Count, Figure, Finding, Part, UnitResult
+from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits
 
 
@@ -183,7 +183,7 @@ class Evaluation(UnitResult):
     """What the compiled code makes of recordings (`gyrotc evaluate`)."""
 
     schema_: Annotated[Literal["gyrotc.evaluate/1"], Field(alias="schema")] = "gyrotc.evaluate/1"
-    numeric: Arithmetic = Field(description="arithmetic that was run")
+    numeric: ArithmeticName = Field(description="arithmetic that was run")
     block_s: float = Field(description="length of a block, s")
     average_s: AverageLength = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Amount | None = Field(description="of means over `average_s`, deg/h")

@@ -220,15 +220,15 @@ class FleetSummary(Result):
     serials: tuple[FleetUnit, ...] = Field(description="every gyro, in the order of the manifest")
 
 
-Celsius = Annotated[float, Field(ge=-400.0, le=800.0)]
+PlottedCelsius = Annotated[float, Field(ge=-400.0, le=800.0)]
 Rate = Annotated[float, Field(ge=-2000.0, le=2000.0)]
-Numbers = tuple[float, ...]
+Figures = tuple[float, ...]
 
 
 class LotFunctions(Part):
     """The functions that maps are written in: docs/lot.md, section 7."""
 
-    center_c: Celsius = Field(description="z_T = (T - center)/half range")
+    center_c: PlottedCelsius = Field(description="z_T = (T - center)/half range")
     half_range_c: Positive = Field(description="of T, C")
     half_range_c_per_min: Positive = Field(description="of dT/dt, C/min")
     kept: tuple[Annotated[int, Field(ge=0, le=120)], ...] = Field(description="numbers of the functions, of 121")
@@ -251,8 +251,8 @@ class LotCluster(Part):
     """Units that resemble each other."""
 
     units: Count = Field(description="how many")
-    mean: Numbers = Field(description="coefficients of their mean map, in units of the lot")
-    covariance: tuple[Numbers, ...] = Field(description="how well it is known: lower triangle, row by row")
+    mean: Figures = Field(description="coefficients of their mean map, in units of the lot")
+    covariance: tuple[Figures, ...] = Field(description="how well it is known: lower triangle, row by row")
 
 
 class LotUnit(Part):
@@ -276,9 +276,9 @@ class CrossValidation(Part):
 class AtRest(Part):
     """The lot to be read: its first cluster where temperature stands still."""
 
-    temperature_c: Numbers = Field(description="C")
-    mean_dph: Numbers = Field(description="mean map, deg/h")
-    spread_dph: Numbers = Field(description="standard deviation of a new unit about it, deg/h")
+    temperature_c: Figures = Field(description="C")
+    mean_dph: Figures = Field(description="mean map, deg/h")
+    spread_dph: Figures = Field(description="standard deviation of a new unit about it, deg/h")
 
 
 class Lot(Result):
@@ -288,9 +288,9 @@ class Lot(Result):
     axis: Axis = Field(description="of the gyros; null where their recordings have one axis")
     units: tuple[LotUnit, ...] = Field(description="fully calibrated units, in the order of their folders")
     text: str = Field(description="in words: how much is shared, clusters, outliers")
-    temperature_c: tuple[Celsius, Celsius] = Field(description="envelope of the lot, C")
+    temperature_c: tuple[PlottedCelsius, PlottedCelsius] = Field(description="envelope of the lot, C")
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
-    occupancy: tuple[Numbers, ...] = Field(
+    occupancy: tuple[Figures, ...] = Field(
         description="where units were: share of time in cells of the envelope, a row for each of dT/dt, T ascending"
     )
     center_dph: float = Field(description="0 of the coefficients, deg/h")
@@ -299,7 +299,7 @@ class Lot(Result):
     clusters: Annotated[tuple[LotCluster, ...], Field(min_length=1)] = Field(
         description="one, where no more were found"
     )
-    directions: tuple[Numbers, ...] = Field(description="in which units differ: coefficients of one standard deviation")
+    directions: tuple[Figures, ...] = Field(description="in which units differ: coefficients of one standard deviation")
     rest: LotProcess = Field(description="what is each unit's own besides")
     of_mean: LotProcess = Field(description="smoothness of the mean maps")
     noise_dph: Positive = Field(description="median noise of means over `mean_s`, deg/h")
@@ -313,11 +313,11 @@ class Lot(Result):
 class UnitCurve(Part):
     """Prior, recordings and posterior where temperature stands still."""
 
-    temperature_c: Numbers = Field(description="C")
-    prior_dph: Numbers = Field(description="what the lot says, deg/h")
-    prior_sigma_dph: Numbers = Field(description="1 sigma of it, deg/h")
-    posterior_dph: Numbers = Field(description="what lot and runs say together, deg/h")
-    posterior_sigma_dph: Numbers = Field(description="1 sigma of it, deg/h")
+    temperature_c: Figures = Field(description="C")
+    prior_dph: Figures = Field(description="what the lot says, deg/h")
+    prior_sigma_dph: Figures = Field(description="1 sigma of it, deg/h")
+    posterior_dph: Figures = Field(description="what lot and runs say together, deg/h")
+    posterior_sigma_dph: Figures = Field(description="1 sigma of it, deg/h")
 
 
 class LotUse(Part):
@@ -342,15 +342,15 @@ class LotUse(Part):
 class KnownMap(Part):
     """What was known of a unit's map when its table was made, where its own recordings do not say it all."""
 
-    temperature_c: tuple[Celsius, Celsius] = Field(description="envelope, C")
+    temperature_c: tuple[PlottedCelsius, PlottedCelsius] = Field(description="envelope, C")
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
     center_dph: float = Field(description="0 of the coefficients, deg/h")
     unit_dph: Positive = Field(description="1 of the coefficients, deg/h")
     functions: LotFunctions = Field(description="what maps are written in: docs/lot.md, section 7")
-    mean: Numbers = Field(description="coefficients of the map")
-    covariance: tuple[Numbers, ...] = Field(description="of the coefficients: lower triangle, row by row")
+    mean: Figures = Field(description="coefficients of the map")
+    covariance: tuple[Figures, ...] = Field(description="of the coefficients: lower triangle, row by row")
     rest: LotProcess = Field(description="the smooth process behind it")
-    asked_temperature_c: Numbers = Field(description="where corrections are asked for, C")
-    asked_slope_c_per_min: Numbers = Field(description="the same, C/min")
-    asked_share: Numbers = Field(description="the same, share of time")
+    asked_temperature_c: Figures = Field(description="where corrections are asked for, C")
+    asked_slope_c_per_min: Figures = Field(description="the same, C/min")
+    asked_share: Figures = Field(description="the same, share of time")
     between_dph: Amount = Field(description="of the constant from power-on to power-on, 1 sigma, deg/h")

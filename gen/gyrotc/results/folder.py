@@ -22,9 +22,8 @@ from .marker import (
     MARKER,
     OWN,
     check_contents,
+    check_same_serial,
     check_separate,
-    check_serial,
-    faults,
     final_place,
     is_inside,
     marker_of,
@@ -32,6 +31,7 @@ from .marker import (
     prefix_of,
     read_marker,
     remove_listed,
+    result_faults,
     sha256,
     walk,
 )
@@ -64,7 +64,7 @@ class Stage:
         """
         self._job.any_serial |= any_serial
         if not self._job.any_serial and not self._part:
-            check_serial(self._job.out, self._job.earlier, serial)
+            check_same_serial(self._job.out, self._job.earlier, serial)
         parts = self._job.parts
         parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
 
@@ -258,7 +258,7 @@ class _Job:
         """A job that died between two renames (where names cannot be exchanged) left the place empty."""
         if not self.place.exists() and not self.place.is_symlink():
             for path in sorted(self.place.parent.iterdir()):
-                if path.name.startswith(self._prefix) and path.name.endswith(_EARLIER) and not faults(path):
+                if path.name.startswith(self._prefix) and path.name.endswith(_EARLIER) and not result_faults(path):
                     path.rename(self.place)
                     return
 

@@ -20,7 +20,7 @@ from .base import Marker, checked_result
 from .files import json_text
 
 MARKER = ".gyrotc-result.json"
-SCHEMA = Marker.schema_id()
+MARKER_SCHEMA = Marker.schema_id()
 KINDS = {
     "build": "result",
     "fit": "result",
@@ -73,7 +73,7 @@ def read_marker(folder: Path) -> Marker | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (InputError, ValueError, RecursionError) as error:
-        raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {SCHEMA}") from error
+        raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {MARKER_SCHEMA}") from error
     return marker.but(parts=parts)
 
 
@@ -135,7 +135,7 @@ def _target(part: Path) -> str:
     return target if target.startswith(f".{part.name}.gyrotc-part-") and "/" not in target else part.name
 
 
-def survey(folder: Path, marker: Marker, entries: frozenset[str] | None = None) -> tuple[list[str], list[str]]:
+def survey_folder(folder: Path, marker: Marker, entries: frozenset[str] | None = None) -> tuple[list[str], list[str]]:
     """What is in a folder and not of gyrotc, and what gyrotc wrote and somebody changed: two lists of paths.
 
     Args:
@@ -155,12 +155,12 @@ def survey(folder: Path, marker: Marker, entries: frozenset[str] | None = None) 
         if not (folder / part).is_dir() or (entries is not None and part.split("/", 1)[0] not in entries):
             continue
         own = read_marker(folder / part) or marker_of()
-        for found, more in zip((foreign, edited), survey(folder / part, own), strict=True):
+        for found, more in zip((foreign, edited), survey_folder(folder / part, own), strict=True):
             found.extend(f"{part}/{name}" for name in more)
     return sorted(foreign), sorted(edited)
 
 
-def faults(folder: Path) -> list[str]:
+def result_faults(folder: Path) -> list[str]:
     """What keeps a folder from being a complete result as it was written: a line for each; empty if it is one.
 
     Files that gyrotc did not write are no fault. A file is whole also where a killed job has replaced some of
@@ -181,7 +181,7 @@ def faults(folder: Path) -> list[str]:
         ):
             found.append(f"{entry}: missing or changed")
     for part in marker.parts:
-        found += [f"{part}/{fault}" for fault in faults(folder / part)]
+        found += [f"{part}/{fault}" for fault in result_faults(folder / part)]
     return found
 
 
@@ -337,7 +337,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
     if kind is not None and marker.kind != kind:
         found = f"holds the {marker.kind} of gyrotc {marker.command}"
         raise InputError(str(out), found, f"a new folder, or a {kind}")
-    foreign, edited = survey(place, marker, entries)
+    foreign, edited = survey_folder(place, marker, entries)
     if foreign:
         found = f"holds what gyrotc did not write: {_some(foreign)}"
         raise InputError(str(out), found, "nothing else in a result that is replaced; move it away")
@@ -347,7 +347,7 @@ def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[
     return marker
 
 
-def check_serial(out: Path, marker: Marker | None, serial: str) -> None:
+def check_same_serial(out: Path, marker: Marker | None, serial: str) -> None:
     """Refuses to put a result of one gyro into the place of another's.
 
     Raises:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .base import Amount, Arithmetic, Axis, Count, Figure, Part, Positive, Result, UnitResult
+from .base import Amount, ArithmeticName, Axis, Count, Figure, Part, Positive, Result, UnitResult
 
 
 class Instrument(Part):
@@ -170,7 +170,7 @@ STATED = (
 class EmittedTable(Part):
     """Size and error bound of one table."""
 
-    numeric: Arithmetic = Field(description="its arithmetic")
+    numeric: ArithmeticName = Field(description="its arithmetic")
     table_bytes: Count = Field(description="size of the table, bytes (section 3)")
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
 

@@ -22,17 +22,18 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.description import dataset_toml
+from ..recordings.importers.rows import FileFormat
 from ..results.files import create, json_text, write_own
 from ..results.folder import result_folder
 from ..results.recordings import SimulatedTruth, TrueLot, TrueRun
-from .gyro import CELL_S, BiasMap, bridge_arcsec, draw, quantised
+from .gyro import CELL_S, BiasMap, bridge_arcsec, draw_map, quantised
 from .instrument import SimulatedRecord, record
 from .scenario import TRUTH_FILE, NoiseLevels, Scenario, read
 
 __all__ = [
     "NOISE",
-    "Format",
-    "Noise",
+    "FileFormat",
+    "NoiseLevel",
     "RecordingPart",
     "RowForm",
     "RowLength",
@@ -47,7 +48,7 @@ __all__ = [
     "write_gyro",
 ]
 
-Noise = Literal["paper", "class"]
+NoiseLevel = Literal["paper", "class"]
 
 NOISE: dict[str, NoiseLevels] = {
     # 7e-4 deg/h of 100-s means, what Ding et al. 2014 report after compensation
@@ -73,8 +74,8 @@ def simulate(
     row_s: float = 10.0,
     raw_hz: float | None = None,
     pulses: bool = False,
-    format: Format = "csv",
-    noise: Noise = "paper",
+    format: FileFormat = "csv",
+    noise: NoiseLevel = "paper",
     progress: Callable[[float], None] | None = None,
 ) -> None:
     """Simulates a campaign and writes it as a data set with its truth beside it.
@@ -113,10 +114,10 @@ class RowForm:
 
     length: RowLength
     pulses: bool
-    format: Format
+    format: FileFormat
 
     @classmethod
-    def of(cls, row_s: float, raw_hz: float | None, pulses: bool, format: Format) -> RowForm:
+    def of(cls, row_s: float, raw_hz: float | None, pulses: bool, format: FileFormat) -> RowForm:
         """Raises `InputError` for a length that cannot be."""
         if format not in ("csv", "parquet"):
             raise InputError("--format", repr(format), "csv or parquet")
@@ -181,7 +182,7 @@ def records(plan: Scenario, bias_map: BiasMap, seeds: np.random.SeedSequence) ->
 
 def gyro_map(plan: Scenario, seed: int) -> BiasMap:
     """The static map of the gyro that a seed draws; the same in every scenario of the same bias range."""
-    return draw(np.random.default_rng(_seeds(seed)[0]), plan.gyro.bias_dph)
+    return draw_map(np.random.default_rng(_seeds(seed)[0]), plan.gyro.bias_dph)
 
 
 def _seeds(seed: int) -> list[np.random.SeedSequence]:
@@ -190,7 +191,7 @@ def _seeds(seed: int) -> list[np.random.SeedSequence]:
     return np.random.SeedSequence(seed).spawn(2)
 
 
-def with_noise(plan: Scenario, noise: Noise) -> Scenario:
+def with_noise(plan: Scenario, noise: NoiseLevel) -> Scenario:
     """The scenario with the chosen levels wherever it does not give its own."""
     if noise not in NOISE:
         raise InputError("noise", str(noise), ", ".join(NOISE))
@@ -211,7 +212,7 @@ def _planned(plan: Scenario) -> list[dict[str, Any]]:
 
 
 def _write_run(
-    path: Path, format: Format, made: SimulatedRecord, length: RowLength, weight: float | None
+    path: Path, format: FileFormat, made: SimulatedRecord, length: RowLength, weight: float | None
 ) -> Iterator[float]:
     """Writes the rows of a run; yields the share that is done."""
     total_s = CELL_S * len(made.reading_c)
@@ -392,7 +393,6 @@ class _Fine:
         return np.asarray(grown[:-1] + (grown[1:] - grown[:-1]) * share + bowed)
 
 
-Format = Literal["csv", "parquet"]
 _RATE_DECIMALS = 9  # deg/h: far below the noise of any row
 _DECIMALS = 6  # s, C: far below the resolution of any logger
 
@@ -412,7 +412,7 @@ class SimulatedRunFile:
     def __init__(
         self,
         path: Path,
-        format: Format,
+        format: FileFormat,
         *,
         row_s: float,
         pulse_weight_arcsec: float | None,

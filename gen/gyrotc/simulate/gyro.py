@@ -76,7 +76,7 @@ def _shape(p: dict[str, Any], spline: CubicSpline, cavity_c: FloatArray, slope: 
     return np.asarray(level + flow * gain + even)
 
 
-def draw(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
+def draw_map(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
     """One gyro: a map whose values over the operating range reach from end to end of `range_dph`, deg/h."""
     knots_c = np.linspace(*T_RANGE_C, 7)
     values = rng.normal(0.0, 0.3, len(knots_c))

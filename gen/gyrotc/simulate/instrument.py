@@ -245,7 +245,7 @@ def _scene(
     time_s: FloatArray = CELL_S * np.arange(points, dtype=np.float64)
     limit = scenario.chamber.max_c_per_min
     programme = profile.corners(run.steps, run.start_c, float(time_s[-1]), limit)
-    programmed = profile.sample(programme, time_s)
+    programmed = profile.sample_profile(programme, time_s)
     air_c = chamber_air(scenario.chamber, programmed, CELL_S, np.random.default_rng(chamber_seeds))
     on_s = time_s - CELL_S * _cells(run.power_on_min)
     network = thermal_network(scenario.gyro)

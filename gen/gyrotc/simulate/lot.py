@@ -18,11 +18,11 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.folder import result_folder
 from ..results.recordings import TrueLot
-from .campaign import Noise, RowForm, SimulatedGyro, with_noise, write_gyro
+from .campaign import NoiseLevel, RowForm, SimulatedGyro, with_noise, write_gyro
 from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .scenario import Gyro, Scenario, read
 
-Scores = dict[str, float]
+SharedScores = dict[str, float]
 
 _KNOTS = 7  # as in `draw`
 _EXPANSION = ("expansion", "expansion_slope", "expansion_curvature")
@@ -86,7 +86,7 @@ def simulate_lot(
     out: Path,
     scenario: str | Path = "paper",
     form: RowForm | None = None,
-    noise: Noise = "paper",
+    noise: NoiseLevel = "paper",
     progress: Callable[[float], None] | None = None,
 ) -> list[str]:
     """Simulates a lot: a data set in `out/<serial>` for each unit, with its truth beside it.
@@ -163,7 +163,7 @@ def _mixing() -> FloatArray:
     return np.asarray(np.linalg.cholesky(matrix))
 
 
-def _map(gyro: Gyro, scores: Scores, center: FloatArray, family: float) -> BiasMap:
+def _map(gyro: Gyro, scores: SharedScores, center: FloatArray, family: float) -> BiasMap:
     """The static map: as sensitive as its lot to the extent to which the lot is a family."""
     parameters = _shape_of(scores)
     low, high = gyro.bias_dph
@@ -175,7 +175,7 @@ def _map(gyro: Gyro, scores: Scores, center: FloatArray, family: float) -> BiasM
     return made(parameters, scale, mean - scale * float(shape.mean()))
 
 
-def _shape_of(s: Scores) -> dict[str, object]:
+def _shape_of(s: SharedScores) -> dict[str, object]:
     """Parameters of the shape (`simulate/gyro.py`); their moments are those of the gyros that `draw` makes."""
     knots_c = np.linspace(*T_RANGE_C, _KNOTS)
     x = np.linspace(-1.0, 1.0, _KNOTS)
@@ -201,7 +201,7 @@ def _shape_of(s: Scores) -> dict[str, object]:
     }
 
 
-def _instrument(plan: Scenario, s: Scores) -> Scenario:
+def _instrument(plan: Scenario, s: SharedScores) -> Scenario:
     """The plan with this unit's thermal paths and thermometer."""
     node = dict(plan.gyro.node)
     case, block = node["case"], node["block"]

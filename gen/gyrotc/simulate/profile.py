@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from ..common.errors import InputError
 
-Celsius = Annotated[float, Field(ge=-90.0, le=200.0)]
-Positive = Annotated[float, Field(gt=0.0)]
+ChamberCelsius = Annotated[float, Field(ge=-90.0, le=200.0)]
+AboveZero = Annotated[float, Field(gt=0.0)]
 
 
 class _Strict(BaseModel):
@@ -25,45 +25,45 @@ class _Strict(BaseModel):
 class Hold(_Strict):
     """Stay at the present temperature."""
 
-    hold_min: Positive
+    hold_min: AboveZero
 
 
 class Ramp(_Strict):
     """Go to a temperature at a constant rate."""
 
-    ramp_to_c: Celsius
-    c_per_min: Positive
+    ramp_to_c: ChamberCelsius
+    c_per_min: AboveZero
 
 
 class FastChange(_Strict):
     """Go to another temperature as fast as the chamber can."""
 
-    step_to_c: Celsius
+    step_to_c: ChamberCelsius
 
 
 class Staircase(_Strict):
     """From the present temperature to another in equal treads: ramp, hold, ramp, hold, ..."""
 
-    staircase_to_c: Celsius
-    tread_c: Positive
-    hold_min: Positive
-    c_per_min: Positive
+    staircase_to_c: ChamberCelsius
+    tread_c: AboveZero
+    hold_min: AboveZero
+    c_per_min: AboveZero
 
 
 class Triangle(_Strict):
     """To the first temperature, then to and fro between both."""
 
-    triangle_c: tuple[Celsius, Celsius]
-    c_per_min: Positive
+    triangle_c: tuple[ChamberCelsius, ChamberCelsius]
+    c_per_min: AboveZero
     cycles: Annotated[int, Field(ge=1, le=1000)] = 1
 
 
 class Nested(_Strict):
     """Loops of given half ranges around a temperature: up, down, up, ... and back to it at the end."""
 
-    nested_c: Celsius
-    half_ranges_c: Annotated[list[Positive], Field(min_length=1)]
-    c_per_min: Positive
+    nested_c: ChamberCelsius
+    half_ranges_c: Annotated[list[AboveZero], Field(min_length=1)]
+    c_per_min: AboveZero
 
 
 class Repeat(_Strict):
@@ -190,7 +190,7 @@ def corners(
     return np.array(times), np.array(temperatures)
 
 
-def sample(
+def sample_profile(
     programme: tuple[NDArray[np.float64], NDArray[np.float64]], time_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Programmed temperature (C) at ascending times (s)."""

@@ -26,10 +26,9 @@ from ..common.errors import InputError
 from ..common.inputs import read_input, read_toml, refuse_above
 from ..results.base import read_optional
 from ..results.recordings import SimulatedTruth
-from .profile import Step
+from .profile import AboveZero, Step
 
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-Positive = Annotated[float, Field(gt=0.0)]
+Identifier = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 NonNegative = Annotated[float, Field(ge=0.0)]
 
 
@@ -44,7 +43,7 @@ class Thermometer(_Strict):
     the lag `loose_lag_s`.
     """
 
-    name: Name
+    name: Identifier
     node: str
     lag_s: NonNegative = 10.0
     offset_c: float = 0.0
@@ -64,7 +63,7 @@ class NodeDifference(_Strict):
     node: str
     against: str
     dph_per_c: float
-    saturation_c: Positive = 1e6
+    saturation_c: AboveZero = 1e6
     growth_per_c: float = 0.0
 
 
@@ -75,29 +74,29 @@ class Laser(_Strict):
     beam loses more where the moving mirror stands half a wavelength from the middle of its stroke.
     """
 
-    intensity: Name = "intensity_v"
-    path_voltage: Name = "path_length_v"
+    intensity: Identifier = "intensity_v"
+    path_voltage: Identifier = "path_length_v"
     mirror_node: str = "cavity"
     gas_node: str = "gas"
     path_node: str = "block"
-    loss_ppm: Positive = 300.0
+    loss_ppm: AboveZero = 300.0
     loss_ppm_per_c: float = 0.1
     contamination_ppm: NonNegative = 6.0
-    contamination_tau_s: Positive = 7200.0
+    contamination_tau_s: AboveZero = 7200.0
     walk_ppm: NonNegative = 20.0
-    gain_ppm: Positive = 900.0
+    gain_ppm: AboveZero = 900.0
     gain_per_c: float = -1e-3
     gas_c: float = 50.0
-    depletion_day: Positive = 10000.0
-    intensity_level_v: Positive = 2.0
+    depletion_day: AboveZero = 10000.0
+    intensity_level_v: AboveZero = 2.0
     intensity_noise_v: NonNegative = 5e-4
-    wavelength_nm: Positive = 632.8
-    path_mm: Positive = 280.0
+    wavelength_nm: AboveZero = 632.8
+    path_mm: AboveZero = 280.0
     expansion_ppm_per_c: float = 0.03
     expansion_ppm_per_c2: float = 1e-4
     mirror_nm_per_c: float = 0.0
     reset_share: Annotated[float, Field(ge=0.5, le=2.0)] = 0.6
-    stroke_v: Positive = 60.0
+    stroke_v: AboveZero = 60.0
     stroke_noise_v: NonNegative = 0.02
     null_dph_per_ppm: float = 1e-4
     null_growth_per_c: float = 0.0
@@ -113,21 +112,21 @@ _OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}
 class Chamber(_Strict):
     """The chamber's air and how well it follows its programme."""
 
-    lag_s: Positive = 120.0
+    lag_s: AboveZero = 120.0
     damping: Annotated[float, Field(ge=0.2, le=2.0)] = 0.7
     ripple_c: NonNegative = 0.2
-    ripple_s: Positive = 180.0
+    ripple_s: AboveZero = 180.0
     setpoint_sigma_c: NonNegative = 0.1
-    max_c_per_min: Positive = 10.0
+    max_c_per_min: AboveZero = 10.0
 
 
 class Node(_Strict):
     """One node of the instrument's thermal network."""
 
-    heat_capacity_j_per_k: Positive
+    heat_capacity_j_per_k: AboveZero
     power_w: NonNegative = 0.0
     to_air_w_per_k: NonNegative = 0.0
-    to: dict[str, Positive] = {}
+    to: dict[str, AboveZero] = {}
 
 
 def _default_nodes() -> dict[str, Node]:
@@ -197,11 +196,11 @@ class NoiseLevels(_Strict):
 class Channel(_Strict):
     """A recorded auxiliary channel."""
 
-    name: Name
+    name: Identifier
     level: float = 0.0
     per_air_c: float = 0.0
     wander_sigma: NonNegative = 0.0
-    wander_tau_s: Positive = 1800.0
+    wander_tau_s: AboveZero = 1800.0
     steps_per_h: NonNegative = 0.0
     step_sigma: NonNegative = 0.0
     noise: NonNegative = 0.0
@@ -253,7 +252,7 @@ class RunSet(_Strict):
 
     role: Literal["train", "exam"] = "train"
     started: datetime
-    every_h: Positive = 24.0
+    every_h: AboveZero = 24.0
     profiles: Annotated[list[str], Field(min_length=1)]
 
 

@@ -35,7 +35,7 @@ from .quantise import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text
 from .rounding import channel_names
 from .text import amalgamate, example_values, table_text
-from .vectors import MISSING, Vectors, answers_text, make_vectors
+from .vectors import MISSING_READING, Vectors, answers_text, make_vectors
 
 COSTS = Path(__file__).resolve().parent / "costs.json"
 #: Options of gtc_config.h by the part that a product may leave out.
@@ -285,7 +285,9 @@ def runtime_texts(models: Iterable[Model], numerics: Iterable[str]) -> dict[str,
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
     """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
     template = c_environment().get_template("board_test.c.j2")
-    text = template.render(id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING)
+    text = template.render(
+        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING_READING
+    )
     return text.encode("ascii")
 
 

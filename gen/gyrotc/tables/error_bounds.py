@@ -241,7 +241,7 @@ _CELLS = (256, 128)
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class CoordinateMap:
     """One input as a table compares it with the edges of regions: coordinate = factor · input + offset.
 
     `limits` are the envelope's edges in the table and `edges` those of its regions, shape (n, 2); `moved` is the
@@ -297,7 +297,7 @@ def regions(model: Model) -> tuple[Envelope, ...]:
 
 
 def handover_error_dph(
-    model: Model, numeric: str, axes: tuple[Axis, Axis], *, share_step: float, share_error: float
+    model: Model, numeric: str, axes: tuple[CoordinateMap, CoordinateMap], *, share_step: float, share_error: float
 ) -> float:
     """Largest effect of moved inputs, rounded edges and rounded shares through the shares of a bank, deg/h.
 
@@ -338,7 +338,7 @@ def handover_error_dph(
     return float(np.max(spread * (part + 2.0 * share_error)))
 
 
-def _ramps(axis: Axis, pairs: list[tuple[float, float]], limits: tuple[float, float], numeric: str) -> _Ramps:
+def _ramps(axis: CoordinateMap, pairs: list[tuple[float, float]], limits: tuple[float, float], numeric: str) -> _Ramps:
     """Model and table side by side in one input."""
     low, high = (axis.factor * limit + axis.offset for limit in limits)
     edges = axis.factor * np.array(pairs) + axis.offset
@@ -376,7 +376,9 @@ def _over_cells(values: FloatArray, least: np.ufunc) -> FloatArray:
     return values
 
 
-def _spread(model: Model, axes: tuple[Axis, Axis], lines: list[FloatArray], counts: NDArray[np.bool_]) -> FloatArray:
+def _spread(
+    model: Model, axes: tuple[CoordinateMap, CoordinateMap], lines: list[FloatArray], counts: NDArray[np.bool_]
+) -> FloatArray:
     """Bound of how far from one another the networks are that count in a cell, deg/h."""
     center, half = model.scale.temperature_c
     inputs = [(x - a.offset) / a.factor for x, a in zip(lines, axes, strict=True)]

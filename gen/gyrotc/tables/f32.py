@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..mirror.table import Table, Words, f32_words
 from ..model import Envelope, Model, Network
-from .error_bounds import Axis, handover_error_dph, regions, unbounded
+from .error_bounds import CoordinateMap, handover_error_dph, regions, unbounded
 from .rounding import STEEPEST, f32_terms, guard_words, largest_gradient, shared, sigma_values
 
 _UNIT = 2.0**-24  # largest relative error of one rounding
@@ -182,7 +182,7 @@ def _region(region: Envelope, per_block: float) -> Words:
     return f32_words([t0, t1, r0 * per_block, r1 * per_block])
 
 
-def _axes(envelope: Words, networks: Words, per_block: float) -> tuple[Axis, Axis]:
+def _axes(envelope: Words, networks: Words, per_block: float) -> tuple[CoordinateMap, CoordinateMap]:
     """Inputs as the table compares them with the edges of regions: C and C per block.
 
     The envelope, to which both sides clamp, is rounded.
@@ -190,7 +190,7 @@ def _axes(envelope: Words, networks: Words, per_block: float) -> tuple[Axis, Axi
     limits = _numbers(envelope).tolist()
     edges = _numbers(networks.reshape(-1, 8)[:, 4:])
     t, r = (
-        Axis(
+        CoordinateMap(
             factor=factor,
             offset=0.0,
             limits=(limits[2 * k], limits[2 * k + 1]),

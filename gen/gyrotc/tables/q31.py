@@ -21,7 +21,7 @@ from ..common.errors import CheckFailed
 from ..mirror.q31 import GAUSS_ERROR
 from ..mirror.table import Table
 from ..model import Envelope, Model, Network, Scale
-from .error_bounds import Axis, handover_error_dph, regions, unbounded
+from .error_bounds import CoordinateMap, handover_error_dph, regions, unbounded
 from .rounding import (
     STEEPEST,
     Floats,
@@ -32,7 +32,7 @@ from .rounding import (
     q31_terms,
     shared,
     sigma_values,
-    solve,
+    solve_cholesky,
     term_size_dph,
 )
 
@@ -315,7 +315,7 @@ def _solved(exact: Surface, rounded: Surface) -> Surface:
         right = right + value * (cross[:, k] - normal[:, k])
     diagonal = np.arange(len(values))
     normal[diagonal, diagonal] += _RIDGE * _SOLVE_POINTS**2
-    values = values + solve(normal, right)
+    values = values + solve_cholesky(normal, right)
     return replace(exact, w0=float(values[0]), linear=values[1:3], weights=values[3:])
 
 
@@ -407,7 +407,7 @@ def _region(region: Envelope, inputs: Inputs, model: Model) -> list[int]:
     return edges
 
 
-def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
+def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[CoordinateMap, CoordinateMap]:
     """Inputs as the table compares them with the edges of regions: positions.
 
     An input is moved to the middle of its cell, and by the rounding of the envelope to which both sides clamp.
@@ -415,7 +415,7 @@ def _axes(model: Model, inputs: Inputs, per_block: float) -> tuple[Axis, Axis]:
     boxes = regions(model)[: len(model.networks)]
     edges = np.array([_region(region, inputs, model) for region in boxes], dtype=np.float64)
     t, r = (
-        Axis(
+        CoordinateMap(
             factor=unit * _UNITS_PER_C * scale.per_unit,
             offset=-scale.low * scale.per_unit - 0.5,
             limits=(0.0, POSITIONS - 1.0),

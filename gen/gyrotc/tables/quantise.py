@@ -54,7 +54,7 @@ _SPAN = 2**26 - 1  # of an input in 2^-16 C: five bits more are 31 (libc/gtc_q31
 _LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 
-Limits = list[tuple[str, float, float]]  # of words in order: name, least, most
+WordLimits = list[tuple[str, float, float]]  # of words in order: name, least, most
 
 
 def outside(table: Table) -> str | None:
@@ -89,18 +89,18 @@ def _refused(table: Table) -> Iterator[str]:
     yield from (_f32 if table.numeric == "f32" else _q31)(table, records)
 
 
-def _beyond(found: Any, limits: Limits) -> Iterator[str]:
+def _beyond(found: Any, limits: WordLimits) -> Iterator[str]:
     for value, (name, least, most) in zip(found, limits, strict=True):
         if not least <= float(value) <= most:
             yield f"{name} is {float(value):g}, not in {least:g} ... {most:g}"
 
 
-def _each(table: Table, records: NDArray[np.uint32], limits: Limits) -> Iterator[str]:
+def _each(table: Table, records: NDArray[np.uint32], limits: WordLimits) -> Iterator[str]:
     for record in records:
         yield from _beyond(table.numbers(record), limits)
 
 
-def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
+def _guards(table: Table, limits: WordLimits, wholes: WordLimits) -> Iterator[str]:
     for channel, record in enumerate(table.records("guards")):
         numbers = table.numbers(record)
         yield from _beyond(numbers[:4], limits)
@@ -113,7 +113,7 @@ def _guards(table: Table, limits: Limits, wholes: Limits) -> Iterator[str]:
             yield "fallback of a guard is beyond its range"
 
 
-def _terms(table: Table, limits: Limits) -> Iterator[str]:
+def _terms(table: Table, limits: WordLimits) -> Iterator[str]:
     width, last = ARRAYS["terms"] - 2, table.n_networks
     if last < 1:
         yield "no network is left to the map"
@@ -172,13 +172,13 @@ def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
 
 
 @functools.cache
-def _limits(numeric: str) -> tuple[Limits, ...]:
+def _limits(numeric: str) -> tuple[WordLimits, ...]:
     """Rows of libc/gtc_limits.inl for one arithmetic: whole numbers, numbers, network, center, guard, terms, sigma."""
     include, libc = runtime_folders()
     headers = [(include / name).read_text(encoding="ascii") for name in ("gtc_config.h", "gtc_table.h")]
     names = dict(_NAME.findall("".join(headers)))
     first = 0 if numeric == "f32" else 2
-    rows: Limits = []
+    rows: WordLimits = []
     for line in (libc / "gtc_limits.inl").read_text(encoding="ascii").splitlines():
         if match := _ROW.search(line):
             values = [_number(text, names) for text in match[1].split(",")]

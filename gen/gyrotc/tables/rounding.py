@@ -166,7 +166,7 @@ def gram(a: Floats, b: Floats) -> Floats:
     return total
 
 
-def solve(matrix: Floats, right: Floats) -> Floats:
+def solve_cholesky(matrix: Floats, right: Floats) -> Floats:
     """x of matrix · x = right for a symmetric positive definite matrix, by Cholesky.
 
     Raises:
@@ -237,7 +237,7 @@ _ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}
 _BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
 """What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
 
-Record = tuple[TableKind, int, list[float]]
+TermRecord = tuple[TableKind, int, list[float]]
 
 
 def channel_names(model: Model) -> list[str]:
@@ -328,7 +328,7 @@ def _heads(model: Model) -> list[int]:
     return heads
 
 
-def _term_record(model: Model, term: Term) -> Record:
+def _term_record(model: Model, term: Term) -> TermRecord:
     channel = 0 if term.channel is None else 1 + channel_names(model).index(term.channel)
     return term.table.kind, channel, term.table.parameters(term.parameters, model.block_s)
 

@@ -26,7 +26,7 @@ from .rounding import channel_names, guard_of
 N_RANDOM = 20000  # a fault that shows in one input of a thousand is missed with a chance of 2e-9
 SAMPLES_PER_BLOCK = 8  # short blocks, so that a few thousand samples make hundreds of corrections
 # A quiet NaN, and the word that fixed point has for no value (docs/FORMAT.md)
-MISSING = {"f32": 0x7FC00000, "q31": 0x80000000}
+MISSING_READING = {"f32": 0x7FC00000, "q31": 0x80000000}
 _SPECIAL_F32 = (
     0x00000000, 0x80000000, 0x00000001, 0x80000001, 0x007FFFFF, 0x00800000,
     0x7F7FFFFF, 0xFF7FFFFF, 0x7F800000, 0xFF800000, 0x7FC00000, 0xFFC00001, 0x7F800001,
@@ -103,7 +103,7 @@ def _samples(segment: Segment, numeric: str, draws: NDArray[np.uint32]) -> NDArr
     steps = segment.start + segment.step * np.arange(segment.count, dtype=np.int64)
     words[:, 0] = segment.bits[numeric] if segment.kind == "BITS" else _bits(numeric, steps + noise, 12)
     alone = segment.kind == "ALONE"
-    words[:, 1:] = MISSING[numeric] if alone else _bits(numeric, _scaled(draws[:, 1:], -4096, 8192), 12)
+    words[:, 1:] = MISSING_READING[numeric] if alone else _bits(numeric, _scaled(draws[:, 1:], -4096, 8192), 12)
     return words
 
 
@@ -236,7 +236,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
         return Segment("RAMP", count, start, step, noise, zero)
 
     def bits(count: int, which: str) -> Segment:
-        words = {"missing": MISSING, "hot": {"f32": 0x7149F2CA, "q31": 250 << 16}}[which]
+        words = {"missing": MISSING_READING, "hot": {"f32": 0x7149F2CA, "q31": 250 << 16}}[which]
         return Segment("BITS", count, 0, 0, 0, {k: words[k] for k in numerics})
 
     yield bits(3, "missing")

@@ -45,7 +45,7 @@ from .parts import Parts, PartsTrial, bent_parts, chosen_parts
 from .plausibility import channel_guard
 from .result import predict
 from .samples import Blocks
-from .uncertainty import of_few
+from .uncertainty import next_run_variance
 
 ShapeId = Literal["line", "product", "curve"]
 
@@ -180,7 +180,7 @@ def _next_rms(left: FloatArray, run: NDArray[np.int64]) -> float:
     mean = np.bincount(index, left) / count
     within = float(np.mean((left - mean[index]) ** 2))
     n = len(count)
-    between = float(np.var(mean, ddof=1)) * (1.0 + 1.0 / n) * of_few(n) if n > 1 else float(mean[0] ** 2)
+    between = float(np.var(mean, ddof=1)) * (1.0 + 1.0 / n) * next_run_variance(n) if n > 1 else float(mean[0] ** 2)
     return float(np.sqrt(within + between))
 
 

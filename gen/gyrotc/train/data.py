@@ -96,7 +96,7 @@ def joined(parts: Sequence[TrainingData]) -> TrainingData:
     return TrainingData(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
-def cleaned(data: TrainingData) -> TrainingData:
+def cleaned_samples(data: TrainingData) -> TrainingData:
     """Checks, sorts by run and time, drops exact duplicates; slopes and temperatures keep their values.
 
     Raises:
@@ -117,7 +117,7 @@ def cleaned(data: TrainingData) -> TrainingData:
 
 
 def _checked(data: TrainingData) -> dict[str, FloatArray]:
-    """Columns by name, after the checks of `cleaned`."""
+    """Columns by name, after the checks of `cleaned_samples`."""
     columns = {name: np.asarray(getattr(data, name), dtype=np.float64) for name in data.__slots__}
     if len({c.shape for c in columns.values()}) != 1 or columns["run"].ndim != 1:
         raise InputError("training data", "arrays differ in length", "one value of each kind for every sample")
@@ -147,17 +147,17 @@ def scaling_of(data: TrainingData) -> Scaling:
     )
 
 
-def average(data: TrainingData, length_s: float) -> TrainingData:
+def average_samples(data: TrainingData, length_s: float) -> TrainingData:
     """Weighted means over `length_s` within each run, in cells of the run's clock; longer samples stay as they are.
 
     Args:
-        data: Samples as `cleaned` returns them.
+        data: Samples as `cleaned_samples` returns them.
         length_s: Length of a mean, s.
 
     Returns:
         One sample for each cell that holds any: means of inputs and bias, summed weight and duration.
     """
-    cells = cells_of(data, length_s)
+    cells = mean_cells(data, length_s)
     if cells.edges is None:
         return data
     return TrainingData(
@@ -172,7 +172,7 @@ def average(data: TrainingData, length_s: float) -> TrainingData:
 
 
 @dataclass(frozen=True, slots=True)
-class Cells:
+class MeanCells:
     """Which samples make a mean: those from an edge to the next; None: each sample is its own.
 
     Attributes:
@@ -192,16 +192,16 @@ class Cells:
         return np.asarray(np.add.reduceat(x * self.of, self.edges) / self.weight)
 
 
-def cells_of(data: TrainingData, length_s: float) -> Cells:
-    """Cells of `average`."""
+def mean_cells(data: TrainingData, length_s: float) -> MeanCells:
+    """Cells of `average_samples`."""
     if _mostly_above(data.duration_s, 0.5 * length_s):
-        return Cells(None, data.weight, data.weight)
+        return MeanCells(None, data.weight, data.weight)
     next_run = data.run[1:] != data.run[:-1]
     starts = np.concatenate([[0], next_run.nonzero()[0] + 1])
     origin = np.repeat(data.time_s[starts], np.diff(starts, append=len(data)))
     cell = np.floor((data.time_s - origin) / length_s + 1e-9)
     edges = np.concatenate([[0], (next_run | (cell[1:] != cell[:-1])).nonzero()[0] + 1])
-    return Cells(edges, data.weight, np.add.reduceat(data.weight, edges))
+    return MeanCells(edges, data.weight, np.add.reduceat(data.weight, edges))
 
 
 def _mostly_above(values: FloatArray, bound: float) -> bool:
@@ -249,7 +249,7 @@ def gather(t: FloatArray, r: FloatArray, y: FloatArray, weight: FloatArray) -> B
     )
 
 
-LIKELIER = 3.0  # of log-likelihoods on unseen means: twenty to one for what is richer
+MIN_LOG_LIKELIHOOD_GAIN = 3.0  # of log-likelihoods on unseen means: twenty to one for what is richer
 
 _SIGNIFICANCE = 0.025  # of the t test: docs/training.md, section 2
 
@@ -311,7 +311,7 @@ class Samples(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class RunSpan:
     """A part of one training run: from_s <= t < to_s on the file's clock.
 
     Attributes:
@@ -402,7 +402,7 @@ def _with_guard(time_s: FloatArray, edges: NDArray[np.intp], held: NDArray[np.in
     return np.concatenate(near)
 
 
-def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
+def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[RunSpan, ...]:
     """Spans of the training runs; none where three runs or more can be left out whole.
 
     Args:
@@ -411,7 +411,7 @@ def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
     """
     if len(runs) >= _ENOUGH_RUNS:
         return ()
-    spans: list[Span] = []
+    spans: list[RunSpan] = []
     for index, run in enumerate(runs):
         mine = samples.run == index
         if mine.any():
@@ -419,7 +419,7 @@ def training_spans(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
     return tuple(spans)
 
 
-def whole_runs(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
+def whole_runs(runs: Sequence[Run], samples: Samples) -> tuple[RunSpan, ...]:
     """Whole training runs to be left out in turn; of many runs some of them, evenly chosen.
 
     Args:
@@ -429,13 +429,13 @@ def whole_runs(runs: Sequence[Run], samples: Samples) -> tuple[Span, ...]:
     some = np.unique(np.linspace(0, len(runs) - 1, min(len(runs), _MOST_RUNS)).round().astype(int)).tolist()
     mine = {index: samples.time_s[samples.run == index] for index in some}
     return tuple(
-        Span(index, runs[index].file, float(time[0]), float(time[-1]) + runs[index].row_period_s, "run", 0.0)
+        RunSpan(index, runs[index].file, float(time[0]), float(time[-1]) + runs[index].row_period_s, "run", 0.0)
         for index, time in mine.items()
         if time.size
     )
 
 
-def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -> list[Span]:
+def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -> list[RunSpan]:
     step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     start, end = float(time_s[0]), float(time_s[-1]) + step
     turns = turning_points(time_s, temperature_c)
@@ -444,7 +444,7 @@ def _cut(index: int, file: str, time_s: FloatArray, temperature_c: FloatArray) -
     if len(edges) < 3:
         edges = [float(edge) for edge in np.linspace(start, end, _EQUAL_PARTS + 1)]
         kind = "part"
-    return [Span(index, file, a, b, kind, min(_GUARD_S, 0.25 * (b - a))) for a, b in pairwise(edges)]
+    return [RunSpan(index, file, a, b, kind, min(_GUARD_S, 0.25 * (b - a))) for a, b in pairwise(edges)]
 
 
 def turning_points(time_s: FloatArray, temperature_c: FloatArray) -> list[float]:

@@ -28,7 +28,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import GyrotcError
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median
 from ..results.training import AllanPoint, BiasPlane, NoiseLimits, NoiseTerms
-from .data import Bins, Scaling, TrainingData, average, gather, weighted_mean
+from .data import Bins, Scaling, TrainingData, average_samples, gather, weighted_mean
 
 MEAN_S = 50.0  # 100 s would smear a ripple of 11 C at 5 C/min: docs/training.md, section 1
 _TRIM_SIGMA = 4.5  # a normal deviation lies beyond it once in 150,000
@@ -136,7 +136,7 @@ def fit_process(data: TrainingData, scaling: Scaling, like: Process | None = Non
     Raises:
         TrainingFailed: The equations cannot be solved.
     """
-    means = average(data, MEAN_S)
+    means = average_samples(data, MEAN_S)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
     weight = means.weight / median(means.weight)
     center = weighted_mean(means.bias_dph, weight)
@@ -386,7 +386,7 @@ def floor_dph(data: TrainingData, residual: FloatArray, average_s: float) -> flo
 
     Slow structure that the map leaves does not count; samples longer than `average_s` are taken as they are.
     """
-    means = average(replace(data, bias_dph=residual), average_s)
+    means = average_samples(replace(data, bias_dph=residual), average_s)
     differences = np.diff(means.bias_dph)[np.diff(means.run) == 0]
     if len(differences) == 0:
         return robust_sigma(means.bias_dph)
@@ -399,7 +399,7 @@ def difference_sigma(means: TrainingData, y: FloatArray, weight: FloatArray) -> 
     First differences count a steady slope as noise, second differences count it as nothing: the smaller of the two.
 
     Args:
-        means: Means in order of run and time, as `average` returns them.
+        means: Means in order of run and time, as `average_samples` returns them.
         y: Their bias in any unit.
         weight: The noise variance of a mean is σ²/weight.
     """

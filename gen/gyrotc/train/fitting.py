@@ -26,7 +26,7 @@ from ..results.base import Finding
 from ..results.evaluation import Pooled
 from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
-from .data import Span, TrainingData, cleaned, joined, scaling_of, training_spans, whole_runs
+from .data import RunSpan, TrainingData, cleaned_samples, joined, scaling_of, training_spans, whole_runs
 from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
 from .networks import snapped
@@ -249,7 +249,7 @@ def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
 
 def _means(data: TrainingData, fitted: Fit) -> MapMeans:
     """What a lot is learnt from, in as many digits as its noise leaves."""
-    samples = cleaned(data)
+    samples = cleaned_samples(data)
     found, mean_s = unit_means(samples, scaling_of(samples), fitted.outcome.process)
 
     def rounded(values: NDArray[np.float64]) -> tuple[float, ...]:
@@ -281,7 +281,7 @@ def _fit(
     )
 
 
-def _left_out(data: TrainingData, spans: Sequence[Span], options: FitOptions, say: Progress) -> list[Averages]:
+def _left_out(data: TrainingData, spans: Sequence[RunSpan], options: FitOptions, say: Progress) -> list[Averages]:
     """Each span left out in turn with its guard gap: residuals of a fit that has not seen it."""
     results = []
     for k, span in enumerate(spans):
@@ -403,7 +403,7 @@ def training_of(
     fitted: Fit,
     front: FrontEnd,
     options: FitOptions,
-    spans: Sequence[Span],
+    spans: Sequence[RunSpan],
     left_out: list[Averages] | None,
 ) -> Training:
     """What `training.json` holds."""

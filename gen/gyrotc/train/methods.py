@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..common.metrics import LEAST_SPAN_C
 from .bank import fit_bank
-from .data import Scaling, TrainingData, cleaned, scaling_of
+from .data import Scaling, TrainingData, cleaned_samples, scaling_of
 from .evidence import TrainingFailed, floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .networks import network
@@ -75,7 +75,7 @@ def fit(
     """
     method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
     BuildOptions(method=method, seed=seed, centers=centers, rho=rho, average_s=average_s)
-    samples = cleaned(data)
+    samples = cleaned_samples(data)
     scaling = scaling_of(samples)
     findings: list[dict[str, object]] = []
     rows: list[dict[str, object]] = []

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..common.arrays import FloatArray
 from .data import Scaling
 
-Network = Mapping[str, Any]
+NetworkEntry = Mapping[str, Any]
 
 _CENTER_GRID = 2.0**20  # so that tables hold centers without further rounding (docs/numerics.md)
 
@@ -30,7 +30,7 @@ def network(
     }
 
 
-def snapped(network: Network, scale: Mapping[str, Any]) -> dict[str, Any]:
+def snapped(network: NetworkEntry, scale: Mapping[str, Any]) -> dict[str, Any]:
     """A network with its centers on multiples of 2^-20 of a scale, so that tables hold them without further rounding.
 
     It moves a center by less than 5e-7 half ranges, far below what the data can tell; the model is what is stored.
@@ -46,7 +46,7 @@ def _on_grid(z: float) -> float:
     return round(z * _CENTER_GRID) / _CENTER_GRID
 
 
-def rescaled(network: Network, old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+def rescaled(network: NetworkEntry, old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     """The same function of temperature and its rate in another scale: linear part and widths count half ranges."""
     (c_old, h_old), (c_new, h_new) = old["temperature_c"], new["temperature_c"]
     wider = (h_new / h_old, new["slope_c_per_min"] / old["slope_c_per_min"])
@@ -62,7 +62,7 @@ def rescaled(network: Network, old: Mapping[str, Any], new: Mapping[str, Any]) -
 
 
 def networks_dph(
-    networks: Sequence[Network], scaling: Scaling, temperature_c: FloatArray, slope: FloatArray
+    networks: Sequence[NetworkEntry], scaling: Scaling, temperature_c: FloatArray, slope: FloatArray
 ) -> FloatArray:
     """Networks at inputs that are already clamped, deg/h; over the overlap of their regions blended linearly.
 
@@ -89,7 +89,7 @@ def networks_dph(
     return np.asarray(total / shares)
 
 
-def _network_dph(network: Network, scaling: Scaling, temperature_c: FloatArray, slope: FloatArray) -> FloatArray:
+def _network_dph(network: NetworkEntry, scaling: Scaling, temperature_c: FloatArray, slope: FloatArray) -> FloatArray:
     """One network (docs/FORMAT.md, section 1), deg/h."""
     t, r = scaling.normalise(temperature_c, slope)
     bias = network["w0"] + network["linear"][0] * t + network["linear"][1] * r

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .data import Scaling, TrainingData, average
+from .data import Scaling, TrainingData, average_samples
 from .networks import networks_dph
 from .result import Outcome
 
@@ -45,7 +45,7 @@ def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average
             return f"it leaves the process that it stands for by {distance[k]:.3g} sigma at {_place(t[k], r[k])}"
         if process.asked is not None:  # a lot knows what lies beyond the unit's own means
             return ""
-    means = average(samples, average_s).bias_dph
+    means = average_samples(samples, average_s).bias_dph
     low, high = float(means.min()), float(means.max())
     beyond = np.maximum(low - values, values - high)
     k = int(np.argmax(beyond))

@@ -21,7 +21,7 @@ import numpy as np
 
 from .. import _core
 from ..common.arrays import FloatArray
-from .data import Scaling, TrainingData, average
+from .data import Scaling, TrainingData, average_samples
 from .evidence import floor_dph
 from .networks import network
 from .result import Outcome
@@ -69,7 +69,7 @@ def fit_ols(
         ridge: Ridge of the weights, as a share of the weight of all samples; 0 for plain least squares.
     """
     started = time.process_time()
-    means = average(data, average_s)
+    means = average_samples(data, average_s)
     t, r = scaling.normalise(means.temperature_c, means.slope_c_per_min)
     problem = _Problem(
         samples=_core.Samples(t, r, means.bias_dph, means.weight),

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from .data import (
-    LIKELIER,
+    MIN_LOG_LIKELIHOOD_GAIN,
     Fold,
     Scaling,
     TrainingData,
-    average,
+    average_samples,
     more_than_its_error,
     pieces,
     surely_above_0,
@@ -165,14 +165,14 @@ class _Course:
 
     @classmethod
     def of(cls, samples: TrainingData, scaling: Scaling, parts: Parts, average_s: float) -> _Course:
-        means = average(samples, MEAN_S)
+        means = average_samples(samples, MEAN_S)
         columns, where, at = [means.bias_dph], {}, 1
         for name, values in parts.columns.items():
-            columns += [average(replace(samples, bias_dph=column), MEAN_S).bias_dph for column in values.T]
+            columns += [average_samples(replace(samples, bias_dph=column), MEAN_S).bias_dph for column in values.T]
             where[name] = np.arange(at, len(columns))
             at = len(columns)
         folds = pieces(means)
-        judged = average(means, average_s)
+        judged = average_samples(means, average_s)
         noise = difference_sigma(judged, judged.bias_dph, judged.weight / np.median(judged.weight))
         table = np.stack(columns, axis=1)
         names = tuple(parts.columns)
@@ -212,10 +212,10 @@ class _Course:
 
     def _averaged(self, held: NDArray[np.bool_], columns: FloatArray) -> FloatArray:
         of = self.means.select(held)
-        return np.stack([average(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1)
+        return np.stack([average_samples(replace(of, bias_dph=c), self.average_s).bias_dph for c in columns.T], axis=1)
 
     def _weight(self, held: NDArray[np.bool_]) -> FloatArray:
-        return average(self.means.select(held), self.average_s).weight
+        return average_samples(self.means.select(held), self.average_s).weight
 
     def squares(self, folds: Sequence[_Fold], chosen: Sequence[str]) -> FloatArray:
         """Mean square on every stretch with some parts, (deg/h)², shape (folds,)."""
@@ -292,11 +292,11 @@ class _Course:
         count = np.array([float(self._averaged_count(fold)) for fold in self.folds])
         likely = [unseen_log_likelihood(square, count, self.noise_dph) for square in (beside, without)]
         if likely[0] is not None:
-            return likely[1] is None or likely[0] > likely[1] + LIKELIER
+            return likely[1] is None or likely[0] > likely[1] + MIN_LOG_LIKELIHOOD_GAIN
         return surely_above_0(self._score(without) - self._score(beside))
 
     def _averaged_count(self, fold: Fold) -> int:
-        return len(average(self.means.select(fold.held), self.average_s))
+        return len(average_samples(self.means.select(fold.held), self.average_s))
 
     def weights(self, process: Process, chosen: Sequence[str]) -> dict[str, FloatArray]:
         """Weights of the chosen parts from all means."""

@@ -14,7 +14,7 @@ from ..results.fleet import KnownMap, LotUse
 from ..results.training import EarlierUse
 from .data import Scaling
 from .evidence import Process
-from .networks import Network, networks_dph
+from .networks import NetworkEntry, networks_dph
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Outcome:
         process: The evidence model that the networks follow, where the method has one.
     """
 
-    networks: Sequence[Network]
+    networks: Sequence[NetworkEntry]
     curves: Mapping[str, Any]
     predicted_rms_ratio: float | None = None
     withheld: str = "the method predicts nothing"
@@ -71,7 +71,7 @@ class Fit:
     process: Process | None = None
 
     @property
-    def networks(self) -> Sequence[Network]:
+    def networks(self) -> Sequence[NetworkEntry]:
         return self.outcome.networks
 
     @property

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from ..mirror import table as status_bits
 from ..mirror.front_end import (
-    FALLBACK,
-    KEEP,
-    MAP,
+    FROM_FALLBACK,
+    FROM_KEPT,
+    FROM_MAP,
+    SampleStream,
     Settings,
     Steps,
-    Stream,
     follow,
     missed_before,
     period_us,
@@ -50,7 +50,7 @@ class Blocks:
     left_out_s: NDArray[np.float64]  # times of rows that were left out of these means as spikes or bursts
     steps: Steps  # every correction of the run
     in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
-    stream: Stream  # its samples
+    stream: SampleStream  # its samples
     settings: Settings
 
     @property
@@ -113,7 +113,7 @@ def run_blocks(
         longest_blocks=hold_blocks,
     )
     missed = missed_before(rows.time_s, run.row_period_s)
-    stream = Stream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
+    stream = SampleStream.of_rows(F32, settings, F32.numbers(rows.temperature_c), missed, run.file)
     steps = follow(F32, stream.samples, settings).led(lead_blocks)
     n_blocks = steps.valid.size
     last = np.minimum(np.arange(1, n_blocks + 1) * n, stream.samples.size) - 1
@@ -144,7 +144,7 @@ def _last_map(steps: Steps, k: NDArray[np.int64]) -> NDArray[np.int64]:
     """The last correction up to each of k that the map made: one that is kept goes on."""
     if steps.kind.size == 0:
         return k
-    made = np.maximum.accumulate(np.where(steps.kind == MAP, np.arange(steps.kind.size), -1))
+    made = np.maximum.accumulate(np.where(steps.kind == FROM_MAP, np.arange(steps.kind.size), -1))
     return np.where(k >= 0, made[k], -1)
 
 
@@ -158,12 +158,12 @@ def _in_force(steps: Steps, k: NDArray[np.int64]) -> tuple[NDArray[np.float32], 
     temperature[started] = np.where(made < 0, np.float32(np.nan), steps.temperature[made])
     slope[started] = np.where(made < 0, np.float32(0.0), steps.slope[made])
     kind = steps.kind[source]
-    kept = steps.remarks[source] | np.where(kind == KEEP, status_bits.HELD, 0)
-    status[started] = np.where(kind == FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)
+    kept = steps.remarks[source] | np.where(kind == FROM_KEPT, status_bits.HELD, 0)
+    status[started] = np.where(kind == FROM_FALLBACK, status_bits.HELD | status_bits.FALLBACK, kept)
     return temperature, slope, status
 
 
-def _time_of(samples: NDArray[np.integer], stream: Stream, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def _time_of(samples: NDArray[np.integer], stream: SampleStream, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Times of samples, shape (k,), between the rows beside them."""
     if len(time_s) == 0:
         return np.empty(0)

@@ -33,14 +33,14 @@ from numpy.typing import NDArray
 from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import LEAST_SPAN_C, median
 from .data import (
-    LIKELIER,
+    MIN_LOG_LIKELIHOOD_GAIN,
     Fold,
     Scaling,
     TrainingData,
-    average,
-    cells_of,
+    average_samples,
     edges_of,
     gather,
+    mean_cells,
     pieces,
     surely_above_0,
     t_statistic,
@@ -96,7 +96,7 @@ class CandidateScores:
             return "constant"
         likely = {n: unseen_log_likelihood(self._rms(n) ** 2, self.means, self.white_dph) for n in able}
         if noise := {n: found for n, found in likely.items() if found is not None}:
-            return next(n for n, found in noise.items() if found >= max(noise.values()) - LIKELIER)
+            return next(n for n, found in noise.items() if found >= max(noise.values()) - MIN_LOG_LIKELIHOOD_GAIN)
         mean = {n: float(self._score(n).mean()) for n in able if n in _SIMPLE}
         name = next(n for n, score in mean.items() if score <= min(mean.values()) + _LEAST)
         if "mrbf" in able and self._surely_better("mrbf", name, _OF_NETWORK):
@@ -216,13 +216,13 @@ def compare_candidates(
     """
     means, kept = _means(samples, process)
     folds = pieces(means)
-    judged = average(means, average_s)
+    judged = average_samples(means, average_s)
     white = difference_sigma(judged, judged.bias_dph, judged.weight / median(judged.weight))
     least = max(_LEAST_NOISE * float(np.ptp(judged.bias_dph)), float(np.finfo(np.float64).tiny) ** 0.5)
     noise = max(_difference_rms(judged), least)
     rest = Rest(means, kept, scaling, process, _on(means, power_on), rate=rate)
     square = np.array([_squares(fold, rest, average_s) for fold in folds]).reshape(len(folds), 2, len(CANDIDATES))
-    count = np.array([len(average(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
+    count = np.array([len(average_samples(means.select(fold.held), average_s)) for fold in folds], dtype=np.float64)
     whole, covered = np.sqrt(square).transpose(1, 0, 2)
     return CandidateScores(folds, whole, noise, max(white, least), count, covered)
 
@@ -240,7 +240,7 @@ def _on(samples: TrainingData, power_on: NDArray[np.int64] | None) -> NDArray[np
 
 def _means(samples: TrainingData, process: Process | None) -> tuple[TrainingData, BoolArray]:
     """Means of every run once, however often it was handed over, and which of them the process kept."""
-    means = average(samples, MEAN_S)
+    means = average_samples(samples, MEAN_S)
     kept = np.ones(len(means), dtype=bool) if process is None else process.kept
     seen: set[bytes] = set()
     first = np.ones(len(means), dtype=bool)
@@ -258,7 +258,7 @@ def _squares(fold: Fold, rest: Rest, average_s: float) -> list[list[float]]:
         np.clip(held.temperature_c, low[0], high[0]), np.clip(held.slope_c_per_min, low[1], high[1])
     )
     flat = high[0] - low[0] < LEAST_SPAN_C
-    cells = cells_of(held, average_s)
+    cells = mean_cells(held, average_s)
     corrections = rest.corrections(fold.near, t, r, ("constant",) if flat else CANDIDATES[1:])
     at = cells.mean(held.temperature_c)
     seen = (at >= low[0]) & (at <= high[0])
@@ -381,7 +381,7 @@ def fit_mixed(samples: TrainingData, scaling: Scaling, power_on: NDArray[np.int6
 
 
 _STRUCTURE = 1.5  # a constant that leaves no more than this many times the noise has nothing to miss
-NAMES = {
+NAMES_OF_CANDIDATES = {
     "nothing": "no correction",
     "constant": "a constant",
     "cubic": "a cubic in T",
@@ -498,7 +498,7 @@ def _does_not_generalise(comparison: CandidateScores) -> dict[str, Any]:
         text += (
             f" Left out in turn ({', '.join(comparison.stretches())}), a constant leaves {rms['constant']:.4g} deg/h, "
             "and "
-            f"{NAMES[best]} {able[best]:.4g}; {_gain(t, freedom)}."
+            f"{NAMES_OF_CANDIDATES[best]} {able[best]:.4g}; {_gain(t, freedom)}."
         )
         evidence |= {"best": best, "best_rms_dph": able[best], "constant_rms_dph": rms["constant"]}
         evidence |= {"t": t, "degrees_of_freedom": freedom}
@@ -521,6 +521,6 @@ def _advice(comparison: CandidateScores) -> str:
 def _refusal(name: str, text: str) -> dict[str, Any]:
     return {
         "id": "map_refused",
-        "text": f"Model selection goes on without {NAMES[name]} ({name}): {text}.",
+        "text": f"Model selection goes on without {NAMES_OF_CANDIDATES[name]} ({name}): {text}.",
         "evidence": {"method": name, "reason": text},
     }

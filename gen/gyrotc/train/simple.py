@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import median
-from .data import Scaling, TrainingData, average, cells_of, edges_of, turning_points
+from .data import Scaling, TrainingData, average_samples, edges_of, mean_cells, turning_points
 from .evidence import GRID, MEAN_S, TrainingFailed, floor_dph
-from .networks import Network, network
+from .networks import NetworkEntry, network
 from .options import SIMPLE
 from .result import Outcome
 
@@ -43,7 +43,7 @@ _TOLERANCE = 0.01  # of the noise floor
 _GRID = 201  # points at which Gaussians are held against powers, at a hundredth of a half range
 
 
-def without_rate(fitted: Network) -> dict[str, Any]:
+def without_rate(fitted: NetworkEntry) -> dict[str, Any]:
     """A network that was fitted where dT/dt is 0 everywhere, flat in dT/dt: a map of T alone."""
     return {
         **fitted,
@@ -76,7 +76,7 @@ def triangle_of(rows: FloatArray) -> FloatArray:
 
 
 def all_solved(triangle: FloatArray, samples: int) -> dict[str, FloatArray]:
-    """Weights of `powers_of`, 0 for those that a correction does without, of each of `SIMPLE`: as `solve` finds them.
+    """Return the weights of `powers_of` for each of `SIMPLE`, 0 for powers that it does without.
 
     One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
 
@@ -98,7 +98,7 @@ def all_solved(triangle: FloatArray, samples: int) -> dict[str, FloatArray]:
     return found
 
 
-def solve(columns: FloatArray, y: FloatArray, weight: FloatArray) -> FloatArray:
+def solve_least_squares(columns: FloatArray, y: FloatArray, weight: FloatArray) -> FloatArray:
     """Weights of columns, shape (n, powers), by weighted least squares; of equally good ones the smallest."""
     root = np.sqrt(weight / weight.max())
     return np.asarray(np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0], dtype=np.float64)
@@ -108,7 +108,7 @@ def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float
     """One of `SIMPLE` on cleaned samples, as a network."""
     t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
     center = float(np.average(data.bias_dph, weights=data.weight))
-    found = solve(design(name, t, r), data.bias_dph - center, data.weight)
+    found = solve_least_squares(design(name, t, r), data.bias_dph - center, data.weight)
     weights = np.zeros(len(_POWERS))
     weights[[_POWERS.index(power) for power in SIMPLE[name]]] = found
     weights[0] += center
@@ -127,7 +127,7 @@ def outcome_of(weights: FloatArray, data: TrainingData, scaling: Scaling, averag
         w0, linear[0] = w0 + extra[0], linear[0] + extra[1]
         centers = np.stack([scaling.center_c + scaling.half_range_c * z, np.zeros(len(z))], axis=1)
         widths = np.stack([np.full(len(z), width), np.full(len(z), FLAT)], axis=1)
-    means = len(average(data, average_s))
+    means = len(average_samples(data, average_s))
     return Outcome(
         networks=(network(w0, linear, centers, widths, of_gaussians),),
         curves={
@@ -214,7 +214,7 @@ def fit_mixed_model(means: TrainingData, scaling: Scaling, power_on: NDArray[np.
     length = max(MEAN_S, float(means.duration_s.sum()) / _CELLS)
     numbered = np.arange(len(means))
     of = _cell_of(means, length)
-    cells = average(means, length)
+    cells = average_samples(means, length)
     first = numbered[np.r_[True, np.diff(of) > 0]]
     order = np.lexsort((cells.run, cells.time_s, power_on[first]))
     place = np.empty(len(order), dtype=np.intp)
@@ -248,8 +248,8 @@ def fit_mixed_model(means: TrainingData, scaling: Scaling, power_on: NDArray[np.
 
 
 def _cell_of(means: TrainingData, length_s: float) -> NDArray[np.intp]:
-    """Number of the cell of `average` that each of the means belongs to."""
-    edges = cells_of(means, length_s).edges
+    """Number of the cell of `average_samples` that each of the means belongs to."""
+    edges = mean_cells(means, length_s).edges
     if edges is None:
         return np.arange(len(means))
     return np.repeat(np.arange(len(edges)), np.diff(edges, append=len(means)))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..common.arrays import FloatArray
-from .data import Scaling, TrainingData, average
+from .data import Scaling, TrainingData, average_samples
 from .networks import network
 from .result import Outcome
 
@@ -26,7 +26,7 @@ def fit_mlr(data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
     scale of T begins.
     """
     started = time.process_time()
-    means = average(data, average_s)
+    means = average_samples(data, average_s)
     powers = list(_CANDIDATES)
     bic, weights = _regression(means, scaling, powers)
     path = [bic]

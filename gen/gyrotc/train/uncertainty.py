@@ -35,7 +35,7 @@ from scipy.special import stdtrit
 from ..causes.hysteresis import strength
 from ..common.arrays import FloatArray
 from ..mirror.recursions import play
-from .data import TrainingData, average, cleaned, edges_of
+from .data import TrainingData, average_samples, cleaned_samples, edges_of
 from .evidence import MEAN_S, Process, fit_process
 from .result import Fit, predict
 
@@ -47,7 +47,7 @@ _MOST = 20000  # samples that are looked at
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class UncertaintyInputs:
     """What the rules are made from; the samples are in order of run and time."""
 
     samples: TrainingData
@@ -59,7 +59,7 @@ class Known:
     added: FloatArray | float = 0.0  # what terms add to the map at each sample, deg/h
 
 
-def rules_of(known: Known, block_s: float) -> dict[str, Any]:
+def rules_of(known: UncertaintyInputs, block_s: float) -> dict[str, Any]:
     """`rules` of `uncertainty_dph` of `model.json`, without terms."""
     s, fit = known.samples, known.fit
     of_map = predict(fit, s.temperature_c, s.slope_c_per_min)
@@ -152,7 +152,7 @@ def _runs(samples: TrainingData) -> list[NDArray[np.int64]]:
     return list(np.split(np.arange(len(samples)), cuts))
 
 
-def _held(known: Known, here: FloatArray, block_s: float) -> float:
+def _held(known: UncertaintyInputs, here: FloatArray, block_s: float) -> float:
     """deg/h for each C by which the input may have gone on at its slope."""
     s = known.samples
     squares, moved, variance = [], [], []
@@ -184,7 +184,7 @@ def _balanced(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float
     return float(np.sqrt(np.exp(middle) * scale))
 
 
-def _gradients(known: Known) -> tuple[float, float]:
+def _gradients(known: UncertaintyInputs) -> tuple[float, float]:
     """RMS gradients of the map where training was, deg/h/C and deg/h/(C/min): beyond the edge they are drawn anew."""
     t, r = known.covered
     spans = known.fit.scaling.temperature_c, known.fit.scaling.slope_c_per_min
@@ -204,7 +204,7 @@ def _gradients(known: Known) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def _correlation_s(known: Known, block_s: float) -> float:
+def _correlation_s(known: UncertaintyInputs, block_s: float) -> float:
     """Time after which the map's error has lost all but 1/e of what it was, on the way that training took, s.
 
     The process forgets over its shortest scales; where inputs stay within them to the end of the runs, the time is
@@ -275,7 +275,7 @@ def uncertainty(
         block_s: Length of a block, s.
         added: What terms add to the map at each sample, deg/h; the samples are in order then.
     """
-    samples = cleaned(data)
+    samples = cleaned_samples(data)
     process = fit.outcome.process or fit.process or fit_process(samples, fit.scaling)
     scale, between = _calibrated(samples, process, fit)
     at_samples = _variance(process, fit, samples.temperature_c, samples.slope_c_per_min, scale)
@@ -288,7 +288,7 @@ def uncertainty(
     unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
     points = t[covered], r[covered]
     added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
-    known = Known(samples, fit, process, np.sqrt(at_samples), float(np.sqrt(between)), points, added)
+    known = UncertaintyInputs(samples, fit, process, np.sqrt(at_samples), float(np.sqrt(between)), points, added)
     return {
         "cells": list(cells),
         "rows": np.sqrt(seen + between).tolist(),
@@ -360,7 +360,7 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
         return 1.0, whole.asked.between_dph**2
     edges, means = edges_of(samples.run), samples
     if len(edges) > 2:
-        means = average(samples, MEAN_S)  # each is of one run, and the process is learnt from them anyway
+        means = average_samples(samples, MEAN_S)  # each is of one run, and the process is learnt from them anyway
         edges_of_means = edges_of(means.run)
     else:
         edges = edges_of_means = -(-np.arange(_SPANS + 1) * len(samples) // _SPANS)
@@ -378,7 +378,7 @@ def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float,
     if not rows:
         return 1.0, 0.0
     scale, between = _likeliest(rows)
-    return scale, between * of_few(len(rows))
+    return scale, between * next_run_variance(len(rows))
 
 
 def _likeliest(rows: Sequence[FloatArray]) -> tuple[float, float]:
@@ -398,7 +398,7 @@ def _likeliest(rows: Sequence[FloatArray]) -> tuple[float, float]:
     return float(_SCALES[k]), float(levels[level, 0, 0])
 
 
-def of_few(runs: int) -> float:
+def next_run_variance(runs: int) -> float:
     """Variance of the next run over that of so many: of Student's t with a degree of freedom less than runs."""
     return (runs - 1.0) / max(runs - 3.0, 1.0)
 

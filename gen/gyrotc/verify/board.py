@@ -38,8 +38,8 @@ from .toolchain import (
     writable_bytes,
 )
 
-Words = NDArray[np.uint32]
-Line = tuple[int, str]
+LogWords = NDArray[np.uint32]
+LogLine = tuple[int, str]
 _GROUP = 256  # results to a CRC: BOARD_CRC of board_test.c
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
@@ -75,7 +75,7 @@ class BoardOutput:
     random: int  # random map vectors
     board: str  # what the board calls itself; may be empty
     n_results: int
-    words: Words
+    words: LogWords
     costs: dict[str, Cost] = field(default_factory=dict)
     line: int = 1  # of its `begin`
 
@@ -86,7 +86,7 @@ class BoardLog:
 
     parts: tuple[BoardOutput, ...]
     lines: int
-    outside: tuple[Line, ...]
+    outside: tuple[LogLine, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,13 +148,13 @@ def read_log(text: str) -> BoardLog:
     return BoardLog(tuple(parts), len(text.splitlines()), tuple(outside))
 
 
-def _numbered(text: str) -> list[Line]:
+def _numbered(text: str) -> list[LogLine]:
     """Lines that hold something, by their number from 1 on."""
     stripped = (line.strip().rstrip(".") for line in _COLOURS.sub("", text).splitlines())
     return [(number, line) for number, line in enumerate(stripped, 1) if line]
 
 
-def _found(lines: list[Line]) -> list[tuple[BoardOutput, tuple[int, int]]]:
+def _found(lines: list[LogLine]) -> list[tuple[BoardOutput, tuple[int, int]]]:
     """Every part, with the positions in `lines` where it starts and after which it ends."""
     found: list[tuple[BoardOutput, tuple[int, int]]] = []
     position = 0
@@ -174,7 +174,7 @@ def _found(lines: list[Line]) -> list[tuple[BoardOutput, tuple[int, int]]]:
     return found
 
 
-def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tuple[BoardOutput, int]:
+def _part(lines: list[LogLine], start: int, head: re.Match[str], board: str) -> tuple[BoardOutput, int]:
     """The part whose `begin` is `lines[start]`, and the position after it."""
     shape = _RESULT if head["mode"] == "all" else _GROUP_CRC
     stop = next((k for k in range(start + 1, len(lines)) if shape.fullmatch(lines[k][1]) is None), None)
@@ -205,12 +205,12 @@ def _part(lines: list[Line], start: int, head: re.Match[str], board: str) -> tup
     return part, after
 
 
-def _words(results: list[Line], *, pairs: bool) -> NDArray[np.uint32]:
+def _words(results: list[LogLine], *, pairs: bool) -> NDArray[np.uint32]:
     words = np.frombuffer(bytes.fromhex("".join(text for _, text in results)), dtype=">u4").astype(np.uint32)
     return words.reshape(-1, 2) if pairs else words
 
 
-def _read_costs(lines: list[Line], position: int) -> tuple[dict[str, Cost], int]:
+def _read_costs(lines: list[LogLine], position: int) -> tuple[dict[str, Cost], int]:
     costs = {}
     while position < len(lines) and (found := _COST.fullmatch(lines[position][1])) is not None:
         calls, low, high, sum_high, sum_low, stack = (int(word, 16) for word in found["words"].split())
@@ -219,7 +219,7 @@ def _read_costs(lines: list[Line], position: int) -> tuple[dict[str, Cost], int]
     return costs, position
 
 
-def compared_words(output: BoardOutput, expected: Words) -> BoardComparison:
+def compared_words(output: BoardOutput, expected: LogWords) -> BoardComparison:
     """Compares the words of a board test with the reference's (status, bits), shape (n, 2).
 
     Raises:
@@ -237,7 +237,7 @@ def compared_words(output: BoardOutput, expected: Words) -> BoardComparison:
     return BoardComparison(len(expected), int(wrong.size), first)
 
 
-def _compare_groups(crcs: Words, expected: Words) -> BoardComparison:
+def _compare_groups(crcs: LogWords, expected: LogWords) -> BoardComparison:
     mismatches, first = 0, []
     for k, got in enumerate(crcs):
         group = expected[k * _GROUP : (k + 1) * _GROUP]

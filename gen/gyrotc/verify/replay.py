@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
 from ..mirror.front_end import blocks_since_power_on, missed_before, period_us, samples_per_block
-from ..mirror.history import FollowedHistory, Replay, followed
+from ..mirror.history import FollowedHistory, Replay, follow_history
 from ..mirror.table import Table, Words
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
@@ -88,7 +88,7 @@ def _words_of(answers: Replay) -> tuple[Words, Words, Words]:
     return answers.sample_status.view(np.uint32), answers.status.view(np.uint32), answers.bits
 
 
-def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
+def replay_case_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
     """Bits and answers of a recording.
 
     Where a term counts from power-on and this was before the first row, the blocks between are missing samples.
@@ -96,12 +96,12 @@ def history_of(rows: Rows, run: Run, model: Model, table: Table) -> ReplayCase:
     Raises:
         InputError: It lacks a channel that a term of the model needs.
     """
-    channels, missed, per_block = inputs_of(rows, run, model, table)
-    answers = followed(table, channels, missed=missed, samples_per_block=per_block)
+    channels, missed, per_block = replay_inputs(rows, run, model, table)
+    answers = follow_history(table, channels, missed=missed, samples_per_block=per_block)
     return ReplayCase(channels, missed, per_block, period_us(table.block_us, per_block), answers)
 
 
-def inputs_of(rows: Rows, run: Run, model: Model, table: Table) -> tuple[Words, NDArray[np.int64], int]:
+def replay_inputs(rows: Rows, run: Run, model: Model, table: Table) -> tuple[Words, NDArray[np.int64], int]:
     """Bits of a recording's channels, samples missed before each row, and samples per block, as of `ReplayCase`."""
     channels = channels_of(rows, model, table)
     missed = missed_before(rows.time_s, run.row_period_s)
@@ -224,7 +224,7 @@ def replay_dataset(
             progress(f"replaying {run.file}, {k} of {len(dataset.runs)}")
             rows = run.rows()
             for table in job.tables.values():
-                history = history_of(rows, run, job.model, table)
+                history = replay_case_of(rows, run, job.model, table)
                 same = [lane for lane in lanes.values() if lane.table is table]
                 list(pool.map(lambda lane, h=history, file=run.file: lane.run(file, h), same))
             del rows, history  # before those of the next run are read

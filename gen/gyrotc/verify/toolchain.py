@@ -43,7 +43,7 @@ LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 _LIMITS = {"c": 0, "d": 2 * 2**20, "v": 16 * 2**20, "f": 8 * 2**20}
 _SAID_BYTES = 64 * 2**20  # kept of what a program says on stderr
 
-Stream = IO[bytes] | int
+ByteStream = IO[bytes] | int
 
 _groups: set[int] = set()  # of processes that run now
 
@@ -59,7 +59,7 @@ class ProgramRun:
 
 @contextmanager
 def confined(
-    command: Sequence[str], folder: Path, *, stdin: Stream, stdout: Stream, stderr: Stream, cpu_s: int
+    command: Sequence[str], folder: Path, *, stdin: ByteStream, stdout: ByteStream, stderr: ByteStream, cpu_s: int
 ) -> Iterator[subprocess.Popen[bytes]]:
     """A process in `folder`, whose whole group ends with the block.
 
@@ -103,7 +103,7 @@ def run_to_end(
     command: Sequence[str],
     folder: Path,
     what: str,
-    stdin: Stream = subprocess.DEVNULL,
+    stdin: ByteStream = subprocess.DEVNULL,
     printed: IO[bytes] | None = None,
 ) -> ProgramRun:
     """Runs a command in `folder` to its end.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.assess.findings import residual_test
-from gyrotc.cli.results import summary
+from gyrotc.cli.results import summary_line
 from gyrotc.jobs.build import build_into
 from gyrotc.pages.report import write_report
 from gyrotc.recordings.load import load
@@ -155,5 +155,5 @@ def test_spikes_of_an_exam_are_in_the_plain_figure_and_not_in_the_robust_one(tmp
     assert exam.without_outliers is not None and built.evaluation.without_outliers == exam.without_outliers
     plain, robust, other = exam.after.rms_dph, exam.without_outliers.rms_dph, clean.after.rms_dph
     assert plain and robust and other and plain > 5.0 * robust and robust < 2.0 * other
-    assert "without 3 rows that are outliers" in summary(built.evaluation)
+    assert "without 3 rows that are outliers" in summary_line(built.evaluation)
     assert "(3 rows)" in write_report(tmp_path / "out").read_text("utf-8")

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from gyrotc.assess.limits import Limits, decided, held_against
-from gyrotc.cli.results import limit_lines, summary
+from gyrotc.cli.results import limit_lines, summary_line
 from gyrotc.fleet import unit
 from gyrotc.fleet.manifest import Fleet, Unit
 from gyrotc.fleet.page import write_summary
@@ -109,7 +109,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         judged = evaluation.judged()
         assert judged is not None
         for name in ("left_out", "train"):
-            assert (where[name] in summary(evaluation)) == (judged[0] == name), number
+            assert (where[name] in summary_line(evaluation)) == (judged[0] == name), number
 
 
 def test_a_fleet_has_the_decision_of_the_unit(

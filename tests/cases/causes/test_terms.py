@@ -12,7 +12,7 @@ from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History, Scene
 from gyrotc.common.errors import InputError
 from gyrotc.mirror.recursions import Course, CourseChannel, TermOutcome, delayed, first_order, play
-from gyrotc.simulate.gyro import draw
+from gyrotc.simulate.gyro import draw_map
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -193,7 +193,7 @@ def test_a_cavity_lag_gives_the_map_the_filtered_temperature(wandering: Array) -
 
 def test_a_sensor_lag_is_absorbed_by_a_static_map() -> None:
     """f(T) = f(T_s + tau dT_s/dt): nothing is left to find. The control must stay one."""
-    bias_map = draw(np.random.default_rng(4), (5.8e-3, 8.5e-3))
+    bias_map = draw_map(np.random.default_rng(4), (5.8e-3, 8.5e-3))
     fine = np.arange(0.0, 20000.0)
     true_c = first_order(900.0, fine, np.interp(fine, [0, 3000, 4200, 9000, 11000], [0.0, 0.0, 60.0, 60.0, -40.0]))
     tau = 300.0

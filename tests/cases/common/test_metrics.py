@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gyrotc.common import metrics
-from gyrotc.common.metrics import MAD_TO_SIGMA, average, median, middle_of_five, statistics, time_statistics
+from gyrotc.common.metrics import MAD_TO_SIGMA, average_rows, median, middle_of_five, statistics, time_statistics
 from gyrotc.common.statistics import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95, TOLERANCE, main_directions, orthonormal
 from gyrotc.results.evaluation import Pooled
 from scipy import stats
@@ -15,7 +15,7 @@ from scipy.linalg import subspace_angles
 def _averages(values: np.ndarray, period: float = 10.0, average_s: float = 100.0, **scored: np.ndarray):
     time = period * np.arange(values.size) + 5.0
     mask = scored.get("scored", np.ones(values.size, dtype=bool))
-    return average(time, np.zeros_like(time), values, values, scored=mask, average_s=average_s)
+    return average_rows(time, np.zeros_like(time), values, values, scored=mask, average_s=average_s)
 
 
 def test_eight_hours_of_10_s_rows_are_288_means_of_100_s() -> None:
@@ -28,7 +28,7 @@ def test_eight_hours_of_10_s_rows_are_288_means_of_100_s() -> None:
 def test_rounded_time_stamps_do_not_move_rows_between_bins() -> None:
     time = np.round(0.505 * np.arange(4000), 3)
     ones = np.ones_like(time)
-    a = average(time, ones, ones, ones, scored=ones.astype(bool), average_s=10.1)
+    a = average_rows(time, ones, ones, ones, scored=ones.astype(bool), average_s=10.1)
     assert a.after_dph.size == 200
 
 
@@ -159,7 +159,7 @@ def test_means_of_rows_that_come_in_parts_are_those_of_the_whole() -> None:
     time = np.cumsum(rng.uniform(0.9, 1.1, 5000))
     columns = [time, rng.normal(size=5000), np.where(rng.random(5000) < 0.01, np.nan, rng.normal(size=5000))]
     scored = rng.random(5000) < 0.9
-    whole = average(*columns, columns[2], scored=scored, average_s=37.0)
+    whole = average_rows(*columns, columns[2], scored=scored, average_s=37.0)
     made = metrics.Averager(time, 37.0)
     for part in np.array_split(np.arange(5000), 13):
         made.add(*(c[part] for c in columns), columns[2][part], scored[part])

@@ -20,7 +20,7 @@ from gyrotc.diagnose.candidates import (
     _switch,
     _two_sided_lag,
     columns_of,
-    diagnosed,
+    diagnosable_causes,
     reach_of,
     searched,
     shapes_of,
@@ -30,7 +30,7 @@ from gyrotc.diagnose.diagnosis import _entries
 from gyrotc.diagnose.discrepancy import NoiseFinding
 from gyrotc.diagnose.extension import Refitting
 from gyrotc.diagnose.misfit import Misfit, contest, misfit
-from gyrotc.diagnose.noise import COLOURS, Colour, Whitener
+from gyrotc.diagnose.noise import NOISE_COLOURS, Colour, Whitener
 from gyrotc.diagnose.profile_likelihood import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
 from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
 from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
@@ -63,7 +63,7 @@ from gyrotc.results.diagnosed import (
     Unexplained,
 )
 from gyrotc.results.recordings import DetectionLimit
-from gyrotc.train.data import TrainingData, cleaned
+from gyrotc.train.data import TrainingData, cleaned_samples
 from gyrotc.train.fitting import FitOptions
 from numpy.typing import NDArray
 from recordings import toml, write_csv
@@ -495,7 +495,7 @@ def test_local_functions_over_the_temperature_add_up_to_one(campaign: Campaign) 
 
 def test_a_cause_is_testable_only_where_the_recordings_say_enough(campaign: Campaign) -> None:
     records = campaign.records
-    assert not any(reason_against(records, cause) for cause in diagnosed())
+    assert not any(reason_against(records, cause) for cause in diagnosable_causes())
     off = replace(records.runs[0], history=replace(records.runs[0].history, on_s=None))
     assert "power-on" in reason_against(Records((off, *records.runs[1:]), 100.0), "warm_up")
     assert "runs" in reason_against(Records(records.runs[:1], 100.0), "turn_on_offset")
@@ -531,7 +531,7 @@ def test_the_direction_is_that_of_the_last_change(campaign: Campaign) -> None:
 def test_the_banks_inner_products_are_those_of_whitened_columns(campaign: Campaign) -> None:
     bank, records = campaign.bank, campaign.records
     number = 7
-    whiten = Whitener(COLOURS[number], records.kept, records.block_s)
+    whiten = Whitener(NOISE_COLOURS[number], records.kept, records.block_s)
     white = whiten(np.column_stack([bank.map, bank.signatures]))
     assert np.allclose(bank.grams[number], white.T @ white, rtol=1e-9, atol=1e-12)
     sigma = np.linspace(0.5, 2.0, records.size)
@@ -831,7 +831,7 @@ def recorded(rng: np.random.Generator, wave: object) -> TrainingData:
         one = np.ones(t.size)
         parts.append(TrainingData(t, r, y, one, np.full(t.size, run), time, 10.0 * one))
     names = TrainingData.__slots__
-    return cleaned(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
+    return cleaned_samples(TrainingData(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}))
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 from gyrotc.causes.base import History
 from gyrotc.common.metrics import Averages
 from gyrotc.diagnose.blocks import (
-    Record,
     Records,
+    RunRecord,
     _bridged,
     _thinned,
     block_length,
@@ -29,8 +29,8 @@ from gyrotc.diagnose.joined import (
     score,
     variance_ratio_of,
 )
-from gyrotc.diagnose.noise import COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
-from gyrotc.diagnose.pipeline import cleaned, screen
+from gyrotc.diagnose.noise import NOISE_COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
+from gyrotc.diagnose.pipeline import cleaned_means, screen
 from gyrotc.diagnose.search import Search, residual_log_likelihood, view_of_bank
 from gyrotc.recordings.records import Rows
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def campaign() -> Campaign:
 
 def noise(campaign: Campaign, seed: int) -> Array:
     print("seed", seed)
-    whiten = Whitener(COLOURS[TRUE_COLOUR], campaign.records.kept, BLOCK_S)
+    whiten = Whitener(NOISE_COLOURS[TRUE_COLOUR], campaign.records.kept, BLOCK_S)
     white = np.random.default_rng(seed).standard_normal((campaign.records.size, 1))
     return np.asarray(LEVEL_DPH * whiten.colour(white)[:, 0])
 
@@ -78,7 +78,7 @@ def all_columns(search: Search) -> Array:
 
 
 def dense(search: Search, number: int) -> Array:
-    return np.asarray(block_diag(*(COLOURS[number].matrix(k, BLOCK_S) for k in search.records.kept)))
+    return np.asarray(block_diag(*(NOISE_COLOURS[number].matrix(k, BLOCK_S) for k in search.records.kept)))
 
 
 def test_a_layout_counts_every_column_once() -> None:
@@ -282,7 +282,7 @@ def test_planted_outliers_are_found_and_left_out(records: Records) -> None:
     assert found.findings[0].id == "outliers" and found.findings[0].parameters["count"] >= 36
     for mask, at in zip(found.masks, planted, strict=True):
         assert not mask[at].any()
-    y, empty = cleaned(dirty, found)
+    y, empty = cleaned_means(dirty, found)
     assert empty.size == 0
     assert np.abs(y - records.target()).max() < 3e-3, "5e-2 in one row of five would be 1e-2"
 
@@ -331,10 +331,10 @@ def test_a_coarse_thermometer_is_reported_with_its_step(records: Records) -> Non
     assert findings["temperature_quantisation"]["step_c"] == pytest.approx(0.5)
 
 
-def _record(hours: float) -> Record:
+def _record(hours: float) -> RunRecord:
     time = np.arange(0.0, 3600.0 * hours, 10.0)
     usable = np.ones(time.size, dtype=bool)
-    return Record("a", History(time_s=time, temperature_c=0.0 * time), 0.0 * time, usable)
+    return RunRecord("a", History(time_s=time, temperature_c=0.0 * time), 0.0 * time, usable)
 
 
 @pytest.mark.parametrize(
@@ -400,11 +400,11 @@ def test_declared_white_noise_and_counts_average_as_they_should() -> None:
 
 
 def test_every_colour_of_the_grid_is_a_covariance() -> None:
-    for colour in COLOURS:
+    for colour in NOISE_COLOURS:
         assert np.linalg.eigvalsh(colour.matrix(np.arange(150), BLOCK_OF_COLOURS_S))[0] > 0.0
 
 
-@pytest.mark.parametrize("colour", [COLOURS[5], Colour(walk=0.04), Colour(white=0.1, quantum=0.45)])
+@pytest.mark.parametrize("colour", [NOISE_COLOURS[5], Colour(walk=0.04), Colour(white=0.1, quantum=0.45)])
 @pytest.mark.parametrize("even", [True, False])
 def test_whitening_is_that_of_the_dense_covariance(colour: Colour, even: bool) -> None:
     rng = np.random.default_rng(3)
@@ -461,7 +461,7 @@ def floor(left: np.ndarray, block_s: float) -> float:
     """Noise floor of what is left of a steady temperature, one number for each block."""
     time = block_s * np.arange(left.size, dtype=float)
     history = History(time_s=time, temperature_c=np.full(left.size, 20.0), on_s=None, run=0, runs=1, day=None)
-    return floor_of(Records((Record("r", history, left, np.ones(left.size, dtype=bool)),), block_s), left, AVERAGE_S)
+    return floor_of(Records((RunRecord("r", history, left, np.ones(left.size, dtype=bool)),), block_s), left, AVERAGE_S)
 
 
 def test_slow_changes_and_outliers_are_not_floor() -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT, Command
-from gyrotc.diagnose.blocks import Record, Records, records_of
+from gyrotc.diagnose.blocks import Records, RunRecord, records_of
 from gyrotc.diagnose.detection import project
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.diagnose.extension import Refitting
@@ -107,7 +107,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, drawing: Drawing) -> Callable
     patch.undo()
 
 
-def changed(records: Records, change: Callable[[Record], Record]) -> Records:
+def changed(records: Records, change: Callable[[RunRecord], RunRecord]) -> Records:
     return Records(tuple(change(r) for r in records.runs), records.block_s)
 
 
@@ -199,7 +199,7 @@ def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
 def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Case]) -> None:
     case = made("auxiliary")
 
-    def shifted(run: Record) -> Record:
+    def shifted(run: RunRecord) -> RunRecord:
         half = len(run.rate_dph) // 2
         return replace(run, channels={k: np.roll(v, half) for k, v in run.channels.items()})
 

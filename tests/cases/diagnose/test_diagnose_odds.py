@@ -24,11 +24,11 @@ from gyrotc.diagnose.rivals import (
     _points,
     _Simulated,
     calibrated,
-    kind_of,
     near_of,
     odds_of,
     probabilities_of,
     ranked_rivals,
+    rival_key,
 )
 from gyrotc.mirror.recursions import delayed, first_order
 from numpy.typing import NDArray
@@ -213,8 +213,8 @@ def test_the_criterion_of_a_place_is_that_of_the_search(campaign: Campaign) -> N
     gains = _gains(campaign, 40.0, HYSTERESIS)
     singles = list(gains.single())
     place = _Place(gains, ())
-    kinds = {kind_of(p.members[0]) for p in singles}
-    best = {k: max(p.criterion(gains.size) for p in singles if kind_of(p.members[0]) == k) for k in kinds}
+    kinds = {rival_key(p.members[0]) for p in singles}
+    best = {k: max(p.criterion(gains.size) for p in singles if rival_key(p.members[0]) == k) for k in kinds}
     models = {k: [place.model(c) for c in _points(singles, (), k)] for k in kinds}
     found = _Simulated(place, models).measured
     assert {"cavity_lag", "turn_on_offset", "map_too_coarse", "hysteresis"} <= {id for id, _ in kinds}
@@ -236,7 +236,7 @@ def test_beside_another_cause_it_is_that_of_the_pairs(campaign: Campaign) -> Non
         k: max(
             p.criterion(gains.size)
             for p in pairs
-            if other in p.members and k in [kind_of(m) for m in p.members if m != other]
+            if other in p.members and k in [rival_key(m) for m in p.members if m != other]
         )
         for k in kinds
     }

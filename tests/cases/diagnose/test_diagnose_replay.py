@@ -13,7 +13,7 @@ import pytest
 from conftest import quick_and_slow
 from gyrotc.causes import CATALOGUE
 from gyrotc.causes.base import History
-from gyrotc.common.metrics import average
+from gyrotc.common.metrics import average_rows
 from gyrotc.diagnose import gain
 from gyrotc.diagnose.attribution import Attribution, attribute
 from gyrotc.diagnose.blocks import Records, records_of
@@ -28,7 +28,7 @@ from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
 from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
 from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
 from gyrotc.mirror.front_end import missed_before
-from gyrotc.mirror.history import FollowedHistory, evaluate_map, followed
+from gyrotc.mirror.history import FollowedHistory, evaluate_map, follow_history
 from gyrotc.mirror.recursions import first_order, play
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
@@ -37,7 +37,7 @@ from gyrotc.simulate.campaign import simulate
 from gyrotc.tables.quantise import quantise
 from gyrotc.train.data import joined
 from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
-from gyrotc.verify.replay import history_of
+from gyrotc.verify.replay import replay_case_of
 from numpy.typing import NDArray
 from single_cycles import NOISE, clean_cycle
 from small_campaign import LEVEL_DPH, Campaign, small_campaign
@@ -177,7 +177,7 @@ def test_the_replay_is_what_the_target_does(
     promised = plane + (played.data.bias_dph - data.bias_dph)
 
     rows = run.rows()
-    history = history_of(rows, run, model, table)
+    history = replay_case_of(rows, run, model, table)
     # A correction in force during a block is the one after the block's last row.
     missed = missed_before(rows.time_s, run.row_period_s)
     position = np.arange(len(rows)) + np.cumsum(missed)
@@ -214,7 +214,7 @@ def test_what_emitted_tables_leave_is_found_with_rows_or_histories_in_memory(
 
     def without_rows(*given: Any, **named: Any) -> FollowedHistory:
         assert not any(one() is not None for one in alive), "a history is made beside the rows"
-        return followed(*given, **named)
+        return follow_history(*given, **named)
 
     monkeypatch.setattr(gain, "followed", without_rows)
     front = front_end(runs, BLOCK_S)
@@ -225,9 +225,9 @@ def test_what_emitted_tables_leave_is_found_with_rows_or_histories_in_memory(
         table = quantise(model, "f32")
         for run, made in zip(runs, means, strict=True):
             rows = run.rows()
-            answers = history_of(rows, run, model, table).reference.rows(slice(None))
+            answers = replay_case_of(rows, run, model, table).reference.rows(slice(None))
             inside, rate = run.in_span(rows.time_s), rows.rate_dph
-            whole = average(
+            whole = average_rows(
                 rows.time_s[inside],
                 rows.temperature_c[inside],
                 rate[inside],

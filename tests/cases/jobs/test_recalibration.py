@@ -19,7 +19,7 @@ from gyrotc.results.evaluation import Evaluation
 from gyrotc.results.release import Verification
 from gyrotc.results.training import Training
 from gyrotc.tables.emit import emitted_tables
-from gyrotc.train.data import TrainingData, cleaned, scaling_of
+from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
 from gyrotc.train.methods import fit
 from gyrotc.train.prior.departures import Departures, Hypothesis, revised, updated, within
 from gyrotc.train.prior.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
@@ -69,7 +69,7 @@ def recorded(
 
 
 def means(data: TrainingData) -> UnitMeans:
-    samples = cleaned(data)
+    samples = cleaned_samples(data)
     return unit_means(samples, scaling_of(samples), None)[0]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.cli.results import summary
+from gyrotc.cli.results import summary_line
 from gyrotc.common.metrics import Averages
 from gyrotc.pages.comparison import (
     AFTER_DPH,
@@ -147,7 +147,7 @@ def test_the_headline_says_how_much_of_the_improvement_is_a_constant() -> None:
     zero, alone = rms(BEFORE) / rms(AFTER), rms(BEFORE) / rms(BEFORE - CONSTANT)
     mean = BEFORE.std() / AFTER.std()
     assert len({f"{x:.2f}" for x in (zero, alone, mean)}) == 3
-    assert summary(evaluation()).startswith(
+    assert summary_line(evaluation()).startswith(
         f"improvement about zero {zero:.2f} (paper: 9.8-10.4; a constant alone: {alone:.2f}), about the mean {mean:.2f}"
     )
 
@@ -168,7 +168,7 @@ def test_what_is_not_known_is_not_said(changes: dict[str, object], begins: str) 
     judged = part(BEFORE, AFTER)
     assert judged.improvement is not None and judged.before.std_dph is not None and judged.after.std_dph
     ratio = judged.before.std_dph / judged.after.std_dph
-    assert summary(evaluation(**changes)).startswith(begins.format(judged.improvement, ratio))
+    assert summary_line(evaluation(**changes)).startswith(begins.format(judged.improvement, ratio))
 
 
 DAYS = ("2020-01-11", "2021-02-11", "2023-03-11", "2024-04-11")

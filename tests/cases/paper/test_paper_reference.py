@@ -18,7 +18,7 @@ import pytest
 from gyrotc import _core
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.simulate.campaign import simulate
-from gyrotc.train.data import average, scaling_of
+from gyrotc.train.data import average_samples, scaling_of
 from gyrotc.train.methods import trained
 from gyrotc.train.result import Outcome
 from numpy.typing import NDArray
@@ -105,7 +105,7 @@ def test_inputs_and_means_are_the_front_end_s(gyro: tuple[int, Path], groups: li
             t, slope = reference.inputs(rows[:, 1])
             assert np.abs(t - data.temperature_c).max() < INPUT_C
             assert np.abs(slope - data.slope_c_per_min).max() < INPUT_C_PER_MIN
-            gathered = average(data, 100.0)
+            gathered = average_samples(data, 100.0)
             assert len(gathered) == 288
             for ours, column in ((gathered.temperature_c, data.temperature_c), (gathered.bias_dph, data.bias_dph)):
                 np.testing.assert_allclose(ours, reference.means(column), rtol=1e-12)
@@ -114,7 +114,7 @@ def test_inputs_and_means_are_the_front_end_s(gyro: tuple[int, Path], groups: li
 
 def test_kohonen_nodes_are_the_same(gyro: tuple[int, Path], groups: list[PaperGroup]) -> None:
     for group in groups:
-        gathered, scaling = average(group.train, 100.0), scaling_of(group.train)
+        gathered, scaling = average_samples(group.train, 100.0), scaling_of(group.train)
         x = np.column_stack(scaling.normalise(gathered.temperature_c, gathered.slope_c_per_min))
         found = _core.kohonen(x, reference.NODES, seed=gyro[0])
         assert np.abs(found.nodes - reference.kohonen(x, gyro[0])).max() < NODES

@@ -16,8 +16,8 @@ from gyrotc.quality import changes as changes_module
 from gyrotc.quality.changes import Change, changes_of
 from gyrotc.quality.check import check
 from gyrotc.quality.curves import curve_findings
-from gyrotc.quality.events import _Judged, accepted, found_events
-from gyrotc.quality.findings import facts_of
+from gyrotc.quality.events import _Judged, found_events, without_events
+from gyrotc.quality.findings import run_facts
 from gyrotc.quality.outliers import departing
 from gyrotc.quality.thermometers import displaced, stuck_stretches, thermometer_findings
 from gyrotc.recordings.load import load
@@ -73,7 +73,7 @@ def only(dataset: Dataset) -> tuple[Finding, tuple[float, float], tuple[float, f
 
 def of_curves(dataset: Dataset) -> list[Finding]:
     """Runs that are not as the others."""
-    return curve_findings(dataset, [facts_of(run, run.rows()) for run in dataset.runs])
+    return curve_findings(dataset, [run_facts(run, run.rows()) for run in dataset.runs])
 
 
 def changes(*runs: EventColumns) -> list[Change]:
@@ -184,7 +184,7 @@ def test_a_drift_that_begins_has_its_run_time_and_slope(tmp_path: Path) -> None:
     assert when[0] <= at <= when[1] and when[1] - when[0] < 1800.0
     assert size[0] <= slope <= size[1] and event.size.value == pytest.approx(slope, rel=0.1)
     assert event.leave_out_s[0][1] > time[-1]
-    assert found_events(accepted(load(folder), [event])) == []
+    assert found_events(without_events(load(folder), [event])) == []
 
 
 def test_a_run_that_goes_on_at_another_level_after_a_gap_was_restarted(tmp_path: Path) -> None:
@@ -220,7 +220,7 @@ def test_a_step_that_comes_back_is_one_event_and_what_is_accepted_is_left_out(tm
     event, _, _ = only(load(folder))
     assert event.id == "step_and_recover"
     assert event.leave_out_s[0][0] <= begin and event.leave_out_s[0][1] >= end
-    rest = accepted(load(folder), [event])
+    rest = without_events(load(folder), [event])
     inside = rest.runs[1].in_span(time)
     assert not inside[(time >= begin) & (time < end)].any() and inside.sum() > 0.75 * time.size
     assert rest.runs[0].in_span(time).all() and rest.runs[2].in_span(time).all()
@@ -273,7 +273,7 @@ def test_a_run_with_another_gain_is_reported_with_its_factor(tmp_path: Path, fac
     assert (event.id, event.file, event.size.unit) == ("gain_changed", "2.csv", "times")
     assert size[0] <= factor <= size[1] and event.size.value == pytest.approx(factor, abs=0.03)
     assert event.exclude is None and event.whole_run, "the whole run goes, by its entry"
-    assert [run.file for run in accepted(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
+    assert [run.file for run in without_events(dataset, [event]).runs] == ["0.csv", "1.csv", "3.csv"]
 
 
 def test_a_gain_that_changes_within_a_run_has_its_time_and_factor(tmp_path: Path) -> None:

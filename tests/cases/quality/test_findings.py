@@ -15,7 +15,7 @@ import pytest
 from gyrotc.assess.findings import findings_of
 from gyrotc.model import Model
 from gyrotc.quality.check import findings_of_run
-from gyrotc.quality.findings import facts_of
+from gyrotc.quality.findings import run_facts
 from gyrotc.quality.outliers import departing_rows
 from gyrotc.quality.thermometers import jumps_of
 from gyrotc.recordings.load import load
@@ -66,7 +66,7 @@ def ids(dataset: Dataset, model: dict[str, Any], result: dict[str, Any], trainin
 
 
 def found_in(dataset: Dataset, model: dict[str, Any], result: dict[str, Any], training: Any = None) -> list[Finding]:
-    facts = [facts_of(run, run.rows()) for run in dataset.runs]
+    facts = [run_facts(run, run.rows()) for run in dataset.runs]
     of_runs = [
         found
         for run, f in zip(dataset.runs, facts, strict=True)

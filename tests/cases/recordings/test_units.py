@@ -14,7 +14,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.quality.check import check
 from gyrotc.recordings.load import load
 from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
-from gyrotc.recordings.units import UnitError, channel_unit, conversion, kind_of
+from gyrotc.recordings.units import UnitError, channel_unit, conversion, quantity_of
 from gyrotc.train.fitting import FitOptions, fit_dataset
 from recordings import Columns, columns, toml, write_csv
 
@@ -95,7 +95,7 @@ def test_what_is_no_unit_is_refused(text: str, kind: str) -> None:
 
 
 def test_kinds_and_names_of_channels() -> None:
-    assert [kind_of(u) for u in ("deg/s", "K", "ms", "V", "Hz", "C")] == [
+    assert [quantity_of(u) for u in ("deg/s", "K", "ms", "V", "Hz", "C")] == [
         "rate",
         "temperature",
         "time",

@@ -26,7 +26,7 @@ from gyrotc.results import update as exchanging
 from gyrotc.results import update as updating
 from gyrotc.results.files import Lock, json_text, write_atomically
 from gyrotc.results.folder import result_folder, scratch_folder, write_result
-from gyrotc.results.marker import MARKER, check_separate, faults, read_marker
+from gyrotc.results.marker import MARKER, check_separate, read_marker, result_faults
 from recordings import columns, toml, write_csv
 
 
@@ -73,7 +73,7 @@ def test_a_result_is_replaced_and_nothing_is_left_beside_it(out: Path) -> None:
     for text in ("one", "two", "three"):
         write(out, text)
         assert content(out) == {"c/table.c": text, "model.json": text}
-        assert not faults(out)
+        assert not result_faults(out)
     marker = read_marker(out)
     assert marker is not None
     assert (marker.kind, marker.command, marker.serial) == ("result", "build", "A")
@@ -88,9 +88,9 @@ def test_entries_are_replaced_and_the_rest_stays(out: Path) -> None:
     update(out, "verify.json", "c", text="two")
     assert content(out) == {"c/table.c": "two", "model.json": "one", "verify.json": "two"}
     assert (out / "model.json").stat().st_ino == kept
-    assert not faults(out)
+    assert not result_faults(out)
     update(out, "c", text="three")
-    assert content(out)["c/table.c"] == "three" and not faults(out)
+    assert content(out)["c/table.c"] == "three" and not result_faults(out)
     write(out, "four")
     assert content(out) == {"c/table.c": "four", "model.json": "four"}
 
@@ -103,7 +103,7 @@ def test_a_failed_job_leaves_all_as_it_was(out: Path) -> None:
             raise error
     with pytest.raises(GyrotcError, match="No space left"), result_folder(out, "build"):
         raise OSError(28, "No space left on device")
-    assert content(out) == {"c/table.c": "one", "model.json": "one"} and not faults(out)
+    assert content(out) == {"c/table.c": "one", "model.json": "one"} and not result_faults(out)
 
 
 def test_a_foreign_file_stops_the_job_before_it_begins(out: Path) -> None:
@@ -183,7 +183,7 @@ def test_parts_have_markers_of_their_own(out: Path) -> None:
             (stage.folder / "report.html").write_text(text)
         update(out / "x", "verify.json")
         update(out / "y" / "diagnosis", "page", text="redrawn")
-        assert not faults(out)
+        assert not result_faults(out)
     marker = read_marker(out / "x")
     assert marker is not None and marker.axis == "x" and marker.parts == ("diagnosis",)
     (out / "x" / "mine").write_text("")
@@ -244,7 +244,7 @@ def test_a_forged_marker_reaches_nothing_outside(out: Path, way: str) -> None:
         with suppress(InputError):
             write(out, "new")
     assert {k: v for k, v in content(out.parent).items() if k in kept} == kept
-    assert thesis.read_text() == "years" and faults(out.parent / "other") == []
+    assert thesis.read_text() == "years" and result_faults(out.parent / "other") == []
 
 
 def test_what_a_forged_leftover_holds_goes_nowhere_else(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -436,7 +436,7 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(made: Path, tmp_path:
     for step in (*steps, *steps[1:4]):
         done = gyrotc(*step)
         assert done.returncode == 0, done.stderr
-        assert not faults(out)
+        assert not result_faults(out)
     assert {p.name for p in out.iterdir()} == {
         MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "more.json", "verify.json",
     }  # fmt: skip

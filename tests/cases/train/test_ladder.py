@@ -16,10 +16,10 @@ from gyrotc.recordings.load import load
 from gyrotc.recordings.records import Dataset, Run
 from gyrotc.train.data import (
     Fold,
-    Span,
+    RunSpan,
     TrainingData,
-    average,
-    cleaned,
+    average_samples,
+    cleaned_samples,
     gather,
     pieces,
     scaling_of,
@@ -34,7 +34,15 @@ from gyrotc.train.objection import objection
 from gyrotc.train.options import SIMPLE
 from gyrotc.train.result import Fit, predict
 from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
-from gyrotc.train.simple import all_solved, design, fit_mixed_model, fit_simple, powers_of, solve, triangle_of
+from gyrotc.train.simple import (
+    all_solved,
+    design,
+    fit_mixed_model,
+    fit_simple,
+    powers_of,
+    solve_least_squares,
+    triangle_of,
+)
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 
@@ -158,7 +166,7 @@ def test_states_are_judged_at_temperatures_that_the_rest_has_covered() -> None:
 
 def test_a_mixed_model_is_the_most_probable_map_of_a_linear_mixed_model() -> None:
     """Against plain matrices: columns with scatter between power-ons, an exponential drift, white noise."""
-    data = average(cleaned(samples(0)), 50.0)
+    data = average_samples(cleaned_samples(samples(0)), 50.0)
     scaling = scaling_of(data)
     found = fit_mixed_model(data, scaling, data.run)
     p = np.exp(2.0 * found.model.log_parameters[:9])
@@ -363,7 +371,7 @@ def test_one_factor_gives_all_simple_rungs_as_least_squares_does(still: bool) ->
     rows = np.column_stack([powers_of(t, r), y]) * np.sqrt(weight)[:, None]
     found = all_solved(triangle_of(rows), len(rows))
     for name in SIMPLE:
-        expected = design(name, t, r) @ solve(design(name, t, r), y, weight)
+        expected = design(name, t, r) @ solve_least_squares(design(name, t, r), y, weight)
         np.testing.assert_allclose(powers_of(t, r) @ found[name], expected, rtol=1e-9, atol=1e-11)
 
 
@@ -380,7 +388,7 @@ def test_what_remains_without_a_piece_is_what_a_fit_of_the_rest_gives(still: boo
     data = samples(seed % 1000)
     slope = np.zeros(len(data)) if still else data.slope_c_per_min
     weight = rng.choice([1.0, 4.0, 1e4], 3)[data.run] * rng.choice([1.0, 2.0], len(data))
-    data = average(cleaned(replace(data, slope_c_per_min=slope, weight=weight)), 50.0)
+    data = average_samples(cleaned_samples(replace(data, slope_c_per_min=slope, weight=weight)), 50.0)
     scaling = scaling_of(data)
     process = fit_process(data, scaling)
     rest = Rest(data, process.kept, scaling, process, data.run)
@@ -394,7 +402,7 @@ def test_what_remains_without_a_piece_is_what_a_fit_of_the_rest_gives(still: boo
         center = weighted_mean(left.bias_dph, left.weight)
         for name in ("constant", "cubic", "cubic_slope"):
             columns = design(name, t, r)
-            expected = center + columns @ solve(columns[out], left.bias_dph - center, left.weight)
+            expected = center + columns @ solve_least_squares(columns[out], left.bias_dph - center, left.weight)
             np.testing.assert_allclose(found[name][out], expected[out], rtol=1e-9, atol=1e-11)
         known = out & process.kept
         mean = conditioned(process, t[known], r[known], data.bias_dph[known], data.weight[known])
@@ -440,7 +448,7 @@ def profile(*legs: tuple[float, float], noise: float = 0.05, start: float = 0.0)
     return Samples(temperature, time + start, np.zeros(len(time), dtype=np.int64))
 
 
-def edges_of(spans: tuple[Span, ...]) -> list[float]:
+def edges_of(spans: tuple[RunSpan, ...]) -> list[float]:
     return [spans[0].from_s, *(s.to_s for s in spans)]
 
 

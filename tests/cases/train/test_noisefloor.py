@@ -12,7 +12,7 @@ from gyrotc.train.data import TrainingData
 from gyrotc.train.evidence import allan_variance, noise_terms, sensitivities, stretches
 from gyrotc.train.methods import fit
 from gyrotc.train.result import predict
-from gyrotc.train.uncertainty import _likeliest, coverage, of_few, uncertainty
+from gyrotc.train.uncertainty import _likeliest, coverage, next_run_variance, uncertainty
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 
@@ -214,7 +214,7 @@ def drawn(rng: np.random.Generator, runs: int, patches: int, between: float, mis
 def test_the_next_run_lies_within_the_variance_between_few(between: float) -> None:
     """Five runs seldom prove an offset of a third of a patch's noise; the next run has one all the same."""
     rng = np.random.default_rng(11)
-    found = np.array([_likeliest(drawn(rng, 5, 30, between, 0.5))[1] for _ in range(300)]) * of_few(5)
+    found = np.array([_likeliest(drawn(rng, 5, 30, between, 0.5))[1] for _ in range(300)]) * next_run_variance(5)
     ratio = rng.normal(0.0, between, 300) / np.sqrt(found + 0.1**2)
     assert np.sqrt(np.mean(ratio**2)) < 1.5, "seed 11"
     assert np.mean(np.abs(ratio) < 1.0) > 0.6

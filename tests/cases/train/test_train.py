@@ -13,7 +13,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.recordings.load import load
 from gyrotc.simulate.campaign import simulate
 from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.train.data import TrainingData, average, cleaned, joined
+from gyrotc.train.data import TrainingData, average_samples, cleaned_samples, joined
 from gyrotc.train.estimator import RBFNetworkRegressor
 from gyrotc.train.evidence import TrainingFailed
 from gyrotc.train.fitting import front_end, samples_of
@@ -298,7 +298,7 @@ def sets(folder: Path) -> tuple[TrainingData, TrainingData, float]:
 
 def rms_dph(fitted: Fit, exam: TrainingData) -> float:
     residual = exam.bias_dph - predict(fitted, exam.temperature_c, exam.slope_c_per_min)
-    left = average(replace(exam, bias_dph=residual), AVERAGE_S)
+    left = average_samples(replace(exam, bias_dph=residual), AVERAGE_S)
     return rms(left.bias_dph)
 
 
@@ -317,7 +317,7 @@ SETS = 40
 
 def beyond(found: Fit, data: TrainingData) -> float:
     """How far the map lies outside the means of the data over the whole envelope, in spans of the means."""
-    means = average(cleaned(data), 100.0).bias_dph
+    means = average_samples(cleaned_samples(data), 100.0).bias_dph
     low, high = float(means.min()), float(means.max())
     s = found.scaling
     grid = np.meshgrid(np.linspace(*s.temperature_c, 41), np.linspace(*s.slope_c_per_min, 21))

@@ -13,7 +13,7 @@ from gyrotc.common.errors import InputError
 from gyrotc.fleet.manifest import load_manifest
 from gyrotc.model import Model
 from gyrotc.recordings.load import load
-from gyrotc.train.data import TrainingData, average
+from gyrotc.train.data import TrainingData, average_samples
 from gyrotc.train.fitting import FitOptions, fit_dataset, front_end
 from gyrotc.train.methods import fit
 from gyrotc.train.options import DEFAULTS
@@ -42,7 +42,7 @@ def test_the_size_by_bic_is_the_smallest_near_the_least() -> None:
     """Against orthogonal least squares on the whole grid in plain numpy."""
     data = samples(2)
     found = fit(data, method="rbf_ols")
-    means, width = average(data, 100.0), found.curves["width"]
+    means, width = average_samples(data, 100.0), found.curves["width"]
     x = np.column_stack(found.scaling.normalise(means.temperature_c, means.slope_c_per_min))
     grid = [np.linspace(*np.quantile(column, [0.0, 1.0]), n) for column, n in zip(x.T, (21, 13), strict=True)]
     centers = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -95,7 +95,7 @@ def test_candidates_are_what_the_method_says() -> None:
     assert all((round(t, 6), round(r, 6)) in points for t, r in random.networks[0]["centers"])
     grid = fit(data, method="rbf_ols", centers=12)
     t, r = np.array(grid.networks[0]["centers"]).T
-    means = average(data, 100.0)
+    means = average_samples(data, 100.0)
     for places, inputs, steps in ((t, means.temperature_c, 20), (r, means.slope_c_per_min, 12)):
         at = (places - inputs.min()) / np.ptp(inputs) * steps
         assert np.abs(at - np.round(at)).max() < 1e-6

@@ -19,7 +19,7 @@ from gyrotc.diagnose import extension
 from gyrotc.diagnose.attribution import Attribution
 from gyrotc.diagnose.blocks import Records, records_of
 from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import Refitting, extend, folds_of, shipping
+from gyrotc.diagnose.extension import Refitting, extend, held_out_masks, shipping
 from gyrotc.diagnose.gain import gain_of
 from gyrotc.diagnose.refit import Effect, completed, known, samples
 from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
@@ -242,7 +242,7 @@ def test_an_effect_is_taken_off_the_samples_as_its_equation_says(case: Case) -> 
 
 
 def test_every_training_sample_is_left_out_once(case: Case) -> None:
-    folds = folds_of(case.refitting)
+    folds = held_out_masks(case.refitting)
     for k, run in enumerate(case.refitting.train):
         count = np.sum([fold[k] for fold in folds], axis=0)
         assert (count == 1).all() and count.size == run.data.bias_dph.size

@@ -26,10 +26,10 @@ from gyrotc.fleet import unit as units
 from gyrotc.fleet.manifest import SUMMARY, Fleet, Unit, load_manifest
 from gyrotc.fleet.run import run_fleet
 from gyrotc.fleet.unit import Task, do_unit
-from gyrotc.results.cache import inputs_of, program_of
+from gyrotc.results.cache import input_hashes, program_of
 from gyrotc.results.files import Lock
 from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import MARKER, faults
+from gyrotc.results.marker import MARKER, result_faults
 from gyrotc.train.fitting import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -242,10 +242,10 @@ def test_inputs_are_every_regular_file_once(tmp_path: Path) -> None:
     (tmp_path / "data" / "round").symlink_to(tmp_path / "data")
     (tmp_path / "data" / "gone.csv").symlink_to(tmp_path / "nothing")
     os.mkfifo(tmp_path / "data" / "pipe.csv")
-    before = inputs_of(tmp_path / "data")
+    before = input_hashes(tmp_path / "data")
     assert list(before) == ["here/run.csv"]
     (tmp_path / "elsewhere" / "run.csv").write_text("2")
-    assert inputs_of(tmp_path / "data") != before
+    assert input_hashes(tmp_path / "data") != before
 
 
 def _without_rights() -> None:
@@ -388,7 +388,7 @@ def test_no_process_outlives_its_fleet(tmp_path: Path) -> None:
 def _agrees(out: Path) -> int:
     """Every unit is whole, and what the summary says of a gyro as done is what lies in its folder; how many are."""
     for folder in out.glob("RLG-*"):
-        assert faults(folder) == [], folder
+        assert result_faults(folder) == [], folder
     if not (out / "fleet.json").exists():
         return 0
     summary = json.loads((out / "fleet.json").read_text())

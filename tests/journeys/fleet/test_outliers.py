@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from gyrotc.common.metrics import Averages
-from gyrotc.fleet.outliers import facts_of, step_in
+from gyrotc.fleet.outliers import gyro_facts, step_in
 from gyrotc.fleet.page import reasons, summary_of
 from gyrotc.results.fleet import Copy, FleetEntry, Reason
 from lot import AXES, FAULTS, Lot
@@ -29,7 +29,7 @@ def entries(lot: Lot) -> Iterator[FleetEntry]:
                 )
                 for run in means
             ]
-            facts = facts_of([(f"run-{k:02d}.csv", a) for k, a in enumerate(reported, 1)])
+            facts = gyro_facts([(f"run-{k:02d}.csv", a) for k, a in enumerate(reported, 1)])
             spikes = sum(int((np.abs(np.diff(run[f"rate_{axis}_dph"])) > 0.04).sum()) // 2 for run in runs)
             yield FleetEntry(
                 name=f"{name}-{axis}", dataset=name, axis=axis, status="done", facts=facts, rows_left_out=spikes

@@ -11,7 +11,7 @@ import pytest
 from gyrotc.assess.limits import load_limits
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import build_into
-from gyrotc.jobs.certificate import certificate, facts_of, missing_facts
+from gyrotc.jobs.certificate import certificate, laboratory_facts, missing_facts
 from gyrotc.pages import certificate as printing
 from gyrotc.pages.display import digits_of
 from gyrotc.pages.unit import unit_in
@@ -136,11 +136,11 @@ def test_who_states_no_thermometer_is_sent_to_the_data_set(
     unit = unit_in(built)
     assert unit.budget is not None
     unit.budget = unit.budget.model_copy(update={"instruments": ()})
-    (line,) = missing_facts(facts_of({}, built.parent / "facts.toml", "1"), [unit])
+    (line,) = missing_facts(laboratory_facts({}, built.parent / "facts.toml", "1"), [unit])
     assert "only dataset.toml states instruments: [[meta.instrument]]" in line and "build again" in line
     (tmp_path / "facts.toml").write_text("schema = 1\n[[instrument]]\nname = 'Pt100'\n")
     with pytest.raises(InputError, match="instrument"):
-        facts_of({}, tmp_path / "facts.toml", None)
+        laboratory_facts({}, tmp_path / "facts.toml", None)
 
 
 def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Path, paper: None) -> None:
@@ -168,12 +168,12 @@ def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Pa
 def test_wrong_facts_are_refused(tmp_path: Path, text: str, reported: str) -> None:
     (tmp_path / "facts.toml").write_text(text)
     with pytest.raises(InputError, match=reported):
-        facts_of({}, tmp_path / "facts.toml", None)
+        laboratory_facts({}, tmp_path / "facts.toml", None)
 
 
 def test_the_facts_file_comes_before_meta_and_the_command_line_before_both(tmp_path: Path) -> None:
     (tmp_path / "facts.toml").write_text("schema = 1\noperator = 'B'\nnumber = '2'")
-    found = facts_of({"operator": "A", "customer": "C", "chamber": 3}, tmp_path / "facts.toml", "3")
+    found = laboratory_facts({"operator": "A", "customer": "C", "chamber": 3}, tmp_path / "facts.toml", "3")
     assert (found.operator, found.customer, found.number) == ("B", "C", "3")
 
 

@@ -23,7 +23,7 @@ from gyrotc.quality.check import check
 from gyrotc.recordings import files
 from gyrotc.recordings.description import Layout, Problems
 from gyrotc.recordings.files import CsvFile
-from gyrotc.recordings.load import axes_of, load, survey
+from gyrotc.recordings.load import axes_of, load, load_reporting
 from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
 from gyrotc.recordings.reading import known_rows
 from gyrotc.recordings.records import Applied
@@ -248,7 +248,7 @@ def test_survey_tells_everything_that_is_wrong(tmp_path: Path) -> None:
     text = toml(*runs, head='schema = 1\nserial = "A/B"\nserail = 2', tail="[noise]\narw = 1.0")
     (folder / "dataset.toml").write_text(text)
     problems = Problems(collect=True)
-    dataset = survey(folder, problems)
+    dataset = load_reporting(folder, problems)
     reported = [str(problem) for problem in problems.found]
     expected = [
         "field serial: 'A/B'",

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ..files import LONGEST_NUMBER, number_in
 from .stamps import forms_of
 
-MISSING = (
+MISSING_WORDS = (
     "", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "na", "null", "NULL", "None", "none", "-", "--", "---", "#N/A",
 )  # fmt: skip
 DELIMITERS = (";", "\t", ",", "|", "whitespace")
@@ -24,7 +24,7 @@ _GROUPED = {
 }  # only with a decimal mark behind it: 1.234 alone may be either
 
 
-def cells_of(line: str, delimiter: str) -> list[str]:
+def split_line(line: str, delimiter: str) -> list[str]:
     """Cells of a line without the spaces and quotes around them."""
     if delimiter == "whitespace":
         return line.split()
@@ -46,7 +46,7 @@ def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> st
     Args:
         thousands: The mark between thousands, where it is stated.
     """
-    held = [cell for cell in cells if cell not in MISSING]
+    held = [cell for cell in cells if cell not in MISSING_WORDS]
     if not held:
         return "empty"
     if all(is_number(cell, decimal, thousands) for cell in held):

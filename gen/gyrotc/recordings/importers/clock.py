@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ..tables import Chunk, Column, LoggerTable
-from ..units import Conversion, conversion, words
+from ..units import Conversion, conversion, words_of_name
 from .map_file import TimeMap
 from .stamps import Stamps, forms_of
 
@@ -31,13 +31,13 @@ _TIME_OF_DAY = {"%H", "%M", "%S"}
 
 def _code(column: Column) -> str | None:
     """What part of a time a column of numbers is named after; None where its name says more, or something else."""
-    name = words(column.name)
+    name = words_of_name(column.name)
     if column.kind != "number" or len(name) != 1:
         return None
     return "%f" if name[0] in _FRACTIONS else _CODES.get(name[0])
 
 
-def parts_of(columns: Sequence[Column]) -> list[Column]:
+def clock_columns(columns: Sequence[Column]) -> list[Column]:
     """Columns of numbers that make a time of day, or a date and one, in order; none where some part is missing."""
     found = {code: column for column in reversed(columns) if (code := _code(column)) is not None}
     dated = {"%Y", "%m", "%d"} & set(found)
@@ -64,7 +64,7 @@ def text_of(column: Column, values: Any) -> Any:
     """A column as text: as it is, or its whole numbers with the digits that its part has."""
     if isinstance(values, pa.Array | pa.ChunkedArray):
         return pc.utf8_trim(values, ' "')
-    name = words(column.name)
+    name = words_of_name(column.name)
     width = _FRACTIONS.get(name[0], 2) if len(name) == 1 else 2
     whole = np.asarray(values, dtype=np.float64)
     texts = [f"{v:0{width}.0f}" if np.isfinite(v) and v == np.floor(v) else None for v in whole.tolist()]

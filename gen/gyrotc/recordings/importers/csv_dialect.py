@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from ...common.errors import InputError
-from ..units import kind_of
-from .cells import DELIMITERS, MISSING, cells_of, is_number, kind_of_cells, thousands_of
+from ..units import quantity_of
+from .cells import DELIMITERS, MISSING_WORDS, is_number, kind_of_cells, split_line, thousands_of
 from .layout import check_between, first_row, rows_among
 from .stamps import forms_of
 
@@ -30,7 +30,7 @@ def in_comments(
     found = []
     for k, line in enumerate(lines[: data_line - 1], start=1):
         mark = next((m for m in comment if line.startswith(m)), None)
-        cells = _rejoined(cells_of(line[len(mark) :].strip(), delimiter), count) if mark else []
+        cells = _rejoined(split_line(line[len(mark) :].strip(), delimiter), count) if mark else []
         if len(cells) == count and count > 1:
             found.append((k, cells))
     return found
@@ -81,7 +81,7 @@ def _labelled(above: Sequence[tuple[int, list[str]]], count: int) -> tuple[int, 
     """Units of a line that says so in its first cell, anywhere above the rows, and that of its abscissa."""
     line, units = 0, [""] * count
     for k, cells in above:
-        if cells and _UNITS_LABEL.fullmatch(cells[0]) and any(kind_of(cell) for cell in cells[1:] if cell):
+        if cells and _UNITS_LABEL.fullmatch(cells[0]) and any(quantity_of(cell) for cell in cells[1:] if cell):
             line, units = k, ["", *_padded(cells[1:], count - 1)[: count - 1]]
     if any(cells[:2] == ["X_Dimension", "Time"] for _, cells in above):
         units[0] = "s"  # of a LabVIEW measurement file
@@ -105,10 +105,11 @@ def _is_units(cells: Sequence[str]) -> bool:
     """
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
     known = sum(
-        kind_of(word) is not None or any(cell.strip()[:1] in "[(" and word in cell for cell in cells if cell.strip())
+        quantity_of(word) is not None
+        or any(cell.strip()[:1] in "[(" and word in cell for cell in cells if cell.strip())
         for word in words
     )
-    of_kinds = sum(kind_of(word) is not None for word in words)
+    of_kinds = sum(quantity_of(word) is not None for word in words)
     return bool(words) and of_kinds > 0 and (known >= 0.5 * len(words) or (of_kinds > 1 and known >= 0.4 * len(words)))
 
 
@@ -171,7 +172,7 @@ class Dialect:
     data_line: int
     names: tuple[str, ...]
     units: tuple[str, ...]
-    missing: tuple[str, ...] = MISSING
+    missing: tuple[str, ...] = MISSING_WORDS
     thousands: str = ""
     spaced_sign: bool = False
     above: int = 0
@@ -189,7 +190,7 @@ class Dialect:
             "header_line": self.header_line,
             "units_line": self.units_line,
         }
-        extra = [token for token in self.missing if token not in MISSING]
+        extra = [token for token in self.missing if token not in MISSING_WORDS]
         found |= {"thousands": self.thousands} if self.thousands else {}
         return found | ({"missing": extra} if extra else {})
 
@@ -212,7 +213,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     comment = _comments(lines, given)
     kept = _kept(name, lines, comment)
     delimiter, decimal = _separators(name, [line for _, line in kept], given)
-    split = [(k, cells_of(line, delimiter)) for k, line in kept]
+    split = [(k, split_line(line, delimiter)) for k, line in kept]
     count = Counter((len(cells) for _, cells in _last(split))).most_common(1)[0][0]
     stated = int(given.get("header_line") or 0)
     skipped = sum(k < stated for k, _ in kept)
@@ -239,7 +240,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         ignored=ignored,
         names=names,
         units=units,
-        missing=(*MISSING, *given.get("missing", ())),
+        missing=(*MISSING_WORDS, *given.get("missing", ())),
         **_digits([cell for _, row in split[first:] for cell in row], decimal, given),
         facts=facts_above(lines[: split[first][0] - 1], header),
     )
@@ -323,7 +324,7 @@ def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tu
     sample = _last(lines)
     best: tuple[float, int, tuple[str, str]] = (0.0, 0, ("", ""))
     for delimiter in [given["delimiter"]] if given.get("delimiter") else DELIMITERS:
-        split = [cells_of(line, delimiter) for line in sample]
+        split = [split_line(line, delimiter) for line in sample]
         count, often = Counter(len(cells) for cells in split).most_common(1)[0]
         for decimal in [given["decimal"]] if given.get("decimal") else (".", ","):
             rows = [cells for cells in split if len(cells) == count and _holds_number(cells, decimal)]
@@ -378,7 +379,7 @@ def _like(cells: Sequence[str], kinds: Sequence[str], decimal: str, count: int) 
     if len(cells) != count:
         return False
     for cell, kind in zip(cells, kinds, strict=True):
-        if kind == "number" and cell not in MISSING and not is_number(cell, decimal):
+        if kind == "number" and cell not in MISSING_WORDS and not is_number(cell, decimal):
             return False
         if kind == "stamp" and not forms_of([cell]):
             return False

@@ -21,10 +21,19 @@ import pyarrow as pa
 
 from ...common.errors import InputError
 from ..files import blocks_of_lines, lines_held, number_in, parsed
-from ..tables import Chunk, Column, LoggerFile, LoggerTable, library
-from .cells import HEXADECIMAL, MISSING, cells_of, is_infinite, is_number, kind_of_cells, plain_lines, plain_number
+from ..tables import Chunk, Column, LoggerFile, LoggerTable, optional_library
+from .cells import (
+    HEXADECIMAL,
+    MISSING_WORDS,
+    is_infinite,
+    is_number,
+    kind_of_cells,
+    plain_lines,
+    plain_number,
+    split_line,
+)
 from .csv_dialect import Dialect, dialect_of
-from .layout import SeveralLayouts, can_be_row, misfit, other_names
+from .layout import SeveralLayouts, can_be_row, other_names, row_misfit
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
@@ -110,7 +119,7 @@ class CsvTable(LoggerTable):
         return bool(text.strip()) and not text.startswith(self.dialect.comment)
 
     def _is_header(self, text: str) -> bool:
-        cells = cells_of(text, self.dialect.delimiter)
+        cells = split_line(text, self.dialect.delimiter)
         names = [name for name in self.dialect.names if name]
         return (
             bool(self.dialect.header_line)
@@ -125,7 +134,7 @@ class CsvTable(LoggerTable):
             octets = mark.encode()
             if lines.startswith(octets) or b"\n" + octets in lines:
                 for line in re.findall(rb"(?m)^" + re.escape(octets) + rb"([^\n]*)", lines):
-                    cells = cells_of(line.decode("utf-8", "replace"), one.delimiter)
+                    cells = split_line(line.decode("utf-8", "replace"), one.delimiter)
                     found += len(cells) == len(one.names) and can_be_row(cells, one.decimal)
         return found
 
@@ -213,10 +222,10 @@ class CsvTable(LoggerTable):
         self, line: int, text: str, names: Sequence[str], index: dict[str, int], following: str | None
     ) -> dict[str, Any]:
         one = self.dialect
-        row = cells_of(text, one.delimiter)
+        row = split_line(text, one.delimiter)
         if len(row) != len(self.columns):
             layout = (len(self.columns), one.delimiter, one.decimal, one.data_line)
-            raise misfit(self.path.name, line, row, layout, following)
+            raise row_misfit(self.path.name, line, row, layout, following)
         return {name: self._value(line, row, name, row[index[name]]) for name in names}
 
     def _value(self, line: int, row: list[str], name: str, cell: str) -> Any:
@@ -258,7 +267,7 @@ def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:
     lines = re.split(r"\r\n|\n|\r", text)
     lines = lines[dialect.data_line - 1 :] if whole else lines[dialect.data_line - 1 : -1]
     rows = [
-        cells_of(line, dialect.delimiter) for line in lines if line.strip() and not line.startswith(dialect.comment)
+        split_line(line, dialect.delimiter) for line in lines if line.strip() and not line.startswith(dialect.comment)
     ]
     rows = [row for row in rows if len(row) == len(dialect.names)]
     return rows if len(rows) <= _SAMPLE else [*rows[: _SAMPLE // 2], *rows[-_SAMPLE // 2 :]]
@@ -267,7 +276,7 @@ def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:
 def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Column:
     kind = kind_of_cells(cells, dialect.decimal, dialect.thousands)
     why = f"in line {dialect.units_line}" if unit else ""
-    known = tuple("" if cell in MISSING else cell for cell in cells)
+    known = tuple("" if cell in MISSING_WORDS else cell for cell in cells)
     held = [cell for cell in known if cell]
     numbers = sum(is_number(cell, dialect.decimal, dialect.thousands) for cell in held)
     if kind == "empty" or (kind == "text" and numbers > _MOST * len(held)):  # its words are refused with their line
@@ -314,7 +323,7 @@ def open_spreadsheet(path: Path) -> LoggerFile:
     Raises:
         InputError: openpyxl is not installed, the file is damaged, or no sheet holds rows of numbers.
     """
-    openpyxl = library(path, "openpyxl", "excel", "a spreadsheet")
+    openpyxl = optional_library(path, "openpyxl", "excel", "a spreadsheet")
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     except Exception as error:  # whatever a damaged file makes of the parser
@@ -340,7 +349,7 @@ def open_spreadsheet(path: Path) -> LoggerFile:
             raise SeveralLayouts(where, error.found, error.expected) from error
         except InputError as error:
             refused.append(InputError(f"{path.name}, sheet {sheet.title}", error.found, error.expected))
-            if any(can_be_row(cells_of(line, ","), ".") for line in place.read_text("utf-8").splitlines()):
+            if any(can_be_row(split_line(line, ","), ".") for line in place.read_text("utf-8").splitlines()):
                 notes.append(f"the rows of sheet {sheet.title} are not read: {error.found}")
     if not tables:
         raise refused[0] if refused else InputError(path.name, "no sheets", "a sheet with a header and rows")

@@ -32,7 +32,7 @@ from ..tables import LoggerFile
 from .csv_table import open_csv
 from .map_file import MAP_FILE, Choice, ImportPlan, Map, TimeMap, map_text
 from .propose import Ask, propose
-from .rows import NAMES, Format, ImportedRows, RunFile
+from .rows import NAMES_OF_COLUMNS, FileFormat, ImportedRows, RunFile
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 
@@ -151,7 +151,7 @@ def preview(rows: ImportedRows) -> Iterator[str]:
         yield f"  row {k + 1}: {before or '-'}  ->  {after}"
 
 
-def summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def import_summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """What was written."""
     for entry in entries:
         cells = entry["evidence"].cells
@@ -185,7 +185,7 @@ def _line(role: str, source: str, unit: str, why: str) -> str:
 
 def _unit_words(choice: Choice) -> str:
     kind = "rate" if choice.role.startswith("rate") else choice.role
-    if choice.role in NAMES or choice.role == "time":
+    if choice.role in NAMES_OF_COLUMNS or choice.role == "time":
         return f"{choice.unit} -> {_NATIVE[kind]}" if choice.unit and kind in _NATIVE else ""
     return choice.unit or ""
 
@@ -205,7 +205,7 @@ def _why(choice: Choice) -> str:
 
 
 Say = Callable[[str], None]
-Progress = Callable[[str, float], None]
+ImportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +221,7 @@ class ImportOptions:
     """
 
     serial: str | None = None
-    format: Format = "parquet"
+    format: FileFormat = "parquet"
     trust_units: bool = False
     dry_run: bool = False
     exam: bool | None = None
@@ -280,7 +280,7 @@ def import_files(
     *,
     ask: Ask | None = None,
     say: Say | None = None,
-    progress: Progress | None = None,
+    progress: ImportProgress | None = None,
 ) -> Imported | None:
     """Imports files, each as a run, into a new folder.
 
@@ -311,7 +311,7 @@ def _imported(
     options: ImportOptions,
     ask: Ask,
     tell: Say,
-    progress: Progress | None,
+    progress: ImportProgress | None,
 ) -> Imported:
     entries: list[dict[str, Any]] = []
     names: set[str] = set()
@@ -336,7 +336,7 @@ def _imported(
             entry["exam"] = exam and entry is entries[-1]
         write_own(folder / MAP_FILE, map_text(chosen))
         write_own(folder / FILE, description_of(serial, chosen, entries))
-    for line in summary(out, entries):
+    for line in import_summary(out, entries):
         tell(line)
     tell(_judged_by(entries))
     return Imported(serial, chosen, tuple(entries))
@@ -375,7 +375,7 @@ def _run(
     chosen: Map,
     options: ImportOptions,
     tell: Say,
-    progress: Progress | None,
+    progress: ImportProgress | None,
 ) -> dict[str, Any]:
     """Writes one run; its entry."""
     layout = rows.layout

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...common.errors import InputError
-from .cells import DELIMITERS, MISSING, cells_of, is_number
+from .cells import DELIMITERS, MISSING_WORDS, is_number, split_line
 from .stamps import forms_of
 
 _WAYS = tuple((delimiter, decimal) for delimiter in DELIMITERS for decimal in (".", ","))
@@ -38,7 +38,7 @@ def can_be_row(cells: Sequence[str], decimal: str) -> bool:
     `Range: 400, 500` is none, because a word says what its numbers are. A word of which most are digits is no such
     word: it is a stamp of a form that is not known.
     """
-    held = [cell for cell in cells if cell not in MISSING]
+    held = [cell for cell in cells if cell not in MISSING_WORDS]
     numbers = [is_number(cell, decimal) for cell in held]
     if sum(numbers) < _FEWEST_NUMBERS:
         return False
@@ -78,8 +78,8 @@ def check_between(name: str, lines: Sequence[tuple[int, str]], count: int, delim
         SeveralLayouts: It has another number of cells.
     """
     for line, text in lines:
-        cells = cells_of(text, delimiter)
-        if any(cell not in MISSING and is_number(cell, decimal) for cell in cells):
+        cells = split_line(text, delimiter)
+        if any(cell not in MISSING_WORDS and is_number(cell, decimal) for cell in cells):
             if len(cells) != count:
                 raise SeveralLayouts(f"{name}, line {line}", *_damaged(name, line, line, len(cells), count))
             return line
@@ -88,7 +88,7 @@ def check_between(name: str, lines: Sequence[tuple[int, str]], count: int, delim
 
 def rows_among(lines: Sequence[tuple[int, str]], delimiter: str, decimal: str) -> list[Row]:
     """Lines that can be rows in any dialect; and those that repeat the words of another one: `IMU,0,20.1,10.2`."""
-    split = [cells_of(text, delimiter) for _, text in lines]
+    split = [split_line(text, delimiter) for _, text in lines]
     words = [_words(cells, decimal) for cells in split]
     often = Counter(words)
     found = []
@@ -103,7 +103,7 @@ def rows_among(lines: Sequence[tuple[int, str]], delimiter: str, decimal: str) -
 def _other_layout(text: str) -> tuple[int, str] | None:
     """The layout of a line that is a row in another dialect."""
     for delimiter, decimal in _WAYS:
-        cells = cells_of(text, delimiter)
+        cells = split_line(text, delimiter)
         if can_be_row(cells, decimal):
             return len(cells), delimiter
     return None
@@ -112,7 +112,7 @@ def _other_layout(text: str) -> tuple[int, str] | None:
 def _words(cells: Sequence[str], decimal: str) -> tuple[int, tuple[tuple[int, str], ...]] | None:
     """Number of cells and the words among them with their places; None without two numbers, or without words."""
     numbers = [is_number(cell, decimal) for cell in cells]
-    words = tuple((k, cell) for k, cell in enumerate(cells) if not numbers[k] and cell not in MISSING)
+    words = tuple((k, cell) for k, cell in enumerate(cells) if not numbers[k] and cell not in MISSING_WORDS)
     return (len(cells), words) if words and sum(numbers) >= _FEWEST_NUMBERS else None
 
 
@@ -120,7 +120,7 @@ def _refusal(name: str, lines: Sequence[tuple[int, str]], rows: Sequence[Row], d
     """The line where the layout changes, and the commands that part the file there or take single lines out."""
     at = next(k for k, row in enumerate(rows) if row.layout != rows[0].layout)
     before, after = rows[at - 1], rows[at]
-    names = next((len(cells_of(text, delimiter)) for k, text in reversed(lines) if k < rows[0].line), 0)
+    names = next((len(split_line(text, delimiter)) for k, text in reversed(lines) if k < rows[0].line), 0)
     if names == after.layout[0] != before.layout[0]:  # the names are those of the rows below
         found, remedy = _damaged(name, rows[0].line, before.line, before.layout[0], names)
         return SeveralLayouts(f"{name}, line {rows[0].line}", found, remedy)
@@ -162,7 +162,7 @@ def _cells(count: int) -> str:
     return f"{count} cells" if count != 1 else "1 cell"
 
 
-def misfit(
+def row_misfit(
     name: str, line: int, row: Sequence[str], dialect: tuple[int, str, str, int], following: str | None
 ) -> SeveralLayouts:
     """The refusal of a line below the first row that has another number of cells.
@@ -175,7 +175,7 @@ def misfit(
     shown = (" " if delimiter == "whitespace" else delimiter).join(row)[:60]
     where, found = f"{name}, line {line}", f"{_cells(len(row))} where line {first} has {count}: {shown!r}"
     numbers = any(is_number(cell, decimal) for cell in row)
-    following_fits = following is not None and len(cells_of(following, delimiter)) == count
+    following_fits = following is not None and len(split_line(following, delimiter)) == count
     if len(row) > 1 and following is not None and not following_fits:
         return SeveralLayouts(where, found, parted(name, line, names=not numbers))
     remedy = _damaged(name, line, line, len(row), count)[1]

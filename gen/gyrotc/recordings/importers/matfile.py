@@ -15,7 +15,7 @@ import scipy.io
 
 from ...common.errors import InputError
 from ...common.inputs import need_memory
-from ..tables import Column, LoggerFile, Part, grouped, library, numbers, part_of, rate_of
+from ..tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, part_of, rate_of
 
 _NUMBER_BYTES = 8  # of a float64, the widest number that is read
 _DEEPEST = 4  # structures within one another: deeper ones are no tables
@@ -39,7 +39,7 @@ def open_mat(path: Path) -> LoggerFile:
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as MATLAB file ({what})", "a whole .mat file") from error
-    columns: list[tuple[str, str, int, Column, Part]] = []
+    columns: list[tuple[str, str, int, Column, ReadPart]] = []
     rates: dict[str, tuple[float, str]] = {}
     units: dict[str, str] = {}
     opaque: list[str] = []
@@ -80,7 +80,7 @@ def _leaves(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, str, int, Column, Part]]:
+def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
     if values.ndim == 1:
         flat = numbers(values)
         yield "", "", len(flat), Column(name), part_of(flat)
@@ -94,7 +94,9 @@ def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, str, int, Col
         yield "", "", len(flat), Column(name + axis), part_of(flat)
 
 
-def _with_unit(entry: tuple[str, str, int, Column, Part], units: dict[str, str]) -> tuple[str, str, int, Column, Part]:
+def _with_unit(
+    entry: tuple[str, str, int, Column, ReadPart], units: dict[str, str]
+) -> tuple[str, str, int, Column, ReadPart]:
     """The unit that a text beside a vector states: `rate_unit`, `units.rate`, `rate.unit`."""
     group, table, rows, column, part = entry
     base = column.name.removesuffix("_x").removesuffix("_y").removesuffix("_z")
@@ -117,13 +119,13 @@ def open_hdf5(path: Path) -> LoggerFile:
     Raises:
         InputError: h5py is not installed, the file is damaged, or holds nothing that can be read.
     """
-    h5py = library(path, "h5py", "hdf5", "an HDF5 or MATLAB 7.3 file")
+    h5py = optional_library(path, "h5py", "hdf5", "an HDF5 or MATLAB 7.3 file")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as HDF5 ({what})", "a whole HDF5 file") from error
-    columns: list[tuple[str, str, int, Column, Part]] = []
+    columns: list[tuple[str, str, int, Column, ReadPart]] = []
     rates: dict[str, tuple[float, str]] = {}
 
     matlab = False
@@ -169,7 +171,7 @@ def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
         raise InputError(f"{path.name}, {name}", found, "values in the file itself (h5repack makes it so)")
 
 
-def _set_columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, int, Column, Part]]:
+def _set_columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
     last = name.rpartition("/")[2]
     if node.dtype.names:
         for field in node.dtype.names:
@@ -192,11 +194,11 @@ def _set_columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, i
         yield group, group, rows, Column(label, unit, why), _part_of(node, k, tall)
 
 
-def _part_of_field(node: Any, field: str) -> Part:
+def _part_of_field(node: Any, field: str) -> ReadPart:
     return lambda a, b: numbers(node[a:b][field])
 
 
-def _part_of(node: Any, index: int | None, tall: bool) -> Part:
+def _part_of(node: Any, index: int | None, tall: bool) -> ReadPart:
     """Reads a vector, a column of a matrix, or a row of one that lies on its side (as MATLAB stores it)."""
     if index is None:
         return lambda a, b: numbers(node[a:b])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from ..tables import Column, LoggerFile, Part, grouped, library, numbers, rate_of
+from ..tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, rate_of
 
 _MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
 
@@ -20,11 +20,11 @@ def open_netcdf(path: Path) -> LoggerFile:
     Raises:
         InputError: xarray is not installed, the file is damaged, or holds nothing that can be read.
     """
-    xarray = library(path, "xarray", "netcdf", "a NetCDF file")
+    xarray = optional_library(path, "xarray", "netcdf", "a NetCDF file")
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
     if not classic:
-        library(path, "h5netcdf", "netcdf", "a NetCDF 4 file")
+        optional_library(path, "h5netcdf", "netcdf", "a NetCDF 4 file")
     try:
         data = xarray.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_timedelta=True)
     except Exception as error:  # whatever a damaged file makes of the parser
@@ -42,7 +42,7 @@ def open_netcdf(path: Path) -> LoggerFile:
     return LoggerFile(path, "NetCDF file", tables, facts, close=data.close)
 
 
-def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, Part]]:
+def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
     kind = variable.dtype.kind
     if kind not in "iufMm" or variable.ndim not in (1, 2):
         return
@@ -63,7 +63,7 @@ def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, 
         yield group, group, rows, Column(label, column.unit, column.why), _part(variable, k)
 
 
-def _part(variable: Any, index: int | None) -> Part:
+def _part(variable: Any, index: int | None) -> ReadPart:
     def read(first: int, last: int) -> Any:
         values = variable[first:last] if index is None else variable[first:last, index]
         array = np.asarray(values.values)

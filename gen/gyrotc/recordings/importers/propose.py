@@ -12,8 +12,8 @@ from pathlib import Path
 
 from ...common.errors import InputError
 from ..tables import Column, LoggerFile, LoggerTable
-from ..units import NATIVE, Meaning, UnitError, channel_unit, conversion, meaning, split_unit, words
-from .clock import fraction_of, parts_of
+from ..units import NATIVE_UNITS, Meaning, UnitError, channel_unit, conversion, meaning, split_unit, words_of_name
+from .clock import clock_columns, fraction_of
 from .map_file import Choice, ImportPlan, Map
 
 Ask = Callable[[str], str | None]
@@ -87,7 +87,7 @@ def increments(file: LoggerFile) -> str:
     for table in file.tables:
         for column in table.columns:
             name, unit, _ = split_unit(column.name)
-            if {"delta", "increment", "incr", "dtheta"} & set(words(name)):
+            if {"delta", "increment", "incr", "dtheta"} & set(words_of_name(name)):
                 angle = column.unit or unit or "rad"
                 return (
                     f'the increments as rates: --column rate="{column.name}" --rate-unit "{angle} / (0.01 s)" with the '
@@ -117,7 +117,7 @@ def listed(file: LoggerFile) -> str:
 
 
 def name_it(kind: str) -> str:
-    return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE[kind]})'
+    return f'--column {kind}="..." with one of them, and {OPTIONS[kind]} (gyrotc\'s own is {NATIVE_UNITS[kind]})'
 
 
 def nameless(file: LoggerFile) -> str:
@@ -247,7 +247,7 @@ def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str],
 
 def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
     """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
-    pulses = [c for c in table.columns if words(c.name)[:1] == ["pulses"]]
+    pulses = [c for c in table.columns if words_of_name(c.name)[:1] == ["pulses"]]
     if pulses:
         return [("pulses", pulses[0], "its name")], 5
     found = [(c, meaning(c.name, c.unit, table.name)) for c in table.columns if c.kind == "number"]
@@ -256,7 +256,7 @@ def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]
         rates = [
             (c, m)
             for c, m in found
-            if c.name in ("x", "y", "z") and "gyro" in words((table.name or file.stem).replace("_", " "))
+            if c.name in ("x", "y", "z") and "gyro" in words_of_name((table.name or file.stem).replace("_", " "))
         ]
     if not rates:
         return [], 0
@@ -324,7 +324,7 @@ def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[
         whole = _stamps(stamps)
         fraction = fraction_of(main.columns, whole[-1][0])
         return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
-    if parts := parts_of(main.columns):
+    if parts := clock_columns(main.columns):
         return [(column, "parts of the time, by their names") for column in parts], None, ""
     stated = {*chosen.columns.values().values(), chosen.columns.temperature}
     free = [c for c in main.columns if c.kind == "number" and c.name not in stated]
@@ -368,7 +368,7 @@ def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str])
         return
     count = 0
     for column in main.columns:
-        parts = words(split_unit(column.name)[0])
+        parts = words_of_name(split_unit(column.name)[0])
         known = next((w for w in parts if w in _CHANNELS), None)
         if column.name in taken or column.kind != "number" or known is None or count >= _MOST_CHANNELS:
             continue
@@ -381,7 +381,7 @@ def _channels(file: LoggerFile, main: LoggerTable, chosen: Map, taken: set[str])
 
 def _channel_name(name: str, unit: str | None, native: str) -> str:
     """A plain name; with the ending of the unit that it is converted to, where its unit is known."""
-    plain = "_".join(words(split_unit(name)[0])).encode("ascii", "ignore").decode() or "channel"
+    plain = "_".join(words_of_name(split_unit(name)[0])).encode("ascii", "ignore").decode() or "channel"
     endings = {"V": "v", "hPa": "hpa", "A": "ma", "uT": "ut", "degC": "c"}
     if unit and native in endings and channel_unit(f"{plain}_{endings[native]}") is not None:
         try:

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.files import create
-from ..description import Layout, faults, likely_temperature
+from ..description import Layout, column_faults, likely_temperature
 from ..reading import Evidence
 from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, UnitError, channel_unit, conversion, meaning
 from .clock import Clock
 from .map_file import Choice, ImportPlan, TimeMap
 
-NAMES = {
+NAMES_OF_COLUMNS = {
     "temperature": "temperature_c",
     "rate": "rate_dph",
     "rate_x": "rate_x_dph",
@@ -76,10 +76,10 @@ class ImportedRows:
     def layout(self) -> Layout:
         """Columns of the rows that are given."""
         roles = [choice.role for choice in self.plan.values]
-        axes = {role[-1]: NAMES[role] for role in roles if role.startswith("rate_")}
-        value = "" if axes else NAMES[roles[0]]
+        axes = {role[-1]: NAMES_OF_COLUMNS[role] for role in roles if role.startswith("rate_")}
+        value = "" if axes else NAMES_OF_COLUMNS[roles[0]]
         channels = tuple(choice.role for choice in self.plan.channels)
-        return Layout("time_s", NAMES["temperature"], value, roles == ["pulses"], axes, channels)
+        return Layout("time_s", NAMES_OF_COLUMNS["temperature"], value, roles == ["pulses"], axes, channels)
 
     def chunks(self) -> Iterator[tuple[dict[str, FloatArray], float]]:
         """Rows by column name, and the share of the file that was read.
@@ -110,7 +110,7 @@ class ImportedRows:
                 kept = self._in_order(kept, rows, chunk)
                 self._check(kept, rows, chunk)
                 self.count += len(kept["time_s"])
-                value_names = [NAMES[choice.role] for choice in plan.values]
+                value_names = [NAMES_OF_COLUMNS[choice.role] for choice in plan.values]
                 self.evidence.add(kept["time_s"], kept["temperature_c"], [kept[n] for n in value_names])
                 yield kept, chunk.done
         self._check_count()
@@ -129,7 +129,7 @@ class ImportedRows:
 
     def name_of(self, choice: Choice) -> str:
         """Name of the column that a choice becomes."""
-        return NAMES.get(choice.role, choice.role)
+        return NAMES_OF_COLUMNS.get(choice.role, choice.role)
 
     def _conversions(self) -> dict[str, Conversion | None]:
         every = (self.plan.temperature, *self.plan.values, *self.plan.channels)
@@ -237,7 +237,7 @@ class ImportedRows:
         Raises:
             InputError: There is one.
         """
-        for fault in faults(kept, self.layout):
+        for fault in column_faults(kept, self.layout):
             place = self.plan.main.place(chunk.first + int(rows[min(fault.row, len(rows) - 1)]))
             kind = {"time_s": "time", "temperature_c": "temperature"}.get(fault.column, "rate")
             unit = self.units.get(fault.column)
@@ -254,7 +254,7 @@ def conversion_of(choice: Choice) -> Conversion | None:
     if choice.unit is None or choice.role == "pulses":
         return None
     kind = "rate" if choice.role.startswith("rate") else choice.role
-    if choice.role in NAMES:
+    if choice.role in NAMES_OF_COLUMNS:
         return conversion(choice.unit, kind)
     wanted = channel_unit(choice.role)
     try:
@@ -274,7 +274,7 @@ def _same_time(plan: ImportPlan, table: LoggerTable) -> list[Column]:
     return likely[:1]
 
 
-Format = Literal["csv", "parquet"]
+FileFormat = Literal["csv", "parquet"]
 _GROUP_ROWS = 2**20  # of a row group: Arrow's own default
 
 
@@ -287,7 +287,7 @@ class RunFile:
         names: Columns; `pulses` are whole numbers.
     """
 
-    def __init__(self, path: Path, format: Format, names: Sequence[str]) -> None:
+    def __init__(self, path: Path, format: FileFormat, names: Sequence[str]) -> None:
         types = [(name, pa.int64() if name == "pulses" else pa.float64()) for name in names]
         self._schema = pa.schema(types)
         self._sink = create(path)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import InputError
-from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, Part, library, numbers
+from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
@@ -20,7 +20,7 @@ def open_tdms(path: Path) -> LoggerFile:
     Raises:
         InputError: nptdms is not installed, or the file is damaged.
     """
-    nptdms = library(path, "nptdms", "tdms", "a TDMS file")
+    nptdms = optional_library(path, "nptdms", "tdms", "a TDMS file")
     stream = path.open("rb")  # nptdms leaves one that it opens itself open where the file is damaged
     try:
         file = nptdms.TdmsFile.open(stream)
@@ -69,7 +69,7 @@ def _column(channel: Any) -> Column | None:
     return Column(channel.name, unit, "a property of the channel" if unit else "")
 
 
-def _part(channel: Any) -> Part:
+def _part(channel: Any) -> ReadPart:
     def part(first: int, last: int) -> Any:
         values = channel[first:last]
         return values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)

@@ -27,7 +27,7 @@ from .learn import FALSE_ALARM
 from .unit_means import UnitMeans
 from .use import MapPosterior, MapPrior
 
-Span = tuple[float, float]
+TemperatureSpan = tuple[float, float]
 
 _CENTERS = 17  # of regions over the run's temperatures: at half of the narrowest one's width
 _WIDTHS = (0.125, 0.25, 0.5)  # of regions, shares of the run's span: narrower ones hold too few means of a short run
@@ -40,8 +40,8 @@ _COVERAGE = 2.0  # k of U, about 95 % (JCGM 100:2008, G.1)
 @dataclass(frozen=True, slots=True)
 class _Shape:
     kind: str
-    temperature_c: Span
-    slope_c_per_min: Span
+    temperature_c: TemperatureSpan
+    slope_c_per_min: TemperatureSpan
     values: FloatArray
 
 
@@ -160,7 +160,7 @@ def _branches(run: UnitMeans) -> Iterator[NDArray[np.bool_]]:
             yield part
 
 
-def _range(x: FloatArray) -> Span:
+def _range(x: FloatArray) -> TemperatureSpan:
     return float(x.min()), float(x.max())
 
 

@@ -26,7 +26,17 @@ from .departures import Departures, Hypothesis, revised, updated, within
 from .given import Given
 from .learn import Envelope, sums_of, that_count
 from .unit_means import UnitMeans, means_of
-from .use import MapPosterior, MapPrior, check_positive, curve_of, followed, known_map, processed, seen_alone, triangle
+from .use import (
+    MapPosterior,
+    MapPrior,
+    check_positive,
+    curve_of,
+    known_map,
+    network_of_posterior,
+    processed,
+    seen_alone,
+    triangle,
+)
 
 _ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
 _SHAPE = 0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape
@@ -76,7 +86,7 @@ class EarlierPrior(MapPrior):
         run = within(self, unit)
         found = revised(self, run, self.unaged)
         posterior = updated(found[0].prior, unit)  # what lies beyond the earlier envelope counts, too
-        map_of_both = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        map_of_both = network_of_posterior(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
         use = _use(self, posterior, found, run, None if isinstance(map_of_both, str) else map_of_both[1])
         if isinstance(map_of_both, str):
             text = f"The earlier model is not used: a map with it is refused: {map_of_both}."

@@ -37,7 +37,7 @@ def freedom_of(units: int, clusters: int, directions: int) -> float:
     return float(max(units - clusters - directions, _LEAST_FREEDOM))
 
 
-def of_few(freedom: float) -> float:
+def student_variance(freedom: float) -> float:
     """Variance of Student's t, by which a spread that is known from few units is widened."""
     return freedom / (freedom - 2.0) if np.isfinite(freedom) else 1.0
 
@@ -414,7 +414,7 @@ def _partitions(sums: UnitSums, plain: LotState, number: int) -> list[NDArray[np
     return list(found.values())
 
 
-def folds_of(units: int) -> int:
+def fold_count(units: int) -> int:
     """Number of folds of the cross-validation."""
     return min(_FOLDS, units)
 
@@ -432,7 +432,7 @@ def _labels_cost(cluster: NDArray[np.int64]) -> float:
 def _left_out(sums: UnitSums, state: LotState) -> tuple[FloatArray, float, NDArray[np.bool_]]:
     """p-value of each unit under the lot without its fold, the inflation that they ask for, and who is an outlier."""
     n = len(sums)
-    folds = np.arange(n) % folds_of(n)
+    folds = np.arange(n) % fold_count(n)
     found: list[tuple[FloatArray, FloatArray]] = [(np.zeros(0), np.zeros(0))] * n
     for fold in range(int(folds.max()) + 1):
         rest = folds != fold

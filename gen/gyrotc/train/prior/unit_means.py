@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.training import MapMeans
-from ..data import Scaling, TrainingData, average, gather
+from ..data import Scaling, TrainingData, average_samples, gather
 from ..evidence import MEAN_S, Process, difference_sigma
 
 _SPREAD_GRID = 2.0**30  # of a spread: as many digits as a file holds
@@ -41,7 +41,7 @@ def unit_means(samples: TrainingData, scaling: Scaling, process: Process | None)
         process: What the outliers were found by and the noise is known from; None: nothing is left out, and the noise
             is that of differences. Noise that differences do not show (a drift) shows in what a process leaves.
     """
-    means = average(samples, MEAN_S)
+    means = average_samples(samples, MEAN_S)
     weight = means.weight / np.median(means.weight)
     sigma = difference_sigma(means, means.bias_dph, weight)
     kept = np.ones(len(means), dtype=bool)

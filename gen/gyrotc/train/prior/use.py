@@ -15,14 +15,14 @@ import numpy as np
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
-from ..data import Bins, Scaling, TrainingData, average
+from ..data import Bins, Scaling, TrainingData, average_samples
 from ..evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
 from ..mrbf import fit_mrbf
 from ..objection import objection
 from ..result import Outcome
 from .basis import PARAMETERS, LotBasis
 from .given import Given
-from .learn import FALSE_ALARM, evidence, freedom_of, of_few, p_value, scores, sums_of
+from .learn import FALSE_ALARM, evidence, freedom_of, p_value, scores, student_variance, sums_of
 from .unit_means import UnitMeans, unit_means
 
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
@@ -64,7 +64,9 @@ class MapPrior:
             shrunk = np.linalg.inv(np.linalg.inv(covariance) + precision)
             found.append((mean + shrunk @ (moment - precision @ mean), shrunk))
             likely.append(float(evidence(sums, mean, covariance)[0]) + float(np.log(share)))
-            factor = np.linalg.cholesky(covariance / of_few(self.freedom))  # the test counts the few by itself
+            factor = np.linalg.cholesky(
+                covariance / student_variance(self.freedom)
+            )  # the test counts the few by itself
             p.append(p_value(*scores(precision, moment, mean, factor), self.freedom))
         weight = np.exp(np.array(likely) - max(likely))
         weight /= weight.sum()
@@ -128,7 +130,7 @@ def process_result(log_parameters: FloatArray) -> LotProcess:
     return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
 
 
-def rounded(values: FloatArray) -> tuple[float, ...]:
+def file_numbers(values: FloatArray) -> tuple[float, ...]:
     """Numbers as a file tells them."""
     return tuple(float(f"{v:.{_DIGITS}g}") for v in values)
 
@@ -241,7 +243,7 @@ class LotPrior(MapPrior):
             )
             evidence = {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum}
             return Given(None, [{"id": "not_of_its_lot", "text": text, "evidence": evidence}], lot=use)
-        found = followed(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        found = network_of_posterior(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
         if isinstance(found, str):
             use = _use(self, posterior, serial, accepted=False, scaling=own)
             text = f"The lot is not used: a map with it is refused: {found}."
@@ -261,7 +263,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     directions = np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
     rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
     freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
-    scale = lot.cross_validation.spread_scale * of_few(freedom)
+    scale = lot.cross_validation.spread_scale * student_variance(freedom)
     means, covariances = _of_clusters(lot, scale, rest, where)
     sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
     if not (sizes > 0.0).all():
@@ -315,7 +317,7 @@ def _centers(span: tuple[float, float], n: int) -> FloatArray:
     return np.asarray(span[0] + (np.arange(n) + 0.5) / n * (span[1] - span[0]))
 
 
-def followed(
+def network_of_posterior(
     samples: TrainingData,
     own: Scaling,
     alone: Process | None,
@@ -368,7 +370,7 @@ def _process(
     samples: TrainingData, scaling: Scaling, alone: Process | None, unit: UnitMeans, posterior: MapPosterior
 ) -> Process:
     """The posterior in the form of a process that has seen the unit's means, asked where the lot's units were."""
-    means = average(samples, MEAN_S)
+    means = average_samples(samples, MEAN_S)
     weight = means.weight / np.median(means.weight)
     center = float(np.average(means.bias_dph, weights=weight))
     asked = posterior.prior.asked
@@ -456,11 +458,11 @@ def known_map(posterior: MapPosterior) -> KnownMap:
         center_dph=prior.center_dph,
         unit_dph=prior.unit_dph,
         functions=basis.result(),
-        mean=rounded(posterior.mean),
-        covariance=tuple(rounded(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
+        mean=file_numbers(posterior.mean),
+        covariance=tuple(file_numbers(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
         rest=process_result(prior.rest),
-        asked_temperature_c=rounded(asked.temperature_c),
-        asked_slope_c_per_min=rounded(asked.slope_c_per_min),
-        asked_share=rounded(asked.share),
+        asked_temperature_c=file_numbers(asked.temperature_c),
+        asked_slope_c_per_min=file_numbers(asked.slope_c_per_min),
+        asked_share=file_numbers(asked.share),
         between_dph=asked.between_dph,
     )
