@@ -22,7 +22,7 @@ from gyrotc.pages.chart import LINE_COLOURS
 from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
 from gyrotc.recordings.load import load
 from gyrotc.results.files import write_atomically
-from gyrotc.simulate.campaign import NoiseLevel, simulate
+from gyrotc.simulate.campaign import NoiseName, simulate
 from gyrotc.simulate.gyro import CELL_S
 from gyrotc.simulate.instrument import SimulatedRecord
 from gyrotc.simulate.scenario import simulated_floor
@@ -112,7 +112,7 @@ def _figures(values: FloatArray) -> dict[str, Any]:
     return {name: found[name] for name in ("mean_dph", "std_dph", "rms_dph")}
 
 
-def experiment(seed: int, noise: NoiseLevel, folder: Path) -> Experiment:
+def experiment(seed: int, noise: NoiseName, folder: Path) -> Experiment:
     """Simulates the paper's two sets for one gyro into `folder`, trains and judges every method."""
     simulate("paper", seed=seed, out=folder, noise=noise)
     groups, floor = groups_of(folder)

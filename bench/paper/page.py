@@ -22,7 +22,7 @@ from gyrotc import _core
 from gyrotc.common.errors import InputError
 from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
 from gyrotc.results.files import write_atomically
-from gyrotc.simulate.campaign import NoiseLevel, campaign, with_noise
+from gyrotc.simulate.campaign import NoiseName, campaign, with_noise
 from gyrotc.simulate.scenario import read
 
 from ..records import read_record, rounded, write_record
@@ -216,7 +216,7 @@ with the noise of an ordinary unit."""
 _DIGITS = 10  # kept of a figure
 _SERIES_DIGITS = 7  # decimals of what is drawn, deg/h: a seven-thousandth of the noise
 _SERIES = ("mlr", "rbf_random", "mrbf_paper")  # methods that the paper draws
-_NOISES: tuple[NoiseLevel, ...] = ("paper", "class")
+_NOISES: tuple[NoiseName, ...] = ("paper", "class")
 
 
 def made_with() -> dict[str, str]:

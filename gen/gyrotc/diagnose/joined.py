@@ -88,7 +88,7 @@ class Projection:
 
 
 @dataclass(frozen=True)
-class CandidateScores:
+class NegativeLogScores:
     """−log p of every candidate, in the order single, pairs, variance, structure; shape (..., candidates)."""
 
     single: FloatArray
@@ -100,14 +100,14 @@ class CandidateScores:
         return np.concatenate([self.single, self.pairs, self.variance, self.structure], axis=-1)
 
 
-def score(projection: Projection, columns: ScoredColumns, a: FloatArray) -> CandidateScores:
+def score(projection: Projection, columns: ScoredColumns, a: FloatArray) -> NegativeLogScores:
     """Scores for inner products `a`, shape (P,) or (draws, P)."""
     size = np.diag(projection.gram)
     alive = projection.alive
     single = columns.single
     z = np.abs(a[..., single]) / np.sqrt(np.where(alive[single], size[single], np.inf))
     one = -(np.log(2.0) + log_ndtr(-z))
-    return CandidateScores(
+    return NegativeLogScores(
         single=one,
         pairs=0.5 * _pair_energy(projection, columns.pairs, a),
         variance=np.stack([_variance(projection, v, a) for v in columns.variance], axis=-1)
@@ -245,7 +245,7 @@ class Joined:
         norm: Norm that channels and inputs had less the map; infinite where the map explains all, shape (c + i,).
         added: Candidates of channels and inputs, in this order.
         columns: Which joined columns belong together.
-        owners: Candidates in the order of `CandidateScores`.
+        owners: Candidates in the order of `NegativeLogScores`.
     """
 
     layout: JoinedLayout

@@ -36,7 +36,7 @@ from ..results.recordings import (
     ThermometerPlace,
     TriedRun,
 )
-from ..simulate.campaign import NoiseLevel
+from ..simulate.campaign import NoiseName
 from .sensitivity import Row, Sensitivity, additions, node_temperatures, programme_of, separability
 
 __all__ = ["places", "plan", "shortest"]
@@ -98,7 +98,7 @@ _D_FOUND = 6.0  # about where most causes are found, as in `sensitivity`
 _LEAST_C = 1e-4  # no thermometer tells less than this
 
 
-def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: NoiseLevel, seed: int) -> list[ThermometerPlace]:
+def places(scenario: str | Path, sensitivity: Sensitivity, *, noise: NoiseName, seed: int) -> list[ThermometerPlace]:
     """Every node but the sensor's own, the most telling first.
 
     Raises:
@@ -146,7 +146,7 @@ _HARD = 10.0  # d above which two causes count as hard to separate
 def plan(
     scenario: str | Path,
     *,
-    noise: NoiseLevel = "paper",
+    noise: NoiseName = "paper",
     seed: int = 1,
     required: Mapping[str, float] | None = None,
     pair: tuple[str, str] | None = None,

@@ -27,7 +27,7 @@ from ..diagnose.noise import NOISE_COLOURS, Declared, Whitener
 from ..diagnose.profile_likelihood import Gains
 from ..diagnose.search import Search, open_search
 from ..diagnose.signature_bank import SignatureBank, bank_of
-from ..simulate.campaign import NoiseLevel, campaign, with_noise
+from ..simulate.campaign import NoiseName, campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, Thermometer, read
 
 _BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
@@ -56,7 +56,7 @@ class Programme:
     bias_range_dph: tuple[float, float]
 
 
-def programme_of(scenario: str | Path, *, noise: NoiseLevel, seed: int, added: Sequence[str] = ()) -> Programme:
+def programme_of(scenario: str | Path, *, noise: NoiseName, seed: int, added: Sequence[str] = ()) -> Programme:
     """The training runs of a scenario (all runs where none is for training), and further ones from the library.
 
     Args:
@@ -105,7 +105,7 @@ class NodeTemperatures:
     there: frozenset[str]
 
 
-def node_temperatures(scenario: str | Path, *, noise: NoiseLevel, seed: int) -> NodeTemperatures:
+def node_temperatures(scenario: str | Path, *, noise: NoiseName, seed: int) -> NodeTemperatures:
     """The nodes of the gyro over the runs of `programme_of`. Raises as that."""
     _, plan = read(scenario)
     there = frozenset(one.node for one in plan.thermometer)
@@ -341,7 +341,7 @@ def _by_inputs(gains: Gains, total: FloatArray, energy: FloatArray) -> Iterator[
 
 
 def additions(
-    scenario: str | Path, pair: tuple[str, str], *, noise: NoiseLevel, seed: int
+    scenario: str | Path, pair: tuple[str, str], *, noise: NoiseName, seed: int
 ) -> list[tuple[str, float, float]]:
     """Profiles by how far one run more of them brings the d at which two causes part, best first.
 

@@ -24,17 +24,17 @@ from .findings import ValueWithLimits
 from .fits import (
     LEAST_ENERGY,
     LONGEST_GAP_S,
-    CellNoise,
     RowArrays,
     RunCells,
     SmoothFit,
+    WalkNoise,
     knots_of,
     likeliest_noise,
     maps_of,
     run_cells,
 )
 
-ChangeKind = Literal["step", "transition", "drift", "gain"]
+RateChangeKind = Literal["step", "transition", "drift", "gain"]
 
 FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
@@ -81,7 +81,7 @@ class Change:
     """
 
     run: int
-    kind: ChangeKind
+    kind: RateChangeKind
     time_s: ValueWithLimits
     duration_s: float
     size: ValueWithLimits
@@ -94,7 +94,7 @@ class _At:
     """A change as the search has it: beginning (s), duration (s)."""
 
     run: int
-    kind: ChangeKind
+    kind: RateChangeKind
     begin_s: float
     duration_s: float = 0.0
 
@@ -179,7 +179,7 @@ class _Search:
     """Runs with the noise that their changes are judged against."""
 
     def __init__(
-        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: CellNoise, curves: list[FloatArray]
+        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: WalkNoise, curves: list[FloatArray]
     ) -> None:
         self._cells, self._maps, self._noise, self._curves = cells, maps, noise, curves
         self._looks = _KINDS * sum(len(one) for one in cells)

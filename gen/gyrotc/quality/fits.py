@@ -66,7 +66,7 @@ def run_cells(rows: RowArrays, cell_s: float) -> RunCells:
 
 
 @dataclass(frozen=True, slots=True)
-class CellNoise:
+class WalkNoise:
     """White noise of variance 1 with walks of a level and its slope: variances of their steps from cell to cell.
 
     Attributes:
@@ -78,10 +78,10 @@ class CellNoise:
     slope: float
     cell_s: float
 
-    def in_cells(self, cell_s: float) -> CellNoise:
+    def in_cells(self, cell_s: float) -> WalkNoise:
         """The same in cells of another length, over the variance that their white part has."""
         ratio = cell_s / self.cell_s
-        return CellNoise(self.level * ratio**2, self.slope * ratio**4, cell_s)
+        return WalkNoise(self.level * ratio**2, self.slope * ratio**4, cell_s)
 
     def variance(self) -> float:
         """Of what the filter makes of it."""
@@ -127,7 +127,7 @@ class SmoothFit:
     """
 
     cells: tuple[RunCells, ...]
-    noise: CellNoise
+    noise: WalkNoise
     own: tuple[FloatArray, ...]
     shared: tuple[FloatArray, ...]
     rest: tuple[FloatArray, ...]
@@ -137,7 +137,7 @@ class SmoothFit:
 
     @staticmethod
     def of(
-        cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: CellNoise, changes: Sequence[FloatArray | None]
+        cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: WalkNoise, changes: Sequence[FloatArray | None]
     ) -> SmoothFit:
         """Fits all runs.
 
@@ -243,14 +243,14 @@ def knots_of(cells: Sequence[RunCells]) -> float:
 
 def likeliest_noise(
     cells: Sequence[RunCells], maps: Sequence[FloatArray], changes: Sequence[FloatArray | None]
-) -> tuple[CellNoise, float]:
+) -> tuple[WalkNoise, float]:
     """The walks of the largest likelihood beside changes that are known (as for `SmoothFit.of`), and its logarithm."""
     known: dict[tuple[int, int], float] = {}
     cell_s = min(one.cell_s for one in cells)
 
     def likelihood(at: tuple[int, int]) -> float:
         if at not in known:
-            noise = CellNoise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
+            noise = WalkNoise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
             known[at] = SmoothFit.of(cells, maps, noise, changes).log_likelihood
         return known[at]
 
@@ -260,7 +260,7 @@ def likeliest_noise(
         around = [(last[0] + i, last[1] + j) for i in (0, -1, 1) for j in (0, -1, 1)]
         inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
         best = max(inside, key=likelihood)
-    return CellNoise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]]), cell_s), known[best]
+    return WalkNoise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]]), cell_s), known[best]
 
 
 _WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through

@@ -33,7 +33,7 @@ from .scenario import TRUTH_FILE, NoiseLevels, Scenario, read
 __all__ = [
     "NOISE",
     "FileFormat",
-    "NoiseLevel",
+    "NoiseName",
     "RecordingPart",
     "RowForm",
     "RowLength",
@@ -48,7 +48,7 @@ __all__ = [
     "write_gyro",
 ]
 
-NoiseLevel = Literal["paper", "class"]
+NoiseName = Literal["paper", "class"]
 
 NOISE: dict[str, NoiseLevels] = {
     # 7e-4 deg/h of 100-s means, what Ding et al. 2014 report after compensation
@@ -75,7 +75,7 @@ def simulate(
     raw_hz: float | None = None,
     pulses: bool = False,
     format: FileFormat = "csv",
-    noise: NoiseLevel = "paper",
+    noise: NoiseName = "paper",
     progress: Callable[[float], None] | None = None,
 ) -> None:
     """Simulates a campaign and writes it as a data set with its truth beside it.
@@ -191,7 +191,7 @@ def _seeds(seed: int) -> list[np.random.SeedSequence]:
     return np.random.SeedSequence(seed).spawn(2)
 
 
-def with_noise(plan: Scenario, noise: NoiseLevel) -> Scenario:
+def with_noise(plan: Scenario, noise: NoiseName) -> Scenario:
     """The scenario with the chosen levels wherever it does not give its own."""
     if noise not in NOISE:
         raise InputError("noise", str(noise), ", ".join(NOISE))

@@ -18,7 +18,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..results.folder import result_folder
 from ..results.recordings import TrueLot
-from .campaign import NoiseLevel, RowForm, SimulatedGyro, with_noise, write_gyro
+from .campaign import NoiseName, RowForm, SimulatedGyro, with_noise, write_gyro
 from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
 from .scenario import Gyro, Scenario, read
 
@@ -86,7 +86,7 @@ def simulate_lot(
     out: Path,
     scenario: str | Path = "paper",
     form: RowForm | None = None,
-    noise: NoiseLevel = "paper",
+    noise: NoiseName = "paper",
     progress: Callable[[float], None] | None = None,
 ) -> list[str]:
     """Simulates a lot: a data set in `out/<serial>` for each unit, with its truth beside it.

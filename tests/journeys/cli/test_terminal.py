@@ -278,7 +278,7 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [(RunFormat, (campaign.FileFormat, rows.FileFormat)), (NoiseLevel, (campaign.NoiseLevel,))],
+    [(RunFormat, (campaign.FileFormat, rows.FileFormat)), (NoiseLevel, (campaign.NoiseName,))],
     ids=["runs", "noise"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:

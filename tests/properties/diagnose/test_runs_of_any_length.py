@@ -13,7 +13,7 @@ from gyrotc.diagnose.blocks import records_of
 from gyrotc.diagnose.diagnosis import diagnose
 from gyrotc.quality.changes import Change, changes_of
 from gyrotc.quality.events import found_events
-from gyrotc.quality.fits import CellNoise, RowArrays
+from gyrotc.quality.fits import RowArrays, WalkNoise
 from gyrotc.recordings.load import load
 from gyrotc.results.diagnosed import Diagnosed
 from hypothesis import given, settings
@@ -89,7 +89,7 @@ def test_order_and_clocks_move_no_change(shorts: list[tuple[float, float, float]
 def test_a_filter_leaves_as_much_of_noise_in_cells_of_any_length() -> None:
     """A level that walks under white noise, in cells of 10 s and in their means over a minute."""
     rng = np.random.default_rng(SEED)
-    noise = CellNoise(3e-3, 1e-13, 10.0)
+    noise = WalkNoise(3e-3, 1e-13, 10.0)
     rate = rng.standard_normal(120_000) + np.cumsum(np.sqrt(noise.level) * rng.standard_normal(120_000))
     means = rate.reshape(-1, 6).mean(axis=1)
     left = [np.std(noise.white(x, cell_s)[200:]) for x, cell_s in ((rate, 10.0), (means, 60.0))]
