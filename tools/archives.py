@@ -1,7 +1,8 @@
-"""Archives to install gyrotc from, without sources beside them: `make dist`.
+"""Archives to install gyrotc from, without sources beside them: `make release`.
 
 Into OUT: `gyrotc-<version>.tar.gz` (sdist: generator, C++ core, C runtime, manual pages, licence), a wheel that was
-built from that archive and needs no compiler, `sbom-generator.cdx.json` and `sbom-c.cdx.json` (CycloneDX 1.5), and
+built from that archive and needs no compiler, `gyrotc-c-<version>.tar.gz` (the C library, for CMake, Zephyr or by
+copying), `sbom-generator.cdx.json` and `sbom-c.cdx.json` (CycloneDX 1.5), and
 `SHA256SUMS`. Equal sources give equal bytes: the time of every entry is SOURCE_DATE_EPOCH, by default that of the last
 commit. `--sdist` leaves the wheel out, which takes a minute of compiling.
 """
@@ -90,16 +91,31 @@ def pkg_info() -> str:
 
 
 def sdist(out: Path) -> Path:
-    """The source archive; entries in order of name, owned by nobody."""
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / f"gyrotc-{version.header_version(ROOT)}.tar.gz"
-    time = epoch()
+    """Write the source archive of the generator."""
     with tempfile.TemporaryDirectory() as folder:
-        top = staged(Path(folder))
+        return _archive(staged(Path(folder)), out)
+
+
+def c_library(out: Path) -> Path:
+    """Write the archive of the C library: sources, CMake's and Zephyr's files, licence."""
+    with tempfile.TemporaryDirectory() as folder:
+        top = Path(folder) / f"gyrotc-c-{version.header_version(ROOT)}"
+        for name in ("include", "libc", "zephyr"):
+            shutil.copytree(ROOT / name, top / name)
+        for name in ("CMakeLists.txt", "LICENSE"):
+            shutil.copy(ROOT / name, top)
+        return _archive(top, out)
+
+
+def _archive(top: Path, out: Path) -> Path:
+    """Pack a folder into `<its name>.tar.gz`; entries in order of name, owned by nobody, of one time."""
+    out.mkdir(parents=True, exist_ok=True)
+    path, time = out / f"{top.name}.tar.gz", epoch()
+    with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder) / "archive.tar"
         with tarfile.open(plain, "w", format=tarfile.PAX_FORMAT) as archive:
             for file in sorted(p for p in top.rglob("*") if p.is_file()):
-                entry = tarfile.TarInfo(file.relative_to(folder).as_posix())
+                entry = tarfile.TarInfo(file.relative_to(top.parent).as_posix())
                 entry.size, entry.mtime, entry.mode = file.stat().st_size, time, 0o644
                 with file.open("rb") as content:
                     archive.addfile(entry, content)
@@ -228,7 +244,7 @@ def main() -> int:
     parser.add_argument("--sdist", action="store_true", help="no wheel")
     arguments = parser.parse_args()
     out = arguments.out.resolve()
-    made = [sdist(out), *sboms(out)]
+    made = [sdist(out), c_library(out), *sboms(out)]
     if not arguments.sdist:
         made.append(wheel(made[0], out))
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}" for path in sorted(made)]

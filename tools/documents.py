@@ -7,8 +7,7 @@ sources' tracked files, with gyrotc of the environment on the PATH. A command wh
 the page says `$? = N` in the line behind its output. `needs: program` in the fence skips a block where it is missing.
 A block whose fence is ```` ```c file: lab/main.c ```` (any language) is a file: it is written there.
 
-    python tools/documents.py docs/tutorial.md            runs a page; exit status 1 and the difference if it is wrong
-    python tools/documents.py --times docs/tutorial.md    also tells how long each command takes
+    python tools/documents.py docs/tutorial.md    runs a page; exit status 1 and the difference if it is wrong
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -77,10 +75,10 @@ def agrees(printed: str, wanted: list[str]) -> bool:
     return re.fullmatch("".join(parts), text) is not None
 
 
-def run(page: Path, timed: Callable[[Step, float], None] = lambda step, seconds: None) -> Iterator[str]:
+def run(page: Path) -> Iterator[str]:
     """What is wrong with a page: one text for each command that prints or ends otherwise.
 
-    Missing programs are reported as `skipped: ...`; `timed` is given how long each command took, in s.
+    Missing programs are reported as `skipped: ...`.
     """
     with tempfile.TemporaryDirectory() as folder:
         work = _copy(Path(folder))
@@ -97,12 +95,10 @@ def run(page: Path, timed: Callable[[Step, float], None] = lambda step, seconds:
             if missing:
                 yield f"skipped: {where} needs {', '.join(missing)}"
                 continue
-            begun = time.monotonic()
             done = subprocess.run(
                 ["bash", "-c", step.command], cwd=work, env=environment, text=True, check=False, timeout=600,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             )  # fmt: skip
-            timed(step, time.monotonic() - begun)
             if done.returncode != step.status:
                 yield f"{where}: {step.command}\n  ends with {done.returncode}, not {step.status}:\n{done.stdout}"
             elif not agrees(done.stdout, step.output):
@@ -123,16 +119,10 @@ def pages() -> list[Path]:
     return sorted([*ROOT.glob("*.md"), *(p for f in folders for p in (ROOT / f).rglob("*.md"))])
 
 
-def _tell(step: Step, seconds: float) -> None:
-    print(f"{seconds:7.1f} s  {step.command.splitlines()[0][:90]}", flush=True)
-
-
 def main() -> int:
     """Runs the pages that are named, by default all that have something to run."""
-    words = [word for word in sys.argv[1:] if word != "--times"]
-    named = [Path(word).resolve() for word in words] or [p for p in pages() if steps(p.read_text("utf-8"))]
-    timed = _tell if "--times" in sys.argv[1:] else (lambda step, seconds: None)
-    wrong = [text for page in named for text in run(page, timed)]
+    named = [Path(word).resolve() for word in sys.argv[1:]] or [p for p in pages() if steps(p.read_text("utf-8"))]
+    wrong = [text for page in named for text in run(page)]
     print("\n".join(wrong) or f"{len(named)} pages are what they say")
     return 1 if any(not text.startswith("skipped") for text in wrong) else 0
 

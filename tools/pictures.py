@@ -1,4 +1,4 @@
-"""The pictures of README.md and docs/fleet.md, by a headless browser (`make picture`)."""
+"""The pictures of README.md and docs/, by a headless browser: `python tools/pictures.py` writes them into docs/."""
 
 from __future__ import annotations
 
@@ -13,37 +13,58 @@ sys.path.insert(0, str(ROOT / "tests" / "support"))
 from browser import browser  # noqa: E402
 from lot import Lot  # noqa: E402
 
-_PHONE = 390  # points: the narrowest phones that are common
+#: Width of the narrowest phones that are common, in points.
+_PHONE = 390
 _PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_offset", "outliers")
+_LIMITS = """schema = 1
+product = "NAV"
+[at_most]
+rms_dph = 9.0e-4
+table_bytes = 200
+[at_least]
+improvement = 8.0
+"""
 
 
-def main(work: Path, docs: Path = ROOT / "docs") -> None:
-    """Writes the pictures of `work/unit` on a screen and, dark, on a phone, of `work/diagnosis`, of a lot."""
-    fleet = _fleet(work / "lot", work / "fleet")
-    with tempfile.TemporaryDirectory(prefix="gyrotc-pictures-") as profile, browser(Path(profile)) as tab:
-        for page, name, width, height, dark, above in (
-            (work / "unit" / "report.html", "report.png", 1120, 1240, False, "html"),
-            (work / "unit" / "report.html", "report-phone.png", _PHONE, 844, True, "h2 + figure"),
-            (work / "diagnosis" / "report.html", "diagnosis.png", 1120, 1020, False, "html"),
-            (fleet, "fleet.png", 1120, 940, False, "html"),
-            (fleet, "fleet-curves.png", 1120, 830, True, "h2:has(+ figure)"),
-        ):
-            tab.open(page, width=width, height=height, dark=dark)
-            tab.value(f"document.querySelector('{above}').scrollIntoView()")
-            tab.picture(docs / name, whole=False)
+def main(docs: Path = ROOT / "docs") -> None:
+    """Make a result, a diagnosis and a fleet, and write pictures of their pages, bright and dark, wide and narrow."""
+    with tempfile.TemporaryDirectory(prefix="gyrotc-pictures-") as folder:
+        work = Path(folder)
+        (work / "product.toml").write_text(_LIMITS)
+        _gyrotc("simulate", "paper", "--seed", "1", "--out", work / "data")
+        _gyrotc("build", work / "data", "--limits", work / "product.toml", "--out", work / "unit")
+        _gyrotc("simulate", "thermal-gradient", "--seed", "3", "--out", work / "gradient")
+        _gyrotc("diagnose", work / "gradient", "--out", work / "diagnosis")
+        unit, diagnosis = (work / name / "report.html" for name in ("unit", "diagnosis"))
+        fleet = _fleet(work / "lot", work / "fleet")
+        with browser(work / "profile") as tab:
+            for page, name, width, height, dark, above in (
+                (unit, "report.png", 1120, 1240, False, "html"),
+                (unit, "report-phone.png", _PHONE, 844, True, "h2 + figure"),
+                (diagnosis, "diagnosis.png", 1120, 1020, False, "html"),
+                (fleet, "fleet.png", 1120, 940, False, "html"),
+                (fleet, "fleet-curves.png", 1120, 830, True, "h2:has(+ figure)"),
+            ):
+                tab.open(page, width=width, height=height, dark=dark)
+                tab.value(f"document.querySelector('{above}').scrollIntoView()")
+                tab.picture(docs / name, whole=False)
+
+
+def _gyrotc(*words: object) -> None:
+    program = Path(sys.executable).with_name("gyrotc")
+    subprocess.run([program, "-q", *map(str, words)], check=True)
 
 
 def _fleet(data: Path, out: Path) -> Path:
-    """The page of a lot of twelve units of three axes, of which six have a fault."""
+    """Return the page of a lot of twelve units of three axes, of which six have a fault."""
     lot = Lot(1, 12)
     for fault, unit in zip(_PLANTED, lot.units[::2], strict=True):
         lot.plant(fault, unit)
     lot.write(data)
     (data / "fleet.toml").write_text('schema = 1\ndatasets = ["IMU-*"]\nnumeric = ["f32"]\n')
-    program = Path(sys.executable).with_name("gyrotc")
-    subprocess.run([program, "-q", "fleet", data / "fleet.toml", "--out", out], check=True)
+    _gyrotc("fleet", data / "fleet.toml", "--out", out)
     return out / "fleet.html"
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

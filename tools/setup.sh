@@ -22,7 +22,7 @@ locked=${2:-}
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
 arm=(gcc-arm-none-eabi qemu-system-arm)
 test=(clang cmake cppcheck gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
-      clang-tidy pkg-config openssl meson ninja-build strace)
+      clang-tidy pkg-config strace)
 check=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-avr avr-libc)
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
          gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386

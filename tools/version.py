@@ -19,11 +19,6 @@ _NUMBER = r"(\d+\.\d+\.\d+)"
 PLACES = {
     "gen/pyproject.toml": rf'^version = "{_NUMBER}"$',
     "gen/gyrotc/__init__.py": rf'^__version__ = "{_NUMBER}"$',
-    "meson.build": rf"^  version: '{_NUMBER}',$",
-    "library.json": rf'^  "version": "{_NUMBER}",$',
-    "packages/meson/gyrotc.wrap": rf"^revision = v{_NUMBER}$",
-    "packages/esp-idf/idf_component.yml.in": rf'^version: "{_NUMBER}"$',
-    "packages/rust/Cargo.toml": rf'^version = "{_NUMBER}"$',
 }
 
 

@@ -1,4 +1,4 @@
-"""Archives of `make dist` and releases: what they hold, that they are made the same twice, what is refused."""
+"""Archives of a release: what they hold, that they are made the same twice, what is refused."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_every_file_has_a_licence_that_lies_in_licenses() -> None:
     assert done.returncode == 0, done.stdout
 
 
-TOOLS = ("release.sh", "version.py", "archives.py", "packages.py", "reference.py")
+TOOLS = ("release.sh", "version.py", "archives.py", "reference.py")
 
 
 def _run(*command: str, cwd: Path, status: int = 0, python: str = sys.executable) -> str:
@@ -170,24 +170,26 @@ def test_from_tag_to_archives(clone: Path) -> None:
     reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
     assert "git tag -a v0.2.0" in reported
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
-    emitter = clone / "gen" / "gyrotc" / "tables" / "text.py"
-    emitter.write_text(emitter.read_text("utf-8").replace("in one file;", "in one file of the tag;"), "utf-8")
     command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
-    command.write_text(command.read_text("utf-8").replace("in a shell, on", "in a shell of the tag, on"), "utf-8")
+    command.write_text(
+        command.read_text("utf-8").replace("Print the JSON Schema of", "Print of the tag the JSON Schema of"), "utf-8"
+    )
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
     _run("tools/release.sh", "archive", "v0.2.0", "--sdist", cwd=clone)
     made = clone / "build" / "release" / "0.2.0"
-    assert {"gyrotc-0.2.0.tar.gz", "sbom-c.cdx.json", "SHA256SUMS", "packages"} <= {p.name for p in made.iterdir()}
-    packages = list((made / "packages").iterdir())
-    assert len(packages) == 2 and all(p.is_file() and "0.2.0" in p.name for p in packages)
-    (crate,) = (p for p in packages if "crate" in p.name)
-    with zipfile.ZipFile(crate) as archive:
-        assert "not of the tag" not in archive.read("gyrotc/c/libc/gtc_crc.c").decode()
-        assert "gyrotc/LICENSE" in archive.namelist()
+    names = {"gyrotc-0.2.0.tar.gz", "gyrotc-c-0.2.0.tar.gz", "sbom-c.cdx.json", "sbom-generator.cdx.json", "SHA256SUMS"}
+    assert {p.name for p in made.iterdir()} == names
+    library = made / "gyrotc-c-0.2.0.tar.gz"
+    with tarfile.open(library) as archive:
+        assert {f"gyrotc-c-0.2.0/{name}" for name in ("LICENSE", "CMakeLists.txt", "zephyr/module.yml")} <= set(
+            archive.getnames()
+        )
+        source = archive.extractfile("gyrotc-c-0.2.0/libc/gtc_crc.c")
+        assert source is not None and b"not of the tag" not in source.read()
     page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
-    assert "in a shell of the tag, on" in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
+    assert "Print of the tag the JSON Schema of" in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
     _run("sha256sum", "-c", "--quiet", "SHA256SUMS", cwd=made)
     listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
     files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}
@@ -204,6 +206,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
         (("prepare", "2"), "is no version"),
         (("archive", "0.2.0"), "is no tag"),
         (("archive", "v0.2.0"), "there is no tag v0.2.0"),
+        (("prepare",), "is no version"),
         ((), "expected prepare or archive"),
     ],
 )
