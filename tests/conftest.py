@@ -106,7 +106,7 @@ def packed(name: str, content: bytes) -> bytes:
 
 
 def quick_and_slow(quick: Sequence[Any], slow: Sequence[Any]) -> list[Any]:
-    """Cases of a parametrised test, of which `make test` runs the quick ones and `make test-all` all."""
+    """Cases of a parametrised test, of which `make test` runs the quick ones."""
     marked = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in slow)
     return [*quick, *marked]
 

@@ -6,7 +6,7 @@
 #   tools/setup.sh check      besides, the cross compilers of `make check`
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
-#   tools/setup.sh picture    besides, the browser of `make picture`
+#   tools/setup.sh picture    besides, the browser of tools/pictures.py
 #
 # `locked` behind a level takes the versions of gen/requirements.lock, each file held against its SHA-256.
 #

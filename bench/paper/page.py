@@ -187,7 +187,7 @@ def _claims_table(gyros: Gyros) -> str:
 
 
 def _times(bench: Sequence[Mapping[str, Any]]) -> str:
-    """Running times in words: the paper's for one environment, `make bench`'s for all six together."""
+    """Running times in words: the paper's for one environment, ours for all six together."""
     ours = {row["name"]: row.get("seconds") for row in bench}
     random, modified = ours.get("paper: rbf_random"), ours.get("paper: mrbf_paper")
     theirs = [sorted(RUNNING_S[method].values()) for method in ("rbf_random", "mrbf_paper")]
@@ -196,7 +196,7 @@ def _times(bench: Sequence[Mapping[str, Any]]) -> str:
         f"modified one in {theirs[1][0]:.0f} to {theirs[1][-1]:.0f} s."
     )
     if random is None or modified is None:
-        return f"{paper} `make bench` has not measured ours."
+        return f"{paper} The campaign accuracy has not measured ours."
     verdict = "confirmed" if modified < 0.9 * random else "not confirmed"
     return (
         f"{paper} Here one model over all six takes {random:.3f} s and {modified:.3f} s of processor time ([results.md]"

@@ -328,15 +328,6 @@ def test_runs_of_a_data_set_have_a_ceiling(tmp_path: Path, monkeypatch: pytest.M
     assert "4 runs; expected at most 3" in refused(lambda: load(tmp_path))
 
 
-@pytest.mark.slow
-def test_mutants_of_every_reader() -> None:
-    """A slice of `make fuzz`: no exception but those meant for users, no hang, no more than 2 GiB."""
-    command = [sys.executable, str(Path(__file__).parents[1] / "mutants.py"), "--count", "420", "--seed", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    assert done.stdout.startswith("seed 1: ")
-
-
 @pytest.mark.parametrize(
     ("steps", "minutes", "reported"),
     [

@@ -17,8 +17,6 @@ from models import random_model, random_uncertainty
 
 sys.path.insert(0, str(ROOT))
 
-from bench.sigma import departures, gyro, pooled
-
 
 @pytest.fixture(scope="module")
 def build() -> Runtime:
@@ -76,13 +74,3 @@ def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> 
     table = quantise(random_model(5), numeric)
     status, _ = build.snapshots(table, table.encode_inputs(np.full((20, 1), 20.0)), np.zeros(20), 2)
     assert set(status[:, 1]) == {E_ABSENT}
-
-
-@pytest.mark.slow
-def test_errors_of_a_few_gyros_are_as_large_as_sigma_says() -> None:
-    """A slice of `make bench ONLY=sigma`: four gyros, whole runs and outages."""
-    parts = [departures(gyro("paper", seed), seed) for seed in range(900_001, 900_005)]
-    found = pooled(parts)
-    for state in ("all", "held", "warming"):
-        assert 0.3 < found[state]["squared"] < 2.5, (state, found[state])
-        assert 0.45 < found[state]["within_1"] < 0.9, (state, found[state])
