@@ -42,7 +42,7 @@ from .gain import emitted_means, floor_of, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refine import Refined
-from .refit import Effect, added_range, terms_of
+from .refit import Effect, added_range, mean_count, terms_of
 from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .static_map import fits_exactly
 from .summary import holds, not_testable, result_of
@@ -129,6 +129,9 @@ def _of_long_runs(dataset: Dataset, records: Records, chosen: FitOptions, say: P
     """All stages behind the choice of runs."""
     # Before the search: the rows of a whole recording and what the search remembers need not fit into memory together.
     refitting = Refitting(dataset, records, chosen, single_cycle=is_single_cycle(records))
+    if not any(mean_count(run, chosen.average_s) for run in refitting.train):
+        text = f"No training run has a mean over {chosen.average_s:g} s: record longer ones."
+        return Diagnosis(not_testable(dataset, chosen, text), None, None, None)
     analysis = analyse(records, declared_noise(dataset), say)
     cycle = cycle_of(records) if refitting.single_cycle else None
     if not refitting.takes(analysis.attribution.causes):
@@ -202,7 +205,7 @@ def _as_emitted(
 ) -> Extension:
     """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
     exam = [run for run in dataset.runs if run.role == "exam"]
-    if extended is None or not exam:
+    if extended is None or not refitting.exam:
         return extension
     plain = fit_dataset(dataset, options, read=refitting.read()).model
     before, after = emitted_means((plain, extended), exam, options.average_s)

@@ -43,6 +43,7 @@ from .refit import (
     completed,
     fit_extended,
     known,
+    mean_count,
     play_runs,
     samples,
     scored_means,
@@ -101,8 +102,9 @@ class Refitting:
         self.runs = [r for r in dataset.runs if r.role == "train"]
         self.front = front_end(self.runs, options.block_s)
         self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
-        self.exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
         self.average_s = options.average_s
+        exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
+        self.exam = [run for run in exam if mean_count(run, self.average_s)]
         self._fits: list[tuple[list[Effect], bool, Fit]] = []
         self.arguments: dict[str, Any] = {
             "method": map_method(options.method),
@@ -370,15 +372,14 @@ def _shipped(
 
 def _crossed(refitting: Refitting, causes: Sequence[Refined]) -> Chain:
     """Every training run (or branch of few runs) left out in turn, in a few groups."""
-    folds = held_out_masks(refitting)
-    if not folds:
+    chains = [refitting.left_out(held, causes) for held in held_out_masks(refitting)]
+    if not any(run.after_dph.size for stages in chains for run in stages[0]):
         return [_score_self(refitting)] * (sum(map(is_corrected, causes)) + 1)
-    chains = [refitting.left_out(held, causes) for held in folds]
     return [[run for stage in stages for run in stage] for stages in zip(*chains, strict=True)]
 
 
 def _score_self(refitting: Refitting) -> list[Averages]:
-    """Where nothing can be left out (one very short run): the training samples themselves, without gain."""
+    """Where no mean can be left out (very short runs): the training samples themselves, without gain."""
     return scored_means(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
 
 

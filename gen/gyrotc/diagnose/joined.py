@@ -146,14 +146,14 @@ def variance_ratio_of(gram: FloatArray, a: FloatArray, before: float) -> tuple[F
     """
     size, vectors = np.linalg.eigh(gram)
     keep = size > ROUNDING * max(before, 1e-300)
-    if not keep.any():
-        none = np.zeros(a.shape[:-1])
-        return none, none
     return ratio_of((a @ vectors[:, keep]) ** 2 / size[keep], size[keep])
 
 
 def ratio_of(energy: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same from energies of independent directions, shape (..., r), and their sizes, shape (r,)."""
+    """The same from energies of independent directions, shape (..., r), and their sizes, shape (r,); 0 of none."""
+    if s.size == 0:
+        none = np.zeros(energy.shape[:-1])
+        return none, none
     gain = np.outer(_LAMBDA / s.mean(), s)
     ratio = energy @ (gain / (1.0 + gain)).T - np.log1p(gain).sum(axis=1)
     best = np.argmax(ratio, axis=-1)

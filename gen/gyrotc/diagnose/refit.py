@@ -425,6 +425,13 @@ def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
     return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
 
 
+def mean_count(run: Played, average_s: float) -> int:
+    """How many means over `average_s` the samples of a run have."""
+    nothing = np.zeros(run.data.time_s.size)
+    whole = np.ones(nothing.size, dtype=bool)
+    return _means(run, nothing, whole, average_s).time_s.size
+
+
 def scored_means(
     fitted: Fit,
     runs: Sequence[Played],
@@ -447,15 +454,17 @@ def scored_means(
         if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
             left = _re_zeroed(left, data.time_s, effects)
         rest[seen] = left
-        out.append(
-            average_rows(
-                run.data.time_s,
-                run.data.temperature_c,
-                run.data.bias_dph,
-                rest,
-                scored=chosen,
-                average_s=max(average_s, run.block_s),
-                from_s=run.begins_s,
-            )
-        )
+        out.append(_means(run, rest, chosen, average_s))
     return out
+
+
+def _means(run: Played, left_dph: FloatArray, scored: NDArray[np.bool_], average_s: float) -> Averages:
+    return average_rows(
+        run.data.time_s,
+        run.data.temperature_c,
+        run.data.bias_dph,
+        left_dph,
+        scored=scored,
+        average_s=max(average_s, run.block_s),
+        from_s=run.begins_s,
+    )

@@ -25,7 +25,7 @@ from scipy.special import chdtrc
 from .. import causes
 from ..causes.base import Reach, SingleCycle
 from ..common.arrays import FloatArray
-from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
+from ..common.statistics import CHI2_95_ONE, NORMAL_95, TOLERANCE, orthonormal
 from ..train.data import turning_points
 from .attribution import Attribution
 from .blocks import Records, centred_slope
@@ -88,12 +88,10 @@ class CycleFits:
 
     @cached_property
     def columns(self) -> dict[str, FloatArray]:
-        """Their columns less the map's part, unit norm, by kind, shape (N, count)."""
+        """Their columns (`_column`) by kind, shape (N, count)."""
         out = {}
         for id, states in self.grid.items():
-            raw = np.column_stack([columns_of(self.records, id, c.values)[:, 0] for c in states])
-            rest = self._less_map(raw)
-            out[id] = rest / np.linalg.norm(rest, axis=0)
+            out[id] = np.column_stack([self._column(c) for c in states])
         return out
 
     def energies(self, kinds: tuple[str, ...]) -> FloatArray:
@@ -128,15 +126,18 @@ class CycleFits:
     def _inputs(self) -> tuple[FloatArray, FloatArray]:
         """Block means of T and centred dT/dt, scaled to -1 ... 1."""
         t, r = self.records.columns(lambda h: h.temperature_c), self.records.columns(centred_slope)
-        return 2.0 * (t - t.min()) / float(np.ptp(t)) - 1.0, r / float(np.abs(r).max())
+        return 2.0 * (t - t.min()) / float(np.ptp(t)) - 1.0, r / (float(np.abs(r).max()) or 1.0)
 
     def _without(self, columns: FloatArray) -> FloatArray:
         q = orthonormal(columns)
         return np.asarray(self.rest - q @ (q.T @ self.rest))
 
     def _column(self, member: Candidate) -> FloatArray:
-        rest = self._less_map(columns_of(self.records, member.id, member.values)[:, 0])
-        return np.asarray(rest / np.linalg.norm(rest))
+        """A state less the map's part, of unit norm; 0 where the map holds it, as where no temperature changes."""
+        raw = columns_of(self.records, member.id, member.values)[:, 0]
+        rest = self._less_map(raw)
+        size = float(np.linalg.norm(rest))
+        return np.asarray(rest / size) if size > TOLERANCE * float(np.linalg.norm(raw)) else np.zeros_like(rest)
 
     def polished(self, members: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
         """The states moved off the grid to the optimum nearby, one after the other; two of a kind stay separate."""

@@ -128,6 +128,27 @@ def test_runs_without_two_blocks_decide_nothing(tmp_path: Path) -> None:
     assert re.search("No run has two blocks", found.result.text)
 
 
+def test_runs_that_hold_their_temperature_name_no_memory(tmp_path: Path) -> None:
+    """Each at one temperature: the map holds all that a memory of it could be."""
+    rng = np.random.default_rng(SEED)
+    runs = [recording(rng, 5400.0, 60.0) for _ in range(2)]
+    for run, held_c in zip(runs, (10.0, 30.0), strict=True):
+        run["temperature_c"] = np.full_like(run["time_s"], held_c)
+    found = diagnose(load(written(tmp_path, *runs))).result
+    assert found.verdict in ("not_testable", "consistent", "noise_differs")
+    assert found.physical == ()
+
+
+def test_samples_too_few_for_a_mean_when_left_out_are_scored_themselves(tmp_path: Path) -> None:
+    """Two minutes of a quick ramp beside eleven rows."""
+    rng = np.random.default_rng(SEED)
+    runs = [recording(rng, 120.0, 10.0), recording(rng, 110.0, 10.0)]
+    for run in runs:
+        run["temperature_c"] = 20.0 + 0.05 * run["time_s"]
+    found = diagnose(load(written(tmp_path, *runs))).result
+    assert found.baseline is None or np.isfinite(found.baseline.exam_rms_dph)
+
+
 @pytest.mark.parametrize(("clock_s", "since_s"), [(0.0, 0.0), (600.0, 600.0), (1e5, 0.0), (1e9, 0.0), (-1e5, 0.0)])
 def test_a_clock_that_starts_elsewhere_does_not_count_from_power_on(
     tmp_path: Path, clock_s: float, since_s: float
