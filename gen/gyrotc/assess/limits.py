@@ -267,7 +267,6 @@ class Limits(_Part):
 
     schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
     product: str = ""
-    display: Literal["deg/h", "deg/s", "mdps", "arcsec/s"] = "deg/h"  # unit of rates on pages
     decision_rule: DecisionRule = "guard_band"
     at_most: AtMost = AtMost()
     at_least: AtLeast = AtLeast()
@@ -334,7 +333,6 @@ def held_against(limits: Limits, model: Model, evaluation: Evaluation, verificat
         limits=checks,
         verdict=worst_of(check.verdict for check in checks),
         decision_rule=limits.decision_rule,
-        display=limits.display,
     )
 
 

@@ -251,25 +251,6 @@ def _targets_begun(incomplete: str) -> list[str]:
 AnyAverageOption = Annotated[float | None, _of_build("average_s")]
 
 
-def _displayed(context: typer.Context, name: str | None) -> str | None:
-    """The unit holds for the whole call; results and files stay in deg/h."""
-    if name is not None:
-        from ..pages.display import displayed
-
-        context.with_resource(displayed(name))
-    return name
-
-
-DisplayOption = Annotated[
-    str | None,
-    typer.Option(
-        "--display",
-        callback=_displayed,
-        help="Unit of rates on page and terminal: deg/h, deg/s, mdps or arcsec/s; default: that of the limits file, "
-        "else deg/h. JSON, CSV, certificate and DCC stay in deg/h, the unit of the tables.",
-        autocompletion=completing(("deg/h", "deg/s", "mdps", "arcsec/s")),
-    ),
-]
 SeedOption = Annotated[int, _of_build("seed")]
 NumericOption = Annotated[
     str | None,
@@ -383,22 +364,13 @@ def progress(stages: Stages = ()) -> Iterator[Callable[[str], None]]:
         status.stop()
 
 
-def verbose() -> bool:
-    """Whether every detail is to be shown."""
-    return _Loudness.verbose
-
-
 def tell(text: str, *, wrong: bool = False) -> None:
-    """A line of the result on stdout, with `--json -` on stderr; rates as they are shown, errors as they are.
+    """A line of the result on stdout, with `--json -` on stderr.
 
     On a terminal it is broken between words; with --quiet only what went wrong is printed.
     """
     if _Loudness.quiet and not wrong:
         return
-    if "deg/h" in text and not wrong:
-        from ..pages.display import shown_text  # with the results: not for who states no rate
-
-        text = shown_text(text)
     line = terminal_line(text)
     OUT.print(folded(line, OUT.width) if OUT.is_terminal else line, highlight=False, soft_wrap=True)
 

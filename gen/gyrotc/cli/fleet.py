@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..pages.display import displayed, in_unit, rate_unit, sci, shown, words
+from ..pages.display import sci, words
 from .base import (
     LOT,
     AcceptOption,
     DirArg,
-    DisplayOption,
     JsonOption,
     LotOption,
     OutOption,
@@ -52,7 +51,6 @@ def fleet(
     ] = None,
     why: Annotated[str, typer.Option("--reason", help="Why, for --release.")] = "",
     lot: LotOption = None,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that are outliers.
@@ -70,15 +68,14 @@ def fleet(
     releases = dict.fromkeys(release or (), " ".join(why.split()))
     wanted = load_manifest(manifest)
     options = replace(wanted.options, prior=lot_in(lot))
-    wanted = replace(wanted, options=options, display=display or wanted.display)
+    wanted = replace(wanted, options=options)
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
-    with displayed(wanted.display), progress() as say:
+    with progress() as say:
         done = _Done(len(wanted.units), say)
         entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, full=full, releases=releases, done=done)
     summary = summary_of(entries)
     write_json(json_file, summary.content())
-    with displayed(wanted.display):
-        _tell_comparison(shown(summary))
+    _tell_comparison(summary)
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
@@ -128,9 +125,8 @@ def _tell_entry(entry: FleetEntry) -> None:
     text = f"{entry.name}: {entry.status}{kept}"
     if entry.after_rms_dph is not None:
         floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
-        before, after = in_unit([entry.before_rms_dph or 0.0, entry.after_rms_dph])
         text += (
-            f"; RMS {sci(float(before), 3)} -> {sci(float(after), 3)} {rate_unit()}{floor}, "
+            f"; RMS {sci(entry.before_rms_dph or 0.0, 3)} -> {sci(entry.after_rms_dph, 3)} deg/h{floor}, "
             f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
     if entry.status != "done":
@@ -147,7 +143,6 @@ def lot(
     axis: Annotated[
         str | None, typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own.")
     ] = None,
-    display: DisplayOption = None,
 ) -> None:
     """Learn what units of one type share, so that the next ones need fewer runs (build --lot).
 
@@ -160,10 +155,10 @@ def lot(
     with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
-    checked = shown(found.cross_validation)
+    checked = found.cross_validation
     tell(f"{out}: {found.text}")
     tell(
-        f"a new unit, before any run: {sci(checked.left_rms_dph)} {rate_unit()} about the lot's map, "
+        f"a new unit, before any run: {sci(checked.left_rms_dph)} deg/h about the lot's map, "
         f"{sci(checked.constant_rms_dph)} about its own mean"
     )
 

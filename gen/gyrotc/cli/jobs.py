@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..common.errors import CheckFailed, InputError
-from ..pages.display import NATIVE, displayed, rate_unit, sci, shown, words
 from ..train.options import BuildOptions
 from .base import (
     BUILD,
@@ -21,7 +20,6 @@ from .base import (
     AppliedOption,
     AxisOption,
     DatasetArg,
-    DisplayOption,
     JsonOption,
     LotOption,
     NumericOption,
@@ -36,13 +34,11 @@ from .base import (
     progress,
     show,
     tell,
-    verbose,
     with_build_options,
     write_json,
 )
 from .results import (
     change_lines,
-    evaluation_table,
     limit_lines,
     not_installed_lines,
     summary_line,
@@ -54,64 +50,37 @@ from .results import (
 if TYPE_CHECKING:
     from ..jobs.build import Built
     from ..model import Model
-    from ..results.diagnosed import ConsideredCause, Diagnosed, GainOnUnseen, NamedCause, Unexplained
-
-_RARE = 0.01  # the familywise level of the search: rarer statistics are reported
+    from ..results.diagnosed import Diagnosed, NamedCause
 
 
 def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
-    """The verdict in words: causes with their size and gain, rivals, what could still hide, what to do next."""
+    """Return the verdict, events with the lines that leave them out, named causes and what to do next.
+
+    The page and the JSON have the rest.
+    """
     axis = f" {result.axis}" if result.axis else ""
     yield f"{result.serial}{axis}: {result.verdict.replace('_', ' ')}. {result.text}"
-    yield result.meaning
     if result.lot is not None:
         yield f"lot: {result.lot}"
     for event in result.events:
         yield f"event: {event.text}"
         if event.exclude and not result.events_accepted:
             yield f"  {event.exclude}"
-    yield from result.missing
-    for d in result.discrepancies:
-        if d.p_value < _RARE:
-            yield (
-                f"  {words(d.statistic)}: measured {sci(d.measured, 3)}, "
-                f"simulated {sci(d.simulated_low, 3)} … {sci(d.simulated_high, 3)}"
-            )
     for cause in result.causes:
         yield from _cause_lines(cause)
-    if result.unexplained:
-        yield f"unexplained: {unexplained_text(result.unexplained)}"
     if result.physical and result.extended is None:
         yield _not_shipped(result)
-    limits = [_limit_text(c) for c in result.considered if c.detection_limit]
-    if limits:
-        yield "what could still hide below its detection limit:"
-        yield from (f"  {text}" for text in limits)
     yield from (f"next: {step}" for step in result.next)
 
 
-def unexplained_text(left: Unexplained) -> str:
-    """What is known of structure that has no name."""
-    parts = [f"p = {sci(left.p_value, 1)}"]
-    if left.best_partial_match:
-        names = " and ".join(left.best_partial_match).replace("_", " ")
-        parts.append(f"{names} would account for {left.share_explained:.0%} of the structure")
-    if left.looks_like:
-        parts.append(f"it looks more like {left.looks_like}")
-    return "; ".join(parts)
-
-
 def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
-    """What the diagnosis added to the model, and what it gained."""
+    """What the diagnosis added to the model."""
     yield f"diagnosis: {diagnosis.verdict.replace('_', ' ')}: {diagnosis.text}"
     extended = diagnosis.extended
     if extended is None:
         yield _not_shipped(diagnosis)
         return
-    added = ", ".join(extended.terms)
-    without = f" (without: {diagnosis.baseline.centers})" if diagnosis.baseline else ""
-    yield f"added: {added}; {extended.centers} centers{without}"
-    yield from _gain_lines(extended.gain)
+    yield f"added: {', '.join(extended.terms)}; {extended.centers} centers"
 
 
 def _not_shipped(result: Diagnosed) -> str:
@@ -125,8 +94,8 @@ def _not_shipped(result: Diagnosed) -> str:
         return "no extension is shipped: no cause is likelier than all others together"
     if "gain" in gains:
         return (
-            "no extension is shipped: the runs above gain, but pieces of the training history left out in turn do not "
-            "agree that it holds"
+            "no extension is shipped: it gains on runs it was not fitted to, but pieces of the training history left "
+            "out in turn do not agree that it holds"
         )
     return "no extension is shipped: no cause is shown to gain on runs it was not fitted to"
 
@@ -134,49 +103,12 @@ def _not_shipped(result: Diagnosed) -> str:
 _WORTH_A_LINE = 0.01  # a probability that is 0 % in print says nothing
 
 
-def _limit_text(considered: ConsideredCause) -> str:
-    name = considered.id + (f" ({considered.channel})" if considered.channel is not None else "")
-    limit = considered.detection_limit
-    if limit is None or limit.value is None:
-        return f"{name}: not visible at any {limit.parameter if limit else 'size'} in this gyro"
-    return f"{name}: {sci(limit.value)} {limit.unit}"
-
-
 def _cause_lines(cause: NamedCause) -> Iterator[str]:
-    yield f"cause: {cause.name} ({cause.id}, family {cause.family})"
-    for name, p in cause.parameters.items():
-        interval = "" if p.low is None else f", 95 % {sci(p.low)} … {sci(p.high)}"
-        yield f"  {words(name)}: {sci(p.value)}{interval}"
-    if cause.equivalent:
-        channels = f" ({', '.join(cause.equivalent_channels)})" if cause.equivalent_channels else ""
-        yield f"  as likely on these runs: {', '.join(cause.equivalent)}{channels}"
     likely = {name: share for name, share in (cause.probabilities or {}).items() if share >= _WORTH_A_LINE}
-    if len(likely) > 1:
-        odds = ", ".join(f"{name} {share:.0%}" for name, share in likely.items())
-        yield f"  probabilities: {odds}"
-    if cause.separate_by:
-        yield f"  to separate them: {cause.separate_by}"
+    odds = ", ".join(f"{name} {share:.0%}" for name, share in likely.items())
+    yield f"cause: {cause.name} ({odds or cause.id})"
     if cause.repair:
         yield f"  repair, a line of dataset.toml: {cause.repair}"
-    if cause.gain:
-        yield from _gain_lines(cause.gain)
-
-
-def _gain_lines(gain: GainOnUnseen) -> Iterator[str]:
-    """RMS and angle without and with, on runs not fitted to."""
-    share, removed = gain.share_of_excess_removed, gain.rms_removed_dph
-    part = "" if share is None else f"; {share:.0%} of the removable error ({gain.low:.0%} … {gain.high:.0%})"
-    before, after = sci(gain.exam_rms_before_dph), sci(gain.exam_rms_after_dph)
-    yield (
-        f"  RMS on runs not fitted to: {before} -> {after} {rate_unit()}, "
-        f"95 % {sci(removed.low, 1)} … {sci(removed.high, 1)} less{part}"
-    )
-    angle = gain.angle_1h_removed_arcsec
-    if angle is not None:
-        yield (
-            f"  angle after one hour: {sci(gain.angle_1h_before_arcsec)} -> {sci(gain.angle_1h_after_arcsec)} "
-            f"arcsec, 95 % {sci(angle.low, 1)} … {sci(angle.high, 1)} less"
-        )
 
 
 @app.command()
@@ -206,7 +138,6 @@ def build(
     any_serial: Annotated[
         bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
     ] = False,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -232,7 +163,6 @@ def build(
             prior=prior,
             ageing_dph=ageing,
             any_serial=any_serial,
-            display=display,
             progress=say,
         )
     if len(results) == 1:
@@ -242,8 +172,7 @@ def build(
     for result in results:
         if result.model.axis:
             tell(f"axis {result.model.axis}")
-        with displayed(display or (result.limits.display if result.limits else "") or NATIVE):
-            _print_built(result)
+        _print_built(result)
     tell(f"report: {out / 'report.html'}")
     why = [r.evaluation.residual_words for r in results if not r.diagnosis and r.evaluation.structure_left]
     if why:
@@ -265,19 +194,18 @@ def _left_out(model: Model) -> Iterator[str]:
 
 
 def _print_built(result: Built) -> None:
-    evaluation = shown(result.evaluation)
-    show(evaluation_table(evaluation))
-    if verbose() or result.verification.failed:
+    evaluation = result.evaluation
+    if result.verification.failed:
         show(verify_table(result.verification))
     for line in (
         verified_line(result.verification),
         *not_installed_lines(result.verification),
-        *training_lines(shown(result.training)),
+        *training_lines(result.training),
         *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
         *_left_out(result.model),
-        *(extension_lines(shown(result.diagnosis)) if result.diagnosis else ()),
-        *(limit_lines(shown(result.limits)) if result.limits else ()),
-        *(change_lines(shown(result.changes)) if result.changes else ()),
+        *(extension_lines(result.diagnosis) if result.diagnosis else ()),
+        *(limit_lines(result.limits) if result.limits else ()),
+        *(change_lines(result.changes) if result.changes else ()),
         *(f"finding {finding.id}: {finding.text}" for finding in evaluation.findings),
         summary_line(evaluation),
     ):
@@ -294,7 +222,6 @@ def compare(
     options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train every method on this data and show them side by side, as in the paper's Table 1.
@@ -316,9 +243,9 @@ def compare(
         result = with_published(run(recordings, trained, progress=say))
         if stage:
             write_atomically(stage.folder / "compare.json", json_text(result.content()))
-            write_atomically(stage.folder / "compare.svg", comparison_picture(shown(result)))
+            write_atomically(stage.folder / "compare.svg", comparison_picture(result))
     write_json(json_file, result.content())
-    for table in comparison_tables(shown(result)):
+    for table in comparison_tables(result):
         show(table)
 
 
@@ -342,7 +269,6 @@ def diagnose(
     accept_events: Annotated[
         bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
     ] = False,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
@@ -387,7 +313,7 @@ def diagnose(
     contents = {name: result.content() for name, result in results.items()}
     write_json(json_file, contents if several else next(iter(contents.values())))
     for name, result in results.items():
-        for line in diagnosis_lines(shown(result)):
+        for line in diagnosis_lines(result):
             tell(line)
         if out is not None:
             tell(f"report: {(out / name if several else out) / 'report.html'}")

@@ -12,10 +12,9 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ..common.errors import InputError
-from ..pages.display import DISPLAYS, NATIVE, plain, rate_unit, sci, shown, with_unit
+from ..pages.display import plain, sci, with_unit
 from .base import (
     PLAN,
-    DisplayOption,
     JsonOption,
     LotOption,
     NoiseLevel,
@@ -40,20 +39,13 @@ def limits_of(texts: Sequence[str]) -> dict[str, float]:
     Raises:
         InputError: One is not of this form, or of another quantity.
     """
-    from ..causes import CATALOGUE
-
     found = {}
     for text in texts:
         name, _, stated = text.partition("=")
-        value, _, unit = stated.strip().partition(" ")
-        native = CATALOGUE[name.strip()].unit if name.strip() in CATALOGUE else NATIVE
-        factors = {native: 1.0} | {native.replace(NATIVE, rate): factor for rate, factor in DISPLAYS.items()}
         try:
-            found[name.strip()] = float(value) / factors[unit.strip() or native]
+            found[name.strip()] = float(stated)
         except ValueError:
             raise InputError("--require", repr(text), "cause=limit, e.g. hysteresis=5e-5") from None
-        except KeyError:
-            raise InputError("--require", repr(text), f"a limit in {' or '.join(factors)}") from None
         if not found[name.strip()] > 0.0:
             raise InputError("--require", repr(text), "a limit above 0")
     return found
@@ -79,7 +71,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
     yield (
         f"{result.scenario}: {len(result.runs)} runs, {result.hours:g} h; "
         f"noise {sci(result.noise.arw_deg_per_sqrt_h)} deg/sqrt(h); "
-        f"simulated bias {sci(low)} … {sci(high)} {rate_unit()}"
+        f"simulated bias {sci(low)} … {sci(high)} deg/h"
     )
     yield _limits(result)
     for id, why in result.not_testable.items():
@@ -100,7 +92,7 @@ def plan_parts(result: Plan) -> Iterator[str | Table]:
 
 def _places(found: Sequence[ThermometerPlace]) -> Table:
     title = "Where a further thermometer would add most"
-    table = _table(title, "node", "difference, C", "not seen so far, C", f"shows from, {rate_unit()}/C")
+    table = _table(title, "node", "difference, C", "not seen so far, C", "shows from, deg/h/C")
     for place in found:
         limit = "never" if place.limit_dph_per_c is None else sci(place.limit_dph_per_c, 1)
         name = f"{place.node} (there is one)" if place.there else place.node
@@ -161,7 +153,7 @@ def _separability(result: Plan) -> Table:
 
 def _accuracy(result: Plan) -> Table:
     title = "Predicted accuracy of the compensated bias over the whole programme"
-    error = f"error of the map, {rate_unit()}"
+    error = "error of the map, deg/h"
     table = _table(title, "after run", "hours", error, "RMS of 100 s means", "over the floor")
     for entry, run in zip(result.accuracy, result.runs, strict=True):
         table.add_row(
@@ -228,7 +220,6 @@ def plan(
         float, typer.Option("--price-per-run", help="With --unit: of mounting and settling once, in the same.")
     ] = 1.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for plan.json and report.html.")] = None,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Predict what a programmed profile can detect, before it is run; with a lot, the shortest programme.
@@ -263,7 +254,7 @@ def plan(
         if stage:
             write_plan(stage.folder, result)
     write_json(json_file, result.content())
-    for part in plan_parts(shown(result)):
+    for part in plan_parts(result):
         if isinstance(part, str):
             tell(part)
         else:
@@ -296,11 +287,10 @@ def _next_run(
             write_atomically(stage.folder / "programme.csv", programme_csv(best))
             write_atomically(stage.folder / "programme.txt", programme_text(best))
     write_json(json_file, result.content())
-    result = shown(result)
-    tell(f"{result.serial} as it is known now: {sci(result.before_dph)} {rate_unit()} (1 sigma over the envelope)")
+    tell(f"{result.serial} as it is known now: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
     for k, one in enumerate(result.proposals):
         tell(
-            f"{one.programme.hours:.1f} h, price {plain(one.price)}: {sci(one.programme.sigma_dph)} {rate_unit()}, "
+            f"{one.programme.hours:.1f} h, price {plain(one.price)}: {sci(one.programme.sigma_dph)} deg/h, "
             f"{one.removed_share:.0%} of the variance removed{', most for its price' if k == result.best else ''}"
         )
     for line in programme_text(best).splitlines():
@@ -326,12 +316,11 @@ def _plan_with_lot(scenario: str, path: Path, require: Sequence[str], out: Path 
             write_atomically(stage.folder / "programme.csv", programme_csv(result.with_lot))
             write_atomically(stage.folder / "programme.txt", programme_text(result.with_lot))
     write_json(json_file, result.content())
-    visible = shown(result)
-    tell(f"the lot alone, before any run: {sci(visible.before_dph)} {rate_unit()} (1 sigma over the envelope)")
-    for name, found in (("with the lot", visible.with_lot), ("without", visible.without)):
+    tell(f"the lot alone, before any run: {sci(result.before_dph)} deg/h (1 sigma over the envelope)")
+    for name, found in (("with the lot", result.with_lot), ("without", result.without)):
         short = "" if found.reached else ", which is all that a day reaches"
         tell(
-            f"{name}: {found.hours:.1f} h for {sci(found.sigma_dph)} {rate_unit()}, "
+            f"{name}: {found.hours:.1f} h for {sci(found.sigma_dph)} deg/h, "
             f"RMS {found.rms_over_floor:.3f} x noise floor{short}"
         )
     for line in programme_text(result.with_lot).splitlines():

@@ -14,7 +14,6 @@ from .base import (
     AppliedOption,
     AxisOption,
     DatasetArg,
-    DisplayOption,
     JsonOption,
     NoiseLevel,
     OutOption,
@@ -260,7 +259,6 @@ def check(
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?")
     ] = None,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Report all errors and warnings of recordings at once, also while they still grow.

@@ -13,8 +13,6 @@ from ..pages.display import (
     COVERAGE,
     bound_words,
     measured_words,
-    plain,
-    rate_unit,
     rounded,
     sci,
     with_uncertainty,
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def evaluation_table(result: Evaluation) -> RichTable:
-    title = f"{result.serial}: means over {result.average_s:g} s, {rate_unit()}"
+    title = f"{result.serial}: means over {result.average_s:g} s, deg/h"
     table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("run", "role", "environment"):
         table.add_column(name, no_wrap=True)
@@ -49,58 +47,21 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
 
 
 def training_lines(training: Training) -> Iterator[str]:
-    """What training did: spans, the correction chosen, channels, and what came from a lot or an earlier model."""
-    if spans := training.spans:
-        if spans[0].kind == "run":
-            yield f"no run for the exam: {len(spans)} training runs, each left out in turn"
-        else:
-            yield f"fewer than three training runs: cut into {len(spans)} spans, each left out in turn with a guard gap"
-            for s in spans:
-                yield f"  {s.file}: {s.from_s:.6g} ... {s.to_s:.6g} s ({s.kind}, gap {s.guard_s:g} s)"
+    """Return which correction was chosen and why, which channels it uses, and what came from a lot or earlier model."""
     if training.candidates:
         yield f"correction {training.method}: {training.reason}"
-        tried = (f"{r.id} {sci(r.left_out_rms_dph)}" for r in training.candidates if r.left_out_rms_dph is not None)
-        yield f"  left-out RMS, {rate_unit()}: {', '.join(tried)}"
-    yield from _channel_lines(training)
+    for tried in training.channels or ():
+        yield f"channel {tried.name}: {tried.verdict}" + ("" if tried.verdict == "taken" else f": {tried.reason}")
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
     if training.prior is not None:
         yield f"earlier model: {training.prior.text}"
-        for cell in training.prior.cells:
-            if not cell.within:
-                (t0, t1), (r0, r1) = cell.temperature_c, cell.slope_c_per_min
-                yield (
-                    f"  {t0:.0f} ... {t1:.0f} C, {r0:.1f} ... {r1:.1f} C/min: {sci(cell.found_dph, 1)} {rate_unit()}, "
-                    f"limit {sci(cell.limit_dph, 1)}"
-                )
-
-
-_SHAPES = {
-    "line": "",
-    "product": " with a slope that depends on temperature",
-    "curve": " along a bent line, of two Gaussians beside a straight one",
-}
-
-
-def _channel_lines(training: Training) -> Iterator[str]:
-    """What became of every channel that was tried as an input."""
-    for tried in training.channels or ():
-        if tried.verdict != "taken":
-            yield f"channel {tried.name}: {tried.verdict}: {tried.reason}"
-            continue
-        before, after = tried.left_out_rms_before_dph, tried.left_out_rms_after_dph
-        average = "" if tried.shape == "line" else " on average"
-        slope = f"{sci(tried.slope_dph_per_unit)} {rate_unit()} per unit{average}"
-        yield (
-            f"channel {tried.name}: taken{_SHAPES[tried.shape or 'line']}, {slope}; left-out RMS {sci(before)} -> "
-            f"{sci(after)} {rate_unit()}, {tried.share_of_variance:.0%} of the variance of the bias"
-        )
 
 
 def prediction_line(training: Training) -> str:
     """What training expects of recordings that it has not seen, or why it does not say."""
     ratio = training.predicted_rms_ratio
-    floor = f"noise floor {sci(training.noise_floor_dph)} {rate_unit()}"
+    floor = f"noise floor {sci(training.noise_floor_dph)} deg/h"
     if ratio is None:
         return f"{floor}; no prediction of RMS over it: {training.prediction_withheld}"
     return f"{floor}; predicted RMS over it: {ratio:.4f}"
@@ -160,7 +121,7 @@ def verify_notes(result: Verification) -> Iterator[str]:
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (
-            f"{error.numeric}: worst error {sci(error.worst_dph)} {rate_unit()} of {error.inputs_visited} inputs "
+            f"{error.numeric}: worst error {sci(error.worst_dph)} deg/h of {error.inputs_visited} inputs "
             f"visited; the bound is {sci(error.bound_dph)}"
             + (" and is EXCEEDED" if error.worst_dph > error.bound_dph else "")
         )
@@ -231,7 +192,7 @@ def summary_line(result: Evaluation) -> str:
     spread = COVERAGE * known.standard if known else None
     if floor and rms is not None:
         text += (
-            f"; RMS {with_uncertainty(rms, spread)} {rate_unit()} = {rms / floor:.4f} x noise floor "
+            f"; RMS {with_uncertainty(rms, spread)} deg/h = {rms / floor:.4f} x noise floor "
             f"({result.noise_floor_source})"
         )
     if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
@@ -258,7 +219,7 @@ _RULES = {
 
 
 def limit_lines(limits: HeldLimits) -> Iterator[str]:
-    """The verdict, and every limit with what was measured and its uncertainty."""
+    """Return the verdict, and every limit that did not pass with what was measured."""
     product = f" of {limits.product}" if limits.product else ""
     if limits.decision is None:
         yield f"limits{product}: the file gives none, so nothing was judged"
@@ -267,10 +228,10 @@ def limit_lines(limits: HeldLimits) -> Iterator[str]:
     yield f"limits{product}: {limits.decision}{rule}"
     yield from (f"  CONDITIONAL PASS at most: {why}" for why in limits.capped)
     for check in limits.limits:
-        kind, _, figure = check.limit.partition(".")
-        sign = kind in ("at_most", "at_least")
-        mark = "" if check.decision == "PASS" else f", {check.decision}"
-        yield f"  {figure if sign else check.limit} {bound_words(check)}: {measured_words(check)}{mark}"
+        if check.decision != "PASS":
+            kind, _, figure = check.limit.partition(".")
+            name = figure if kind in ("at_most", "at_least") else check.limit
+            yield f"  {name} {bound_words(check)}: {measured_words(check)}, {check.decision}"
 
 
 def change_lines(changes: Changes) -> Iterator[str]:
@@ -286,19 +247,10 @@ def change_lines(changes: Changes) -> Iterator[str]:
             more = "significant: more than" if moved.significant else "not significant: no more than"
             share += f", {more} U = {rounded(moved.expanded_uncertainty_dph)}"
         yield (
-            f"against the earlier result: maps {sci(moved.rms_dph)} {rate_unit()} RMS difference{share}, at most "
+            f"against the earlier result: maps {sci(moved.rms_dph)} deg/h RMS difference{share}, at most "
             f"{sci(moved.max_abs_dph)} at {at.temperature_c:.1f} C, {at.slope_c_per_min:+.2f} C/min"
         )
     yield from _as_found_lines(changes)
-    for name, figure in changes.figures.items():
-        if not isinstance(figure, str) and plain(figure.before) != plain(figure.after):
-            yield f"  {name}: {plain(figure.before)} -> {plain(figure.after)}"
-    for kind, part in changes.named:
-        for what, names in part:
-            if names:
-                yield f"  {kind}, {what.replace('_', ' ')}: {', '.join(names)}"
-    for name, version in changes.versions.items():
-        yield f"  {name}: {version.before} -> {version.after}"
 
 
 def _as_found_lines(changes: Changes) -> Iterator[str]:
@@ -309,4 +261,4 @@ def _as_found_lines(changes: Changes) -> Iterator[str]:
             yield f"  as found: not known ({changes.as_found_missing})"
         return
     verdict = f", {found.limits.verdict}" if found.limits and found.limits.verdict else ""
-    yield f"  as found: RMS {sci(found.figures.after.rms_dph)} {rate_unit()} with the earlier correction{verdict}"
+    yield f"  as found: RMS {sci(found.figures.after.rms_dph)} deg/h with the earlier correction{verdict}"

@@ -23,7 +23,6 @@ from .base import (
     AxisOption,
     DatasetArg,
     DirArg,
-    DisplayOption,
     JsonOption,
     LotOption,
     NumericOption,
@@ -103,7 +102,6 @@ def fit(
     lot: LotOption = None,
     prior: PriorOption = None,
     ageing: AgeingOption = None,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
@@ -111,7 +109,6 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..jobs.recalibration import with_prior
-    from ..pages.display import shown
     from ..recordings.load import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
@@ -127,7 +124,7 @@ def fit(
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
     write_json(json_file, fitted.training.content())
-    training = shown(fitted.training)
+    training = fitted.training
     for line in training_lines(training):
         tell(line)
     for finding in training.findings:
@@ -281,7 +278,6 @@ def evaluate(
     applied: AppliedOption = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,
-    display: DisplayOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -290,7 +286,6 @@ def evaluate(
     """
     from ..assess.evaluate import evaluate as run
     from ..model import load_model
-    from ..pages.display import shown
     from ..recordings.load import load
     from ..results.files import json_text, write_atomically
 
@@ -305,13 +300,13 @@ def evaluate(
         )
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())
-    show(evaluation_table(shown(result)))
+    show(evaluation_table(result))
     if result.mismatches:
         raise CheckFailed(f"{result.mismatches} steps differ from the reference")
 
 
 @app.command()
-def report(folder: DirArg, display: DisplayOption = None) -> None:
+def report(folder: DirArg) -> None:
     """Write DIR/report.html from what build, diagnose or plan left in DIR.
 
     Example: gyrotc report result
@@ -326,7 +321,7 @@ def report(folder: DirArg, display: DisplayOption = None) -> None:
         if is_diagnosis(folder) or is_plan(folder):
             path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
         elif axes := axes_in(folder):
-            path = write_page(folder, axes_page(folder, axes, display))
+            path = write_page(folder, axes_page(folder, axes))
         else:
-            path = write_report(folder, display)
+            path = write_report(folder)
     tell(f"report: {path}")

@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
-from ..pages.display import NATIVE
 from ..recordings.load import asked_axes
 from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
@@ -59,7 +58,6 @@ class Fleet:
     options: FitOptions
     numerics: tuple[str, ...] | None
     limits: Limits | None
-    display: str = NATIVE
 
 
 class _Part(BaseModel):
@@ -111,7 +109,7 @@ def load_manifest(path: Path) -> Fleet:
     limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
     options = FitOptions(**options_in(manifest.options, f"{path}, field options."))
     numerics = tuple(manifest.numeric) if manifest.numeric else None
-    return _distinct(path, Fleet(units, options, numerics, limits, limits.display if limits else NATIVE))
+    return _distinct(path, Fleet(units, options, numerics, limits))
 
 
 def _units(folder: Path, axis: str | None) -> Iterator[Unit]:

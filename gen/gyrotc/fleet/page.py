@@ -23,7 +23,6 @@ from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..common.texts import csv_cell
 from ..pages.chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
-from ..pages.display import NATIVE, displayed, in_unit, rate_unit, shown
 from ..pages.report import page_environment
 from ..quality.thermometers import lag_of
 from ..results.files import json_text, write_atomically
@@ -57,9 +56,9 @@ def rms_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup | 
     place = np.arange(1, len(ordered) + 1)
     ringed = [k for k, entry in enumerate(ordered) if entry.name in outliers]
     size = 5.0 if len(ordered) < _SMALL_FLEET else 2.5
-    panel = Panel(x="gyros, in the order of what remains", y=f"RMS, {rate_unit()}", y_log=True, whole_x=True)
+    panel = Panel(x="gyros, in the order of what remains", y="RMS, deg/h", y_log=True, whole_x=True)
     for label, color in (("before", BEFORE), ("after", AFTER)):
-        values = in_unit(np.array([getattr(entry, f"{label}_rms_dph") for entry in ordered], dtype=np.float64))
+        values = np.array([getattr(entry, f"{label}_rms_dph") for entry in ordered], dtype=np.float64)
         panel.dots(place, values, color, label, size=size)
         if ringed:
             panel.dots(place[ringed], values[ringed], ACCENT, "outlier", size=11.0, hollow=True)
@@ -74,7 +73,7 @@ def curves_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup
         if len(members) < 2:
             continue
         plain = [e for e in members if e.name not in outliers]
-        panel = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title=f"axis {axis}" if axis else "", zoom=True)
+        panel = Panel(x="temperature, C", y="bias, deg/h", title=f"axis {axis}" if axis else "", zoom=True)
         for k, entry in enumerate(plain[:: -(-len(plain) // _MOST_CURVES) or 1]):
             label = "the others" if k == 0 else ""
             panel.line(_centers(entry), _curve(entry), COVERED, label, width=0.8, title=entry.name)
@@ -96,16 +95,16 @@ def why_outlier(known: Mapping[str, FleetEntry], reason: Reason) -> Markup:
 
 
 def _over_time(series: ResidualSeries, reason: Reason) -> Panel:
-    panel = Panel(x="time, h", y=f"compensated, {rate_unit()}")
+    panel = Panel(x="time, h", y="compensated, deg/h")
     time = np.array(series.time_s)
-    panel.line((time - time[0]) / 3600.0, in_unit(series.rate_dph), AFTER, series.file, width=1.0)
+    panel.line((time - time[0]) / 3600.0, series.rate_dph, AFTER, series.file, width=1.0)
     if reason.time_s is not None and reason.file == series.file:
         panel.vertical((reason.time_s - time[0]) / 3600.0, BEFORE, reason.id, dash="5 3", width=1.2)
     return panel
 
 
 def _over_temperature(known: Mapping[str, FleetEntry], entry: FleetEntry) -> Panel:
-    panel = Panel(x="temperature, C", y=f"bias, {rate_unit()}")
+    panel = Panel(x="temperature, C", y="bias, deg/h")
     rows = np.array([_curve(e) for e in known.values() if e.axis == entry.axis and e.facts])
     t = _centers(entry)
     seen = np.isfinite(rows).any(axis=0)
@@ -124,7 +123,7 @@ def _centers(entry: FleetEntry) -> FloatArray:
 
 def _curve(entry: FleetEntry) -> FloatArray:
     assert entry.facts is not None
-    return in_unit(_numbers(entry.facts.curve))
+    return _numbers(entry.facts.curve)
 
 
 _COLUMNS = (
@@ -160,11 +159,8 @@ def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
     )
 
 
-def write_summary(out: Path, entries: Sequence[FleetEntry], display: str = NATIVE) -> FleetSummary:
+def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
     """Writes `fleet.json`, `fleet.csv` and `fleet.html`; returns what the first says.
-
-    Args:
-        display: Unit of rates on the page.
 
     Raises:
         InputError: There are files of these names that gyrotc did not write.
@@ -172,27 +168,25 @@ def write_summary(out: Path, entries: Sequence[FleetEntry], display: str = NATIV
     summary = summary_of(entries)
     outliers = {reason.name for reason in summary.reasons} | {outlier.name for outlier in summary.outliers}
     known = {entry.name: entry for entry in entries if entry.facts}
-    with displayed(display):
-        visible = shown(summary)
-        pictures = {
-            reason.name: why_outlier(known, reason)
-            for reason in summary.reasons[:_PICTURES]
-            if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
-        }
-        page = (
-            page_environment()
-            .get_template("fleet.html.j2")
-            .render(
-                summary=visible,
-                outliers=outliers,
-                picture=rms_of_units([e for e in entries if e.after_rms_dph], outliers),
-                curves=curves_of_units(entries, outliers),
-                pictures=pictures,
-                links={entry.name: _link(out, entry.name) for entry in summary.serials},
-                verdicts=Counter(entry.verdict for entry in visible.serials),
-                barred=sum(bool(entry.barred) for entry in visible.serials),
-            )
+    pictures = {
+        reason.name: why_outlier(known, reason)
+        for reason in summary.reasons[:_PICTURES]
+        if reason.name in known and reason.id != "copy_of_other"  # nothing to be seen in it
+    }
+    page = (
+        page_environment()
+        .get_template("fleet.html.j2")
+        .render(
+            summary=summary,
+            outliers=outliers,
+            picture=rms_of_units([e for e in entries if e.after_rms_dph], outliers),
+            curves=curves_of_units(entries, outliers),
+            pictures=pictures,
+            links={entry.name: _link(out, entry.name) for entry in summary.serials},
+            verdicts=Counter(entry.verdict for entry in summary.serials),
+            barred=sum(bool(entry.barred) for entry in summary.serials),
         )
+    )
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(_COLUMNS)

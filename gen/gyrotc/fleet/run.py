@@ -298,7 +298,7 @@ def _run(
     if len(entries) < len(tasks) and any((out / name).exists() for name in SUMMARY):
         # What an earlier summary says of them ends now: a fleet that is killed must not leave it there.
         so_far = [entries.get(n) or _unfinished(task) for n, task in enumerate(tasks)]
-        write_summary(out, so_far, fleet.display)
+        write_summary(out, so_far)
     waiting = [number for number in range(len(tasks)) if number not in entries]
     left = [tasks[number] for number in waiting]
     for k, entry in on_dask(cluster, left) if cluster and left else on_processes(jobs, left):
@@ -308,7 +308,7 @@ def _run(
         entry.model_copy(update={"released": why}) if (why := releases.get(entry.serial or "")) else entry
         for entry in _one_of_each_serial([entries[number] for number in range(len(tasks))])
     ]
-    write_summary(out, found, fleet.display)
+    write_summary(out, found)
     return found
 
 

@@ -23,10 +23,10 @@ AXES = ("x", "y", "z")
 _HOST = "host-gcc-O2"
 
 
-def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> None:
+def join_axes(folder: Path, axes: Sequence[str]) -> None:
     """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
 
-    `display`: as of `build`. Proves that all tables link and pass their self-tests in one image.
+    Proves that all tables link and pass their self-tests in one image.
 
     Raises:
         CheckFailed: The image does not link, or a table does not pass its self-test in it.
@@ -38,7 +38,7 @@ def join_axes(folder: Path, axes: Sequence[str], display: str | None = None) -> 
     for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
         write_own(c / name, data)
     _run_together(c, [m.id for m in models.values()])
-    write_atomically(folder / "report.html", axes_page(folder, axes, display))
+    write_atomically(folder / "report.html", axes_page(folder, axes))
 
 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:

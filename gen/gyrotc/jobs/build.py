@@ -29,7 +29,6 @@ from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average_rows
 from ..model import Model, load_model
-from ..pages.display import check_display
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
 from ..recordings.load import asked_axes, load
@@ -109,7 +108,6 @@ class _Order:
     compiled: bool = True
     watch: Watch | None = None
     targets: Sequence[str] = ()
-    display: str | None = None
 
 
 def build(
@@ -128,7 +126,6 @@ def build(
     prior: Path | None = None,
     ageing_dph: float | None = None,
     any_serial: bool = False,
-    display: str | None = None,
     progress: Progress | None = None,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
@@ -148,7 +145,6 @@ def build(
             check run) do not speak against it; also the `previous` one where none is given.
         ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
         any_serial: An earlier result in `out` may be of another gyro.
-        display: Unit of rates on the page; None: that of the limits, else deg/h.
 
     Raises:
         InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
@@ -157,7 +153,6 @@ def build(
     say = progress or (lambda _: None)
     say("reading")
     chosen_targets(targets)
-    check_display(display)
     known = applied_of(applied) if applied else None
     if extend and (options.prior is not None or prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
@@ -165,7 +160,7 @@ def build(
     held = load_limits(limits) if limits else None
     order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph)
     proven = targets or (held.needs.targets if held else ())
-    order = replace(order, targets=proven, display=display)
+    order = replace(order, targets=proven)
     axes = asked_axes(source, axis)
     with result_folder(out, "build", inputs=[source]) as stage:
         if len(axes) == 1 and axis != "all":
@@ -181,7 +176,7 @@ def build(
                 part.of(dataset.serial, name)
                 say_axis = _of_axis(f"{name} ({k} of {len(axes)})", say)
                 built.append(_build_axis(dataset, part.folder, options, order, say_axis))
-        join_axes(stage.folder, names, display)
+        join_axes(stage.folder, names)
         return built
 
 
@@ -258,7 +253,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     _write(work / "budget.json", budget.content())
     if order.compiled:
         say("drawing the report")
-        write_report(work, order.display)
+        write_report(work)
     return Built(fitted.model, fitted.training, evaluation, verification, emission.refused, diagnosis, held, changes)
 
 

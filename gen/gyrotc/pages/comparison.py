@@ -13,7 +13,7 @@ from rich.table import Table
 
 from ..results.evaluation import Comparison, Group, Method, Published
 from .chart import AFTER, BEFORE, COVERED, Panel, drawing, stacked
-from .display import power, rate_unit
+from .display import power
 
 ENVIRONMENTS = ("-40 C", "20 C", "60 C", "1 C/min", "3 C/min", "5 C/min")
 
@@ -81,7 +81,7 @@ def _exponent(result: Comparison) -> int:
 def comparison_tables(result: Comparison) -> Iterator[Table]:
     """Environment by environment, as in the paper's Table 1; then all environments together, with the costs."""
     exponent = _exponent(result)
-    title = f"{result.serial}: judged on {result.judged_on}, rates in {power(exponent)} {rate_unit()}"
+    title = f"{result.serial}: judged on {result.judged_on}, rates in {power(exponent)} deg/h"
     yield _table_1(result, title, 10.0**exponent)
     yield _costs(result, 10.0**exponent)
 
@@ -168,9 +168,7 @@ def _rows_of(methods: Sequence[Method]) -> dict[str, Any]:
 
 def _environment(methods: Sequence[Method], k: int, exponent: int) -> Panel:
     unit = 10.0**exponent
-    panel = Panel(
-        x=f"RMS after, {power(exponent)} {rate_unit()}", title=methods[0].groups[k].environment, **_rows_of(methods)
-    )
+    panel = Panel(x=f"RMS after, {power(exponent)} deg/h", title=methods[0].groups[k].environment, **_rows_of(methods))
     place = np.arange(len(methods))[::-1]
     before = (methods[0].groups[k].before_std_dph or 0.0) / unit
     panel.vertical(before, label="σ before: what the mean alone leaves", dash="2 3")

@@ -29,7 +29,7 @@ from ..results.diagnosed import (
     Statistic,
 )
 from .chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
-from .display import rate_unit, shown, words
+from .display import words
 from .report import page_environment, page_from, sorted_by_rate, write_page
 
 PICTURES, SERIES = "pictures", "series.json"
@@ -41,13 +41,13 @@ def is_diagnosis(folder: Path) -> bool:
 
 
 def write_diagnosis_page(folder: Path) -> Path:
-    """Writes `folder/report.html` from what stands in the folder, rates as they are shown; returns its path.
+    """Writes `folder/report.html` from what stands in the folder; returns its path.
 
     Raises:
         InputError: `diagnose.json` is missing, or it or `series.json` is broken or of another kind.
     """
-    result = shown(read_result(folder / "diagnose.json", Diagnosed))
-    series = shown(read_optional(folder / SERIES, DiagnosisSeries))
+    result = read_result(folder / "diagnose.json", Diagnosed)
+    series = read_optional(folder / SERIES, DiagnosisSeries)
     with page_from(folder / "diagnose.json"):
         text = (
             page_environment()
@@ -119,7 +119,7 @@ def _events(runs: Sequence[RunSeries], events: Sequence[Finding]) -> Markup | No
     shown = [run for run in runs if run.file in files][:_MOST_PANELS]
     if not shown:
         return None
-    panels = _panels(len(shown), "h on the file's clock", f"rate − mean, {rate_unit()}")
+    panels = _panels(len(shown), "h on the file's clock", "rate − mean, deg/h")
     for panel, run in zip(panels, shown, strict=True):
         panel.title = run.name
         panel.line(np.array(run.hours) + run.first_s / 3600.0, np.array(run.rate_dph), BEFORE)
@@ -131,7 +131,7 @@ def _events(runs: Sequence[RunSeries], events: Sequence[Finding]) -> Markup | No
 
 def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
     """Half-hour means of every run's residual over the band of the simulated ones, and the fitted causes."""
-    panels = _panels(len(runs), "h since the first row", f"residual, {rate_unit()}")
+    panels = _panels(len(runs), "h since the first row", "residual, deg/h")
     for panel, run in zip(panels, runs, strict=True):
         panel.title = " ".join(dict.fromkeys((run.name, run.environment)))
         panel.band(run.hours, run.simulated_low_dph, run.simulated_high_dph, COVERED, "simulated, 95 %")
@@ -143,7 +143,7 @@ def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
 
 def _cycle_over_time(runs: Sequence[RunSeries]) -> Markup:
     """Block means of what a map of T alone leaves, and the states' part of it; temperature below."""
-    upper = Panel(y=f"residual, {rate_unit()}")
+    upper = Panel(y="residual, deg/h")
     lower = Panel(x="time, min", y="temperature, C")
     at = 0.0
     for run in runs:
@@ -192,7 +192,7 @@ def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
         for of in zip(*((r.temperature_c, r.slope_c_per_min, r.residual_dph) for r in runs), strict=True)
     )
     line = np.concatenate([np.zeros(len(r.hours)) if r.named_dph is None else np.array(r.named_dph) for r in runs])
-    words = f"residual, {rate_unit()}"
+    words = "residual, deg/h"
     over_t = Panel(x="temperature, C", y=words)
     for label, color, mask in sorted_by_rate(slope):
         if mask.sum() > _LEAST_SHOWN:
@@ -249,7 +249,7 @@ def _before_and_after(scored: Sequence[ScoredRun], average_s: float) -> Markup:
     """Half-hour means on the scored runs: model without the causes, and with them."""
     smooth_s = min(HALF_HOUR_S, min(len(run.hours) for run in scored) * average_s / 16.0)
     width = max(round(smooth_s / average_s), 1)
-    panels = _panels(len(scored), "time, h", f"remains, {rate_unit()}")
+    panels = _panels(len(scored), "time, h", "remains, deg/h")
     for panel, run in zip(panels, scored, strict=True):
         panel.horizontal(0.0)
         panel.line(run.hours, _smooth(run.before_dph, width), BEFORE, "without")

@@ -36,12 +36,9 @@ from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, 
 from .display import (
     COVERAGE,
     bound_words,
-    displayed,
-    in_unit,
     limit_words,
     measured_words,
     plain,
-    rate_unit,
     rounded,
     sci,
     with_uncertainty,
@@ -73,17 +70,17 @@ def _bias_over_time(traced: Sequence[_Traced]) -> Markup | None:
     """Measured and compensated bias, one panel a run, common scales; marks above rows that training left out."""
     if not traced:
         return None
-    rates = in_unit(np.concatenate([np.r_[one.means.before_dph, one.means.after_dph, 0.0] for one in traced]))
+    rates = np.concatenate([np.r_[one.means.before_dph, one.means.after_dph, 0.0] for one in traced])
     span = (float(rates.min()), float(rates.max()))
     pictures = []
     for k, one in enumerate(traced):
         title = f"{one.run.environment or one.run.file} ({one.run.role})"
-        panel = Panel(x="time, h", y=f"bias, {rate_unit()}", title=title, y_range=span)
+        panel = Panel(x="time, h", y="bias, deg/h", title=title, y_range=span)
         first = one.means.time_s[0]
         hours = (one.means.time_s - first) / 3600.0
         panel.horizontal(0.0)
-        panel.line(hours, in_unit(one.means.before_dph), BEFORE, "" if k else "measured", width=1.0)
-        panel.line(hours, in_unit(one.means.after_dph), AFTER, "" if k else "compensated", width=1.0)
+        panel.line(hours, one.means.before_dph, BEFORE, "" if k else "measured", width=1.0)
+        panel.line(hours, one.means.after_dph, AFTER, "" if k else "compensated", width=1.0)
         if one.left_out_s:
             panel.tops((np.array(one.left_out_s) - first) / 3600.0)
         pictures.append(drawing([panel], width=THIRD, height=110.0))
@@ -98,16 +95,16 @@ def map_with_centers(model: Model) -> Markup | None:
     seen = model.coverage
     hidden = np.array([[c == "0" for c in row] for row in seen.rows]) if seen is not None else None
     surface = Panel(x="temperature, C", y="dT/dt, C/min", title="dots: centers (rings: beyond); hatched: not trained")
-    surface.image(in_unit(model.map_dph(tt, rr)), (t0, t1), (r0, r1), f"bias, {rate_unit()}", hidden)
+    surface.image(model.map_dph(tt, rr), (t0, t1), (r0, r1), "bias, deg/h", hidden)
     centers = np.array([c for network in model.networks for c in network.centers]).reshape(-1, 2)
     places = np.clip(centers, (t0, r0), (t1, r1))
     within = np.all(places == centers, axis=1)
     for of, hollow in ((within, False), (~within, True)):
         surface.dots(places[of, 0], places[of, 1], ACCENT, size=7.0, hollow=hollow)
-    cuts = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="cuts through the map")
+    cuts = Panel(x="temperature, C", y="bias, deg/h", title="cuts through the map")
     for rate, dash, color in zip(np.linspace(r0, r1, 3), ("5 3", "", "1.5 2.5"), (AFTER, COVERED, BEFORE), strict=True):
         label = f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−")  # + 0.0: not "-0.00"
-        cuts.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, label, dash=dash, width=1.4)
+        cuts.line(t, model.map_dph(t, np.full_like(t, rate)), color, label, dash=dash, width=1.4)
     return side_by_side(drawing([surface], width=HALF, height=240.0), drawing([cuts], width=HALF, height=220.0))
 
 
@@ -146,7 +143,7 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
     named = dated and len(at) <= _MOST_NAMED
     ticks = [(t, str(one.date)[:10]) for t, one in zip(at, history, strict=True)] if named else None
     words = "" if named else "days since the first calibration" if dated else "number of the calibration"
-    left = Panel(x=words, y=f"RMS of what remains, {rate_unit()}", y_range=(0.0, None), x_ticks=ticks, whole_x=True)
+    left = Panel(x=words, y="RMS of what remains, deg/h", y_range=(0.0, None), x_ticks=ticks, whole_x=True)
     for label, color, values in (
         ("as found: the correction before", BEFORE, [one.as_found_rms_dph for one in history]),
         ("as left: the new one", AFTER, [one.as_left_rms_dph for one in history]),
@@ -155,7 +152,7 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
         if known.size:
             left.line(known[:, 0], known[:, 1], color, label)
             left.dots(known[:, 0], known[:, 1], color, size=6.0)
-    right = Panel(x=words, y=f"mean of the map, {rate_unit()}", x_ticks=ticks, whole_x=True)
+    right = Panel(x=words, y="mean of the map, deg/h", x_ticks=ticks, whole_x=True)
     _moved(right, at, history)
     return side_by_side(drawing([left], width=HALF), drawing([right], width=HALF))
 
@@ -197,7 +194,7 @@ def prior_and_posterior(training: Training) -> Markup | None:
     if curve is None:
         return None
     t = np.array(curve.temperature_c)
-    panel = Panel(x="temperature, C", y=f"bias at rest, {rate_unit()}")
+    panel = Panel(x="temperature, C", y="bias at rest, deg/h")
     for mean, sigma, color, label in (
         (curve.prior_dph, curve.prior_sigma_dph, COVERED, name),
         (curve.posterior_dph, curve.posterior_sigma_dph, AFTER, "with this unit's own runs"),
@@ -217,18 +214,14 @@ _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are 
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
 
-def write_report(folder: Path, display: str | None = None) -> Path:
+def write_report(folder: Path) -> Path:
     """Writes `folder/report.html` from what stands in the folder; returns its path.
-
-    Args:
-        display: Unit of rates; None: that of the limits, else deg/h.
 
     Raises:
         InputError: `model.json` or `evaluate.json` is missing or broken, or the unit is not known.
     """
     unit = unit_in(folder)
-    with displayed(display or unit.display), page_from(folder):
-        unit = unit.shown()
+    with page_from(folder):
         pictures = _pictures(folder, unit)
         template = page_environment().get_template("report.html.j2")
         of_file: dict[str, list[LeftOutRows]] = {}
@@ -241,18 +234,14 @@ def write_report(folder: Path, display: str | None = None) -> Path:
     return write_page(folder, text)
 
 
-def axes_page(folder: Path, axes: Sequence[str], display: str | None = None) -> str:
+def axes_page(folder: Path, axes: Sequence[str]) -> str:
     """The page of a unit with several axes, each in a folder of its name: those that failed first.
-
-    Args:
-        display: As of `write_report`.
 
     Raises:
         InputError: A result of an axis is missing or broken.
     """
     units = [unit_in(folder / axis) for axis in axes]
-    with displayed(display or units[0].display), page_from(folder):
-        units = [unit.shown() for unit in units]
+    with page_from(folder):
         ordered = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
         pictures = {u.model.axis: thermal_picture(folder / str(u.model.axis), u) for u in units}
         worst = ordered[0].verdict
@@ -285,7 +274,6 @@ def page_environment() -> jinja2.Environment:
     )  # fmt: skip
     environment.filters["number"] = lambda value, digits=2: "–" if value is None else f"{value:.{digits}f}"
     environment.filters["chance"] = lambda value: "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.2g} %"
-    environment.globals["rate"] = rate_unit
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"
     return environment
 
@@ -393,15 +381,15 @@ def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup |
     if not there:
         return None
     t = np.concatenate([a.temperature_c for a in there])
-    before, after = (in_unit(np.concatenate([getattr(a, name) for a in there])) for name in ("before_dph", "after_dph"))
+    before, after = (np.concatenate([getattr(a, name) for a in there]) for name in ("before_dph", "after_dph"))
     slope = np.concatenate(  # zero of a single one
         [np.gradient(a.temperature_c, a.time_s / 60.0) if a.time_s.size > 1 else np.zeros(1) for a in there]
     )
     kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
-    first = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="measured, and the map")
-    second = Panel(x="temperature, C", y=f"bias, {rate_unit()}", title="before and after, on one scale")
-    third = Panel(x="temperature, C", y=f"residual, {rate_unit()}", title="what remains, over temperature")
-    fourth = Panel(x="dT/dt, C/min", y=f"residual, {rate_unit()}", title="what remains, over dT/dt")
+    first = Panel(x="temperature, C", y="bias, deg/h", title="measured, and the map")
+    second = Panel(x="temperature, C", y="bias, deg/h", title="before and after, on one scale")
+    third = Panel(x="temperature, C", y="residual, deg/h", title="what remains, over temperature")
+    fourth = Panel(x="dT/dt, C/min", y="residual, deg/h", title="what remains, over dT/dt")
     second.dots(t, before, COVERED, "before", size=_DOT)
     for panel in (second, third, fourth):
         panel.horizontal(0.0)
@@ -418,17 +406,16 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
     """The map at the median rate of heating and of cooling, and at rest with its band of U."""
     t0, t1 = model.envelope.temperature_c
     t = np.linspace(t0, t1, 160) if t1 > t0 else np.array([t0 - 0.5, t0 + 0.5])
-    rest = in_unit(model.map_dph(t, np.zeros_like(t)))
+    rest = model.map_dph(t, np.zeros_like(t))
     sigma = _sigma_at_rest(model, t)
     if sigma is not None:
-        sigma = in_unit(sigma)
         panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2")
     panel.line(t, rest, ACCENT, "map at rest", width=1.4)
     for label, color, of in kinds:
         if label != "held":
             rate = float(np.median(slope[of]))
             words = f"map at {rate:+.2g} C/min".replace("-", "−")
-            panel.line(t, in_unit(model.map_dph(t, np.full_like(t, rate))), color, words, dash="5 3", width=1.6)
+            panel.line(t, model.map_dph(t, np.full_like(t, rate)), color, words, dash="5 3", width=1.6)
 
 
 def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
@@ -463,7 +450,7 @@ def allan_deviation(noise: NoiseTerms) -> Markup | None:
     tau, value, freedom = (
         np.array([getattr(p, name) for p in points]) for name in ("tau_s", "deviation_dph", "freedom")
     )
-    panel = Panel(x="averaging time, s", y=f"Allan deviation, {rate_unit()}", x_log=True, y_log=True)
+    panel = Panel(x="averaging time, s", y="Allan deviation, deg/h", x_log=True, y_log=True)
     spread = value / np.sqrt(2.0 * freedom)
     low, high = np.maximum(value - spread, 0.1 * value), value + spread
     panel.y_range = (float(low.min()) / 1.5, float(high.max()) * 1.5)
@@ -471,13 +458,13 @@ def allan_deviation(noise: NoiseTerms) -> Markup | None:
     n, b = noise.arw_deg_per_sqrt_h, noise.bias_instability_dph
     k, q = noise.rate_random_walk_dph_per_sqrt_h, noise.quantisation_arcsec
     if n:
-        panel.line(at, in_unit(60.0 * n / np.sqrt(at)), BEFORE, f"N = {sci(n)} deg/√h", dash="5 3")
+        panel.line(at, 60.0 * n / np.sqrt(at), BEFORE, f"N = {sci(n)} deg/√h", dash="5 3")
     if b:
-        panel.horizontal(b * _FLOOR_OVER_B, COVERED, f"B = {sci(b)} {rate_unit()}", dash="5 3", width=1.2)
+        panel.horizontal(b * _FLOOR_OVER_B, COVERED, f"B = {sci(b)} deg/h", dash="5 3", width=1.2)
     if k:
-        panel.line(at, k * np.sqrt(at / 3600.0 / 3.0), ACCENT, f"K = {sci(k)} {rate_unit()}/√h", dash="2 3")
+        panel.line(at, k * np.sqrt(at / 3600.0 / 3.0), ACCENT, f"K = {sci(k)} deg/h/√h", dash="2 3")
     if q:
-        panel.line(at, in_unit(_TAU_OVER_Q * q / at), COVERED, f"Q = {sci(q)} arcsec", dash="2 3")
+        panel.line(at, _TAU_OVER_Q * q / at, COVERED, f"Q = {sci(q)} arcsec", dash="2 3")
     panel.errors(tau, low, high, AFTER)
     panel.line(tau, value, AFTER, "compensated training records")
     panel.dots(tau, value, AFTER, size=6.0)

@@ -13,7 +13,7 @@ from ..results.files import json_text, write_atomically
 from ..results.folder import result_folder
 from ..results.recordings import Plan
 from .chart import AFTER, BEFORE, Panel, drawing
-from .display import rate_unit, shown, with_unit
+from .display import with_unit
 from .report import page_environment, page_from, write_page
 
 _FULL = 30.0  # d from which a pair counts as inseparable
@@ -59,7 +59,7 @@ def accuracy_by_hours(result: Plan) -> Markup:
     """Predicted RMS over the noise floor, and error of the map, over chamber hours."""
     hours = [a.hours for a in result.accuracy]
     left = Panel(x="chamber hours", y="RMS ÷ noise floor")
-    right = Panel(x="chamber hours", y=f"error of the map, {rate_unit()}", y_log=True)
+    right = Panel(x="chamber hours", y="error of the map, deg/h", y_log=True)
     left.horizontal(1.0, dash="5 3")
     for panel, color, values in (
         (left, AFTER, [a.rms_over_floor for a in result.accuracy]),
@@ -89,7 +89,7 @@ def write_plan_page(folder: Path) -> Path:
     Raises:
         InputError: `plan.json` is missing or broken.
     """
-    result = shown(read_result(folder / "plan.json", Plan))
+    result = read_result(folder / "plan.json", Plan)
     with page_from(folder / "plan.json"):
         text = (
             page_environment()

@@ -12,7 +12,7 @@ from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation, Pooled
 from ..results.release import Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.training import CandidateModel, LeftOutRows, Manifest, Training
-from .display import COVERAGE, NATIVE, limit_words, plain, shown, words
+from .display import COVERAGE, limit_words, plain, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
@@ -65,18 +65,6 @@ class UnitResults:
         judged = evaluation.judged()
         self.judged = judged[1] if judged else None
         self.judged_on = _JUDGED_ON[judged[0]] if judged else "nothing"
-
-    @property
-    def display(self) -> str:
-        """Unit of rates that the limits of the product ask for, else deg/h."""
-        return (self.limits.display if self.limits else "") or NATIVE
-
-    def shown(self) -> UnitResults:
-        """The same with every rate in the unit in which rates are shown; the model stays in deg/h."""
-        names = (
-            "evaluation", "training", "verification", "manifest", "diagnosis", "limits", "changes", "budget",
-        )  # fmt: skip
-        return UnitResults(self.model, **{name: shown(getattr(self, name)) for name in names})
 
     @property
     def decision(self) -> Verdict | None:

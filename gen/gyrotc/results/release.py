@@ -145,9 +145,6 @@ class HeldLimits(UnitResult):
     limits: tuple[Limit, ...] = Field(description="every limit of the file")
     verdict: Verdict | None = Field(default=None, description="the worst of all limits; null: there are none")
     decision_rule: DecisionRule | None = Field(default=None, description="of the limits file")
-    display: str = Field(
-        default="", description="unit in which pages show rates; empty: deg/h, as every figure of the file is in"
-    )
 
     @property
     def decision(self) -> Verdict | None:

@@ -102,9 +102,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         lines = list(limit_lines(held))
         assert said(lines[0])[:1] == ([held.decision] if held.decision else []), number
         marked = [line.rpartition(", ")[2] for line in lines[1:] if not line.startswith("  CONDITIONAL")]
-        assert [m if m in _VERDICTS.split("|") else "PASS" for m in marked] == [one.decision for one in held.limits], (
-            number
-        )
+        assert marked == [one.decision for one in held.limits if one.decision != "PASS"], number
         where = {"left_out": "spans left out", "train": "training runs themselves"}
         judged = evaluation.judged()
         assert judged is not None

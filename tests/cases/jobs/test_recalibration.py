@@ -229,7 +229,7 @@ def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path
     reported = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
     assert "no longer holds" in reported and "finding prior_does_not_hold" in reported
     reported = run_here("fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged", *block)
-    assert "ageing of 5·10⁻³ deg/h" in reported
+    assert "ageing of 0.005 deg/h" in reported
 
 
 def sigma_dph(result: Path) -> float:

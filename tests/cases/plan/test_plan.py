@@ -10,12 +10,10 @@ from typing import Any
 import pytest
 from campaigns import scenario, simulated
 from conftest import Command, invoked
-from gyrotc.cli.plan import limits_of, pair_of, plan_parts
+from gyrotc.cli.plan import limits_of, pair_of
 from gyrotc.common.errors import InputError
-from gyrotc.pages.display import displayed, sci, shown
 from gyrotc.plan.plan import plan, shortest
 from gyrotc.plan.sensitivity import Sensitivity, programme_of
-from gyrotc.results.recordings import Plan
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +101,6 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
     assert gyrotc("report", tmp_path).returncode == 0
     assert (tmp_path / "report.html").read_text("utf-8") == page
     assert "warm up 3.00·10⁻³ deg/h" in page
-    assert gyrotc("report", tmp_path, "--display", "mdps").returncode == 0
-    page = (tmp_path / "report.html").read_text("utf-8")
-    assert "error of the map, mdps" in page and "error of the map, deg/h" not in page
 
 
 @pytest.mark.parametrize(
@@ -113,7 +108,6 @@ def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, gyrotc: Com
     [
         (("--require", "hysteresis"), "cause=limit"),
         (("--require", "hysteresis=-1"), "above 0"),
-        (("--require", "cavity_lag=1 mdps"), "a limit in s"),
         (("--require", "sensor_lag=1"), "thermal_gradient"),
         (("--separate", "hysteresis"), "two causes"),
         (("--separate", "hysteresis,sensor_lag"), "thermal_gradient"),
@@ -125,22 +119,8 @@ def test_bad_options_are_reported(folder: Path, options: tuple[str, str], report
     assert isinstance(done.exception, InputError) and reported in str(done.exception)
 
 
-def test_what_is_printed_is_in_the_unit_that_is_asked_for(planned: dict[str, Any]) -> None:
-    result = Plan.model_validate(json.loads(json.dumps(planned)), strict=False)
-    with displayed("mdps"):
-        first, *_ = plan_parts(shown(result))
-        tables = [part for part in plan_parts(shown(result)) if not isinstance(part, str)]
-    low, high = result.bias_range_dph
-    assert f"{sci(low / 3.6)} … {sci(high / 3.6)} mdps" in first
-    accuracy = next(table for table in tables if "accuracy" in str(table.title))
-    assert accuracy.columns[2].header == "error of the map, mdps"
-    assert list(accuracy.columns[2].cells) == [sci(a.map_error_dph / 3.6, 1) for a in result.accuracy]
-
-
 def test_options_are_read() -> None:
     assert limits_of(["hysteresis=5e-5", " warm_up = 1e-3"]) == {"hysteresis": 5e-5, "warm_up": 1e-3}
-    stated = limits_of(["warm_up=1e-3 mdps", "hysteresis = 1 deg/s/C", "cavity_lag=2 s", "accuracy=3600"])
-    assert stated == {"warm_up": 3.6e-3, "hysteresis": 3600.0, "cavity_lag": 2.0, "accuracy": 3600.0}
     assert pair_of("hysteresis, ageing") == ("hysteresis", "ageing") and pair_of(None) is None
     with pytest.raises(InputError):
         pair_of("ageing,ageing")

