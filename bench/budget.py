@@ -13,15 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.assess.limits import load_limits
-from gyrotc.jobs.build import build_into
-from gyrotc.mirror.history import replay
-from gyrotc.recordings.load import load
-from gyrotc.results.base import read_result
-from gyrotc.results.release import Budget
-from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.quantise import quantise
-from gyrotc.train.fitting import FitOptions
+from gyrotc.assess import load_limits
+from gyrotc.jobs import build_into
+from gyrotc.mirror import replay
+from gyrotc.recordings import load
+from gyrotc.results import Budget, read_result
+from gyrotc.simulate import simulate
+from gyrotc.tables import quantise
+from gyrotc.train import FitOptions
 
 from .campaigns import Settings, say
 from .page import Figure, ResultsTable

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.mirror.table import Numeric, Table
+from gyrotc.mirror import Numeric, Table
 from gyrotc.model import Model
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import campaign, simulate, with_noise
-from gyrotc.simulate.scenario import read
-from gyrotc.tables.quantise import quantise
-from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.recordings import load
+from gyrotc.simulate import read, simulate, simulate_campaign, with_noise
+from gyrotc.tables import quantise
+from gyrotc.train import FitOptions, fit_dataset
 from libc_build import runtime
 from numpy.typing import NDArray
 
@@ -80,7 +79,7 @@ def unit(seed: int, numeric: Numeric = "f32") -> Unit:
         plan.write_text(PLAN, "utf-8")
         simulate(plan, seed=seed, out=Path(place) / "data", format="parquet", row_s=_PERIOD_S)
         model = fit_dataset(load(Path(place) / "data"), FitOptions(channels=True)).model
-        record = list(campaign(with_noise(read(plan)[1], "paper"), seed))[-1]
+        record = list(simulate_campaign(with_noise(read(plan)[1], "paper"), seed))[-1]
     assert model.uncertainty_dph is not None
     names = [term.channel for term in model.terms if term.channel]
     return Unit(

@@ -18,12 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Exclusion, Rows, Run
-from gyrotc.results.diagnosed import Diagnosed
-from gyrotc.simulate.campaign import simulate
-from gyrotc.train.fitting import FitOptions
+from gyrotc.diagnose import diagnose
+from gyrotc.recordings import Dataset, Exclusion, Rows, Run, load
+from gyrotc.results import Diagnosed
+from gyrotc.simulate import simulate
+from gyrotc.train import FitOptions
 
 from .campaigns import Settings, say
 from .page import Figure, ResultsTable

@@ -15,20 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.recursions import FLOAT64, TermOutcome, recursion_of
-from gyrotc.mirror.table import CLAMPED, FALLBACK, HELD, UNCOVERED, WARMING, Table
+from gyrotc.mirror import CLAMPED, FALLBACK, FLOAT64, HELD, UNCOVERED, WARMING, Table, TermOutcome, recursion_of, replay
 from gyrotc.model import Model, Term, load_model
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import campaign, simulate, with_noise
-from gyrotc.simulate.scenario import read
-from gyrotc.tables.emit import emit
-from gyrotc.tables.quantise import quantise
-from gyrotc.train.data import TrainingData, joined
-from gyrotc.train.fitting import FitOptions, front_end, model_of, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.uncertainty import start_sigma
-from gyrotc.verify.toolchain import all_targets, compile_c, run_program
+from gyrotc.recordings import load
+from gyrotc.simulate import read, simulate, simulate_campaign, with_noise
+from gyrotc.tables import emit, quantise
+from gyrotc.train import FitOptions, TrainingData, fit, front_end, joined, model_of, samples_of, start_sigma
+from gyrotc.verify import all_targets, compile_c, run_program
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
@@ -79,7 +72,7 @@ def exam_of(plan: str | Path, seed: int) -> Iterator[Recording]:
     content = with_noise(read(plan)[1], "paper")
     runs = [(s.role, name) for s in content.set for name in s.profiles]
     n = round(BLOCK_S)
-    for (role, name), record in zip(runs, campaign(content, seed), strict=True):
+    for (role, name), record in zip(runs, simulate_campaign(content, seed), strict=True):
         whole = len(record.reading_c) // n * n
         if role == "exam":
             yield Recording(

@@ -13,18 +13,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.causes.base import Scene
+from gyrotc.causes import Scene
 from gyrotc.model import Model
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Rows, joined_runs
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read, read_truth
-from gyrotc.tables.quantise import applied_of, quantise
-from gyrotc.train.channels import seen_by_target
-from gyrotc.train.data import TrainingData, average_samples, joined
-from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, power_ons, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.result import predict
+from gyrotc.recordings import Dataset, Rows, joined_runs, load
+from gyrotc.simulate import read, read_truth, simulate
+from gyrotc.tables import applied_of, quantise
+from gyrotc.train import (
+    FitOptions,
+    TrainingData,
+    average_samples,
+    fit,
+    fit_dataset,
+    front_end,
+    joined,
+    power_ons,
+    predict,
+    samples_of,
+    seen_by_target,
+)
 from numpy.typing import NDArray
 
 from .campaigns import Settings, say

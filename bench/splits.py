@@ -17,13 +17,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.common.errors import GyrotcError
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.recordings.load import axes_of, load
-from gyrotc.recordings.records import Dataset
-from gyrotc.train.data import TrainingData, average_samples, joined, scaling_of, turning_points
-from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
-from gyrotc.train.simple import design, solve_least_squares
+from gyrotc.common import GyrotcError
+from gyrotc.diagnose import diagnose
+from gyrotc.recordings import Dataset, axes_of, load
+from gyrotc.train import (
+    FitOptions,
+    TrainingData,
+    average_samples,
+    design,
+    fit_dataset,
+    front_end,
+    joined,
+    samples_of,
+    scaling_of,
+    solve_least_squares,
+    turning_points,
+)
 from numpy.typing import NDArray
 
 from .campaigns import Settings, say

@@ -15,13 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from gyrotc import _core
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read_truth
-from gyrotc.train.data import TrainingData, average_samples
-from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.result import predict
+from gyrotc.recordings import load
+from gyrotc.simulate import read_truth, simulate
+from gyrotc.train import TrainingData, average_samples, fit, front_end, predict, samples_of
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -12,9 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gyrotc.train.data import TrainingData, joined
-from gyrotc.train.methods import fit
-from gyrotc.train.result import Fit, predict
+from gyrotc.train import Fit, TrainingData, fit, joined, predict
 from numpy.typing import NDArray
 
 from ..campaigns import say

@@ -31,7 +31,7 @@ def used():
     both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(one.ru_utime + one.ru_stime for one in both)
 marks = [("starting", 0.0)]
-from gyrotc.jobs.build import build
+from gyrotc.jobs.calibration import build
 from gyrotc.train.fitting import FitOptions
 build(Path(sys.argv[1]), Path(sys.argv[2]), FitOptions(), progress=lambda text: marks.append((text.split()[0], used())))
 print(json.dumps([*marks, ("", used())]))

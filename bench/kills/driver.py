@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from gyrotc.common.errors import GyrotcError
-from gyrotc.results.files import Interrupted, die_of, raise_on_signals
+from gyrotc.common import GyrotcError
+from gyrotc.results import Interrupted, die_of, raise_on_signals
 
 ACTIONS = {
     "KILL": int(signal.SIGKILL),

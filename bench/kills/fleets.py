@@ -11,11 +11,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.unit import Task, do_unit
-from gyrotc.results.cache import program_of
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import result_faults
+from gyrotc.fleet import Task, do_unit, load_manifest
+from gyrotc.results import FleetEntry, program_of, result_faults
 
 from .driver import run
 from .jobs import GYROTC, Case, command

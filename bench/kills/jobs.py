@@ -12,9 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gyrotc.results.files import write_atomically
-from gyrotc.results.folder import result_folder, write_result
-from gyrotc.results.marker import MARKER, read_marker, result_faults
+from gyrotc.results import MARKER, read_marker, result_faults, result_folder, write_atomically, write_result
 
 from .driver import Job
 

@@ -17,19 +17,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.recordings.load import load
-from gyrotc.results.fleet import Lot
-from gyrotc.simulate.campaign import RowForm, SimulatedGyro, with_noise, write_gyro
-from gyrotc.simulate.lot import LotOrder, draw_lot
-from gyrotc.simulate.scenario import read, read_truth
-from gyrotc.train.data import TrainingData, cleaned_samples, joined, scaling_of
-from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.prior.learn import learn
-from gyrotc.train.prior.unit_means import UnitMeans, unit_means
-from gyrotc.train.prior.use import LotPrior
-from gyrotc.train.result import Fit, predict
-from gyrotc.train.uncertainty import uncertainty
+from gyrotc.recordings import load
+from gyrotc.results import Lot
+from gyrotc.simulate import LotOrder, RowForm, SimulatedGyro, draw_lot, read, read_truth, with_noise, write_gyro
+from gyrotc.train import (
+    Fit,
+    TrainingData,
+    cleaned_samples,
+    fit,
+    front_end,
+    joined,
+    predict,
+    samples_of,
+    scaling_of,
+    uncertainty_of,
+)
+from gyrotc.train.prior import LotPrior, UnitMeans, learn_prior, means_of_unit
 from numpy.typing import NDArray
 
 from ..campaigns import say
@@ -94,7 +97,7 @@ def measured(case: Case, seed: int, unseen: int) -> dict[str, Any]:
     own = [u for u in units if u.lot and not u.lot.unrelated]
     strange = [u for u in units if u.lot and u.lot.unrelated]
     taught = [
-        unit_means(cleaned_samples(data), scaling_of(data), None)[0]
+        means_of_unit(cleaned_samples(data), scaling_of(data), None)[0]
         for data, _ in recordings_of(own[:_UNITS], exam=False)
     ]
     before = time.process_time()
@@ -114,7 +117,7 @@ def measured(case: Case, seed: int, unseen: int) -> dict[str, Any]:
             p = (
                 use.p_value
                 if use
-                else prior.with_runs(unit_means(cleaned_samples(part), scaling_of(part), None)[0]).p_value
+                else prior.with_runs(means_of_unit(cleaned_samples(part), scaling_of(part), None)[0]).p_value
             )
             refused[name].append(p < 0.01)
     lot = prior.lot
@@ -137,13 +140,13 @@ def ordered(case: Case) -> LotOrder:
 
 def learnt(units: list[UnitMeans]) -> LotPrior:
     """A lot as `gyrotc lot` makes it, without the way over files."""
-    from gyrotc.jobs.lot import lot_from
-    from gyrotc.train.prior.use import prior_of
+    from gyrotc.jobs import lot_from
+    from gyrotc.train.prior import prior_of
 
     t = [float(f(u.temperature_c)) for u in units for f in (np.min, np.max)]
     r = [float(f(u.slope_c_per_min)) for u in units for f in (np.min, np.max)]
     envelope = (min(t), max(t)), (min(r), max(r))
-    found = learn(units, envelope, lambda _: None)
+    found = learn_prior(units, envelope, lambda _: None)
     lot: Lot = lot_from([(f"U{k:03d}", "") for k in range(len(units))], units, found, envelope)
     return prior_of(lot)
 
@@ -199,7 +202,7 @@ def _unit(data: TrainingData, exam: Exam, prior: LotPrior, taught: list[UnitMean
         }
         if name == "2.5 h":
             ways["auto"] = lambda p=part: predict(fit(p, method="auto"), exam.temperature_c, exam.slope_c_per_min)
-            ways |= peers(taught, unit_means(cleaned_samples(part), scaling_of(part), None)[0], exam)
+            ways |= peers(taught, means_of_unit(cleaned_samples(part), scaling_of(part), None)[0], exam)
         assert with_lot.lot is not None
         row[name] = {way: exam.judged(run()) for way, run in ways.items()}
         row[name] |= {"p_value": with_lot.lot.p_value, "accepted": with_lot.lot.accepted}
@@ -209,7 +212,7 @@ def _unit(data: TrainingData, exam: Exam, prior: LotPrior, taught: list[UnitMean
 
 def _covered(data: TrainingData, found: Fit, exam: Exam) -> tuple[float, float]:
     """Share of the exam at which the truth lies within 1 and 1.96 sigma of the table's cell."""
-    known = uncertainty(data, found)
+    known = uncertainty_of(data, found)
     s = found.scaling
     spans = ((exam.temperature_c, s.temperature_c), (exam.slope_c_per_min, s.slope_c_per_min))
     i, j = (

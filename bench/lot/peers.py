@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from .new_units import Exam
-from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
-from gyrotc.train.evidence import fit_process
-from gyrotc.train.prior.learn import FALSE_ALARM, sums_of
-from gyrotc.train.prior.unit_means import UnitMeans, unit_means
-from gyrotc.train.prior.use import LotPrior
+from gyrotc.train import TrainingData, cleaned_samples, fit_process, scaling_of
+from gyrotc.train.prior import FALSE_ALARM, LotPrior, UnitMeans, means_of_unit, sums_of
 from scipy.stats import norm
 
 Floats = NDArray[np.float64]
@@ -134,7 +131,7 @@ def seen(data: TrainingData) -> UnitMeans:
     """Means of samples, as a fit has them."""
     samples = cleaned_samples(data)
     scaling = scaling_of(samples)
-    return unit_means(samples, scaling, fit_process(samples, scaling))[0]
+    return means_of_unit(samples, scaling, fit_process(samples, scaling))[0]
 
 
 def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:

@@ -7,9 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.page import summary_of
-from gyrotc.fleet.run import run_fleet
+from gyrotc.fleet import load_manifest, run_fleet, summary_of
 from lot import FAULTS, RUN_FAULTS, Lot
 
 from ..campaigns import say

@@ -17,20 +17,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gyrotc.simulate.campaign import SimulatedGyro, with_noise
-from gyrotc.simulate.lot import LotOrder, draw_lot
-from gyrotc.simulate.scenario import read
-from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
-from gyrotc.train.methods import fit
-from gyrotc.train.prior.earlier import (
-    EarlierPrior,
-    posterior_of_means,
-    stated_sigma_dph,
-    widened,
-)
-from gyrotc.train.prior.unit_means import unit_means
-from gyrotc.train.result import Fit, predict
-from gyrotc.train.uncertainty import uncertainty
+from gyrotc.simulate import LotOrder, SimulatedGyro, draw_lot, read, with_noise
+from gyrotc.train import Fit, TrainingData, cleaned_samples, fit, predict, scaling_of, uncertainty_of
+from gyrotc.train.prior import EarlierPrior, means_of_unit, posterior_of_means, stated_sigma_dph, widened
 from numpy.typing import NDArray
 
 from ..campaigns import say
@@ -135,8 +124,8 @@ def _prior(early: TrainingData, known: Fit) -> EarlierPrior:
     """As `jobs.recalibration` reads it from a result."""
     samples = cleaned_samples(early)
     scaling = scaling_of(samples)
-    means = unit_means(samples, scaling, known.outcome.process)[0]
-    stated = uncertainty(samples, known)
+    means = means_of_unit(samples, scaling, known.outcome.process)[0]
+    stated = uncertainty_of(samples, known)
     envelope = scaling.temperature_c, scaling.slope_c_per_min
     between = stated["rules"]["between_dph"]
     sigma = stated_sigma_dph(np.array(stated["rows"]), envelope, between, means)

@@ -16,20 +16,12 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from gyrotc.common.arrays import FloatArray
-from gyrotc.common.metrics import average_rows, statistics
-from gyrotc.pages.chart import LINE_COLOURS
-from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
-from gyrotc.recordings.load import load
-from gyrotc.results.files import write_atomically
-from gyrotc.simulate.campaign import NoiseName, simulate
-from gyrotc.simulate.gyro import CELL_S
-from gyrotc.simulate.instrument import SimulatedRecord
-from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.train.data import TrainingData, joined, scaling_of
-from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.methods import fit, trained
-from gyrotc.train.result import Fit, predict
+from gyrotc.common import FloatArray, average_rows, statistics_of
+from gyrotc.pages import ENVIRONMENTS, LINE_COLOURS, NEURONS
+from gyrotc.recordings import load
+from gyrotc.results import write_atomically
+from gyrotc.simulate import CELL_S, NoiseName, SimulatedRecord, simulate, simulated_floor
+from gyrotc.train import Fit, TrainingData, fit, front_end, joined, predict, samples_of, scaling_of, trained
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -108,7 +100,7 @@ def _after(cell: Cell, whole: bool) -> dict[str, Any]:
 
 
 def _figures(values: FloatArray) -> dict[str, Any]:
-    found = statistics(values)
+    found = statistics_of(values)
     return {name: found[name] for name in ("mean_dph", "std_dph", "rms_dph")}
 
 
@@ -301,8 +293,8 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
     """Writes one simulated run: temperatures, and the bias under its noise, over hours."""
     path.parent.mkdir(parents=True, exist_ok=True)
     hours = CELL_S * np.arange(len(record.cavity_c)) / 3600.0
-    average_rows = round(AVERAGE_S / CELL_S)
-    measured, true = (np.diff(angle[::average_rows]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec))
+    cells = round(AVERAGE_S / CELL_S)
+    measured, true = (np.diff(angle[::cells]) / AVERAGE_S for angle in (record.angle_arcsec, record.true_arcsec))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.6), layout="constrained")
         above, below = figure.subplots(2, 1, sharex=True)

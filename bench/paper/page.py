@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 import scipy
 from gyrotc import _core
-from gyrotc.common.errors import InputError
-from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
-from gyrotc.results.files import write_atomically
-from gyrotc.simulate.campaign import NoiseName, campaign, with_noise
-from gyrotc.simulate.scenario import read
+from gyrotc.common import InputError
+from gyrotc.pages import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, RUNNING_S
+from gyrotc.results import write_atomically
+from gyrotc.simulate import NoiseName, read, simulate_campaign, with_noise
 
 from ..records import read_record, rounded, write_record
 from .experiment import FIGURES, METHODS, Experiment, Series, checksum, draw, draw_run, experiment
@@ -322,7 +321,7 @@ def write(docs: Path) -> None:
     write_atomically(docs / "paper.md", page_of(docs, record))
     draw(series, docs / "paper")
     plan = with_noise(read("paper-5C-min")[1], "paper")
-    draw_run(next(iter(campaign(plan, SEEDS[0]))), f"Chamber at {_RUN}", docs / "simulation" / "run.png")
+    draw_run(next(iter(simulate_campaign(plan, SEEDS[0]))), f"Chamber at {_RUN}", docs / "simulation" / "run.png")
     print(f"{docs / 'paper.md'} and the figures beside it")
 
 

@@ -13,13 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.extension import Refitting
-from gyrotc.diagnose.refit import Effect
-from gyrotc.diagnose.single_cycle import cycle_of
-from gyrotc.recordings.load import load
-from gyrotc.train.data import TrainingData
-from gyrotc.train.fitting import FitOptions, front_end, samples_of
+from gyrotc.diagnose import Effect, Refitting, cycle_of, records_of
+from gyrotc.recordings import load
+from gyrotc.train import FitOptions, TrainingData, front_end, samples_of
 
 from ..paper.page import filled
 from .page import with_exam

@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.common.metrics import average_rows
-from gyrotc.recordings.load import axes_of, load
-from gyrotc.tables.emit import emit
-from gyrotc.train.data import training_spans
-from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
+from gyrotc.assess import evaluate
+from gyrotc.common import average_rows
+from gyrotc.recordings import axes_of, load
+from gyrotc.tables import emit
+from gyrotc.train import FitOptions, fit_dataset, front_end, samples_of, training_spans
 from matplotlib.figure import Figure
 
 from ..paper.experiment import AFTER, BEFORE, png

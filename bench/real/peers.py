@@ -12,12 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from gyrotc.common.metrics import average_rows
-from gyrotc.recordings.records import Dataset, Run
-from gyrotc.train.data import TrainingData, joined
-from gyrotc.train.data import average_samples as means_of
-from gyrotc.train.fitting import FrontEnd, front_end, samples_of
-from gyrotc.train.samples import Blocks
+from gyrotc.common import average_rows
+from gyrotc.recordings import Dataset, Run
+from gyrotc.train import Blocks, FrontEnd, TrainingData, front_end, joined, samples_of
+from gyrotc.train import average_samples as means_of
 
 BLOCK_S = 10.0
 AVERAGE_S = 100.0

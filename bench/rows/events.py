@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from gyrotc.quality.check import check
-from gyrotc.quality.events import found_events
-from gyrotc.recordings.load import load
-from gyrotc.results.base import Finding
+from gyrotc.quality import check, found_events
+from gyrotc.recordings import load
+from gyrotc.results import Finding
 
 from tests.blind.chamber import Array, draw_unit, expose, steps
 from tests.blind.noise import Noise, draw

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.jobs.build import build_into
-from gyrotc.recordings.load import load
-from gyrotc.train.fitting import FitOptions
+from gyrotc.common import CheckFailed, InputError
+from gyrotc.jobs import build_into
+from gyrotc.recordings import load
+from gyrotc.train import FitOptions
 
 from ..campaigns import say
 from .sets import FAULTS, drawn_set, faulty, written

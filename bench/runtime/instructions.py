@@ -13,17 +13,11 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from gyrotc.common.errors import CheckFailed
-from gyrotc.mirror.history import answers, evaluate_map
-from gyrotc.mirror.table import Table
+from gyrotc.common import CheckFailed
+from gyrotc.mirror import Table, answers, evaluate_map
 from gyrotc.model import Coverage, Envelope, Model, Network, Scale
-from gyrotc.tables import vectors
-from gyrotc.tables.emit import emit, emitted_tables
-from gyrotc.tables.vectors import make_vectors
-from gyrotc.verify.board import board_entries
-from gyrotc.verify.emitted import Job
-from gyrotc.verify.job import visit_all
-from gyrotc.verify.toolchain import Target, all_targets, compile_objects, compiler_version, symbols
+from gyrotc.tables import emit, emitted_tables, make_vectors, vectors
+from gyrotc.verify import Job, Target, all_targets, board_entries, compile_objects, compiler_version, symbols, visit_all
 from numpy.typing import NDArray
 
 from ..campaigns import say

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import COSTS, emit_texts, needs_of, quantise_all
-from gyrotc.verify.sizes import parse_graph
+from gyrotc.tables import COSTS, emit_texts, needs_of, quantise_all
+from gyrotc.verify import parse_graph
 
 from .sizes import COMPILER, CORES, LEVELS, LINKED, MODEL
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import SWITCHES, emit_texts, quantise_all
+from gyrotc.tables import SWITCHES, emit_texts, quantise_all
 
 from ..records import ROOT
 

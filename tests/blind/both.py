@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from gyrotc.pages.chart import AFTER, BEFORE, COVERED, HALF, Panel, drawing
-from gyrotc.results.files import write_atomically
+from gyrotc.pages import AFTER, BEFORE, COVERED, HALF, Panel, drawing
+from gyrotc.results import write_atomically
 
 from bench.page import ResultsTable, keep
 from bench.records import Record, rounded

@@ -17,8 +17,8 @@ from typing import Any
 
 def main() -> None:
     """Answers until stdin ends."""
-    from gyrotc.diagnose.diagnosis import diagnose
-    from gyrotc.recordings.load import load
+    from gyrotc.diagnose import diagnose
+    from gyrotc.recordings import load
 
     for line in sys.stdin:
         folder, target = line.rstrip("\n").split("\t")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables import emit_texts, quantise_all
 
 HERE = Path(__file__).resolve().parent
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from emitted import GOLDEN
-from gyrotc.mirror.front_end import Settings, follow
-from gyrotc.mirror.recursions import F32, Q31
-from gyrotc.mirror.samples import Guarded
+from gyrotc.mirror import F32, Q31, Guarded, Settings, follow
 from gyrotc.model import Model, load_model
-from gyrotc.tables.quantise import quantise
+from gyrotc.tables import quantise
 from numpy.typing import NDArray
 from results import Results
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from emitted import GOLDEN, emitted
 from gyrotc.model import Model, load_model
-from gyrotc.tables.emit import emitted_tables
-from gyrotc.verify.job import visit_all
+from gyrotc.tables import emitted_tables
+from gyrotc.verify import visit_all
 from results import Results
 from test_primitives import CURVE_ERROR, F32_CURVE_ERROR, F32_GAUSS_ERROR, _run
 

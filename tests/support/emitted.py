@@ -9,11 +9,9 @@ from typing import Any
 
 import numpy as np
 from gyrotc.model import Model, load_model
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset
-from gyrotc.tables.emit import emit
-from gyrotc.verify.job import verify
-from gyrotc.verify.toolchain import Target, all_targets, compiler_version
+from gyrotc.recordings import Dataset, load
+from gyrotc.tables import emit
+from gyrotc.verify import Target, all_targets, compiler_version, verify
 from recordings import csv_text, toml
 
 #: What the negative controls of this session showed: a record for each program that ran to its end and differed.

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gyrotc.mirror.history import evaluate_map
-from gyrotc.mirror.table import Table, f32_words
+from gyrotc.mirror import Table, evaluate_map, f32_words
 from gyrotc.model import Envelope, Model, Network, Scale
 from models import random_model
 from numpy.typing import NDArray

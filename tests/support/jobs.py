@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gyrotc.mirror.history import answers
+from gyrotc.mirror import answers
 from gyrotc.model import load_model
-from gyrotc.tables.emit import emitted_tables
-from gyrotc.tables.vectors import make_vectors
-from gyrotc.verify.emitted import Job
+from gyrotc.tables import emitted_tables, make_vectors
+from gyrotc.verify import Job
 
 
 def job_of(folder: Path) -> Job:

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.mirror.front_end import period_us
-from gyrotc.mirror.table import ARRAYS, LAYOUT, Table, Words
+from gyrotc.mirror import ARRAYS, LAYOUT, Table, Words, period_us
 
 ROOT = Path(__file__).resolve().parents[2]
 _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing-declarations shadow error"

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 from conftest import ROOT
-from gyrotc.mirror.front_end import period_us
-from gyrotc.mirror.table import Table, Words
+from gyrotc.mirror import Table, Words, period_us
 from gyrotc.model import Model
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms

@@ -8,7 +8,7 @@ On the target it is a memory with the amplitude −60 b/tau.
 from __future__ import annotations
 
 import numpy as np
-from gyrotc.causes.base import (
+from gyrotc.causes import (
     ADVICE_MORE_RATES,
     Cause,
     CauseValues,
@@ -23,8 +23,8 @@ from gyrotc.causes.base import (
     memory_gain,
     weights_of,
 )
-from gyrotc.common.arrays import FloatArray
-from gyrotc.mirror.recursions import TableKind, first_order
+from gyrotc.common import FloatArray
+from gyrotc.mirror import TableKind, first_order
 
 TAU = Parameter("tau_s", "s", 60.0, 8000.0)
 

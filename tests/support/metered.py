@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gyrotc.verify.toolchain import all_targets, compile_c, run_program
+from gyrotc.verify import all_targets, compile_c, run_program
 
 HERE = Path(__file__).resolve().parent
 

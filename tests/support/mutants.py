@@ -26,7 +26,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 
 import numpy as np
-from gyrotc.common.errors import GyrotcError
+from gyrotc.common import GyrotcError
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from gyrotc.train.data import TrainingData
+from gyrotc.train import TrainingData
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]

@@ -13,38 +13,22 @@ from unittest.mock import patch
 
 import gyrotc.pages.report as pages
 import numpy as np
-from gyrotc.assess.budget import budget_of
-from gyrotc.assess.changes import Earlier, changes_since
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.assess.limits import held_against, load_limits
-from gyrotc.common.errors import InputError
-from gyrotc.common.metrics import average_rows
-from gyrotc.diagnose import signature_bank
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.diagnosis import diagnose, series_of
-from gyrotc.diagnose.signature_bank import build_bank
-from gyrotc.fleet.manifest import load_manifest
+from gyrotc.assess import Earlier, budget_of, changes_since, evaluate, held_against, load_limits
+from gyrotc.common import InputError, average_rows
+from gyrotc.diagnose import build_bank, diagnose, records_of, series_of, signature_bank
+from gyrotc.fleet import load_manifest
 from gyrotc.model import load_model
-from gyrotc.pages.diagnosis import write_diagnosis_page
-from gyrotc.pages.short import write_plan_page
+from gyrotc.pages import write_diagnosis_page, write_plan_page
 from gyrotc.plan.plan import plan
-from gyrotc.quality.check import check
-from gyrotc.recordings.load import load
+from gyrotc.quality import check
+from gyrotc.recordings import load
+from gyrotc.results import DeclaredUnits, Evaluation, Manifest, Plan, read_result
 from gyrotc.results import cache as kept
-from gyrotc.results.base import read_result
-from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.recordings import Plan
-from gyrotc.results.training import DeclaredUnits, Manifest
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read as read_scenario
-from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.tables.emit import emit
-from gyrotc.tables.quantise import quantise
-from gyrotc.tables.record import RECORD, read_options
-from gyrotc.train.fitting import FitOptions, fit_dataset
-from gyrotc.train.samples import run_blocks
-from gyrotc.verify.board import compared_words, log_parts
-from gyrotc.verify.job import verify
+from gyrotc.simulate import read as read_scenario
+from gyrotc.simulate import simulate, simulated_floor
+from gyrotc.tables import RECORD, emit, quantise, read_options
+from gyrotc.train import FitOptions, fit_dataset, run_blocks
+from gyrotc.verify import compared_words, log_parts, verify
 from mutation import Form
 from recordings import columns, columns_of_pulses, csv_text, toml, write_parquet
 

@@ -8,7 +8,7 @@ import socket
 from pathlib import Path
 
 import numpy as np
-from gyrotc.recordings.tables import ArrayTable, Column, LoggerFile, part_of
+from gyrotc.recordings import ArrayTable, Column, LoggerFile, part_of
 
 
 def a_table(path: Path, text: str = "") -> LoggerFile:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import gyrotc
 from gyrotc.model import Model
-from gyrotc.tables.emit import config_text, emit_texts, quantise_all
-from gyrotc.verify.toolchain import Target, link, run_to_end
+from gyrotc.tables import config_text, emit_texts, quantise_all
+from gyrotc.verify import Target, link, run_to_end
 from models import random_model, random_terms
 
 TABLES = 40

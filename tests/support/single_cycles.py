@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from gyrotc.diagnose.blocks import Records, records_of
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import simulate
+from gyrotc.diagnose import Records, records_of
+from gyrotc.recordings import load
+from gyrotc.simulate import simulate
 
 NOISE = (0.2, 0.5, 1.0, 2.0)
 """Levels of the noise, of 7e-4 deg/h of 100-s means."""

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from gyrotc.causes.base import History
-from gyrotc.diagnose.blocks import Records, RunRecord
-from gyrotc.diagnose.noise import Colour
-from gyrotc.diagnose.search import Search, open_search
-from gyrotc.diagnose.signature_bank import SignatureBank, build_bank
+from gyrotc.causes import History
+from gyrotc.diagnose import Colour, Records, RunRecord, Search, SignatureBank, build_bank, open_search
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

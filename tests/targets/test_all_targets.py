@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 from emitted import GOLDEN, emitted, recorded
 from gyrotc.model import Model, load_model
-from gyrotc.verify.job import verify
-from gyrotc.verify.toolchain import all_targets
+from gyrotc.verify import all_targets, verify
 from metered import metered
 from models import bank_with_channels, random_model, with_memories
 from results import Results

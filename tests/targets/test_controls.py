@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 from emitted import emitted, ran_and_differed, with_flags
-from gyrotc.verify.board import board_entries
-from gyrotc.verify.toolchain import Target
+from gyrotc.verify import Target, board_entries
 from jobs import job_of
 from test_negative_controls import CONTRACTED, SELF_TEST_FAILED, natural_expressions
 

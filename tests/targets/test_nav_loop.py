@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emitted import GOLDEN, emitted
-from gyrotc.mirror.history import replay
+from gyrotc.mirror import replay
 from gyrotc.model import load_model
-from gyrotc.tables.emit import quantise_all
-from gyrotc.verify.toolchain import all_targets, compile_c, run_program
+from gyrotc.tables import quantise_all
+from gyrotc.verify import all_targets, compile_c, run_program
 from results import Results
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "nav_loop"

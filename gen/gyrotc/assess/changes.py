@@ -32,7 +32,7 @@ from ..results.evaluation import (
 )
 from ..results.release import Verification
 from ..results.training import Manifest, Training
-from .evaluate import evaluate
+from .evaluation import evaluate
 from .limits import Limits, held_against
 
 

@@ -20,8 +20,8 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 from ..model import Model
-from ..quality.check import findings_of_data_set
 from ..quality.findings import RunFacts, finding, temperature_findings
+from ..quality.inspection import findings_of_data_set
 from ..recordings.records import Dataset
 from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest

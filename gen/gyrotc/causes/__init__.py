@@ -8,10 +8,44 @@ from __future__ import annotations
 import pkgutil
 from importlib import import_module
 
-from .base import Cause, History, Needs, Parameter, Scene
+from .base import (
+    ADVICE_MORE_RATES,
+    Cause,
+    CauseValues,
+    History,
+    Needs,
+    Parameter,
+    Reach,
+    Scene,
+    SearchRule,
+    Tabled,
+    Wording,
+    geometric,
+    lagged,
+    memory_gain,
+    weights_of,
+)
 
-__all__ = ["CATALOGUE", "Cause", "History", "Needs", "Parameter", "Scene", "register", "separate_by"]
-
+__all__ = [
+    "ADVICE_MORE_RATES",
+    "CATALOGUE",
+    "Cause",
+    "CauseValues",
+    "History",
+    "Needs",
+    "Parameter",
+    "Reach",
+    "Scene",
+    "SearchRule",
+    "Tabled",
+    "Wording",
+    "geometric",
+    "lagged",
+    "memory_gain",
+    "register",
+    "separate_by",
+    "weights_of",
+]
 
 CATALOGUE: dict[str, Cause] = {}
 """Every cause by its id, in the order in which results list them."""

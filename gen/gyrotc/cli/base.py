@@ -457,6 +457,6 @@ def applied_in(path: Path | None) -> Applied | None:
     """The model of `--applied`. Raises as `applied_of`."""
     if path is None:
         return None
-    from ..tables.quantise import applied_of  # with the reference: not for who has none
+    from ..tables.quantisation import applied_of  # with the reference: not for who has none
 
     return applied_of(path)

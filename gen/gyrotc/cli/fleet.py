@@ -181,7 +181,7 @@ def certificate(
 
     Example: gyrotc certificate result --facts laboratory.toml --number 2026-0042 --out certificate
     """
-    from ..jobs.certificate import certificate as run
+    from ..jobs.certification import certificate as run
 
     with progress() as say:
         say("writing")

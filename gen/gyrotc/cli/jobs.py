@@ -48,7 +48,7 @@ from .results import (
 )
 
 if TYPE_CHECKING:
-    from ..jobs.build import Built
+    from ..jobs.calibration import Built
     from ..model import Model
     from ..results.diagnosed import Diagnosed, NamedCause
 
@@ -144,7 +144,7 @@ def build(
 
     Example: gyrotc build recordings --out result
     """
-    from ..jobs.build import build as run
+    from ..jobs.calibration import build as run
     from ..train.fitting import FitOptions
 
     with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
@@ -228,9 +228,9 @@ def compare(
 
     Example: gyrotc compare recordings --out comparison
     """
-    from ..jobs.build import compare as run
+    from ..jobs.calibration import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
-    from ..recordings.load import load
+    from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
 
@@ -277,7 +277,7 @@ def diagnose(
     """
     from ..jobs.diagnosis import diagnose_dataset
     from ..model import load_model
-    from ..recordings.load import asked_axes, load
+    from ..recordings.loading import asked_axes, load
     from ..recordings.records import Dataset
     from ..results.folder import result_folder
     from ..train.fitting import FitOptions

@@ -266,8 +266,8 @@ def check(
     Example: gyrotc check recordings --envelope=-40:60,-5:5
     """
     from ..assess.changes import earlier_models
-    from ..quality.check import check as run
-    from ..quality.check import envelope_of
+    from ..quality.inspection import check as run
+    from ..quality.inspection import envelope_of
 
     with progress() as say:
         result = run(

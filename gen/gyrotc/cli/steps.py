@@ -109,7 +109,7 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..jobs.recalibration import with_prior
-    from ..recordings.load import load
+    from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
     from ..train.fitting import FitOptions, fit_dataset
@@ -162,8 +162,8 @@ def emit(
     from ..results.files import json_text
     from ..results.folder import result_folder, write_result
     from ..results.release import Emitted, EmittedTable
-    from ..tables.emit import emit as run
-    from ..tables.map_grid import csv_text, map_grid, map_result
+    from ..tables.emission import emit as run
+    from ..tables.map_grid import csv_text, grid_of_map, map_result
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
@@ -188,7 +188,7 @@ def emit(
     )
     write_json(json_file, result.content())
     if map_file is not None:
-        grid = map_grid(loaded if zero_at is None else loaded.zeroed_at(zero_at))
+        grid = grid_of_map(loaded if zero_at is None else loaded.zeroed_at(zero_at))
         text = csv_text(grid) if map_file.suffix == ".csv" else json_text(map_result(grid).content())
         write_result(map_file, text)
         tell(f"{map_file}: {grid.summary}")
@@ -224,7 +224,7 @@ def verify(
     """
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
-    from ..recordings.load import load
+    from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
     from ..results.release import JointVerification, Verification
@@ -284,9 +284,9 @@ def evaluate(
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
-    from ..assess.evaluate import evaluate as run
+    from ..assess.evaluation import evaluate as run
     from ..model import load_model
-    from ..recordings.load import load
+    from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
 
     if average_s is not None:

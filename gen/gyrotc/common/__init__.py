@@ -1,1 +1,5 @@
 """What every package may use: errors, texts, opening of input files, metrics and small statistics of arrays."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

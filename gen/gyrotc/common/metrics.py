@@ -33,7 +33,7 @@ __all__ = [
     "median_step",
     "middle_of_five",
     "quantile_of_parts",
-    "statistics",
+    "statistics_of",
     "time_statistics",
     "window_means",
 ]
@@ -237,7 +237,7 @@ def average_rows(
     return made.averages()
 
 
-def statistics(values: FloatArray) -> dict[str, float | None]:
+def statistics_of(values: FloatArray) -> dict[str, float | None]:
     """Mean, standard deviation, RMS and largest magnitude, deg/h; None where there is no sample."""
     if values.size == 0:
         return dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))

@@ -19,11 +19,11 @@ from .candidates import Candidate, searched
 from .detection import Found, detect
 from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
-from .misfit import Contest, Misfit, contest, explained, misfit
 from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
-from .refine import Refined, model_columns, refine, sized
+from .refinement import Refined, model_columns, refine, sized
 from .rivals import NOTHING, UNNAMED, Rival, calibrated, near_of, no_cause, odds_of, probabilities_of, ranked_rivals
 from .search import Search
+from .unexplained import Contest, Misfit, contest, explained, misfit
 from .wide_memory import WideMemory, outlasts, rate_independent
 
 LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)

@@ -41,7 +41,7 @@ from .extension import Extension, Refitting, extend, stand_ins_of
 from .gain import emitted_means, floor_of, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
-from .refine import Refined
+from .refinement import Refined
 from .refit import Effect, added_range, mean_count, terms_of
 from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .static_map import fits_exactly

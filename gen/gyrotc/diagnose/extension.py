@@ -36,7 +36,7 @@ from .attribution import choose
 from .blocks import Records
 from .gain import Gain, gain_of
 from .pipeline import search_of
-from .refine import Refined
+from .refinement import Refined
 from .refit import (
     Effect,
     Played,

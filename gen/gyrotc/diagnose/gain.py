@@ -21,7 +21,7 @@ from ..model import Model
 from ..recordings.records import Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
-from ..tables.emit import quantise_all
+from ..tables.emission import quantise_all
 from ..train.evidence import steps_of, stretches
 from ..verify.replay import replay_inputs
 from .blocks import Records

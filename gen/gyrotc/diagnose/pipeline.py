@@ -27,7 +27,7 @@ from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .joined import ROUNDING, Channels
 from .noise import NOISE_WORDS, Colour, Declared
 from .profile_likelihood import Gains
-from .refine import Refined
+from .refinement import Refined
 from .search import Search, open_search
 from .signature_bank import bank_of
 from .static_map import LEVELS, fits_exactly

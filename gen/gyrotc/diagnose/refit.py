@@ -34,7 +34,7 @@ from ..train.plausibility import longest_same_s
 from ..train.result import Fit, predict
 from ..train.simple import without_rate
 from .candidates import searched
-from .refine import Refined
+from .refinement import Refined
 
 
 def overtones_of(data: TrainingData, term: Cause, values: CauseValues) -> tuple[dict[str, float], ...]:

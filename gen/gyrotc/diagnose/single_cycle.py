@@ -31,7 +31,7 @@ from .attribution import Attribution
 from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, price_of, searched, shape_parameter
 from .profile_likelihood import SEPARATION
-from .refine import Interval, Refined
+from .refinement import Interval, Refined
 from .rivals import EQUIVALENT, Rival
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings

@@ -37,7 +37,7 @@ from .extension import Extension
 from .gain import Gain
 from .noise import NOISE_WORDS
 from .pipeline import Analysis
-from .refine import Interval, Refined
+from .refinement import Interval, Refined
 from .refit import terms_of
 from .rivals import UNNAMED
 from .single_cycle import Cycle, memories

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
-from ..recordings.load import asked_axes
+from ..recordings.loading import asked_axes
 from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.options import options_in

@@ -156,7 +156,7 @@ def spread(entries: Sequence[FleetUnit], figure: str) -> Spread | None:
     return Spread(median=float(np.median(values)), least=min(values), largest=max(values))
 
 
-def outliers(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
+def outlying_units(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
     """Serials that are outliers among those of their axis, each with each figure that does, the farthest first."""
     kinds: dict[str | None, list[FleetUnit]] = defaultdict(list)
     for entry in entries:

@@ -37,7 +37,7 @@ from .outliers import (
     PROFILE_S,
     copies,
     mirrored_units,
-    outliers,
+    outlying_units,
     spread,
     with_copies,
 )
@@ -152,7 +152,7 @@ def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
         failed=counts["failed"],
         unfinished=counts["unfinished"],
         figures={f: spread(figured, f) for f in (*FIGURES, "sum_abs_weights_dph", "centers", "table_bytes")},
-        outliers=tuple(outliers(figured)),
+        outliers=tuple(outlying_units(figured)),
         reasons=tuple(named),
         copies=tuple(copied),
         serials=tuple(entry.unit() for entry in entries),

@@ -17,9 +17,9 @@ from ..assess.limits import coverage_factor
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
-from ..jobs.build import Built, build_into
+from ..jobs.calibration import Built, build_into
 from ..quality.events import found_events
-from ..recordings.load import load
+from ..recordings.loading import load
 from ..recordings.records import Dataset
 from ..results.cache import input_hashes, program_of
 from ..results.files import Lock, digest_of, json_text, write_atomically

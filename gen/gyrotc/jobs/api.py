@@ -33,12 +33,12 @@ from ..pages.unit import UnitResults, unit_in
 from ..recordings import records
 from ..recordings.importers.job import ImportOptions, import_files
 from ..recordings.importers.map_file import Map
-from ..recordings.load import load as _load
+from ..recordings.loading import load as _load
 from ..results.evaluation import Evaluation
 from ..results.folder import scratch_folder
 from ..train.fitting import FitOptions
-from .build import Built
-from .build import build as _build
+from .calibration import Built
+from .calibration import build as _build
 
 __all__ = ["Dataset", "Picture", "Result", "build", "load"]
 

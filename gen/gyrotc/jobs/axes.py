@@ -13,7 +13,7 @@ from ..pages.report import axes_page
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
 from ..results.release import JointVerification, Verification
-from ..tables.emit import config_text, emitted_tables, runtime_texts
+from ..tables.emission import config_text, emitted_tables, runtime_texts
 from ..tables.record import RECORD, joint_record_text
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries

@@ -18,7 +18,7 @@ from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotClust
 from ..results.marker import check_intact
 from ..results.training import Training
 from ..train.evidence import MEAN_S
-from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, fold_count, learn
+from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, fold_count, learn_prior
 from ..train.prior.unit_means import UnitMeans, means_of
 from ..train.prior.use import file_numbers, prior_of, process_result
 
@@ -74,7 +74,7 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
     say = progress or (lambda _: None)
     units = _units(fleet, axis)
     means, envelope = [u.means for u in units], _envelope([u.model for u in units])
-    found = learn(means, envelope, say)
+    found = learn_prior(means, envelope, say)
     kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
     names = [(u.model.serial, u.model.hash) for u in units]
     return lot_from(

@@ -152,7 +152,7 @@ class _Q31(Operations):
 _OPERATIONS: dict[str, Operations] = {"f32": _F32(), "q31": _Q31()}
 
 
-def recursions(table: Table) -> list[Recursion]:
+def recursions_of_table(table: Table) -> list[Recursion]:
     """The terms of a table."""
     made = []
     for record in table.records("terms"):
@@ -297,7 +297,7 @@ def follow_history(
     )
     if not led.at.size:  # no corrections: nothing that terms could change
         outcome.away += [np.zeros(0, dtype=np.bool_) for channel in table.channels if channel]
-    terms = zip(recursions(table), table.channels, table.stand_ins, strict=True)
+    terms = zip(recursions_of_table(table), table.channels, table.stand_ins, strict=True)
     for recursion, channel, number in terms if led.at.size else ():
         shown = None
         if channel:

@@ -27,7 +27,7 @@ from ..diagnose.noise import NOISE_COLOURS, Declared, Whitener
 from ..diagnose.profile_likelihood import Gains
 from ..diagnose.search import Search, open_search
 from ..diagnose.signature_bank import SignatureBank, bank_of
-from ..simulate.campaign import NoiseName, campaign, with_noise
+from ..simulate.campaign import NoiseName, simulate_campaign, with_noise
 from ..simulate.scenario import RunSet, Scenario, Thermometer, read
 
 _BARE: dict[str, object] = {"cause": [], "channel": [], "thermometer": [], "difference": [], "laser": None}
@@ -112,7 +112,7 @@ def node_temperatures(scenario: str | Path, *, noise: NoiseName, seed: int) -> N
     bare = _training_only(with_noise(plan, noise))
     asked = [Thermometer(name=f"at_{k}", node=node) for k, node in enumerate(plan.gyro.node)]
     runs = []
-    for made in campaign(bare.model_copy(update={"thermometer": asked}), seed):
+    for made in simulate_campaign(bare.model_copy(update={"thermometer": asked}), seed):
         n = made.reading_c.size // _ROW_CELLS * _ROW_CELLS
         runs.append({node: _rows(made.states[f"{node}_c"][:n]) for node in plan.gyro.node})
     return NodeTemperatures(tuple(runs), plan.sensor.node, there)
@@ -144,7 +144,7 @@ def _with_added(plan: Scenario, added: Sequence[str]) -> Scenario:
 def _records(plan: Scenario, seed: int) -> Iterator[RunRecord]:
     names = [(name, s, k) for s in plan.set for k, name in enumerate(s.profiles)]
     first = min(s.started for s in plan.set)
-    for number, ((name, run_set, k), made) in enumerate(zip(names, campaign(plan, seed), strict=True)):
+    for number, ((name, run_set, k), made) in enumerate(zip(names, simulate_campaign(plan, seed), strict=True)):
         n = made.reading_c.size // _ROW_CELLS * _ROW_CELLS
         time_s = np.arange(0.0, n, _ROW_CELLS)
         history = History(

@@ -1,1 +1,5 @@
 """Whether recordings are sound: facts of runs, findings, events, and the report of `gyrotc check`."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

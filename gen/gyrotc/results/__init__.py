@@ -2,3 +2,7 @@
 
 `gyrotc schema` and the tables of fields in the manual are made from the classes (`cli/shell.py`).
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

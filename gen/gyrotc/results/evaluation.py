@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ..common.inputs import AverageLength
-from ..common.metrics import Averages, statistics
+from ..common.metrics import Averages, statistics_of
 from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits
 
@@ -97,7 +97,7 @@ class Pooled(Part):
         """Figures over all samples of several runs."""
         before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
         after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
-        was, remains = Statistics(**statistics(before)), Statistics(**statistics(after))
+        was, remains = Statistics(**statistics_of(before)), Statistics(**statistics_of(after))
         ratio = was.rms_dph / remains.rms_dph if was.rms_dph is not None and remains.rms_dph else None
         return cls(before=was, after=remains, improvement=ratio, samples=int(after.size))
 

@@ -39,11 +39,11 @@ __all__ = [
     "RowLength",
     "SimulatedGyro",
     "SimulatedRunFile",
-    "campaign",
     "gyro_map",
     "records",
     "rows",
     "simulate",
+    "simulate_campaign",
     "with_noise",
     "write_gyro",
 ]
@@ -162,7 +162,7 @@ def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, report: Callabl
     _write_texts(folder, gyro, weight, runs, truths)
 
 
-def campaign(plan: Scenario, seed: int) -> Iterator[SimulatedRecord]:
+def simulate_campaign(plan: Scenario, seed: int) -> Iterator[SimulatedRecord]:
     """The runs of a scenario, one after the other.
 
     Raises:

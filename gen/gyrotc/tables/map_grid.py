@@ -51,7 +51,7 @@ class MapGrid:
         )
 
 
-def map_grid(model: Model, points: tuple[int, int] = _POINTS) -> MapGrid:
+def grid_of_map(model: Model, points: tuple[int, int] = _POINTS) -> MapGrid:
     """Return the map of a model over its envelope, without its terms."""
     t = _axis_points(model.envelope.temperature_c, points[0])
     r = _axis_points(model.envelope.slope_c_per_min, points[1])

@@ -33,10 +33,10 @@ from .networks import snapped
 from .options import AUTO, SIMPLE, BuildOptions
 from .plausibility import AGREE_S, longest_same_s, stuck_after_s
 from .prior.given import Prior
-from .prior.unit_means import unit_means
+from .prior.unit_means import means_of_unit
 from .result import Fit, predict
 from .samples import Blocks, run_blocks
-from .uncertainty import coverage, rezero_dph, uncertainty
+from .uncertainty import coverage, rezero_dph, uncertainty_of
 
 __all__ = [
     "HOLD_S",
@@ -250,7 +250,7 @@ def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
 def _means(data: TrainingData, fitted: Fit) -> MapMeans:
     """What a lot is learnt from, in as many digits as its noise leaves."""
     samples = cleaned_samples(data)
-    found, mean_s = unit_means(samples, scaling_of(samples), fitted.outcome.process)
+    found, mean_s = means_of_unit(samples, scaling_of(samples), fitted.outcome.process)
 
     def rounded(values: NDArray[np.float64]) -> tuple[float, ...]:
         return tuple(float(f"{v:.{_MEANS_DIGITS}g}") for v in values)
@@ -379,7 +379,7 @@ def _uncertainty(
 ) -> dict[str, Any] | None:
     """Of the corrections; None where the process behind them cannot be solved."""
     try:
-        return uncertainty(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
+        return uncertainty_of(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
     except TrainingFailed:
         return None
 

@@ -13,7 +13,7 @@ from .data import Scaling, TrainingData, cleaned_samples, scaling_of
 from .evidence import TrainingFailed, floor_dph
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .networks import network
-from .objection import objection
+from .objection import objection_to
 from .ols import RIDGE, fit_ols
 from .options import AUTO, DEFAULTS, METHODS, SIMPLE, BuildOptions
 from .prior.given import Prior
@@ -21,7 +21,7 @@ from .result import Fit, Outcome, predict
 from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .stepwise import fit_mlr
-from .uncertainty import coverage, uncertainty
+from .uncertainty import coverage, uncertainty_of
 
 __all__ = [
     "AUTO",
@@ -35,7 +35,7 @@ __all__ = [
     "fit",
     "predict",
     "trained",
-    "uncertainty",
+    "uncertainty_of",
 ]
 
 _MAPS: dict[str, Callable[..., Outcome]] = {"mrbf": fit_mrbf, "mrbf_t": fit_mrbf_t, "bank": fit_bank}
@@ -101,7 +101,7 @@ def fit(
         outcome = trained(
             method, samples, scaling, seed=seed, centers=centers, rho=rho, average_s=average_s, power_on=power_on
         )
-        against = objection(outcome, samples, scaling, average_s) if method in _GUARDED else ""
+        against = objection_to(outcome, samples, scaling, average_s) if method in _GUARDED else ""
         if against:
             findings.append(_beyond(method, against))
     mean = float(np.average(samples.bias_dph, weights=samples.weight))

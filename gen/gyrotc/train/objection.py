@@ -17,7 +17,7 @@ _SIGMAS = 4.0  # of the process at a point and of a mean's noise: nothing that a
 _LARGEST_DPH = 7.5e6  # that a table holds
 
 
-def objection(outcome: Outcome, samples: TrainingData, scaling: Scaling, average_s: float) -> str:
+def objection_to(outcome: Outcome, samples: TrainingData, scaling: Scaling, average_s: float) -> str:
     """Why the networks must not be used, in words; empty if they may.
 
     They must not leave their process by 4 σ anywhere on the envelope, nor lie beyond the lowest or highest mean of

@@ -49,7 +49,7 @@ from .data import (
 )
 from .evidence import MEAN_S, Process, TrainingFailed, conditioned_on, difference_sigma, fit_process
 from .mrbf import fit_mrbf
-from .objection import objection
+from .objection import objection_to
 from .result import Outcome
 from .simple import Mixed, all_solved, fit_mixed_model, fit_simple, outcome_of, powers_of, triangle_of
 
@@ -429,7 +429,7 @@ def chosen_by_cross_validation(
         name = comparison.chosen(tuple(refused))
         try:
             outcome = _trained(name, samples, scaling, process, power_on, seed, average_s)
-            against = objection(outcome, samples, scaling, average_s) if name != "constant" else ""
+            against = objection_to(outcome, samples, scaling, average_s) if name != "constant" else ""
         except TrainingFailed as failure:
             against = str(failure)
         if not against:

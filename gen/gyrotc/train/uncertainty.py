@@ -256,7 +256,7 @@ def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) ->
     return {"cells": list(cells), "rows": ["".join("1" if x else "0" for x in row) for row in seen]}
 
 
-def uncertainty(
+def uncertainty_of(
     data: TrainingData,
     fit: Fit,
     cells: tuple[int, int] = (8, 5),

@@ -29,7 +29,7 @@ from ..model import SERIAL, Model
 from ..results.files import write_own
 from ..results.marker import MARKER, sha256
 from ..results.release import VerifiedFile
-from ..tables.emit import Emission, board_test_text, emit_texts, quantise_all
+from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
 from ..tables.text import ARITHMETICS, amalgamate
 

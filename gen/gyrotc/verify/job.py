@@ -37,7 +37,7 @@ from ..results.release import (
     VerifiedTarget,
     WorstError,
 )
-from ..tables.emit import expected_answers
+from ..tables.emission import expected_answers
 from ..tables.vectors import Vectors, make_vectors
 from .board import board_entries, log_entries
 from .emitted import (

@@ -28,7 +28,7 @@ from ..recordings.records import Dataset, Rows, Run
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import ReplayedRows, VerifiedTarget
-from ..tables.quantise import channels_of
+from ..tables.quantisation import channels_of
 from .emitted import Job, checked_sources, table_files
 from .toolchain import Target, compile_objects, link, run_program, runtime_object
 

@@ -8,21 +8,38 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.assess.budget import budget_of, combined, figure_uncertainties
-from gyrotc.assess.limits import Limits, coverage_factor, decided, instruments_in, last_day, load_limits, worst_of
-from gyrotc.common.errors import InputError
-from gyrotc.common.metrics import Averages, statistics, time_statistics
-from gyrotc.jobs.build import build_into
+from gyrotc.assess import (
+    Limits,
+    budget_of,
+    combined,
+    coverage_factor,
+    decided,
+    figure_uncertainties,
+    instruments_in,
+    last_day,
+    load_limits,
+    worst_of,
+)
+from gyrotc.common import Averages, InputError, statistics_of, time_statistics
+from gyrotc.jobs import build_into
 from gyrotc.model import load_model
-from gyrotc.pages.display import rounded
-from gyrotc.pages.report import write_report
-from gyrotc.recordings.load import load
-from gyrotc.results.base import read_optional, read_result
-from gyrotc.results.evaluation import Changes, EvaluatedRun, Evaluation, FigureUncertainty, RunStatistics, Statistics
-from gyrotc.results.release import Budget, Verification
-from gyrotc.results.training import Training
-from gyrotc.simulate.campaign import simulate
-from gyrotc.train.fitting import FitOptions
+from gyrotc.pages import rounded, write_report
+from gyrotc.recordings import load
+from gyrotc.results import (
+    Budget,
+    Changes,
+    EvaluatedRun,
+    Evaluation,
+    FigureUncertainty,
+    RunStatistics,
+    Statistics,
+    Training,
+    Verification,
+    read_optional,
+    read_result,
+)
+from gyrotc.simulate import simulate
+from gyrotc.train import FitOptions
 
 LIMITS = """schema = 1
 [interval]
@@ -225,8 +242,8 @@ def reported_of(runs: list[Averages]) -> list[EvaluatedRun]:
     return [
         EvaluatedRun(
             file="a.csv", role="exam", environment=None, samples=a.after_dph.size,
-            before=Statistics(**statistics(a.before_dph)),
-            after=RunStatistics(**statistics(a.after_dph), **time_statistics(a, 100.0)),
+            before=Statistics(**statistics_of(a.before_dph)),
+            after=RunStatistics(**statistics_of(a.after_dph), **time_statistics(a, 100.0)),
         )
         for a in runs
     ]  # fmt: skip

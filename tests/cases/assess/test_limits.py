@@ -9,17 +9,24 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from conftest import HOST, Command
-from gyrotc.assess.limits import AtLeast, AtMost, held_against, load_limits
-from gyrotc.assess.product_guards import guarded
-from gyrotc.common.errors import InputError
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.table import CHANNEL_LOST, CLAMPED, FALLBACK, HELD
+from gyrotc.assess import AtLeast, AtMost, guarded, held_against, load_limits
+from gyrotc.common import InputError
+from gyrotc.mirror import CHANNEL_LOST, CLAMPED, FALLBACK, HELD, replay
 from gyrotc.model import Guard, Model, Term
-from gyrotc.results.base import Finding
-from gyrotc.results.evaluation import EvaluatedRun, Evaluation, ModelSizes, Pooled, RunStatistics, Statistics
-from gyrotc.results.release import MapError, Verification, VerifiedTarget, WorstError
-from gyrotc.tables.emit import emit_texts, quantise_all
-from gyrotc.tables.quantise import quantise
+from gyrotc.results import (
+    EvaluatedRun,
+    Evaluation,
+    Finding,
+    MapError,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+    Statistics,
+    Verification,
+    VerifiedTarget,
+    WorstError,
+)
+from gyrotc.tables import emit_texts, quantise, quantise_all
 from models import random_model
 from recordings import columns, described, write_csv
 

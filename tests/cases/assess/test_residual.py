@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, run_here
-from gyrotc.assess.findings import residual_test
+from gyrotc.assess import residual_test
 from gyrotc.cli.results import summary_line
-from gyrotc.jobs.build import build_into
-from gyrotc.pages.report import write_report
-from gyrotc.recordings.load import load
-from gyrotc.results.evaluation import RMS_OVER_FLOOR, ResidualTest
-from gyrotc.train.evidence import robust_sigma
-from gyrotc.train.fitting import FitOptions
+from gyrotc.jobs import build_into
+from gyrotc.pages import write_report
+from gyrotc.recordings import load
+from gyrotc.results import RMS_OVER_FLOOR, ResidualTest
+from gyrotc.train import FitOptions, robust_sigma
 from numpy.typing import NDArray
 from recordings import columns, toml, write_csv
 

@@ -14,16 +14,14 @@ from typing import Any
 
 import pytest
 from conftest import quick_and_slow, run_gyrotc
-from gyrotc.assess.limits import load_limits
-from gyrotc.common.errors import GyrotcError, InputError
-from gyrotc.jobs.build import build_into
-from gyrotc.jobs.certificate import certificate, unit_of
+from gyrotc.assess import load_limits
+from gyrotc.common import GyrotcError, InputError
+from gyrotc.jobs import build_into, certificate, unit_of
 from gyrotc.jobs.lot import _unit
 from gyrotc.pages import certificate as printing
-from gyrotc.recordings.load import load
-from gyrotc.results.folder import result_folder
-from gyrotc.results.marker import MARKER
-from gyrotc.train.fitting import FitOptions
+from gyrotc.recordings import load
+from gyrotc.results import MARKER, result_folder
+from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
 from bench.rows.evidence import ABOUT, found

@@ -10,23 +10,23 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from gyrotc.assess.limits import Limits, decided, held_against
+from gyrotc.assess import Limits, decided, held_against
 from gyrotc.cli.results import limit_lines, summary_line
-from gyrotc.fleet import unit
-from gyrotc.fleet.manifest import Fleet, Unit
-from gyrotc.fleet.page import write_summary
-from gyrotc.jobs.api import Result
-from gyrotc.jobs.build import Built
-from gyrotc.jobs.certificate import LaboratoryFacts
+from gyrotc.fleet import Fleet, Unit, unit, write_summary
+from gyrotc.jobs import Built, LaboratoryFacts, Result
 from gyrotc.model import Model
-from gyrotc.pages.certificate import certificate_page, rows_of
-from gyrotc.pages.report import page_environment
-from gyrotc.pages.unit import UnitResults
-from gyrotc.recordings.records import Dataset
-from gyrotc.results.base import Finding
-from gyrotc.results.evaluation import Evaluation, FigureUncertainty, Pooled, ResidualTest, Statistics
-from gyrotc.results.release import HeldLimits
-from gyrotc.results.training import Training
+from gyrotc.pages import UnitResults, certificate_page, page_environment, rows_of
+from gyrotc.recordings import Dataset
+from gyrotc.results import (
+    Evaluation,
+    FigureUncertainty,
+    Finding,
+    HeldLimits,
+    Pooled,
+    ResidualTest,
+    Statistics,
+    Training,
+)
 from test_limits import EVALUATION, VERIFICATION
 
 _FIGURES = ("rms_dph", "std_dph", "max_abs_dph", "mean_dph", "rms_30min_dph", "centers")

@@ -10,16 +10,15 @@ from pathlib import Path
 import made_up_cause
 import numpy as np
 import pytest
-from gyrotc.causes import CATALOGUE, register, separate_by
-from gyrotc.causes.base import Cause, History, Parameter, Reach, Scene
+from gyrotc.causes import CATALOGUE, Cause, History, Parameter, Reach, Scene, register, separate_by
 from gyrotc.cli.plan import plan_parts
-from gyrotc.jobs.build import build
-from gyrotc.mirror.recursions import Course, CourseChannel, TermOutcome
+from gyrotc.jobs import build
+from gyrotc.mirror import Course, CourseChannel, TermOutcome
 from gyrotc.model import load_model
-from gyrotc.pages.short import write_plan
+from gyrotc.pages import write_plan
 from gyrotc.plan.plan import plan
-from gyrotc.simulate.campaign import simulate
-from gyrotc.train.fitting import FitOptions
+from gyrotc.simulate import simulate
+from gyrotc.train import FitOptions
 
 PACKAGE = Path(__file__).resolve().parents[3] / "gen" / "gyrotc"
 MOST_LITERALS = 14  # of them three are fields of what a lot or a prior holds: no rule about a cause

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.causes import CATALOGUE
-from gyrotc.causes.base import History, Scene
-from gyrotc.common.errors import InputError
-from gyrotc.mirror.recursions import Course, CourseChannel, TermOutcome, delayed, first_order, play
-from gyrotc.simulate.gyro import draw_map
+from gyrotc.causes import CATALOGUE, History, Scene
+from gyrotc.common import InputError
+from gyrotc.mirror import Course, CourseChannel, TermOutcome, delayed, first_order, play
+from gyrotc.simulate import draw_map
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

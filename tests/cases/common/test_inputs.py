@@ -17,25 +17,19 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from conftest import ROOT, Command, packed
-from gyrotc.assess.limits import load_limits
-from gyrotc.common import inputs
-from gyrotc.common.errors import InputError, install_command
-from gyrotc.common.inputs import parse_json, parse_toml
-from gyrotc.diagnose import signature_bank
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.fleet.manifest import load_manifest
+from gyrotc.assess import load_limits
+from gyrotc.common import InputError, inputs, install_command, parse_json, parse_toml
+from gyrotc.diagnose import records_of, signature_bank
+from gyrotc.fleet import load_manifest
 from gyrotc.fleet.run import Cluster, _connected
 from gyrotc.model import load_model
 from gyrotc.pages import report
-from gyrotc.recordings.load import load
+from gyrotc.recordings import load
+from gyrotc.results import EvaluatedRun, Evaluation, Verification, checked_result, read_result
 from gyrotc.results import cache as kept
-from gyrotc.results.base import checked_result, read_result
-from gyrotc.results.evaluation import EvaluatedRun, Evaluation
-from gyrotc.results.release import Verification
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read, simulated_floor
-from gyrotc.train.samples import run_blocks
-from gyrotc.verify.board import log_parts
+from gyrotc.simulate import read, simulate, simulated_floor
+from gyrotc.train import run_blocks
+from gyrotc.verify import log_parts
 from recordings import columns, csv_text, described, write_csv
 
 READERS: dict[str, Callable[[Path], Any]] = {
@@ -131,7 +125,7 @@ def test_a_parquet_file_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     assert (folder / "a.parquet").stat().st_size < 2**20
     del table
     program = (
-        "import resource, sys; from gyrotc.recordings.load import load; from pathlib import Path\n"
+        "import resource, sys; from gyrotc.recordings.loading import load; from pathlib import Path\n"
         "used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "try: load(Path(sys.argv[1]))\nexcept Exception as error: print(error)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used, 'KiB')\n"
@@ -243,9 +237,9 @@ def test_results_of_other_types_are_refused_by_field() -> None:
 @pytest.mark.slow
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
     program = (
-        "import sys, gyrotc.recordings.load as m, gyrotc.quality.check, gyrotc.cli.main\n"
+        "import sys, gyrotc.recordings.loading as m, gyrotc.quality.inspection, gyrotc.cli.main\n"
         "def fail(*a, **k): raise {0}\n"
-        "gyrotc.quality.check.survey = fail\n"
+        "gyrotc.quality.inspection.survey = fail\n"
         f"sys.argv = ['gyrotc', 'check', {str(tmp_path)!r}]\n"
         "gyrotc.cli.main.main()\n"
     )

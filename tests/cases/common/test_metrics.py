@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.common import metrics
-from gyrotc.common.metrics import MAD_TO_SIGMA, average_rows, median, middle_of_five, statistics, time_statistics
-from gyrotc.common.statistics import CHI2_95_ONE, CHI2_95_TWO, NORMAL_95, TOLERANCE, main_directions, orthonormal
-from gyrotc.results.evaluation import Pooled
+from gyrotc.common import (
+    CHI2_95_ONE,
+    CHI2_95_TWO,
+    MAD_TO_SIGMA,
+    NORMAL_95,
+    TOLERANCE,
+    average_rows,
+    main_directions,
+    median,
+    metrics,
+    middle_of_five,
+    orthonormal,
+    statistics_of,
+    time_statistics,
+)
+from gyrotc.results import Pooled
 from scipy import stats
 from scipy.linalg import subspace_angles
 
@@ -51,7 +63,7 @@ def test_pooled_figures_weigh_every_sample_alike() -> None:
 
 
 def test_statistics_of_nothing_are_null() -> None:
-    assert set(statistics(np.zeros(0)).values()) == {None}
+    assert set(statistics_of(np.zeros(0)).values()) == {None}
 
 
 def test_constant_residual_turns_by_its_rate_times_one_hour() -> None:

@@ -17,18 +17,17 @@ import jinja2
 import pytest
 from conftest import Command
 from emitted import recorded
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.assess.limits import load_limits
+from gyrotc.assess import evaluate, load_limits
 from gyrotc.cli import base
 from gyrotc.cli.results import evaluation_table, verify_table
-from gyrotc.common.errors import InputError
-from gyrotc.common.inputs import checked
-from gyrotc.common.texts import (
+from gyrotc.common import (
     C_COMMENT,
+    InputError,
     c_code,
     c_comment,
     c_environment,
     c_literal,
+    checked,
     checked_svg,
     csv_cell,
     file_stem,
@@ -38,23 +37,16 @@ from gyrotc.common.texts import (
     toml_key,
     toml_value,
 )
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.page import write_summary
-from gyrotc.jobs.diagnosis import extended_scenario
+from gyrotc.fleet import load_manifest, write_summary
+from gyrotc.jobs import extended_scenario
 from gyrotc.model import Model, table_id
-from gyrotc.pages import report
-from gyrotc.pages.chart import Panel, drawing
-from gyrotc.pages.diagnosis import write_diagnosis_page as write_page
-from gyrotc.recordings.description import Problems, dataset_toml, parse_description
-from gyrotc.recordings.load import load
-from gyrotc.results.base import checked_result
-from gyrotc.results.diagnosed import Diagnosed, Estimate
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.release import VerifiedTarget
+from gyrotc.pages import Panel, drawing, report
+from gyrotc.pages import write_diagnosis_page as write_page
+from gyrotc.recordings import Problems, dataset_toml, load, parse_description
+from gyrotc.results import Diagnosed, Estimate, FleetEntry, VerifiedTarget, checked_result
 from gyrotc.simulate import scenario
-from gyrotc.tables.emit import emit_texts, quantise_all
-from gyrotc.verify.emitted import checked_sources, table_files
-from gyrotc.verify.job import verify
+from gyrotc.tables import emit_texts, quantise_all
+from gyrotc.verify import checked_sources, table_files, verify
 from hostile import hostile_strings
 
 if sys.version_info >= (3, 11):

@@ -11,11 +11,66 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.causes import CATALOGUE
-from gyrotc.causes.base import History
+from gyrotc.causes import CATALOGUE, History
 from gyrotc.cli.jobs import diagnosis_lines
-from gyrotc.diagnose.attribution import Attribution, attribute, choose, overlap
-from gyrotc.diagnose.blocks import Records, centred_slope, records_of
+from gyrotc.diagnose import (
+    EQUIVALENT,
+    LEVELS,
+    NOISE_COLOURS,
+    NOTHING,
+    UNNAMED,
+    VERDICTS,
+    Attribution,
+    Colour,
+    CycleFits,
+    Effect,
+    Gains,
+    Misfit,
+    NoiseFinding,
+    Point,
+    Records,
+    Refined,
+    Refitting,
+    Rival,
+    Search,
+    SizeLimit,
+    Whitener,
+    attribute,
+    best_of,
+    centred_slope,
+    choose,
+    clear_pair,
+    completed,
+    contest,
+    direction_of,
+    fine_columns,
+    holds,
+    looks_like,
+    make_basis,
+    makes_sense,
+    misfit,
+    model_columns,
+    near_of,
+    next_steps,
+    no_cause,
+    odds_of,
+    overlap,
+    overtones_of,
+    parabola_top,
+    probabilities_of,
+    profile_interval,
+    proportional_map,
+    random_size,
+    ranked_rivals,
+    records_of,
+    refine,
+    replaced_map,
+    samples,
+    sentence_of,
+    terms_of,
+    verdict_of,
+)
+from gyrotc.diagnose import testable as reason_against
 from gyrotc.diagnose.candidates import (
     Candidate,
     _switch,
@@ -26,36 +81,13 @@ from gyrotc.diagnose.candidates import (
     searched,
     shapes_of,
 )
-from gyrotc.diagnose.candidates import testable as reason_against
 from gyrotc.diagnose.diagnosis import _entries
-from gyrotc.diagnose.discrepancy import NoiseFinding
-from gyrotc.diagnose.extension import Refitting
-from gyrotc.diagnose.misfit import Misfit, contest, misfit
-from gyrotc.diagnose.noise import NOISE_COLOURS, Colour, Whitener
-from gyrotc.diagnose.profile_likelihood import Gains, Point, SizeLimit, best_of, clear_pair, makes_sense
-from gyrotc.diagnose.refine import Refined, model_columns, parabola_top, profile_interval, random_size, refine
-from gyrotc.diagnose.refit import MOST_TERMS, Effect, completed, overtones_of, samples, terms_of
-from gyrotc.diagnose.rivals import (
-    EQUIVALENT,
-    NOTHING,
-    UNNAMED,
-    Rival,
-    near_of,
-    no_cause,
-    odds_of,
-    probabilities_of,
-    ranked_rivals,
-)
-from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.signature_bank import direction_of
-from gyrotc.diagnose.single_cycle import CycleFits
-from gyrotc.diagnose.static_map import LEVELS, fine_columns, make_basis, proportional_map, replaced_map
-from gyrotc.diagnose.summary import VERDICTS, holds, looks_like, next_steps, sentence_of, verdict_of
-from gyrotc.mirror.recursions import first_order
-from gyrotc.pages.diagnosis import write_diagnosis_page
-from gyrotc.recordings.load import load
-from gyrotc.results.diagnosed import (
+from gyrotc.mirror import first_order
+from gyrotc.pages import write_diagnosis_page
+from gyrotc.recordings import load
+from gyrotc.results import (
     ConsideredCause,
+    DetectionLimit,
     Diagnosed,
     DiagnosisVerdict,
     Estimate,
@@ -63,11 +95,9 @@ from gyrotc.results.diagnosed import (
     GainOnUnseen,
     NamedCause,
     Unexplained,
+    json_text,
 )
-from gyrotc.results.files import json_text
-from gyrotc.results.recordings import DetectionLimit
-from gyrotc.train.data import TrainingData, cleaned_samples
-from gyrotc.train.fitting import FitOptions
+from gyrotc.train import MOST_TERMS, FitOptions, TrainingData, cleaned_samples
 from numpy.typing import NDArray
 from recordings import toml, write_csv
 from scipy import stats

@@ -6,8 +6,36 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.causes.base import History
-from gyrotc.common.metrics import Averages
+from gyrotc.causes import History
+from gyrotc.common import Averages
+from gyrotc.diagnose import (
+    NOISE_COLOURS,
+    Candidate,
+    Colour,
+    Declared,
+    JoinedLayout,
+    Projection,
+    ScoredColumns,
+    Search,
+    Whitener,
+    cleaned_means,
+    columns_of,
+    detect,
+    detection_limits,
+    draw_null,
+    flicker_row,
+    floor_of,
+    gain_of,
+    limit_of,
+    markov_row,
+    project,
+    ratio_of,
+    residual_log_likelihood,
+    score,
+    screen,
+    variance_ratio_of,
+    view_of_bank,
+)
 from gyrotc.diagnose.blocks import (
     Records,
     RunRecord,
@@ -17,22 +45,7 @@ from gyrotc.diagnose.blocks import (
     centred_slope,
     singled_out,
 )
-from gyrotc.diagnose.candidates import Candidate, columns_of
-from gyrotc.diagnose.detection import detect, detection_limits, limit_of, project
-from gyrotc.diagnose.gain import floor_of, gain_of
-from gyrotc.diagnose.joined import (
-    JoinedLayout,
-    Projection,
-    ScoredColumns,
-    draw_null,
-    ratio_of,
-    score,
-    variance_ratio_of,
-)
-from gyrotc.diagnose.noise import NOISE_COLOURS, Colour, Declared, Whitener, flicker_row, markov_row
-from gyrotc.diagnose.pipeline import cleaned_means, screen
-from gyrotc.diagnose.search import Search, residual_log_likelihood, view_of_bank
-from gyrotc.recordings.records import Rows
+from gyrotc.recordings import Rows
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.integrate import dblquad

@@ -10,15 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.gain import emitted_means
-from gyrotc.diagnose.noise import declared_noise
-from gyrotc.diagnose.pipeline import analyse
-from gyrotc.diagnose.summary import holds
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, joined_runs
-from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.diagnose import analyse, declared_noise, diagnose, emitted_means, holds, records_of
+from gyrotc.recordings import Dataset, joined_runs, load
+from gyrotc.train import FitOptions, fit_dataset
 
 from tests.blind import fixed
 from tests.blind.campaign import ROW_S, draw_recording, mean_of, write

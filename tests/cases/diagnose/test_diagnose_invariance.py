@@ -17,21 +17,27 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT, Command
-from gyrotc.diagnose.blocks import Records, RunRecord, records_of
-from gyrotc.diagnose.detection import project
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import Refitting
-from gyrotc.diagnose.gain import floor_of
+from gyrotc.diagnose import (
+    Analysis,
+    Declared,
+    Effect,
+    Records,
+    Refitting,
+    RunRecord,
+    analyse,
+    cycle_of,
+    declared_noise,
+    diagnose,
+    floor_of,
+    open_search,
+    project,
+    records_of,
+    search_of,
+    verdict_of,
+)
 from gyrotc.diagnose.joined import _root
-from gyrotc.diagnose.noise import Declared, declared_noise
-from gyrotc.diagnose.pipeline import Analysis, analyse, search_of
-from gyrotc.diagnose.refit import Effect
-from gyrotc.diagnose.search import open_search
-from gyrotc.diagnose.single_cycle import cycle_of
-from gyrotc.diagnose.summary import verdict_of
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, joined_runs
-from gyrotc.train.fitting import FitOptions
+from gyrotc.recordings import Dataset, joined_runs, load
+from gyrotc.train import FitOptions
 from recordings import write_csv
 
 from bench.invariance import VARIATIONS, averaged

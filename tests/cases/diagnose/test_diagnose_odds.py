@@ -8,15 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gyrotc.causes.base import History
-from gyrotc.common.statistics import orthonormal
-from gyrotc.diagnose.blocks import Records
-from gyrotc.diagnose.candidates import Candidate, columns_of
+from gyrotc.causes import History
+from gyrotc.common import orthonormal
+from gyrotc.diagnose import (
+    NOISE_WORDS,
+    Candidate,
+    Declared,
+    Gains,
+    Point,
+    Records,
+    best_of,
+    columns_of,
+    needs_finer,
+    search_of,
+)
 from gyrotc.diagnose.discrepancy import _discrepancy, _two_sided, ensemble_of, noise_findings
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood, _largest
-from gyrotc.diagnose.noise import NOISE_WORDS, Declared
-from gyrotc.diagnose.pipeline import needs_finer, search_of
-from gyrotc.diagnose.profile_likelihood import Gains, Point, best_of
 from gyrotc.diagnose.rivals import (
     LOOKED_AT,
     Rival,
@@ -30,7 +37,7 @@ from gyrotc.diagnose.rivals import (
     ranked_rivals,
     rival_key,
 )
-from gyrotc.mirror.recursions import delayed, first_order
+from gyrotc.mirror import delayed, first_order
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign

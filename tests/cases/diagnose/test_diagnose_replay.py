@@ -11,33 +11,44 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.causes import CATALOGUE
-from gyrotc.causes.base import History
-from gyrotc.common.metrics import average_rows
-from gyrotc.diagnose import gain
-from gyrotc.diagnose.attribution import Attribution, attribute
-from gyrotc.diagnose.blocks import Records, records_of
-from gyrotc.diagnose.candidates import columns_of
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import Refitting, stand_ins_of
-from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood
-from gyrotc.diagnose.profile_likelihood import Gains
-from gyrotc.diagnose.refit import Effect, Played, added_range, completed, play_runs, samples
-from gyrotc.diagnose.search import Search
-from gyrotc.diagnose.single_cycle import cycle_of, is_single_cycle
-from gyrotc.diagnose.summary import holds, sentence_of, shows_as, verdict_of
-from gyrotc.diagnose.wide_memory import WideMemory, outlasts, rate_independent
-from gyrotc.mirror.front_end import missed_before
-from gyrotc.mirror.history import FollowedHistory, evaluate_map, follow_history
-from gyrotc.mirror.recursions import first_order, play
+from gyrotc.causes import CATALOGUE, History
+from gyrotc.common import average_rows
+from gyrotc.diagnose import (
+    Attribution,
+    Effect,
+    Gains,
+    MarginalLikelihood,
+    Played,
+    Records,
+    Refitting,
+    Search,
+    WideMemory,
+    added_range,
+    attribute,
+    columns_of,
+    completed,
+    cycle_of,
+    diagnose,
+    gain,
+    holds,
+    is_single_cycle,
+    outlasts,
+    play_runs,
+    rate_independent,
+    records_of,
+    samples,
+    sentence_of,
+    shows_as,
+    stand_ins_of,
+    verdict_of,
+)
+from gyrotc.mirror import FollowedHistory, evaluate_map, first_order, follow_history, missed_before, play
 from gyrotc.model import Model
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Rows, Run, joined_runs
-from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.quantise import quantise
-from gyrotc.train.data import joined
-from gyrotc.train.fitting import FitOptions, FrontEnd, fit_dataset, front_end
-from gyrotc.verify.replay import replay_case_of
+from gyrotc.recordings import Dataset, Rows, Run, joined_runs, load
+from gyrotc.simulate import simulate
+from gyrotc.tables import quantise
+from gyrotc.train import FitOptions, FrontEnd, fit_dataset, front_end, joined
+from gyrotc.verify import replay_case_of
 from numpy.typing import NDArray
 from single_cycles import NOISE, clean_cycle
 from small_campaign import LEVEL_DPH, Campaign, small_campaign

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from gyrotc.model import load_model
-from gyrotc.tables.emit import emit_texts, quantise_all
+from gyrotc.tables import emit_texts, quantise_all
 
 GOLDEN = Path(__file__).resolve().parent
 EXAMPLE = GOLDEN.parents[2] / "examples" / "minimal"

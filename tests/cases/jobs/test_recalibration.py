@@ -12,19 +12,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, run_here
-from gyrotc.common.errors import InputError
+from gyrotc.common import InputError
 from gyrotc.model import load_model
-from gyrotc.results.base import read_result
-from gyrotc.results.evaluation import Evaluation
-from gyrotc.results.release import Verification
-from gyrotc.results.training import Training
-from gyrotc.tables.emit import emitted_tables
-from gyrotc.train.data import TrainingData, cleaned_samples, scaling_of
-from gyrotc.train.methods import fit
-from gyrotc.train.prior.departures import Departures, Hypothesis, revised, updated, within
-from gyrotc.train.prior.earlier import EarlierPrior, known_map, posterior_of_known, posterior_of_means, widened
-from gyrotc.train.prior.unit_means import UnitMeans, unit_means
-from gyrotc.train.result import predict
+from gyrotc.results import Evaluation, Training, Verification, read_result
+from gyrotc.tables import emitted_tables
+from gyrotc.train import TrainingData, cleaned_samples, fit, predict, scaling_of
+from gyrotc.train.prior import (
+    Departures,
+    EarlierPrior,
+    Hypothesis,
+    UnitMeans,
+    known_map,
+    means_of_unit,
+    posterior_of_known,
+    posterior_of_means,
+    revised,
+    updated,
+    widened,
+    within,
+)
 from numpy.typing import NDArray
 from recordings import write_csv
 
@@ -70,7 +76,7 @@ def recorded(
 
 def means(data: TrainingData) -> UnitMeans:
     samples = cleaned_samples(data)
-    return unit_means(samples, scaling_of(samples), None)[0]
+    return means_of_unit(samples, scaling_of(samples), None)[0]
 
 
 def earlier(rng: np.random.Generator, ageing_dph: float = 0.0) -> EarlierPrior:

@@ -10,23 +10,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc._core import posteriors
-from gyrotc.common.errors import InputError
-from gyrotc.jobs.lot import checksum_of, lot_from
-from gyrotc.lot.planning import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
-from gyrotc.results.fleet import Lot, LotCluster
-from gyrotc.results.recordings import ChamberStep
-from gyrotc.simulate.scenario import read
-from gyrotc.train.data import TrainingData
-from gyrotc.train.evidence import Asked
-from gyrotc.train.methods import fit
+from gyrotc.common import InputError
+from gyrotc.jobs import checksum_of, lot_from
+from gyrotc.lot import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
+from gyrotc.results import ChamberStep, Lot, LotCluster
+from gyrotc.simulate import read
+from gyrotc.train import Asked, TrainingData, coverage, fit, predict, uncertainty_of
+from gyrotc.train.prior import (
+    PRIOR_LOG,
+    Learned,
+    LotBasis,
+    LotPrior,
+    MapPosterior,
+    MapPrior,
+    UnitMeans,
+    evidence,
+    fitted,
+    learn_prior,
+    p_value,
+    prior_of,
+    scores,
+    sums_of,
+    widened,
+)
 from gyrotc.train.prior import basis as lot_basis
-from gyrotc.train.prior.basis import PRIOR_LOG, LotBasis
-from gyrotc.train.prior.earlier import widened
-from gyrotc.train.prior.learn import Learned, evidence, fitted, learn, p_value, scores, sums_of
-from gyrotc.train.prior.unit_means import UnitMeans
-from gyrotc.train.prior.use import LotPrior, MapPosterior, MapPrior, prior_of
-from gyrotc.train.result import predict
-from gyrotc.train.uncertainty import coverage, uncertainty
 from models import random_model
 from numpy.typing import NDArray
 from scipy.stats import kstest, multivariate_normal
@@ -73,7 +80,7 @@ def short_run(rng: np.random.Generator, own: list[float]) -> TrainingData:
 
 
 def lot_of(units: list[UnitMeans]) -> tuple[Lot, Learned]:
-    found = learn(units, ENVELOPE, lambda _: None)
+    found = learn_prior(units, ENVELOPE, lambda _: None)
     return lot_from([(f"U{k}", "0" * 64) for k in range(len(units))], units, found, ENVELOPE), found
 
 
@@ -140,7 +147,7 @@ def test_a_unit_with_one_run_gains_what_its_lot_knows() -> None:
         truth = bias(own, t, r)
         left = predict(with_lot, t, r) - truth
         errors.append((np.std(left) / np.std(predict(alone, t, r) - truth), np.sqrt(np.mean(left**2))))
-        known = uncertainty(data, with_lot)
+        known = uncertainty_of(data, with_lot)
         sigma = np.sqrt(np.mean(np.square(known["rows"])))
         inside.append(errors[-1][1] / sigma)
         assert with_lot.scaling.temperature_c[0] <= -40.0 and with_lot.scaling.slope_c_per_min == ENVELOPE[1]

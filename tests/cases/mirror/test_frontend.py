@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.mirror.front_end import Settings, expand_missed, missed_before, samples_per_block
-from gyrotc.mirror.recursions import F32
-from gyrotc.mirror.samples import Guarded
-from gyrotc.train.samples import Blocks, run_blocks
+from gyrotc.mirror import F32, Guarded, Settings, expand_missed, missed_before, samples_per_block
+from gyrotc.train import Blocks, run_blocks
 
 
 def recording(temperature: np.ndarray, time_s: np.ndarray | None = None, *, from_s: float = 0.0) -> Any:

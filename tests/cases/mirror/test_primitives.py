@@ -10,12 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emitted import spoil
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.q31 import GAUSS_ERROR, exp2_table
-from gyrotc.mirror.table import CHANNEL_LOST, CLAMPED
+from gyrotc.mirror import CHANNEL_LOST, CLAMPED, GAUSS_ERROR, exp2_table, replay
 from gyrotc.model import Guard, Term
-from gyrotc.tables.quantise import quantise
-from gyrotc.train.plausibility import longest_same_s, stuck_after_s
+from gyrotc.tables import quantise
+from gyrotc.train import longest_same_s, stuck_after_s
 from libc_build import runtime
 from models import random_channels, random_history, random_model, random_terms
 

@@ -10,14 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.common.errors import CheckFailed
+from gyrotc.common import CheckFailed
+from gyrotc.mirror import (
+    ARRAYS,
+    GAUSS_ERROR,
+    HELD,
+    Course,
+    Table,
+    TermOutcome,
+    evaluate_map,
+    exp2,
+    f32_words,
+    recursions_of_table,
+    replay,
+)
 from gyrotc.mirror import table as layout
-from gyrotc.mirror.history import evaluate_map, recursions, replay
-from gyrotc.mirror.q31 import GAUSS_ERROR, exp2
-from gyrotc.mirror.recursions import Course, TermOutcome
-from gyrotc.mirror.table import ARRAYS, HELD, Table, f32_words
 from gyrotc.model import Term
-from gyrotc.tables.quantise import NUMERICS, _limits, outside, quantise
+from gyrotc.tables.quantisation import NUMERICS, _limits, outside, quantise
 from libc_build import ROOT, UNGUARDED, runtime
 from models import bank_of, bank_with_channels, random_channels, random_history, random_model, random_terms
 
@@ -105,7 +114,7 @@ def test_a_play_of_one_strength_is_what_it_was(numeric: str) -> None:
     added = []
     for table in (plain, grown):
         outcome = TermOutcome(x, np.zeros_like(x), np.zeros_like(x), np.zeros(5, dtype=np.int32))
-        recursions(table)[0].apply(Course(x, np.arange(5) > 0, np.arange(5)), None, outcome)
+        recursions_of_table(table)[0].apply(Course(x, np.arange(5) > 0, np.arange(5)), None, outcome)
         added.append(outcome.added * unit)
     assert added[1][[2, 4]] == pytest.approx(added[0][[2, 4]]), "at the reference"
     assert added[1][1] == pytest.approx(added[0][1] * (1e-3 + 8.0 * 2e-5) / 1e-3, rel=1e-4)

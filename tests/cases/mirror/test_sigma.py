@@ -7,10 +7,9 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.common.errors import CheckFailed
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.table import E_ABSENT
-from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.common import CheckFailed
+from gyrotc.mirror import E_ABSENT, replay
+from gyrotc.tables import NUMERICS, quantise
 from libc_build import Runtime, runtime
 from libc_device import history, variant
 from models import random_model, random_uncertainty

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.common.errors import InputError
+from gyrotc.common import InputError
 from gyrotc.model import Model, load_model, table_id
 
 

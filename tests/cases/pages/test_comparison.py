@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.cli.results import summary_line
-from gyrotc.common.metrics import Averages
-from gyrotc.pages.comparison import (
+from gyrotc.common import Averages
+from gyrotc.pages import (
     AFTER_DPH,
     BEFORE_DPH,
     ENVIRONMENTS,
+    calibrations_over_time,
     comparison_picture,
     comparison_tables,
     with_published,
 )
-from gyrotc.pages.report import calibrations_over_time
-from gyrotc.results.evaluation import (
+from gyrotc.results import (
     Calibration,
     Comparison,
     EvaluatedRun,

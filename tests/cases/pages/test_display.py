@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.pages.display import sci, significant, with_uncertainty
-from gyrotc.pages.marks import AxisScale, scale_of
+from gyrotc.pages import AxisScale, scale_of, sci, significant, with_uncertainty
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.common.errors import InputError
-from gyrotc.pages.comparison import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
+from gyrotc.common import InputError
+from gyrotc.pages import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS
 
 from bench.paper.experiment import FIGURES, METHODS, Series, checksum, draw
 from bench.paper.page import departures, filled, made_with, measured, page_of, record_of, stale

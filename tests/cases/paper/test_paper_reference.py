@@ -16,11 +16,9 @@ import numpy as np
 import paper_reference as reference
 import pytest
 from gyrotc import _core
-from gyrotc.pages.comparison import ENVIRONMENTS, NEURONS
-from gyrotc.simulate.campaign import simulate
-from gyrotc.train.data import average_samples, scaling_of
-from gyrotc.train.methods import trained
-from gyrotc.train.result import Outcome
+from gyrotc.pages import ENVIRONMENTS, NEURONS
+from gyrotc.simulate import simulate
+from gyrotc.train import Outcome, average_samples, scaling_of, trained
 from numpy.typing import NDArray
 
 from bench.paper.experiment import LITERAL_RHO, PaperGroup, groups_of

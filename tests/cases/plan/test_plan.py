@@ -11,9 +11,9 @@ import pytest
 from campaigns import scenario, simulated
 from conftest import Command, invoked
 from gyrotc.cli.plan import limits_of, pair_of
-from gyrotc.common.errors import InputError
+from gyrotc.common import InputError
+from gyrotc.plan import Sensitivity, programme_of
 from gyrotc.plan.plan import plan, shortest
-from gyrotc.plan.sensitivity import Sensitivity, programme_of
 
 
 @pytest.fixture(scope="module")

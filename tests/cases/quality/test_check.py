@@ -13,14 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.assess.changes import earlier_models
-from gyrotc.common.errors import InputError
-from gyrotc.quality.check import CheckResult, check, envelope_of
+from gyrotc.assess import earlier_models
+from gyrotc.common import InputError
+from gyrotc.quality import CheckResult, check, envelope_of, finding
 from gyrotc.quality.findings import __file__ as findings_file
-from gyrotc.quality.findings import finding
-from gyrotc.recordings.plausibility import earth_rate
-from gyrotc.results.base import Finding
-from gyrotc.results.fleet import Facts, FleetEntry
+from gyrotc.recordings import earth_rate
+from gyrotc.results import Facts, Finding, FleetEntry
 from numpy.typing import NDArray
 from recordings import ROWS, RUN, Columns, columns, described, toml, write_csv
 
@@ -304,8 +302,8 @@ def test_one_axis_against_earths_rate(sign: float, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Models of three axes, as an earlier `build --axis all` left them."""
-    from gyrotc.recordings.load import load
-    from gyrotc.train.fitting import FitOptions, fit_dataset
+    from gyrotc.recordings import load
+    from gyrotc.train import FitOptions, fit_dataset
 
     folder = tmp_path_factory.mktemp("earlier") / "RLG-0042"
     for k in range(2):
@@ -394,7 +392,7 @@ def _entry(name: str, curve: list[float | None]) -> FleetEntry:
 
 @pytest.mark.parametrize("reversed_unit", [None, 3])
 def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | None) -> None:
-    from gyrotc.fleet.outliers import mirrored_units
+    from gyrotc.fleet import mirrored_units
 
     g = np.random.default_rng(1)
     t = np.arange(-60.0, 126.0, 5.0)
@@ -409,7 +407,7 @@ def test_a_gyro_with_the_lots_curve_turned_over_is_named(reversed_unit: int | No
 
 
 def test_a_lot_of_gyros_that_have_nothing_in_common_accuses_nobody() -> None:
-    from gyrotc.fleet.outliers import mirrored_units
+    from gyrotc.fleet import mirrored_units
 
     g = np.random.default_rng(2)
     for _ in range(200):

@@ -11,20 +11,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.mirror.recursions import first_order
+from gyrotc.mirror import first_order
+from gyrotc.quality import (
+    Change,
+    changes_of,
+    check,
+    curve_findings,
+    departing,
+    displaced,
+    run_facts,
+    stuck_stretches,
+    thermometer_findings,
+)
 from gyrotc.quality import changes as changes_module
-from gyrotc.quality.changes import Change, changes_of
-from gyrotc.quality.check import check
-from gyrotc.quality.curves import curve_findings
 from gyrotc.quality.events import _Judged, found_events, without_events
-from gyrotc.quality.findings import run_facts
-from gyrotc.quality.outliers import departing
-from gyrotc.quality.thermometers import displaced, stuck_stretches, thermometer_findings
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Rows
-from gyrotc.results.base import Finding
-from gyrotc.simulate.campaign import simulate
-from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
+from gyrotc.recordings import Dataset, Rows, load
+from gyrotc.results import Finding
+from gyrotc.simulate import simulate
+from gyrotc.train import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
 from recordings import Columns, toml, write_csv
 
@@ -417,7 +421,7 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
 
 @pytest.mark.slow
 def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Path) -> None:
-    from gyrotc.jobs.build import build
+    from gyrotc.jobs import build
 
     table = cycle()
     table["rate_dph"][[5000, 9000]] += 5.0

@@ -12,16 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.assess.findings import findings_of
+from gyrotc.assess import findings_of
 from gyrotc.model import Model
-from gyrotc.quality.check import findings_of_run
-from gyrotc.quality.findings import run_facts
-from gyrotc.quality.outliers import departing_rows
-from gyrotc.quality.thermometers import jumps_of
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset
-from gyrotc.results.base import Finding
-from gyrotc.results.evaluation import Pooled
+from gyrotc.quality import departing_rows, findings_of_run, jumps_of, run_facts
+from gyrotc.recordings import Dataset, load
+from gyrotc.results import Finding, Pooled
 from recordings import Columns, columns, toml, write_csv
 
 

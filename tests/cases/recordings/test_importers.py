@@ -22,15 +22,10 @@ import pyarrow.parquet as pq
 import pytest
 import scipy.io
 from conftest import Command, run_gyrotc
-from gyrotc.quality.check import check
-from gyrotc.recordings import units
-from gyrotc.recordings.importers.job import ImportOptions, import_files
-from gyrotc.recordings.importers.map_file import Map, load_map
-from gyrotc.recordings.importers.stamps import Stamps
-from gyrotc.recordings.load import load
-from gyrotc.recordings.tables import LoggerFile
-from gyrotc.results.base import read_result
-from gyrotc.results.recordings import ImportedFiles
+from gyrotc.quality import check
+from gyrotc.recordings import LoggerFile, load, units
+from gyrotc.recordings.importers import ImportOptions, Map, Stamps, import_files, load_map
+from gyrotc.results import ImportedFiles, read_result
 from logger_analysis import ANALYSIS_CASES
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, START, Case, truth

@@ -25,13 +25,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from conftest import ROOT
-from gyrotc.common.errors import InputError
-from gyrotc.recordings import parser_process
+from gyrotc.common import InputError
+from gyrotc.recordings import LoggerFile, ParquetFile, Parser, landlock_version, open_confined, parser_process
+from gyrotc.recordings.importers import Map
 from gyrotc.recordings.importers import job as import_job
-from gyrotc.recordings.importers.map_file import Map
-from gyrotc.recordings.parser_process import Parser, landlock_version, open_confined
-from gyrotc.recordings.reading import ParquetFile
-from gyrotc.recordings.tables import LoggerFile
 from logger_binaries import BINARY_CASES
 from logger_files import Case, truth
 

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.common.errors import InputError
-from gyrotc.fleet.outliers import copies
-from gyrotc.quality.check import check
-from gyrotc.recordings.fingerprints import fingerprints_of, windows_in_common
-from gyrotc.recordings.load import load
-from gyrotc.results.fleet import FleetEntry
+from gyrotc.common import InputError
+from gyrotc.fleet import copies
+from gyrotc.quality import check
+from gyrotc.recordings import fingerprints_of, load, windows_in_common
+from gyrotc.results import FleetEntry
 from numpy.typing import NDArray
 from recordings import Columns, columns, toml, write_csv
 

@@ -10,12 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.common.errors import InputError
-from gyrotc.quality.check import check
-from gyrotc.recordings.load import load
-from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
-from gyrotc.recordings.units import UnitError, channel_unit, conversion, quantity_of
-from gyrotc.train.fitting import FitOptions, fit_dataset
+from gyrotc.common import InputError
+from gyrotc.quality import check
+from gyrotc.recordings import EARTH_RATE_DPH, UnitError, channel_unit, conversion, earth_rate, load, quantity_of
+from gyrotc.train import FitOptions, fit_dataset
 from recordings import Columns, columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "RLG-1"\nearth_rate = "removed"\n'

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from gyrotc.verify.toolchain import all_targets
+from gyrotc.verify import all_targets
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools" / "check_libc")]

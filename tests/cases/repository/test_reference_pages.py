@@ -10,7 +10,7 @@ import reference
 from conftest import ROOT
 from gyrotc.cli.main import application
 from gyrotc.cli.shell import kinds, tables
-from gyrotc.verify.sizes import PUBLIC
+from gyrotc.verify import PUBLIC
 from typer.main import get_command
 
 

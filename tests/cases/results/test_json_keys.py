@@ -15,13 +15,20 @@ from conftest import Command
 from gyrotc import results
 from gyrotc.cli.main import application
 from gyrotc.cli.shell import kinds, tables
-from gyrotc.common.errors import InputError
+from gyrotc.common import InputError
 from gyrotc.model import load_model
-from gyrotc.results.base import Marker, Numbered, checked_result
-from gyrotc.results.evaluation import At, MapDifference
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import marker_of, marker_text
-from gyrotc.results.release import HeldLimits, Limit
+from gyrotc.results import (
+    At,
+    FleetEntry,
+    HeldLimits,
+    Limit,
+    MapDifference,
+    Marker,
+    Numbered,
+    checked_result,
+    marker_of,
+    marker_text,
+)
 from pydantic import ValidationError
 from pydantic_core import PydanticUndefined
 from recordings import columns, described, write_csv

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import typer
 from conftest import ROOT, quick_and_slow, run_gyrotc
-from gyrotc.common.errors import InputError
-from gyrotc.results.files import Lock, write_atomically
+from gyrotc.common import InputError
+from gyrotc.results import Lock, write_atomically
 from recordings import columns, toml, write_csv
 
 PACKAGE = ROOT / "gen" / "gyrotc"

@@ -20,13 +20,22 @@ from typing import Any
 import pytest
 from conftest import HOST, Command, quick_and_slow
 from gyrotc.cli import main
-from gyrotc.common.errors import GyrotcError, InputError
+from gyrotc.common import GyrotcError, InputError
+from gyrotc.results import (
+    MARKER,
+    Lock,
+    check_separate,
+    json_text,
+    read_marker,
+    result_faults,
+    result_folder,
+    scratch_folder,
+    write_atomically,
+    write_result,
+)
 from gyrotc.results import folder as folders
 from gyrotc.results import update as exchanging
 from gyrotc.results import update as updating
-from gyrotc.results.files import Lock, json_text, write_atomically
-from gyrotc.results.folder import result_folder, scratch_folder, write_result
-from gyrotc.results.marker import MARKER, check_separate, read_marker, result_faults
 from recordings import columns, toml, write_csv
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.mirror.table import Numeric
-from gyrotc.tables.quantise import NUMERICS
+from gyrotc.mirror import Numeric
+from gyrotc.tables import NUMERICS
 
 from bench.faults import CLASSES, FIRST_SEED, outcomes
 

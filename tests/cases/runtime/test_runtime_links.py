@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.common.inputs import runtime_folders
-from gyrotc.mirror.table import E_ID, E_IMAGE, E_LAYOUT, SERIAL_WORDS, Table, Words
+from gyrotc.common import runtime_folders
+from gyrotc.mirror import E_ID, E_IMAGE, E_LAYOUT, SERIAL_WORDS, Table, Words
 from gyrotc.model import Model, Term
-from gyrotc.tables.emit import emit, emit_texts, quantise_all
-from gyrotc.tables.quantise import NUMERICS
-from gyrotc.tables.text import amalgamate
-from gyrotc.verify.sizes import PUBLIC
-from gyrotc.verify.toolchain import all_targets, compile_c, compile_objects, run_program
+from gyrotc.tables import NUMERICS, amalgamate, emit, emit_texts, quantise_all
+from gyrotc.verify import PUBLIC, all_targets, compile_c, compile_objects, run_program
 from libc_build import Runtime, runtime
 from libc_device import Device, history, variant
 from models import random_model

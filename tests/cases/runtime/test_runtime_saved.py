@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.common.errors import CheckFailed
-from gyrotc.mirror.table import E_ID, E_IMAGE, Words
+from gyrotc.common import CheckFailed
+from gyrotc.mirror import E_ID, E_IMAGE, Words
 from gyrotc.model import Model, Term, load_model
-from gyrotc.tables.quantise import NUMERICS, quantise
-from gyrotc.train.uncertainty import rezero_dph
+from gyrotc.tables import NUMERICS, quantise
+from gyrotc.train import rezero_dph
 from libc_build import Runtime, runtime
 from libc_device import SAVE_WORDS, Device, history, variant
 from models import random_history

@@ -12,12 +12,26 @@ import allantools
 import numpy as np
 import pytest
 from gyrotc.causes import CATALOGUE
-from gyrotc.common.errors import InputError
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import NOISE, RowLength, campaign, gyro_map, rows, simulate
-from gyrotc.simulate.gyro import CELL_S, cell_noise, quantised, white_sigma_arcsec
-from gyrotc.simulate.instrument import SimulatedRecord
-from gyrotc.simulate.scenario import NoiseLevels, names, read, read_truth, simulated_floor
+from gyrotc.common import InputError
+from gyrotc.recordings import load
+from gyrotc.simulate import (
+    CELL_S,
+    NOISE,
+    NoiseLevels,
+    RowLength,
+    SimulatedRecord,
+    cell_noise,
+    gyro_map,
+    names,
+    quantised,
+    read,
+    read_truth,
+    rows,
+    simulate,
+    simulate_campaign,
+    simulated_floor,
+    white_sigma_arcsec,
+)
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.stats import chi2
@@ -132,7 +146,7 @@ def test_temperature_and_its_rate_explain_the_plain_bias_far_below_the_noise(see
     """A dense static map of (T, dT/dt) leaves less than 2 % of the noise, whatever gyro was drawn."""
     _, plan = read("paper")
     inputs, bias = [], []
-    for record in campaign(plan, seed):
+    for record in simulate_campaign(plan, seed):
         inputs.append(causal_inputs(record.reading_c.reshape(-1, 10).mean(axis=1)))
         bias.append(np.diff(record.true_arcsec[::100]) / 100.0)
     temperature, slope = (np.concatenate(parts) for parts in zip(*inputs, strict=True))
@@ -153,7 +167,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_gyro(short:
 
 def test_a_cause_changes_nothing_but_its_own_effect() -> None:
     """Noise, temperature and gyro stay as they are when a cause is switched on."""
-    plain, warming = (next(iter(campaign(read(name)[1], 5))) for name in ("separating", "warm-up"))
+    plain, warming = (next(iter(simulate_campaign(read(name)[1], 5))) for name in ("separating", "warm-up"))
     assert np.array_equal(plain.reading_c, warming.reading_c)
     on_s = np.arange(len(plain.bias_dph)) - plain.power_on_s
     assert np.allclose(warming.bias_dph - plain.bias_dph, 2e-3 * np.exp(-on_s / 1800.0), atol=1e-12)
@@ -189,7 +203,7 @@ def test_every_cause_is_switched_on_from_a_scenario_file(cause: str, short: Path
     more = "".join(f"{key} = {json.dumps(value)}\n" for key, value in SWITCHED_ON[cause].items())
     path = tmp_path / "with.toml"
     path.write_text(f'extends = "{short}"\n[[cause]]\nid = "{cause}"\n{more}', "utf-8")
-    plain, moved = (list(campaign(read(str(name))[1], 5))[1] for name in (short, path))
+    plain, moved = (list(simulate_campaign(read(str(name))[1], 5))[1] for name in (short, path))
     readings = np.abs(moved.reading_c - plain.reading_c).max()
     bias = np.abs(moved.bias_dph - plain.bias_dph).max()
     if cause in ON_THE_RECORD:
@@ -237,7 +251,7 @@ def test_the_truth_is_the_noise_in_the_rows(short: Path, tmp_path: Path) -> None
     truth = read_truth(folder)
     assert truth is not None
     added = []
-    for index, record in enumerate(campaign(plan, 7)):
+    for index, record in enumerate(simulate_campaign(plan, 7)):
         rate = columns(folder / f"run-{index + 1:02d}.csv")["rate_dph"]
         step_s, noise = truth.noise_dph(f"run-{index + 1:02d}.csv")
         assert step_s == 10.0

@@ -9,14 +9,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import invoked
-from gyrotc.common.errors import InputError
-from gyrotc.recordings.load import load
-from gyrotc.simulate import profile
-from gyrotc.simulate.campaign import campaign, simulate
-from gyrotc.simulate.gyro import laser_bias, laser_readings, laser_states, thermometer_readings
-from gyrotc.simulate.instrument import ThermalNetwork, chamber_air, thermal_network
-from gyrotc.simulate.lot import SCORES, LotOrder, draw_lot, simulate_lot
-from gyrotc.simulate.scenario import Chamber, Gyro, Laser, Scenario, Thermometer, read, read_truth
+from gyrotc.common import InputError
+from gyrotc.recordings import load
+from gyrotc.simulate import (
+    SCORES,
+    Chamber,
+    Gyro,
+    Laser,
+    LotOrder,
+    Scenario,
+    ThermalNetwork,
+    Thermometer,
+    chamber_air,
+    draw_lot,
+    laser_bias,
+    laser_readings,
+    laser_states,
+    profile,
+    read,
+    read_truth,
+    simulate,
+    simulate_campaign,
+    simulate_lot,
+    thermal_network,
+    thermometer_readings,
+)
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy.integrate import solve_ivp
@@ -34,7 +51,7 @@ def planned(**changes: object) -> Scenario:
 
 def test_thermometers_show_their_own_nodes_with_their_own_faults() -> None:
     """Offset, lag and steps follow from the true temperature of the node alone."""
-    made = next(campaign(planned(), 3))
+    made = next(simulate_campaign(planned(), 3))
     for name, node, lag_s, offset_c, step_c in (
         ("mirror_c", "mirror", 15.0, 0.3, 0.02),
         ("case_c", "case", 40.0, -0.4, 0.0625),
@@ -90,7 +107,9 @@ def test_intensity_falls_with_losses_with_a_hotter_gas_and_with_the_years() -> N
 
 
 def test_the_bias_is_the_map_with_what_differences_and_laser_add() -> None:
-    whole, bare = (next(campaign(planned(**changes), 3)) for changes in ({}, {"difference": [], "laser": None}))
+    whole, bare = (
+        next(simulate_campaign(planned(**changes), 3)) for changes in ({}, {"difference": [], "laser": None})
+    )
     added = (whole.bias_dph - bare.bias_dph)[:-1]
     s = whole.states
     x = s["mirror_c"] - s["block_c"]
@@ -105,7 +124,7 @@ def test_the_bias_is_the_map_with_what_differences_and_laser_add() -> None:
 def test_further_thermometers_change_nothing_else_of_a_recording() -> None:
     _, plan = read("paper-20C")
     more = plan.model_copy(update={"thermometer": [Thermometer(name="case_c", node="case")]})
-    a, b = next(campaign(plan, 5)), next(campaign(more, 5))
+    a, b = next(simulate_campaign(plan, 5)), next(simulate_campaign(more, 5))
     assert np.array_equal(a.angle_arcsec, b.angle_arcsec)
     assert np.array_equal(a.reading_c, b.reading_c)
     assert not a.states

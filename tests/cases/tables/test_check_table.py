@@ -22,10 +22,9 @@ import numpy as np
 import pytest
 from conftest import ROOT, quick_and_slow
 from emitted import GOLDEN, emitted, flip, spoil
-from gyrotc.mirror.table import Table
+from gyrotc.mirror import Table
 from gyrotc.model import Model, load_model
-from gyrotc.tables import vectors
-from gyrotc.tables.emit import Emission, emit, emit_texts, quantise_all, write_texts
+from gyrotc.tables import Emission, emit, emit_texts, quantise_all, vectors, write_texts
 from models import bank_of, random_model, random_terms
 
 SCRIPT = ROOT / "tools" / "check_table.py"

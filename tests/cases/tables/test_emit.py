@@ -14,13 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import EXAMPLE, GOLDEN, ROOT, Command
-from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.mirror.f32 import gauss
-from gyrotc.mirror.history import evaluate_map
-from gyrotc.mirror.table import MAGIC, Table
+from gyrotc.common import CheckFailed, InputError
+from gyrotc.mirror import MAGIC, Table, evaluate_map, gauss
 from gyrotc.model import Guard, Model, Term, load_model
-from gyrotc.tables.emit import COSTS, SWITCHES, config_text, emit, emit_texts, quantise_all
-from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.tables import COSTS, NUMERICS, SWITCHES, config_text, emit, emit_texts, quantise, quantise_all
 from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.

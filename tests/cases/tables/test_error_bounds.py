@@ -14,14 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
-from gyrotc.common.errors import CheckFailed
-from gyrotc.mirror.history import recursions
-from gyrotc.mirror.recursions import Course, CourseChannel, Recursion, TermOutcome
-from gyrotc.mirror.table import Numeric
+from gyrotc.common import CheckFailed
+from gyrotc.mirror import Course, CourseChannel, Numeric, Recursion, TermOutcome, recursions_of_table
 from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
-from gyrotc.tables.emit import emit_texts, quantise_all
-from gyrotc.tables.error_bounds import channel_error_dph
-from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.tables import NUMERICS, channel_error_dph, emit_texts, quantise, quantise_all
 from models import bank_of, random_model
 from numpy.typing import NDArray
 
@@ -92,7 +88,7 @@ def test_the_bound_of_curves_and_products_holds(id: str, numeric: Numeric) -> No
             table = quantise(model, numeric)
         except CheckFailed:  # a reading, or a width of less than 2^-6 units, that fixed point does not hold
             continue
-        recursion, guard = recursions(table)[0], model.guards["supply_v"]
+        recursion, guard = recursions_of_table(table)[0], model.guards["supply_v"]
         reading = np.concatenate([rng.uniform(guard.low, guard.high, 1000), [guard.low, guard.high]])
         t = rng.uniform(*model.envelope.temperature_c, len(reading))
         numbers = [_as_seen(x, numeric) for x in (reading, t)]

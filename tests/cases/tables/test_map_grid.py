@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, Command
 from gyrotc.model import Model, load_model
-from gyrotc.tables.map_grid import csv_text, map_grid
+from gyrotc.tables import csv_text, grid_of_map
 from scipy.interpolate import RegularGridInterpolator
 
 MODEL = ROOT / "tests" / "c" / "model.json"
@@ -23,7 +23,7 @@ def model() -> Model:
 
 @pytest.mark.parametrize("points", [(61, 25), (8, 4), (2, 2)])
 def test_the_grid_holds_the_envelope_its_edges_and_rest(model: Model, points: tuple[int, int]) -> None:
-    grid = map_grid(model, points)
+    grid = grid_of_map(model, points)
     assert grid.bias_dph.shape == points
     for axis, span in (
         (grid.temperature_c, model.envelope.temperature_c),
@@ -36,14 +36,14 @@ def test_the_grid_holds_the_envelope_its_edges_and_rest(model: Model, points: tu
 
 def test_an_envelope_without_width_has_one_point(model: Model) -> None:
     still = model.model_copy(update={"envelope": model.envelope.model_copy(update={"slope_c_per_min": (0.0, 0.0)})})
-    grid = map_grid(still)
+    grid = grid_of_map(still)
     assert grid.bias_dph.shape == (61, 1) and np.isfinite(grid.max_abs_dph)
 
 
 def test_the_error_of_interpolation_is_the_one_that_is_stated(model: Model) -> None:
     errors = []
     for points in ((9, 5), (61, 25)):
-        grid = map_grid(model, points)
+        grid = grid_of_map(model, points)
         between = RegularGridInterpolator((grid.temperature_c, grid.slope_c_per_min), grid.bias_dph)
         draw = np.random.default_rng(7)
         t, r = (draw.uniform(*span, 4000) for span in (model.envelope.temperature_c, model.envelope.slope_c_per_min))
@@ -55,7 +55,7 @@ def test_the_error_of_interpolation_is_the_one_that_is_stated(model: Model) -> N
 
 
 def test_each_row_of_the_csv_is_the_map(model: Model) -> None:
-    rows = list(csv.DictReader(csv_text(map_grid(model)).splitlines()))
+    rows = list(csv.DictReader(csv_text(grid_of_map(model)).splitlines()))
     assert len(rows) == 61 * 25
     for row in rows[:: 61 * 5]:
         bias = model.map_dph(float(row["temperature_c"]), float(row["slope_c_per_min"]))

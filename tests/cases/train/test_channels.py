@@ -12,21 +12,26 @@ import numpy as np
 import pytest
 from campaigns import up_and_down
 from conftest import HOST, Command, run_gyrotc
-from gyrotc.causes.base import History
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.jobs.build import build_into
+from gyrotc.causes import History
+from gyrotc.fleet import load_manifest
+from gyrotc.jobs import build_into
 from gyrotc.model import Model, load_model
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Rows, Run
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read_truth
-from gyrotc.tables.quantise import applied_of
-from gyrotc.train import fitting
-from gyrotc.train.channels import SHAPES, chosen_channels, seen_by_target, shape_of
-from gyrotc.train.data import TrainingData
-from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.plausibility import channel_guard
-from gyrotc.train.samples import Blocks
+from gyrotc.recordings import Dataset, Rows, Run, load
+from gyrotc.simulate import read_truth, simulate
+from gyrotc.tables import applied_of
+from gyrotc.train import (
+    SHAPES,
+    Blocks,
+    FitOptions,
+    Fitted,
+    TrainingData,
+    channel_guard,
+    chosen_channels,
+    fit_dataset,
+    fitting,
+    seen_by_target,
+    shape_of,
+)
 from numpy.typing import NDArray
 
 from bench.signals import rms_of, without

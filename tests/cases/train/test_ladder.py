@@ -11,37 +11,40 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
-from gyrotc.common.errors import InputError
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset, Run
-from gyrotc.train.data import (
+from gyrotc.common import InputError
+from gyrotc.recordings import Dataset, Run, load
+from gyrotc.train import (
+    CANDIDATES,
+    SIMPLE,
+    CandidateScores,
+    Fit,
+    FitOptions,
+    Fitted,
     Fold,
+    Rest,
     RunSpan,
     TrainingData,
+    all_solved,
     average_samples,
     cleaned_samples,
+    conditioned,
+    design,
+    fit,
+    fit_dataset,
+    fit_mixed_model,
+    fit_process,
+    fit_simple,
     gather,
+    objection_to,
     pieces,
+    powers_of,
+    predict,
     scaling_of,
+    solve_least_squares,
     training_spans,
+    triangle_of,
     turning_points,
     weighted_mean,
-)
-from gyrotc.train.evidence import conditioned, fit_process
-from gyrotc.train.fitting import FitOptions, Fitted, fit_dataset
-from gyrotc.train.methods import fit
-from gyrotc.train.objection import objection
-from gyrotc.train.options import SIMPLE
-from gyrotc.train.result import Fit, predict
-from gyrotc.train.selection import CANDIDATES, CandidateScores, Rest
-from gyrotc.train.simple import (
-    all_solved,
-    design,
-    fit_mixed_model,
-    fit_simple,
-    powers_of,
-    solve_least_squares,
-    triangle_of,
 )
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -236,13 +239,13 @@ def test_a_map_that_leaves_its_process_or_the_data_is_refused_with_words() -> No
     data = samples(0)
     found = fit(data)
     arguments = data, found.scaling, 100.0
-    assert objection(found.outcome, *arguments) == ""
+    assert objection_to(found.outcome, *arguments) == ""
     [good] = found.networks
     far = replace(found.outcome, networks=[{**good, "linear": [good["linear"][0], 0.01]}])
-    assert "leaves the process" in objection(far, *arguments)
-    assert "the means span" in objection(replace(far, process=None), *arguments)
+    assert "leaves the process" in objection_to(far, *arguments)
+    assert "the means span" in objection_to(replace(far, process=None), *arguments)
     heavy = {**good, "weights": [1e8, *good["weights"][1:]]}
-    assert "more than a table holds" in objection(replace(far, networks=[heavy]), *arguments)
+    assert "more than a table holds" in objection_to(replace(far, networks=[heavy]), *arguments)
 
 
 def test_a_run_handed_over_twice_is_no_second_witness() -> None:

@@ -7,12 +7,9 @@ from dataclasses import replace
 import allantools
 import numpy as np
 import pytest
-from gyrotc.common.arrays import FloatArray
-from gyrotc.train.data import TrainingData
-from gyrotc.train.evidence import allan_variance, noise_terms, sensitivities, stretches
-from gyrotc.train.methods import fit
-from gyrotc.train.result import predict
-from gyrotc.train.uncertainty import _likeliest, coverage, next_run_variance, uncertainty
+from gyrotc.common import FloatArray
+from gyrotc.train import TrainingData, allan_variance, fit, noise_terms, predict, sensitivities, stretches
+from gyrotc.train.uncertainty import _likeliest, coverage, next_run_variance, uncertainty_of
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 
@@ -153,7 +150,7 @@ def test_one_sigma_holds_the_truth_two_times_in_three() -> None:
     for seed in range(12):
         data = samples(seed)
         found = fit(data)
-        sigma = np.array(uncertainty(data, found, (12, 8))["rows"])
+        sigma = np.array(uncertainty_of(data, found, (12, 8))["rows"])
         t, r = cells_of(data, found, (12, 8))
         error = predict(found, data.temperature_c, data.slope_c_per_min)
         error -= true_bias(data.temperature_c, data.slope_c_per_min)
@@ -171,7 +168,7 @@ def test_where_no_sample_was_it_is_larger() -> None:
     data = samples(1)
     up = data.select((data.slope_c_per_min > -0.1) | (data.temperature_c < -30.0))
     found = fit(up)
-    known = uncertainty(up, found, (12, 8))
+    known = uncertainty_of(up, found, (12, 8))
     t, r = cells_of(up, found, (12, 8))
     seen = np.zeros((8, 12), dtype=bool)
     seen[r, t] = True
@@ -188,14 +185,14 @@ def test_offsets_between_runs_are_part_of_it() -> None:
         offset = rng.normal(0.0, 3e-4)
         runs.append(replace(one, run=np.full(len(one), k), bias_dph=one.bias_dph + offset))
     data = TrainingData(**{k: np.concatenate([getattr(x, k) for x in runs]) for k in TrainingData.__dataclass_fields__})
-    sigma = np.array(uncertainty(data, fit(data))["rows"])
+    sigma = np.array(uncertainty_of(data, fit(data))["rows"])
     assert 1.5e-4 < np.median(sigma) < 8e-4
 
 
 def test_a_single_run_is_cut_into_spans() -> None:
     data = samples(3)
     one = data.select(data.run == 1)
-    sigma = np.array(uncertainty(one, fit(one), (4, 3))["rows"])
+    sigma = np.array(uncertainty_of(one, fit(one), (4, 3))["rows"])
     assert sigma.shape == (3, 4)
     assert np.isfinite(sigma).all()
     assert (sigma > 0.0).all()

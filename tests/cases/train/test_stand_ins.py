@@ -11,15 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import quick_and_slow
-from gyrotc.mirror.history import Replay, replay, stand_in
-from gyrotc.mirror.table import CHANNEL_LOST, Table
+from gyrotc.mirror import CHANNEL_LOST, Replay, Table, replay, stand_in
 from gyrotc.model import Model, Network, Scale, Term
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Rows
-from gyrotc.simulate.campaign import simulate
-from gyrotc.tables.quantise import NUMERICS, channels_of, quantise
-from gyrotc.train.fitting import FitOptions, fit_dataset
-from gyrotc.train.networks import rescaled
+from gyrotc.recordings import Rows, load
+from gyrotc.simulate import simulate
+from gyrotc.tables import NUMERICS, channels_of, quantise
+from gyrotc.train import FitOptions, fit_dataset, rescaled
 from libc_build import runtime
 from models import random_guards, random_history, random_model, random_stand_in, random_uncertainty
 

@@ -9,17 +9,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.common.errors import InputError
-from gyrotc.recordings.load import load
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.train.data import TrainingData, average_samples, cleaned_samples, joined
-from gyrotc.train.estimator import RBFNetworkRegressor
-from gyrotc.train.evidence import TrainingFailed
-from gyrotc.train.fitting import front_end, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.options import COMPARED
-from gyrotc.train.result import Fit, predict
+from gyrotc.common import InputError
+from gyrotc.recordings import load
+from gyrotc.simulate import simulate, simulated_floor
+from gyrotc.train import (
+    COMPARED,
+    Fit,
+    RBFNetworkRegressor,
+    TrainingData,
+    TrainingFailed,
+    average_samples,
+    cleaned_samples,
+    fit,
+    front_end,
+    joined,
+    predict,
+    samples_of,
+)
 from odd_training import odd_samples
 from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline

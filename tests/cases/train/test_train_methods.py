@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.cli.main import application
-from gyrotc.common.errors import InputError
-from gyrotc.fleet.manifest import load_manifest
+from gyrotc.common import InputError
+from gyrotc.fleet import load_manifest
 from gyrotc.model import Model
-from gyrotc.recordings.load import load
-from gyrotc.train.data import TrainingData, average_samples
-from gyrotc.train.fitting import FitOptions, fit_dataset, front_end
-from gyrotc.train.methods import fit
-from gyrotc.train.options import DEFAULTS
-from gyrotc.train.result import predict
+from gyrotc.recordings import load
+from gyrotc.train import DEFAULTS, FitOptions, TrainingData, average_samples, fit, fit_dataset, front_end, predict
 from numpy.typing import NDArray
 from recordings import columns, toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias

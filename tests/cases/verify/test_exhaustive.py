@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from conftest import ROOT, Command
 from emitted import emitted, measured, spoil
-from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.mirror.history import evaluate_map
-from gyrotc.verify.job import Visited, verify, visit_all
-from gyrotc.verify.sizes import PUBLIC, function_costs, parse_graph
-from gyrotc.verify.toolchain import all_targets, runtime_object
+from gyrotc.common import CheckFailed, InputError
+from gyrotc.mirror import evaluate_map
+from gyrotc.verify import PUBLIC, Visited, all_targets, function_costs, parse_graph, runtime_object, verify, visit_all
 from jobs import job_of
 from models import random_model
 

@@ -14,13 +14,11 @@ from typing import Any
 import pytest
 from conftest import Command
 from emitted import emitted, recorded
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.common.errors import CheckFailed
+from gyrotc.assess import evaluate
+from gyrotc.common import CheckFailed
 from gyrotc.model import Model, load_model
-from gyrotc.tables.emit import emit
-from gyrotc.verify.emitted import board_files, checked_sources
-from gyrotc.verify.job import verify
-from gyrotc.verify.toolchain import confined, run_to_end
+from gyrotc.tables import emit
+from gyrotc.verify import board_files, checked_sources, confined, run_to_end, verify
 
 FAST = "host-gcc-O0"
 

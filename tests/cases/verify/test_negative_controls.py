@@ -14,9 +14,7 @@ from pathlib import Path
 import pytest
 from emitted import emitted, ran_and_differed, spoil, with_flags
 from gyrotc.model import load_model
-from gyrotc.verify.board import board_entries
-from gyrotc.verify.emitted import Job
-from gyrotc.verify.toolchain import Target
+from gyrotc.verify import Job, Target, board_entries
 from jobs import job_of
 from libc_build import UNGUARDED
 from models import bank_of, random_model, random_terms

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gyrotc.mirror import evaluate_map
 from gyrotc.mirror.f32 import FUSIBLE, _plus
-from gyrotc.mirror.history import evaluate_map
-from gyrotc.tables.quantise import N_PROBES, quantise
+from gyrotc.tables import N_PROBES, quantise
 from libc_build import UNGUARDED
 from self_tests import OK, RIGHT, Verdict, models, native, write_sources
 

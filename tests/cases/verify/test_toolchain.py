@@ -9,14 +9,13 @@ from pathlib import Path
 import pytest
 from conftest import packed
 from emitted import emitted
-from gyrotc.common.errors import CheckFailed, InputError
+from gyrotc.common import CheckFailed, InputError
 from gyrotc.results import cache
-from gyrotc.verify import toolchain
-from gyrotc.verify.board import board_entries
-from gyrotc.verify.toolchain import (
+from gyrotc.verify import (
     Object,
     Target,
     all_targets,
+    board_entries,
     compile_c,
     compile_objects,
     compiler_version,
@@ -24,6 +23,7 @@ from gyrotc.verify.toolchain import (
     run_program,
     shared_object,
     symbols,
+    toolchain,
     writable_bytes,
 )
 from jobs import job_of

@@ -16,14 +16,12 @@ import numpy as np
 import pytest
 from conftest import Command
 from emitted import GOLDEN, emitted, entries, flip, recorded, spoil
-from gyrotc.common.errors import CheckFailed, InputError
-from gyrotc.jobs.axes import axes_in, joint_texts, verify_axes
+from gyrotc.common import CheckFailed, InputError
+from gyrotc.jobs import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
-from gyrotc.tables.emit import emit, expected_answers
+from gyrotc.tables import emit, expected_answers
+from gyrotc.verify import Target, all_targets, compared_words, compile_c, read_output, run_program, verify
 from gyrotc.verify import job as package
-from gyrotc.verify.board import compared_words, read_output
-from gyrotc.verify.job import verify
-from gyrotc.verify.toolchain import Target, all_targets, compile_c, run_program
 from jobs import job_of
 
 FAST = "host-gcc-O0"

@@ -27,9 +27,9 @@ from gyrotc.cli.main import _hoisted, application, run
 from gyrotc.cli.recordings import RunFormat
 from gyrotc.model import Model
 from gyrotc.recordings.importers import rows
-from gyrotc.results.marker import MARKER
+from gyrotc.results import MARKER
 from gyrotc.simulate import campaign
-from gyrotc.tables.emit import emit
+from gyrotc.tables import emit
 from recordings import described
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -303,7 +303,7 @@ def test_a_build_ends_with_the_next_command(
     built = SimpleNamespace(
         model=SimpleNamespace(axis=None), evaluation=evaluation, diagnosis=diagnosis, failures=(), limits=None
     )
-    monkeypatch.setattr("gyrotc.jobs.build.build", lambda *_, **__: [built])
+    monkeypatch.setattr("gyrotc.jobs.calibration.build", lambda *_, **__: [built])
     monkeypatch.setattr("gyrotc.cli.jobs._print_built", lambda _: None)
     last = gyrotc("build", "my data").stdout.splitlines()[-1]
     assert last.endswith("gyrotc diagnose 'my data'") == (left and diagnosis is None), last

@@ -14,24 +14,31 @@ import pytest
 from campaigns import GRADIENT, simulated
 from conftest import HOST, Command
 from gyrotc.causes import CATALOGUE
+from gyrotc.diagnose import (
+    VERDICTS,
+    Attribution,
+    Effect,
+    Records,
+    Refitting,
+    completed,
+    diagnose,
+    extend,
+    extension,
+    gain_of,
+    held_out_masks,
+    known,
+    next_steps,
+    not_testable,
+    records_of,
+    samples,
+    shipping,
+)
 from gyrotc.diagnose import diagnosis as stages
-from gyrotc.diagnose import extension
-from gyrotc.diagnose.attribution import Attribution
-from gyrotc.diagnose.blocks import Records, records_of
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.diagnose.extension import Refitting, extend, held_out_masks, shipping
-from gyrotc.diagnose.gain import gain_of
-from gyrotc.diagnose.refit import Effect, completed, known, samples
-from gyrotc.diagnose.summary import VERDICTS, next_steps, not_testable
-from gyrotc.mirror.recursions import first_order
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset
-from gyrotc.results.diagnosed import DiagnosisVerdict, NamedCause
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import read
-from gyrotc.train import fitting
-from gyrotc.train.data import joined
-from gyrotc.train.fitting import FitOptions
+from gyrotc.mirror import first_order
+from gyrotc.recordings import Dataset, load
+from gyrotc.results import DiagnosisVerdict, NamedCause
+from gyrotc.simulate import read, simulate
+from gyrotc.train import FitOptions, fitting, joined
 from recordings import ACCEPTED, toml, write_csv
 
 

@@ -17,14 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.common.errors import InputError
-from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
-from gyrotc.fleet.outliers import outliers
-from gyrotc.fleet.run import run_fleet
-from gyrotc.fleet.unit import Task, do_unit
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.train.fitting import FitOptions
-from gyrotc.verify.job import verify
+from gyrotc.common import InputError
+from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet
+from gyrotc.results import FleetEntry
+from gyrotc.train import FitOptions
+from gyrotc.verify import verify
 from recordings import columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
@@ -237,24 +234,24 @@ def test_the_odd_gyro_is_named_and_an_even_fleet_has_none() -> None:
     seed = int(np.random.default_rng().integers(2**31))
     print("seed", seed)
     even = _entries(200, seed)
-    far = outliers(even)
+    far = outlying_units(even)
     assert len(far) <= 2, "5 robust standard deviations of 1400 normal figures"
     even[7] = even[7].model_copy(update={"after_rms_dph": 3.0 * (even[7].after_rms_dph or 0.0)})
     even[9] = even[9].model_copy(update={"bias_dph": 30.0})
-    assert {(o.name, o.figure) for o in outliers(even)} - {(o.name, o.figure) for o in far} == {
+    assert {(o.name, o.figure) for o in outlying_units(even)} - {(o.name, o.figure) for o in far} == {
         ("RLG-7", "after_rms_dph"),
         ("RLG-9", "bias_dph"),
     }
-    assert outliers(even[:7]) == [], "a handful does not say what is usual"
+    assert outlying_units(even[:7]) == [], "a handful does not say what is usual"
 
 
 def test_alike_gyros_do_not_stand_apart_by_a_hair() -> None:
     """Figures that all agree to the last digits have no scatter to stand out of."""
     entries = [_entry(f"{k}", noise_floor_dph=1e-3, bias_dph=1.0) for k in range(20)]
     entries[3] = _entry("3", noise_floor_dph=1.01e-3, bias_dph=1.0)
-    assert outliers(entries) == []
+    assert outlying_units(entries) == []
     entries[3] = _entry("3", noise_floor_dph=1.1e-3, bias_dph=1.0)
-    assert [o.name for o in outliers(entries)] == ["3"]
+    assert [o.name for o in outlying_units(entries)] == ["3"]
 
 
 def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) -> None:

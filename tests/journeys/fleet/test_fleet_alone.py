@@ -18,19 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gyrotc.assess.limits import load_limits
-from gyrotc.common.errors import InputError
-from gyrotc.fleet import run
+from gyrotc.assess import load_limits
+from gyrotc.common import InputError
+from gyrotc.fleet import SUMMARY, Fleet, Task, Unit, do_unit, load_manifest, run, run_fleet
 from gyrotc.fleet import run as pool
 from gyrotc.fleet import unit as units
-from gyrotc.fleet.manifest import SUMMARY, Fleet, Unit, load_manifest
-from gyrotc.fleet.run import run_fleet
-from gyrotc.fleet.unit import Task, do_unit
-from gyrotc.results.cache import input_hashes, program_of
-from gyrotc.results.files import Lock
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import MARKER, result_faults
-from gyrotc.train.fitting import FitOptions
+from gyrotc.results import MARKER, FleetEntry, Lock, input_hashes, program_of, result_faults
+from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")

@@ -18,11 +18,9 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT, Command, on_terminal
+from gyrotc.fleet import Cluster, load_manifest, run_fleet
 from gyrotc.fleet import run as running
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.run import Cluster, run_fleet
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import MARKER
+from gyrotc.results import MARKER, FleetEntry
 from recordings import columns, toml, write_csv
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed")

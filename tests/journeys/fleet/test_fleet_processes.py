@@ -10,13 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gyrotc.fleet import Cluster, Fleet, Task, Unit, do_unit, load_manifest, run_fleet, tasks_of
 from gyrotc.fleet import run as pools
-from gyrotc.fleet.manifest import Fleet, Unit, load_manifest
-from gyrotc.fleet.run import Cluster, run_fleet, tasks_of
-from gyrotc.fleet.unit import Task, do_unit
-from gyrotc.results.fleet import FleetEntry
-from gyrotc.results.marker import MARKER
-from gyrotc.train.fitting import FitOptions
+from gyrotc.results import MARKER, FleetEntry
+from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
 

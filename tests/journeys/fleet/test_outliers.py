@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from gyrotc.common.metrics import Averages
-from gyrotc.fleet.outliers import gyro_facts, step_in
-from gyrotc.fleet.page import reasons, summary_of
-from gyrotc.results.fleet import Copy, FleetEntry, Reason
+from gyrotc.common import Averages
+from gyrotc.fleet import gyro_facts, reasons, step_in, summary_of
+from gyrotc.results import Copy, FleetEntry, Reason
 from lot import AXES, FAULTS, Lot
 
 MEANS = 5  # rows of a mean: 100 s

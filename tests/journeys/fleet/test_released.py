@@ -7,12 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 from conftest import Command
-from gyrotc.fleet import run
-from gyrotc.fleet.manifest import load_manifest
-from gyrotc.fleet.page import write_summary
+from gyrotc.fleet import load_manifest, run, write_summary
 from gyrotc.jobs import lot as job
-from gyrotc.results.base import read_result
-from gyrotc.results.fleet import FleetEntry, FleetSummary, FleetUnit
+from gyrotc.results import FleetEntry, FleetSummary, FleetUnit, read_result
 from recordings import columns, toml, write_csv
 
 

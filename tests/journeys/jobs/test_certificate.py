@@ -8,18 +8,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from gyrotc.assess.limits import load_limits
-from gyrotc.common.errors import InputError
-from gyrotc.jobs.build import build_into
-from gyrotc.jobs.certificate import certificate, laboratory_facts, missing_facts
+from gyrotc.assess import load_limits
+from gyrotc.common import InputError
+from gyrotc.jobs import build_into, certificate, laboratory_facts, missing_facts
 from gyrotc.pages import certificate as printing
-from gyrotc.pages.display import digits_of
-from gyrotc.pages.unit import unit_in
-from gyrotc.recordings.load import load
-from gyrotc.results.base import read_result
-from gyrotc.results.folder import result_folder
-from gyrotc.results.training import Manifest
-from gyrotc.train.fitting import FitOptions
+from gyrotc.pages import digits_of, unit_in
+from gyrotc.recordings import load
+from gyrotc.results import Manifest, read_result, result_folder
+from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
 REASON = "kept for a test bench"

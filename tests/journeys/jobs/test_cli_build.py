@@ -16,13 +16,12 @@ import gyrotc
 import numpy as np
 import pytest
 from conftest import EXAMPLE, HOST, Command, run_gyrotc
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.common.errors import InputError
+from gyrotc.assess import evaluate
+from gyrotc.common import InputError
 from gyrotc.model import load_model
-from gyrotc.pages.report import write_report
-from gyrotc.pages.unit import failed_checks
-from gyrotc.recordings.load import load
-from gyrotc.results.release import MapError
+from gyrotc.pages import failed_checks, write_report
+from gyrotc.recordings import load
+from gyrotc.results import MapError
 from recordings import columns, write_csv
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[4] / "shared/data/real"))
@@ -226,7 +225,7 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
 def test_traces_of_files_with_one_stem_do_not_meet() -> None:
     from types import SimpleNamespace
 
-    from gyrotc.assess.evaluate import trace_name
+    from gyrotc.assess import trace_name
 
     runs = [
         SimpleNamespace(file=f, from_s=s)

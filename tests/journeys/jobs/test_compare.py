@@ -8,19 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.assess.evaluate import evaluate
-from gyrotc.common.errors import InputError
-from gyrotc.jobs.build import compare
-from gyrotc.recordings.load import load
-from gyrotc.results.evaluation import Comparison
-from gyrotc.simulate.campaign import simulate
-from gyrotc.simulate.scenario import simulated_floor
-from gyrotc.tables.emit import emit
-from gyrotc.train.data import TrainingData
-from gyrotc.train.fitting import FitOptions, fit_dataset, front_end, samples_of
-from gyrotc.train.methods import fit
-from gyrotc.train.options import COMPARED
-from gyrotc.train.result import predict
+from gyrotc.assess import evaluate
+from gyrotc.common import InputError
+from gyrotc.jobs import compare
+from gyrotc.recordings import load
+from gyrotc.results import Comparison
+from gyrotc.simulate import simulate, simulated_floor
+from gyrotc.tables import emit
+from gyrotc.train import COMPARED, FitOptions, TrainingData, fit, fit_dataset, front_end, predict, samples_of
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import HOST, run_here
-from gyrotc.common.errors import InputError
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.extension import Refitting
-from gyrotc.jobs.lot import load_lot, lot_of
-from gyrotc.lot.planning import plan_with_lot
+from gyrotc.common import InputError
+from gyrotc.diagnose import Refitting, records_of
+from gyrotc.jobs import load_lot, lot_of
+from gyrotc.lot import plan_with_lot
 from gyrotc.model import load_model
-from gyrotc.recordings.load import load
-from gyrotc.results.files import json_text
-from gyrotc.results.recordings import LotPlan, NextRun
-from gyrotc.train.data import joined
-from gyrotc.train.fitting import FitOptions
-from gyrotc.train.prior.use import prior_of
-from gyrotc.train.result import predict
+from gyrotc.recordings import load
+from gyrotc.results import LotPlan, NextRun, json_text
+from gyrotc.train import FitOptions, joined, predict
+from gyrotc.train.prior import prior_of
 
 RUNS = """
 title = "Two short cycles"

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import HOST, Command
-from gyrotc.common.errors import InputError
-from gyrotc.jobs.build import build
-from gyrotc.mirror.recursions import first_order, play
-from gyrotc.quality.fits import evidence_beside_memories
-from gyrotc.train.fitting import FitOptions
+from gyrotc.common import InputError
+from gyrotc.jobs import build
+from gyrotc.mirror import first_order, play
+from gyrotc.quality import evidence_beside_memories
+from gyrotc.train import FitOptions
 from numpy.typing import NDArray
 from recordings import ACCEPTED, REFUSED, ROWS, columns, described, write_csv
 

@@ -71,7 +71,7 @@ def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp
     program = (
         "import sys; sys.meta_path = [f for f in sys.meta_path if 'gyrotc' not in type(f).__module__]\n"
         "from pathlib import Path\n"
-        "import gyrotc; from gyrotc.tables.emit import emit; from gyrotc.model import load_model\n"
+        "import gyrotc; from gyrotc.tables.emission import emit; from gyrotc.model import load_model\n"
         "assert Path(gyrotc.__file__).parents[1] == Path.cwd(), gyrotc.__file__\n"
         "emit(load_model(Path(sys.argv[1])), Path(sys.argv[2]))"
     )

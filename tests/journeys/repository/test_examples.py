@@ -14,10 +14,9 @@ from pathlib import Path
 import gyrotc
 import numpy as np
 import pytest
-from gyrotc.mirror.history import evaluate_map
+from gyrotc.mirror import evaluate_map
 from gyrotc.model import Model, load_model
-from gyrotc.tables.emit import emit
-from gyrotc.tables.quantise import quantise
+from gyrotc.tables import emit, quantise
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"

@@ -7,15 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.causes import CATALOGUE
-from gyrotc.causes.base import History
-from gyrotc.diagnose.blocks import records_of
-from gyrotc.diagnose.diagnosis import diagnose
-from gyrotc.quality.changes import Change, changes_of
-from gyrotc.quality.events import found_events
-from gyrotc.quality.fits import RowArrays, WalkNoise
-from gyrotc.recordings.load import load
-from gyrotc.results.diagnosed import Diagnosed
+from gyrotc.causes import CATALOGUE, History
+from gyrotc.diagnose import diagnose, records_of
+from gyrotc.quality import Change, RowArrays, WalkNoise, changes_of, found_events
+from gyrotc.recordings import load
+from gyrotc.results import Diagnosed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import Columns, toml, write_csv

@@ -6,9 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from gyrotc.mirror.history import replay
-from gyrotc.mirror.table import FALLBACK, HELD, Table
-from gyrotc.tables.quantise import NUMERICS, quantise
+from gyrotc.mirror import FALLBACK, HELD, Table, replay
+from gyrotc.tables import NUMERICS, quantise
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from libc_build import runtime

@@ -18,15 +18,21 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
-from gyrotc.common.errors import InputError
-from gyrotc.quality.check import check
-from gyrotc.recordings import files
-from gyrotc.recordings.description import Layout, Problems
-from gyrotc.recordings.files import CsvFile
-from gyrotc.recordings.load import axes_of, load, load_reporting
-from gyrotc.recordings.plausibility import EARTH_RATE_DPH, earth_rate
-from gyrotc.recordings.reading import known_rows
-from gyrotc.recordings.records import Applied
+from gyrotc.common import InputError
+from gyrotc.quality import check
+from gyrotc.recordings import (
+    EARTH_RATE_DPH,
+    Applied,
+    CsvFile,
+    Layout,
+    Problems,
+    axes_of,
+    earth_rate,
+    files,
+    known_rows,
+    load,
+    load_reporting,
+)
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from recordings import ACCEPTED, REFUSED, ROWS, RUN, columns, columns_of_pulses, csv_text, described, toml, write_csv
@@ -427,7 +433,7 @@ def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path)
         table = pa.table({"time_s": np.round(time, 2), "temperature_c": temperature, "rate_dph": rate})
         pacsv.write_csv(table, folder / f"{index}.csv")
     program = (
-        "import sys; from pathlib import Path; from gyrotc.recordings.load import load\n"
+        "import sys; from pathlib import Path; from gyrotc.recordings.loading import load\n"
         "rows = sum(len(run.rows()) for run in load(Path(sys.argv[1])).runs)\n"
         "peak = Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]\n"
         "print(rows, peak)"

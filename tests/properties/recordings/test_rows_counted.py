@@ -14,11 +14,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import Command, run_gyrotc
-from gyrotc.common.errors import InputError
-from gyrotc.recordings.importers.job import ImportOptions, import_files
-from gyrotc.recordings.importers.map_file import Map
-from gyrotc.results.base import read_result
-from gyrotc.results.recordings import ImportedFile, ImportedFiles
+from gyrotc.common import InputError
+from gyrotc.recordings.importers import ImportOptions, Map, import_files
+from gyrotc.results import ImportedFile, ImportedFiles, read_result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -281,7 +281,7 @@ class Learned:
     left_out_dph: tuple[float, float]
 
 
-def learn(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Learned:
+def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Learned:
     """Learns what units share.
 
     Args:

@@ -33,7 +33,7 @@ class UnitMeans:
     sigma_dph: float
 
 
-def unit_means(samples: TrainingData, scaling: Scaling, process: Process | None) -> tuple[UnitMeans, float]:
+def means_of_unit(samples: TrainingData, scaling: Scaling, process: Process | None) -> tuple[UnitMeans, float]:
     """Means over 50 s of cleaned samples, gathered into cells of 1/50 of each half range; and their length, s.
 
     Args:

@@ -18,12 +18,12 @@ from ...results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
 from ..data import Bins, Scaling, TrainingData, average_samples
 from ..evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
 from ..mrbf import fit_mrbf
-from ..objection import objection
+from ..objection import objection_to
 from ..result import Outcome
 from .basis import PARAMETERS, LotBasis
 from .given import Given
 from .learn import FALSE_ALARM, evidence, freedom_of, p_value, scores, student_variance, sums_of
-from .unit_means import UnitMeans, unit_means
+from .unit_means import UnitMeans, means_of_unit
 
 _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
@@ -341,7 +341,7 @@ def network_of_posterior(
     process = _process(samples, scaling, alone, unit, posterior)
     try:
         outcome = fit_mrbf(samples, scaling, seed=seed, centers=None, average_s=average_s, process=process)
-        against = objection(outcome, samples, scaling, average_s)
+        against = objection_to(outcome, samples, scaling, average_s)
     except TrainingFailed as failure:
         return str(failure)
     return against or (outcome, scaling)
@@ -353,7 +353,7 @@ def seen_alone(samples: TrainingData, own: Scaling) -> tuple[Process | None, Uni
         alone = fit_process(samples, own)
     except TrainingFailed:
         alone = None
-    return alone, unit_means(samples, own, alone)[0]
+    return alone, means_of_unit(samples, own, alone)[0]
 
 
 def _over_both(own: Scaling, prior: MapPrior) -> Scaling:

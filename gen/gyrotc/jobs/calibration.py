@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..assess.budget import budget_of
 from ..assess.changes import changes_since, load_earlier
-from ..assess.evaluate import Watch, evaluate
+from ..assess.evaluation import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
 from ..common.arrays import Progress
@@ -31,7 +31,7 @@ from ..common.metrics import Averages, average_rows
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
-from ..recordings.load import asked_axes, load
+from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset, Run
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Comparison, Evaluation, Group, Method, Pooled
@@ -40,8 +40,8 @@ from ..results.folder import result_folder
 from ..results.marker import MARKER, sha256
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
-from ..tables.emit import emit
-from ..tables.quantise import applied_of
+from ..tables.emission import emit
+from ..tables.quantisation import applied_of
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit

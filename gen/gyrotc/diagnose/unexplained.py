@@ -24,7 +24,7 @@ from .detection import project
 from .joined import Held, Projection, ratio_of
 from .noise import Whitener
 from .profile_likelihood import Gains
-from .refine import Refined
+from .refinement import Refined
 from .search import Search, View
 from .signature_bank import DIRECTION_C, Alternative, direction_of
 from .static_map import proportional_map

@@ -17,7 +17,7 @@ from .. import __version__
 from ..common.errors import InputError
 from ..model import Model
 from ..recordings.description import Problems
-from ..recordings.load import asked_axes, load_reporting
+from ..recordings.loading import asked_axes, load_reporting
 from ..recordings.plausibility import TRUSTED
 from ..recordings.records import Applied, Dataset, Mark, Rows, Run
 from ..results.base import Finding, MarkedRows

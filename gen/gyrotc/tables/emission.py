@@ -31,7 +31,7 @@ from ..model import Model, RuntimePart
 from ..results.files import write_own
 from ..results.folder import result_folder
 from .error_bounds import MARGIN, channel_error_dph
-from .quantise import NUMERICS, quantise
+from .quantisation import NUMERICS, quantise
 from .record import RECORD, Options, read_options, record_text
 from .rounding import channel_names
 from .text import amalgamate, example_values, table_text

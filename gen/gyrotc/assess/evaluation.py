@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..common.arrays import FloatArray, Progress
 from ..common.errors import CheckFailed, GyrotcError
-from ..common.metrics import Averager, Averages, statistics, time_statistics
+from ..common.metrics import Averager, Averages, statistics_of, time_statistics
 from ..common.texts import file_stem
 from ..mirror.history import Replay
 from ..mirror.table import Table, Words
 from ..model import Model, load_model
-from ..quality.check import findings_of_run
 from ..quality.findings import RunFacts, run_facts
+from ..quality.inspection import findings_of_run
 from ..quality.outliers import departing_rows
 from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Rows, Run
@@ -45,7 +45,7 @@ from ..results.evaluation import (
 from ..results.files import create
 from ..results.training import Training
 from ..simulate.scenario import simulated_floor
-from ..tables.emit import emitted_tables
+from ..tables.emission import emitted_tables
 from ..verify.replay import replay_case_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
@@ -306,7 +306,7 @@ def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:
     """Figures of several runs without rows that are outliers; None where there are none."""
     if not any(part.outlier_rows for part in parts):
         return None
-    return Statistics(**statistics(np.concatenate([part.robust.after_dph for part in parts])))
+    return Statistics(**statistics_of(np.concatenate([part.robust.after_dph for part in parts])))
 
 
 def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
@@ -316,8 +316,8 @@ def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
         role=run.role,
         environment=run.environment,
         samples=int(a.after_dph.size),
-        before=Statistics(**statistics(a.before_dph)),
-        after=RunStatistics(**statistics(a.after_dph), **time_statistics(a, average_s)),
+        before=Statistics(**statistics_of(a.before_dph)),
+        after=RunStatistics(**statistics_of(a.after_dph), **time_statistics(a, average_s)),
     )
     if part.outlier_rows:
         robust = {"outlier_rows": part.outlier_rows, "without_outliers": _without_outliers([part])}

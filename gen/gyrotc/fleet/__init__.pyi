@@ -1,0 +1,17 @@
+from .manifest import SUMMARY as SUMMARY
+from .manifest import Fleet as Fleet
+from .manifest import Unit as Unit
+from .manifest import load_manifest as load_manifest
+from .outliers import copies as copies
+from .outliers import gyro_facts as gyro_facts
+from .outliers import mirrored_units as mirrored_units
+from .outliers import outlying_units as outlying_units
+from .outliers import step_in as step_in
+from .page import reasons as reasons
+from .page import summary_of as summary_of
+from .page import write_summary as write_summary
+from .run import Cluster as Cluster
+from .run import run_fleet as run_fleet
+from .run import tasks_of as tasks_of
+from .unit import Task as Task
+from .unit import do_unit as do_unit

@@ -1,0 +1,5 @@
+from .job import ImportOptions as ImportOptions
+from .job import import_files as import_files
+from .map_file import Map as Map
+from .map_file import load_map as load_map
+from .stamps import Stamps as Stamps
