@@ -113,7 +113,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
 def test_a_fleet_has_the_decision_of_the_unit(
     model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(unit, "facts_of", lambda runs: None)  # no verdict depends on the comparison
+    monkeypatch.setattr(unit, "gyro_facts", lambda runs: None)  # no verdict depends on the comparison
     seed, draws = 20260726, 60
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
