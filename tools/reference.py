@@ -20,14 +20,14 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Results whose objects are reported in the tables of another result on the page.
-REPORTED_BY = {"next-run": "lot-plan", "release": "limits", "entry": "fleet", "verify-axes": "verify"}
+REPORTED_BY = {"entry": "fleet", "verify-axes": "verify"}
 #: Where FORMAT.md has the table of a result's fields.
 PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
 #: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
     "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
     "tables.emit", "mirror.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",
-    "simulate.campaign", "plan.plan", "common.metrics", "common.errors",
+    "simulate.campaign", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(
     r"/\* (?P<text>(?:(?!\*/).)*?) ?\*/\n(?P<code>(?:GTC_MUST_CHECK int gtc_\w+\([^;]*;\n)+)", re.DOTALL

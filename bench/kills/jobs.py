@@ -111,7 +111,7 @@ def writing(root: Path) -> list[Case]:
             _fill(version, stage.folder, "evaluate.json")
 
     def single(version: int) -> None:
-        write_result(alone, json.dumps({"schema": "gyrotc.plan/1", "version": version}))
+        write_result(alone, json.dumps({"schema": "gyrotc.check/1", "version": version}))
 
     folders = [Case(job.__name__, job, (out,)) for job in (build, emit, verify, evaluate)]
     return [*folders, Case("json", single, (alone,))]
@@ -157,7 +157,6 @@ def commands(root: Path) -> list[Case]:
         case("report", lambda _: [out], out),
         case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
         case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v], root / "diagnosed"),
-        case("plan", lambda v: [scenario, "--out", root / "planned", "--seed", v], root / "planned"),
         case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
              root / "imported"),
         case("check", lambda _: [data, "--json", root / "check.json"], root / "check.json"),

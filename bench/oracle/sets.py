@@ -100,7 +100,7 @@ def _text(name: str, text: str) -> Callable[[Path], object]:
 
 
 def _paper(s: Steps) -> None:
-    """All that can be done with one unit without a compiler, and the plan of its campaign."""
+    """All that can be done with one unit without a compiler."""
     s.run("simulate", "paper", "--seed", 1, "--out", "data")
     s.run("check", "data", "--json", "check.json", "--envelope", "-40:60,-5:5")
     s.run("fit", "data", "--out", "result", "--json", "fit.json")
@@ -108,8 +108,6 @@ def _paper(s: Steps) -> None:
     s.run("evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json")
     s.run("report", "result")
     s.run("diagnose", "data", "--out", "diagnosis")
-    s.run("plan", "paper", "--out", "plan", "--add-thermometer", "--separate", "hysteresis,turn_on_offset")
-    s.run("plan", "paper", "--require", "hysteresis=5e-5", "--json", "plan.json", name="plan to a limit")
     s.run("compare", "data", "--out", "comparison", "--quiet")  # it prints how long training took
     s.run(
         "emit",
@@ -245,9 +243,6 @@ def _lot(s: Steps) -> None:
     unit = "short/LOT-0005-010"
     s.run("fit", unit, "--lot", "lot.json", "--out", "with-lot")
     s.run("diagnose", unit, "--lot", "lot.json", "--json", "diagnose.json")
-    s.run("plan", "whole.toml", "--lot", "lot.json", "--require", "accuracy=2e-4", "--out", "plan")
-    s.run("plan", "whole.toml", "--unit", "fleet/LOT-0005-001", "--hours", 0.5, "--price-per-hour", 90, "--json",
-          "next.json", name="plan of the next run")  # fmt: skip
 
 
 def _reversed_unit(folder: Path) -> None:
@@ -428,8 +423,8 @@ def _wrong(s: Steps) -> None:
         ("fit", "RLG-1", "--axis", "x"), ("fit", "RLG-1", "--lot", "none.json"), ("fit", "RLG-1", "--prior", "none"),
         ("fit", "nowhere"), ("build", "RLG-1", "--numeric", "f99"), ("build", "RLG-1", "--limits", "bad.toml"),
         ("fleet", "fleet.toml", "--out", "fleet"), ("fleet", "nowhere", "--out", "fleet"),
-        ("simulate", "bad.toml", "--out", "made"), ("simulate", "nothing", "--out", "made"), ("plan", "bad.toml"),
-        ("plan", "paper", "--require", "hysteresis=x"), ("lot", "nowhere", "--out", "lot.json"),
+        ("simulate", "bad.toml", "--out", "made"), ("simulate", "nothing", "--out", "made"),
+        ("lot", "nowhere", "--out", "lot.json"),
         ("import", "RLG-1/a.csv", "--out", "made", "--rate-unit", "apples"), ("diagnose", "RLG-1", "--model", "x"),
         ("certificate", "result", "--number", "1", "--out", "made"), ("verify", "nowhere"), ("schema", "nothing"),
         ("emit", "bad.toml"), ("report", "nowhere"), ("x",),

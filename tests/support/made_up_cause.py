@@ -56,12 +56,11 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias follows the temperature rate of a second node",
-        short="slow",
         signature="residual follows the ramp and fades in holds",
         remedy="one first-order state and a linear term",
         experiment=ADVICE_MORE_RATES,
     ),
-    search=SearchRule(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True, shown=(900.0,)),
+    search=SearchRule(price=2, grid=geometric(TAU, 24), over=TAU.name, imitates=True),
     table=Tabled(TableKind.MEMORY, _record),
     bias=_bias,
     features=_features,

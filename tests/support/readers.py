@@ -18,11 +18,10 @@ from gyrotc.common import InputError, average_rows
 from gyrotc.diagnose import build_bank, diagnose, records_of, series_of, signature_bank
 from gyrotc.fleet import load_manifest
 from gyrotc.model import load_model
-from gyrotc.pages import write_diagnosis_page, write_plan_page
-from gyrotc.plan.plan import plan
+from gyrotc.pages import write_diagnosis_page
 from gyrotc.quality import check
 from gyrotc.recordings import load
-from gyrotc.results import DeclaredUnits, Evaluation, Manifest, Plan, read_result
+from gyrotc.results import DeclaredUnits, Evaluation, Manifest, read_result
 from gyrotc.results import cache as kept
 from gyrotc.simulate import read as read_scenario
 from gyrotc.simulate import simulate, simulated_floor
@@ -131,7 +130,6 @@ def make_seeds(folder: Path) -> None:
         ("budget", budget.content()),
     ):  # fmt: skip
         (out / f"{name}.json").write_text(json.dumps(content))
-    (folder / "plan.json").write_text(json.dumps(plan("paper-1C-min").content()))
     found = diagnose(dataset)
     series = series_of(found)
     assert series is not None
@@ -142,7 +140,7 @@ def make_seeds(folder: Path) -> None:
 READERS = (
     "csv", "parquet", "dataset.toml", "model.json", "limits.toml", "fleet.toml", "scenario.toml", "evaluate.json",
     "training.json", "verify.json", "manifest.json", "limits.json", "changes.json", "budget.json",
-    "plan.json", "diagnose.json", "series.json",
+    "diagnose.json", "series.json",
     "truth.json", "noise.npy", "trace.csv", "board.log", "bank", "record",
 )  # fmt: skip
 
@@ -161,9 +159,6 @@ def seeds_in(seeds: Path, folder: Path) -> dict[str, Reader]:
         ),
         "fleet.toml": Reader(_manifest(folder), "toml", [MANIFEST.encode()]),
         "scenario.toml": Reader(_scenario(folder), "toml", [SCENARIO.encode()]),
-        "plan.json": Reader(
-            _page(folder, "plan.json", write_plan_page), "json", [(seeds / "plan.json").read_bytes()]
-        ),
         "diagnose.json": Reader(
             _page(folder, "diagnose.json", write_diagnosis_page), "json", [(seeds / "diagnose.json").read_bytes()]
         ),
@@ -327,17 +322,10 @@ def _series(seeds: Path, folder: Path) -> Callable[[bytes], None]:
 
 
 def _page(folder: Path, name: str, write: Callable[[Path], Any]) -> Callable[[bytes], None]:
-    number = 0
-
     def read(data: bytes) -> None:
-        nonlocal number
-        number += 1
         work = _fresh(folder, "page")
         (work / name).write_bytes(data)
-        if name == "plan.json" and number % PICTURES_EVERY:
-            read_result(work / name, Plan)
-        else:
-            write(work)
+        write(work)
 
     return read
 

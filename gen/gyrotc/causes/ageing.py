@@ -49,7 +49,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias drifts from run to run with the date",
-        short="ageing",
         signature="means of the runs follow the calendar",
         remedy="calibrate again in time; a table must not extrapolate it",
         experiment="three or more repeats of one hold with power cycles between them",

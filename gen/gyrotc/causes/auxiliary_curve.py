@@ -62,7 +62,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias follows a recorded channel along a bent line",
-        short="curve",
         signature="residual is a bent function of the channel, the same at every temperature",
         remedy="a line and two Gaussians in the channel, or a better supply or shield",
         experiment="vary the channel by hand over its whole range at a constant temperature",

@@ -51,7 +51,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias follows a recorded channel with a slope that depends on temperature",
-        short="product",
         signature="residual is proportional to the channel, more at some temperatures than at others",
         remedy="a line in the channel times a line in temperature, or a better supply or shield",
         experiment="vary the channel by hand at two constant temperatures",

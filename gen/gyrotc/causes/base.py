@@ -67,9 +67,6 @@ class SearchRule:
         step: Step of the derivative to the parameter, in its unit; None: 2 % of its value.
         twice: It may be there twice, with parameters far from one another.
         imitates: Whether a cause that is found is compared with it: from which d the two can be distinguished.
-        planned: Whether a profile without rates says anything of it.
-        shown: Values of `over` at which it stands for itself in a plan.
-        rival_every: A plan looks at one point in this many of its grid as a rival.
         cycle: How it is looked for in a single chamber cycle; None: it is not.
         loops: It stands for every memory with loops that do not depend on the rate, and is judged by them all.
     """
@@ -82,9 +79,6 @@ class SearchRule:
     step: float | None = None
     twice: bool = False
     imitates: bool = False
-    planned: bool = True
-    shown: tuple[float, ...] = ()
-    rival_every: int = 1
     cycle: SingleCycle | None = None
     loops: bool = False
 
@@ -176,7 +170,6 @@ class Wording:
 
     Attributes:
         name: One clause.
-        short: At most eight letters, for the head of a column.
         signature: How it shows in the residuals.
         remedy: What to do about it.
         experiment: What tells it from other causes.
@@ -187,7 +180,6 @@ class Wording:
     """
 
     name: str
-    short: str
     signature: str
     remedy: str
     experiment: str

@@ -49,12 +49,11 @@ CAUSE = Cause(
     parameters=(_TAU,),
     words=Wording(
         name="The cavity lags the temperature sensor",
-        short="lag",
         signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
         remedy="one first-order state: the map sees the cavity's temperature",
         experiment=ADVICE_MORE_RATES,
     ),
-    search=SearchRule(price=2, grid=geometric(_TAU, 22), over=_TAU.name, imitates=True, shown=(300.0, 900.0)),
+    search=SearchRule(price=2, grid=geometric(_TAU, 22), over=_TAU.name, imitates=True),
     table=Tabled(TableKind.MEMORY, _record),
     cavity=_cavity,
     features=_features,

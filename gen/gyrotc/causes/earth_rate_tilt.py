@@ -41,7 +41,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The fixture turns the axis through Earth rate",
-        short="tilt",
         signature="none on one axis: the static map holds it",
         remedy="a stiffer fixture, or Earth rate computed from its measured angles",
         experiment="the same profile with the gyro rotated by 180 degrees on its fixture",

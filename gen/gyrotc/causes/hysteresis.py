@@ -73,7 +73,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias remembers the direction of the last temperature change",
-        short="hyster.",
         signature="loops over T whose width does not depend on the rate; "
         "holds differ by the side they were reached from",
         remedy="one play operator, saved over power cycles",
@@ -87,7 +86,6 @@ CAUSE = Cause(
         over=_WIDTH.name,
         imitates=True,
         loops=True,
-        shown=(4.0, 12.0),
         cycle=SingleCycle(points=24, usual=False),
     ),
     table=Tabled(TableKind.PLAY, _record, optional=("reference_c", "amplitude_dph_per_c_per_c")),

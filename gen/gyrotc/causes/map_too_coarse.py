@@ -36,14 +36,13 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The static map is too coarse",
-        short="map",
         signature="residual repeats over T, heating and cooling alike, finer than the map",
         remedy="no map follows it, and more centers do not help: count it in the error budget, or find its source in "
         "the gyro, such as a relay, a resonance or the glass transition of an adhesive",
         experiment="one slow ramp over the full range in both directions",
         telling=Telling.STATIC,
     ),
-    search=SearchRule(price=1, grid=anywhere, needed_d=9.0, planned=False),
+    search=SearchRule(price=1, grid=anywhere, needed_d=9.0),
     bias=_bias,
     features=_features,
 )

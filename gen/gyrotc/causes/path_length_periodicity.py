@@ -85,7 +85,6 @@ CAUSE = Cause(
     ),
     words=Wording(
         name="The bias is periodic in temperature",
-        short="period",
         signature="residual waves over T with one period and the same phase heating and cooling",
         remedy="a sine and a cosine of T, with overtones where the wave is no sine",
         experiment="one slow ramp over the full range in both directions",
@@ -99,7 +98,6 @@ CAUSE = Cause(
         needed_d=6.6,
         width=lambda here, span_c: here**2 / (4.0 * span_c),
         twice=True,
-        shown=(8.0,),
     ),
     table=Tabled(TableKind.HARMONIC, _record),
     bias=_bias,

@@ -47,7 +47,6 @@ CAUSE = Cause(
     parameters=(Parameter("slope_dph_per_c", "deg/h/C", 1e-7, 1e-1, linear=True, signed=True),),
     words=Wording(
         name="Every power-on sets an offset by the temperature that it finds",
-        short="start T",
         signature="means of the runs follow the temperature at power-on",
         remedy="no map holds it: switch on at one temperature, or re-zero in the first minutes at rest",
         experiment=_REPEATED,

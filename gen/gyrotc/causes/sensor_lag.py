@@ -26,7 +26,6 @@ CAUSE = Cause(
     parameters=(Parameter("tau_s", "s", 10.0, 1000.0),),
     words=Wording(
         name="The temperature sensor lags the cavity",
-        short="sensor",
         signature="none: a static map absorbs it",
         remedy="none is needed",
         experiment=ADVICE_MORE_RATES,

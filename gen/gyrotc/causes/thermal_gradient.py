@@ -60,7 +60,6 @@ CAUSE = Cause(
     parameters=(_TAU, Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-2, linear=True, signed=True)),
     words=Wording(
         name="The bias follows a temperature difference inside the gyro",
-        short="gradient",
         signature="residual follows the ramp with the same size at every temperature and fades in holds",
         remedy="one first-order state and a linear term",
         experiment=ADVICE_MORE_RATES,
@@ -74,7 +73,6 @@ CAUSE = Cause(
         over=_TAU.name,
         twice=True,
         imitates=True,
-        shown=(300.0, 1500.0),
         cycle=SingleCycle(points=48, usual=True),
     ),
     table=Tabled(TableKind.MEMORY, _record),

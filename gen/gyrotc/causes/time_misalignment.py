@@ -60,7 +60,6 @@ CAUSE = Cause(
     parameters=(Parameter("shift_s", "s", 5.0, 1200.0, signed=True),),
     words=Wording(
         name="Temperature and rate are not recorded at the same time",
-        short="shift",
         signature="residual follows the second derivative of T at the corners of ramps",
         remedy="mend the clocks or the filter of the recording; no term on the target",
         experiment=ADVICE_MORE_RATES,
@@ -75,8 +74,6 @@ CAUSE = Cause(
         width=lambda here, span_c: 45.0,
         step=5.0,
         imitates=True,
-        shown=(200.0,),
-        rival_every=3,
     ),
     mended=_mended,
     unseen_s=_unseen_s,

@@ -36,7 +36,6 @@ CAUSE = Cause(
     parameters=(Parameter("std_dph", "deg/h", 1e-5, 1e-1, linear=True),),
     words=Wording(
         name="Every power-on has its own offset",
-        short="offsets",
         signature="means of the runs scatter more than their noise allows",
         remedy="no map holds it: re-zero in the first minutes at rest, or state it as an uncertainty",
         experiment="three or more repeats of one hold with power cycles between them",

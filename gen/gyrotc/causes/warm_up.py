@@ -64,7 +64,6 @@ CAUSE = Cause(
     parameters=(_TAU, Parameter("amplitude_dph", "deg/h", 1e-5, 1e-1, linear=True, signed=True)),
     words=Wording(
         name="The bias settles after power-on whatever the temperature is",
-        short="warm-up",
         signature="residuals of all runs agree over the time since power-on",
         remedy="one exponential of the time since power-on",
         experiment="cold starts at two constant chamber temperatures, and a hot restart",
@@ -72,7 +71,7 @@ CAUSE = Cause(
         beside={"thermal_gradient": COLD_STARTS, "cavity_lag": COLD_STARTS},
         recording="note the time of power-on of every run (power_on_s)",
     ),
-    search=SearchRule(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True, shown=(1800.0,)),
+    search=SearchRule(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True),
     table=Tabled(TableKind.WARM_UP, _record),
     needs=Needs(power_on=True),
     bias=_bias,

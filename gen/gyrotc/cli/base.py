@@ -55,7 +55,7 @@ def completing(words: Sequence[str]) -> Callable[[str], list[str]]:
 
 
 GROUPS = {
-    "Record": ("plan", "simulate", "import", "check"),
+    "Record": ("simulate", "import", "check"),
     "Calibrate": ("build", "diagnose", "compare", "fit", "emit"),
     "Judge": ("evaluate", "verify", "report"),
     "Many units": ("fleet", "lot"),
@@ -96,10 +96,6 @@ DIAGNOSE: Stages = (
 BUILD: Stages = (
     ("reading", 0.11), ("training", 0.07), ("leaving out span", 0.02), ("emitting C", 0.03), ("verifying", 0.6),
     ("replaying", 0.09), ("drawing the report", 0.08),
-)  # fmt: skip
-PLAN: Stages = (
-    ("simulating the profile", 0.1), ("computing signatures", 0.3), ("comparing causes", 0.2),
-    ("trying further thermometers", 0.1), ("looking for the shortest profile", 0.2), ("trying further runs", 0.1),
 )  # fmt: skip
 COMPARE: Stages = (("reading", 0.05), ("", 0.95))
 LOT: Stages = (("smoothness of the maps", 0.2), ("", 0.3), ("every unit left out", 0.4), ("without", 0.1))

@@ -182,7 +182,7 @@ def _hoisted(arguments: list[str]) -> list[str]:
 
 def application() -> Typer:
     """The application with all its subcommands: importing a module of them registers its own."""
-    from . import fleet, jobs, plan, recordings, shell, steps  # noqa: F401
+    from . import fleet, jobs, recordings, shell, steps  # noqa: F401
     from .base import app
 
     return app

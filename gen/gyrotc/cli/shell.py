@@ -48,7 +48,7 @@ def kinds() -> dict[str, type[BaseModel]]:
     from ..results.diagnosed import Diagnosed, DiagnosisSeries
     from ..results.evaluation import Changes, Comparison, Evaluation
     from ..results.fleet import FleetEntry, FleetSummary, Lot
-    from ..results.recordings import Checked, ImportedFiles, LotPlan, NextRun, Plan, SimulatedTruth
+    from ..results.recordings import Checked, ImportedFiles, SimulatedTruth
     from ..results.release import Budget, Emitted, HeldLimits, JointVerification, MapOnGrid, Verification
     from ..results.training import Manifest, Training
     from ..tables.record import EmissionRecord
@@ -67,13 +67,10 @@ def kinds() -> dict[str, type[BaseModel]]:
         "fleet": FleetSummary,
         "import": ImportedFiles,
         "limits": HeldLimits,
-        "lot-plan": LotPlan,
         "lot": Lot,
         "manifest": Manifest,
         "map": MapOnGrid,
         "model": Model,
-        "next-run": NextRun,
-        "plan": Plan,
         "result": Marker,
         "training": Training,
         "truth": SimulatedTruth,

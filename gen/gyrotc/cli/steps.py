@@ -307,19 +307,18 @@ def evaluate(
 
 @app.command()
 def report(folder: DirArg) -> None:
-    """Write DIR/report.html from what build, diagnose or plan left in DIR.
+    """Write DIR/report.html from what build or diagnose left in DIR.
 
     Example: gyrotc report result
     """
     from ..jobs.axes import axes_in
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.report import axes_page, write_page, write_report
-    from ..pages.short import is_plan, write_plan_page
 
     with progress() as say:
         say("drawing")
-        if is_diagnosis(folder) or is_plan(folder):
-            path = write_plan_page(folder) if is_plan(folder) else write_diagnosis_page(folder)
+        if is_diagnosis(folder):
+            path = write_diagnosis_page(folder)
         elif axes := axes_in(folder):
             path = write_page(folder, axes_page(folder, axes))
         else:

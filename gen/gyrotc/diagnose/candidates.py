@@ -236,11 +236,6 @@ def diagnosable_causes() -> dict[str, Cause]:
     return {id: term for id, term in CATALOGUE.items() if term.search is not None}
 
 
-def planned() -> list[str]:
-    """Those of which a profile without rates says something."""
-    return [id for id in diagnosable_causes() if searched(id).planned]
-
-
 def searched(cause: str) -> SearchRule:
     """How diagnosis looks for a cause."""
     search = CATALOGUE[cause].search

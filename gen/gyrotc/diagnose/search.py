@@ -192,10 +192,6 @@ class Search(Question):
         """Whether the data are so much likelier under another colour that that of the view cannot be theirs."""
         return 2.0 * (self.likeliest.log_likelihood - view.log_likelihood) > _COLOUR_RATIO
 
-    def map_weights(self) -> FloatArray:
-        """Least-squares weights of the map, shape (m,)."""
-        return np.asarray(self.bank.map.T @ self.y)
-
     def extended(self, columns: FloatArray) -> Search:
         """The same search with further columns, shape (N, k), in every model; columns of zeros have no part in any.
 

@@ -16,6 +16,7 @@ from ..results.diagnosed import (
     ComparedStatistic,
     ConsideredCause,
     CycleResult,
+    DetectionLimit,
     Diagnosed,
     DiagnosisVerdict,
     ExtendedModel,
@@ -27,7 +28,6 @@ from ..results.diagnosed import (
     Unexplained,
     WithoutRate,
 )
-from ..results.recordings import DetectionLimit
 from ..train.fitting import FitOptions, front_end
 from .attribution import Attribution
 from .candidates import diagnosable_causes, searched, shape_parameter
@@ -54,8 +54,7 @@ VERDICTS: dict[DiagnosisVerdict, str] = {
 }
 
 _STEPS: dict[DiagnosisVerdict, str] = {
-    "consistent": "Nothing is needed. For lower detection limits see what gyrotc plan says of a longer or livelier"
-    " profile.",
+    "consistent": "Nothing is needed. For lower detection limits record the programme of docs/howto-calibration.md.",
     "explained": "Mend the cause and record again.",
     "partial": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded input."
     " Record supply, discharge current, pressure and magnetic field beside the rate.",
@@ -82,7 +81,7 @@ def next_steps(
         untestable: Ids of the causes that these recordings cannot test.
         gain: Of the extension that is shipped; None: none is.
     """
-    steps = [f"To separate them: {c.separate_by}." for c in causes if c.separate_by]
+    steps = [_deciding_run(c) for c in causes if c.separate_by]
     if gain is not None and gain.shown == "gain":
         steps.append("Build with the extension (gyrotc build --extend).")
     elif gain is not None:
@@ -99,6 +98,14 @@ def next_steps(
     if missing and verdict != "not_testable":
         steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
     return steps
+
+
+def _deciding_run(cause: NamedCause) -> str:
+    """The run to record in order to separate a cause from its likeliest rival, and what the present runs can do."""
+    rival, limits = cause.equivalent[0], cause.separable_from_d or {}
+    now = f" The present runs separate them from d = {limits[rival]:.2g} on." if rival in limits else ""
+    pair = f"{cause.id} from {rival}".replace("_", " ")
+    return f"To separate {pair}, record {cause.separate_by}.{now}"
 
 
 def sentence_of(

@@ -11,16 +11,11 @@ from ..assess.budget import DAYS_A_YEAR, yearly_drifts
 from ..assess.changes import Earlier, load_earlier, started_on
 from ..assess.limits import Limits
 from ..common.errors import InputError
-from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_result
-from ..results.fleet import Lot
-from ..results.training import MapMeans, Training
+from ..results.training import Training
 from ..train.fitting import FitOptions
 from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
-from ..train.prior.learn import FALSE_ALARM
-from ..train.prior.unit_means import means_of
-from ..train.prior.use import MapPosterior, prior_of
 
 
 def prior_from(
@@ -74,32 +69,6 @@ def with_prior(
     if folder is None:
         return options
     return replace(options, prior=prior_from(folder, dataset, ageing_dph=ageing_dph, limits=limits))
-
-
-def unit_in(folder: Path, lot: Lot | None = None) -> tuple[Model, MapPosterior, MapMeans]:
-    """A unit's model, what is known of its map, and the means of its own runs.
-
-    Args:
-        folder: Its result.
-        lot: What units of its type share, for one that was calibrated without; else its result says all.
-
-    Raises:
-        InputError: The result does not say enough, or the unit does not fit the lot.
-    """
-    if not (folder / "model.json").is_file():
-        raise InputError(f"--unit {folder}", "has no model.json", "a folder that gyrotc build or fit wrote")
-    model, where = load_model(folder / "model.json"), folder / "training.json"
-    training = read_result(where, Training)
-    means = means_of(training.means, where)
-    assert training.means is not None
-    if lot is None or training.known is not None:
-        return model, posterior_of_result(training, model, where), training.means
-    if lot.axis != model.axis:
-        raise InputError("--lot", f"of axis {lot.axis}", f"a lot of axis {model.axis}, as the unit")
-    known = prior_of(lot).with_runs(means)
-    if known.p_value < FALSE_ALARM:
-        raise InputError("--lot", f"the unit does not fit it (p = {known.p_value:.2g})", "its own lot, or none")
-    return model, known, training.means
 
 
 def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None) -> tuple[float, str]:

@@ -26,8 +26,6 @@ from .marks import scale_of as scale_of
 from .report import calibrations_over_time as calibrations_over_time
 from .report import page_environment as page_environment
 from .report import write_report as write_report
-from .short import write_plan as write_plan
-from .short import write_plan_page as write_plan_page
 from .unit import UnitResults as UnitResults
 from .unit import failed_checks as failed_checks
 from .unit import unit_in as unit_in

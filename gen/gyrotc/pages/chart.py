@@ -205,10 +205,6 @@ class Panel:
         """Text to the right of places."""
         self._add("words", x, y, ACCENT, texts=tuple(texts))
 
-    def cells(self, x: ArrayLike, y: ArrayLike, texts: Sequence[str], shades: ArrayLike) -> None:
-        """Squares of one unit of both axes with text; shades 0 ... 1, from no colour to full."""
-        self._add("cells", x, y, BEFORE, far=np.asarray(shades, dtype=np.float64), texts=tuple(texts))
-
     def image(
         self, values: FloatArray, x: tuple[float, float], y: tuple[float, float], bar: str,
         hidden: NDArray[np.bool_] | None = None,
@@ -338,8 +334,7 @@ def _left(panel: Panel, scale: AxisScale, height: float) -> float:
 
 
 def _foot(panel: Panel, numbered: bool) -> float:
-    lines = 1 + max((text.count("\n") for _, text in panel.x_ticks or ()), default=0)
-    return (lines * _LINE + (_LINE + 2.0 if panel.x else 0.0) if numbered else 0.0) + 8.0
+    return (_LINE + (_LINE + 2.0 if panel.x else 0.0) if numbered else 0.0) + 8.0
 
 
 def _legend(panels: Sequence[Panel], width: float) -> tuple[str, float]:
@@ -380,8 +375,7 @@ def _panel(
     parts.append(f'<path class="s-accent" stroke-width="0.9" d="{frame}"/>')
     if bottom:
         parts.append('<g class="numbers">' + "".join(
-            text_svg(a, y + h + 14.0 + _LINE * k, line, anchor="middle")
-            for a, (_, text) in zip(at_x, x_ticks, strict=True) for k, line in enumerate(text.split("\n"))
+            text_svg(a, y + h + 14.0, text, anchor="middle") for a, (_, text) in zip(at_x, x_ticks, strict=True)
         ) + "</g>")  # fmt: skip
         if panel.x:
             under = y + h + _foot(panel, True) - 10.0

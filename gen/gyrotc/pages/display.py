@@ -37,11 +37,6 @@ def significant(value: float, digits: int) -> str:
     return f"{mantissa}·{power(int(exact))}".replace("-", "−")
 
 
-def with_unit(value: float | None, unit: str) -> str:
-    """A figure and its unit; "never" where there is none."""
-    return "never" if value is None else f"{significant(value, 3)} {unit}"
-
-
 COVERAGE = 2.0
 """k of about 95 % of a normal distribution (JCGM 100:2008, G.1)."""
 

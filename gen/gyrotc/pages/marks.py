@@ -195,7 +195,7 @@ def mark_svg(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale) -> str:
     x0, y0, w, h = box
     x = x0 + w * xs.place(mark.x)
     y = y0 + h * (1.0 - ys.place(mark.y))
-    far = None if mark.far is None or mark.kind == "cells" else y0 + h * (1.0 - ys.place(mark.far))
+    far = None if mark.far is None else y0 + h * (1.0 - ys.place(mark.far))
     stroke = f'class="s-{mark.color}" stroke-width="{mark.width:g}"{_dash(mark)} vector-effect="non-scaling-stroke"'
     match mark.kind:
         case "line":
@@ -228,32 +228,16 @@ def mark_svg(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale) -> str:
         case "tops":
             d = "".join(f"M{a - 3.5:.1f} {y0 + 1:.1f}h7l-3.5 6z" for a in x)
             return f'<g class="f-accent"><path class="f-accent" style="fill-opacity:1" d="{d}"/></g>'
+        case "bars":
+            zero = x0 + w * float(xs.place(np.zeros(1))[0])
+            high = mark.width * h * abs(float(ys.place(np.array([ys.low + 1.0]))[0]))
+            return "".join(
+                f'<rect class="f-{mark.color}" x="{min(a, zero):.1f}" y="{b - high / 2:.1f}" '
+                f'width="{abs(a - zero):.1f}" height="{high:.1f}"/>'
+                for a, b in zip(x, y, strict=True)
+            )
         case _:
-            return _boxes(mark, box, xs, ys, (x, y))
-
-
-def _boxes(mark: Drawn, box: Box, xs: AxisScale, ys: AxisScale, at: tuple[FloatArray, FloatArray]) -> str:
-    """Bars, words, and words on squares."""
-    x0, _, w, h = box
-    x, y = at
-    unit_y = abs(float(ys.place(np.array([ys.low + 1.0]))[0])) * h
-    if mark.kind == "bars":
-        zero = x0 + w * float(xs.place(np.zeros(1))[0])
-        high = mark.width * unit_y
-        return "".join(
-            f'<rect class="f-{mark.color}" x="{min(a, zero):.1f}" y="{b - high / 2:.1f}" width="{abs(a - zero):.1f}" '
-            f'height="{high:.1f}"/>'
-            for a, b in zip(x, y, strict=True)
-        )
-    if mark.kind == "words":
-        return "".join(text_svg(a + 5.0, b + 4.0, t) for a, b, t in zip(x, y, mark.texts, strict=True))
-    unit_x = abs(float(xs.place(np.array([xs.low + 1.0]))[0])) * w
-    shade = np.zeros(len(x)) if mark.far is None else mark.far
-    return "".join(
-        f'<rect class="f-{mark.color}" fill-opacity="{s:.2f}" x="{a - unit_x / 2:.1f}" y="{b - unit_y / 2:.1f}" '
-        f'width="{unit_x:.1f}" height="{unit_y:.1f}"/>' + text_svg(a, b + 4.0, t, anchor="middle")
-        for a, b, t, s in zip(x, y, mark.texts, shade, strict=True)
-    )
+            return "".join(text_svg(a + 5.0, b + 4.0, t) for a, b, t in zip(x, y, mark.texts, strict=True))
 
 
 def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

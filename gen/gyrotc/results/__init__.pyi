@@ -8,6 +8,7 @@ from .base import read_result as read_result
 from .cache import input_hashes as input_hashes
 from .cache import program_of as program_of
 from .diagnosed import ConsideredCause as ConsideredCause
+from .diagnosed import DetectionLimit as DetectionLimit
 from .diagnosed import Diagnosed as Diagnosed
 from .diagnosed import DiagnosisVerdict as DiagnosisVerdict
 from .diagnosed import ExtendedModel as ExtendedModel
@@ -53,13 +54,8 @@ from .marker import marker_of as marker_of
 from .marker import marker_text as marker_text
 from .marker import read_marker as read_marker
 from .marker import result_faults as result_faults
-from .recordings import ChamberStep as ChamberStep
-from .recordings import DetectionLimit as DetectionLimit
 from .recordings import ImportedFile as ImportedFile
 from .recordings import ImportedFiles as ImportedFiles
-from .recordings import LotPlan as LotPlan
-from .recordings import NextRun as NextRun
-from .recordings import Plan as Plan
 from .release import Budget as Budget
 from .release import HeldLimits as HeldLimits
 from .release import Limit as Limit

@@ -121,7 +121,7 @@ class Marker(Result):
 
     schema_: Annotated[Literal["gyrotc.result/1"], Field(alias="schema")] = "gyrotc.result/1"
     kind: str = Field(
-        description="`result` (build, fit, emit, verify, evaluate), `diagnosis`, `plan`, `comparison`, "
+        description="`result` (build, fit, emit, verify, evaluate), `diagnosis`, `comparison`, "
         "`data set` (simulate, import), `fleet`, `trace` (traces outside a result)"
     )
     command: str = Field(description="that wrote the folder last")
@@ -175,7 +175,7 @@ ADVICE = {
     "constant_channel": "Look whether the sensor was connected; take the column out if it says nothing.",
     "counter_wrapped": "Add the range of the counter behind each such place, or store the counts with their sign.",
     "earth_rate_not_stated": 'Say in dataset.toml what was done about it: earth_rate = "removed", "none" or "compute".',
-    "envelope_coverage": "Plan runs for the cells that are empty: gyrotc plan.",
+    "envelope_coverage": "Record runs that pass through the cells that are empty.",
     "envelope_not_reached": "Record a run that goes there, or state the envelope that the product needs.",
     "gaps": "Look at the logger (buffer, disk, cable) at these times. Blocks with fewer than half of their rows are "
     "left out by themselves.",

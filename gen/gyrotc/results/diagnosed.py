@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .base import Count, Estimate, Figure, Finding, Part, Result, UnitResult
-from .recordings import DetectionLimit
 
 DiagnosisVerdict = Literal[
     "consistent", "explained", "ambiguous", "partial", "noise_differs", "unexplained", "not_testable"
@@ -136,6 +135,15 @@ class ExtendedModel(Part):
     forward_in_time: GainOnUnseen | None = Field(
         description="on runs later than all that was learnt from; null without dates"
     )
+
+
+class DetectionLimit(Part):
+    """Smallest size of a cause that is found in 95 % of cases."""
+
+    value: Figure = Field(description="null: never")
+    unit: str = Field(description="of `value`")
+    parameter: str | None = Field(description="that the limit depends on; null: none")
+    over: tuple[tuple[float, Figure], ...] = Field(description="pairs of parameter and limit")
 
 
 class ConsideredCause(Part):

@@ -28,7 +28,6 @@ KINDS = {
     "verify": "result",
     "evaluate": "result",
     "diagnose": "diagnosis",
-    "plan": "plan",
     "compare": "comparison",
     "simulate": "data set",
     "import": "data set",

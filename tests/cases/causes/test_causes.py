@@ -11,12 +11,9 @@ import made_up_cause
 import numpy as np
 import pytest
 from gyrotc.causes import CATALOGUE, Cause, History, Parameter, Reach, Scene, register, separate_by
-from gyrotc.cli.plan import plan_parts
 from gyrotc.jobs import build
 from gyrotc.mirror import Course, CourseChannel, TermOutcome
 from gyrotc.model import load_model
-from gyrotc.pages import write_plan
-from gyrotc.plan.plan import plan
 from gyrotc.simulate import simulate
 from gyrotc.train import FitOptions
 
@@ -53,16 +50,10 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[Cause]:
 
 @pytest.mark.slow
 def test_a_cause_from_one_file_goes_all_the_way(tmp_path: Path, made_up: Cause) -> None:
-    """Simulated, planned, found, named, put into the table, emitted, verified on the host, reported."""
+    """Simulated, found, named, put into the table, emitted, verified on the host, reported."""
     scenario, out = tmp_path / "made-up.toml", tmp_path / "out"
     scenario.write_text(SCENARIO)
     simulate(scenario, seed=5, out=tmp_path / "data")
-    planned = plan(scenario, seed=5)
-    assert made_up.id in [entry.id for entry in planned.limits]
-    assert made_up.id in [row.id for row in planned.separability]
-    assert list(plan_parts(planned))
-    assert "slow rate" in write_plan(tmp_path / "plan", planned).read_text()
-
     (built,) = build(tmp_path / "data", out, FitOptions(), targets=["host-gcc-O2"], extend=True)
     assert not built.failures
     diagnosis = built.diagnosis
@@ -106,9 +97,8 @@ def test_every_cause_says_what_it_is(id: str) -> None:
     term = CATALOGUE[id]
     assert term.id == id and term.equation and term.source
     words = term.words
-    assert all((words.name, words.short, words.signature, words.remedy, words.experiment))
+    assert all((words.name, words.signature, words.remedy, words.experiment))
     assert words.name[0].isupper() and not words.name.endswith(".")
-    assert len(words.short) <= 8
     assert set(words.beside) <= set(CATALOGUE), "an experiment beside a cause that there is"
     linear = [p.linear for p in term.parameters]
     assert linear == sorted(linear), "the linear parameters come last"

@@ -466,29 +466,6 @@ def test_the_page_and_the_table_of_a_fleet(tmp_path: Path) -> None:
         assert cell[:1] not in tuple("=+-@\t\r\n") and "\x1b" not in cell
 
 
-def test_the_page_of_a_plan(tmp_path: Path) -> None:
-    """Its template alone: its pictures are drawn of the same texts below."""
-    over = {"value": 1.0, "unit": "u", "parameter": "p", "over": [[1.0, 2.0]]}
-    plan = {
-        "scenario": "s",
-        "runs": [{"profile": "p"}],
-        "hours": 1.0,
-        "noise": {"arw_deg_per_sqrt_h": 1e-4},
-        "bias_range_dph": [0.0, 1.0],
-        "limits": [{"id": "i", "detection_limit": over}],
-        "not_testable": {"?id": "why"},
-        "hard_to_separate": [{"pair": ["a", "b"], "d": 9.0, "add": "t"}],
-        "shortest": {"required": {"?id": 1.0}, "runs": ["a"], "hours": 1.0},
-        "additions": {"pair": ["a", "b"], "runs": [{"profile": "a", "hours": 1.0, "d": 3.0}]},
-    }
-
-    def draw(text: Callable[[], str]) -> str:
-        template = report.page_environment().get_template("plan.html.j2")
-        return template.render(p=_with(plan, text), limit=lambda _, v: v, temperatures="", matrix="", accuracy="")
-
-    _same_page(draw)
-
-
 def test_pictures_show_every_text_as_it_is() -> None:
     shown = [text for text in HOSTILE if text.strip()]
     panels = [Panel(title=f"{text} (train)") for text in shown]

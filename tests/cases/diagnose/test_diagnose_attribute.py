@@ -669,6 +669,7 @@ def result(verdict: DiagnosisVerdict) -> Diagnosed:
         parameters={"width_c": Estimate(value=4.0, low=3.0, high=5.0)}, remedy="one play operator",
         equivalent=("turn_on_offset",) if verdict == "ambiguous" else (),
         separate_by="holds from both sides" if verdict == "ambiguous" else None,
+        separable_from_d={"turn_on_offset": 15.7} if verdict == "ambiguous" else {},
     )  # fmt: skip
     causes = (cause,) if verdict in ("explained", "ambiguous", "partial") else ()
     considered = tuple(
@@ -693,9 +694,13 @@ def test_every_verdict_has_words_and_a_next_step(verdict: DiagnosisVerdict) -> N
     assert "next: " in text
 
 
-def test_an_ambiguous_verdict_names_the_experiment() -> None:
-    steps = next_steps("ambiguous", result("ambiguous").causes, [], gain=None)
-    assert steps == ["To separate them: holds from both sides."]
+def test_an_ambiguous_verdict_names_the_run_that_decides() -> None:
+    (cause,) = result("ambiguous").causes
+    expected = "To separate hysteresis from turn on offset, record holds from both sides."
+    limit = " The present runs separate them from d = 16 on."
+    assert next_steps("ambiguous", [cause], [], gain=None) == [expected + limit]
+    unknown = cause.model_copy(update={"separable_from_d": {}})
+    assert next_steps("ambiguous", [unknown], [], gain=None) == [expected]
 
 
 def test_what_no_table_holds_has_its_own_remedy() -> None:

@@ -1,4 +1,4 @@
-"""A lot: what is learnt from units that share directions, what a new unit gains, who does not belong, the next run."""
+"""A lot: what is learnt from units that share directions, what a new unit gains, who does not belong."""
 
 from __future__ import annotations
 
@@ -12,17 +12,13 @@ import pytest
 from gyrotc._core import posteriors
 from gyrotc.common import InputError
 from gyrotc.jobs import checksum_of, lot_from
-from gyrotc.lot import HOLDS, RATES, Price, hours_of, inputs_of, next_run, programme_text
-from gyrotc.results import ChamberStep, Lot, LotCluster
-from gyrotc.simulate import read
-from gyrotc.train import Asked, TrainingData, coverage, fit, predict, uncertainty_of
+from gyrotc.results import Lot, LotCluster
+from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty_of
 from gyrotc.train.prior import (
     PRIOR_LOG,
     Learned,
     LotBasis,
     LotPrior,
-    MapPosterior,
-    MapPrior,
     UnitMeans,
     evidence,
     fitted,
@@ -31,10 +27,8 @@ from gyrotc.train.prior import (
     prior_of,
     scores,
     sums_of,
-    widened,
 )
 from gyrotc.train.prior import basis as lot_basis
-from models import random_model
 from numpy.typing import NDArray
 from scipy.stats import kstest, multivariate_normal
 
@@ -270,115 +264,6 @@ def test_the_processes_of_a_lot_have_the_priors_of_the_evidence_method() -> None
     assert np.exp(lot_basis.PRIOR_LOG[1:]) == pytest.approx(numbers("kPriorMean")[:-1], rel=1e-12)
     assert list(lot_basis._PRIOR_SD[1:]) == numbers("kPriorSd")[:-1]
     assert numbers("kReach") == [lot_basis._REACH]
-
-
-ENVELOPE_OF_RUNS = ((-40.0, 60.0), (-5.0, 5.0))
-SEED = 20
-NOISE_OF_RUNS, MEAN_S = 7e-4, 50.0
-
-
-def bias_of_runs(own: Floats, t: Floats, r: Floats) -> Floats:
-    x = (t - 10.0) / 50.0
-    shape = own[0] + own[1] * x + own[2] * np.sin(2.5 * x) + own[3] * np.cos(4.0 * x) + own[4] * r / 5.0
-    return np.asarray(7e-3 + 1e-3 * shape)
-
-
-def before_any_run() -> MapPrior:
-    """A smooth process; corrections are asked for all over the envelope."""
-    basis = LotBasis.over(*ENVELOPE_OF_RUNS)
-    t, r = (x.ravel() for x in np.meshgrid(np.linspace(-38, 58, 25), np.linspace(-4.5, 4.5, 7)))
-    rest = PRIOR_LOG.copy()
-    covariance = np.diag(basis.variance(rest))
-    n = len(basis.kept)
-    asked = Asked(t, r, np.full(len(t), 1.0 / len(t)), 0.0)
-    return MapPrior(
-        basis, 7e-3, 1e-3, *ENVELOPE_OF_RUNS, np.zeros((1, n)), covariance[None], np.ones(1), rest, asked, np.inf
-    )
-
-
-def measured(rng: np.random.Generator, own: Floats, steps: list[ChamberStep]) -> UnitMeans:
-    t, r = inputs_of(read("paper")[1], 10.0, steps, MEAN_S)
-    return UnitMeans(
-        t, r, bias_of_runs(own, t, r) + NOISE_OF_RUNS * rng.normal(size=len(t)), np.ones(len(t)), NOISE_OF_RUNS
-    )
-
-
-def as_prior(known: MapPosterior) -> MapPrior:
-    return widened(known, 0.0, "", "", None)
-
-
-def known_of(rng: np.random.Generator, own: Floats) -> MapPosterior:
-    """After a run that has seen the warm side alone."""
-    steps = [ChamberStep(to_c=60.0, c_per_min=3.0, hold_min=60.0)]
-    return before_any_run().with_runs(measured(rng, own, steps))
-
-
-def random_run(rng: np.random.Generator, hours: float) -> list[ChamberStep]:
-    """A programme of up to four steps that costs the same within a tenth."""
-    while True:
-        steps, at = [], 10.0
-        for _ in range(int(rng.integers(1, 5))):
-            to = float(rng.choice([c for c in (-40.0, -15.0, 10.0, 35.0, 60.0) if c != at]))
-            rate, hold = (float(rng.choice(x)) for x in (RATES, HOLDS))
-            steps.append(ChamberStep(to_c=to, c_per_min=rate, hold_min=hold))
-            at = to
-        if 0.9 * hours <= hours_of(10.0, steps) <= 1.1 * hours:
-            return steps
-
-
-def test_the_proposal_tells_more_than_a_random_run_of_its_price() -> None:
-    """Squared error of the map over the envelope once the run was measured, of units not drawn from the prior."""
-    print("seed", SEED)
-    rng = np.random.default_rng(SEED)
-    owns = 0.5 * rng.normal(size=(12, 5))
-    known = known_of(rng, owns[0])  # its covariance is that of all: the same temperatures
-    proposed = next_run(random_model(1), known, NOISE_OF_RUNS, MEAN_S, "paper", Price())
-    best = proposed.proposals[proposed.best].programme
-    asked = known.prior.asked
-    errors: list[list[float]] = []
-    for own in owns:
-        mine = as_prior(known_of(rng, own))
-        truth = bias_of_runs(own, asked.temperature_c, asked.slope_c_per_min)
-        runs = [list(best.steps), *(random_run(rng, best.hours) for _ in range(4))]
-        after = [mine.with_runs(measured(rng, own, steps)) for steps in runs]
-        left = [a.mean_dph(asked.temperature_c, asked.slope_c_per_min) - truth for a in after]
-        errors.append([float(np.mean(e**2)) for e in left])
-    by_proposal, by_chance = np.mean(errors, axis=0)[0], np.mean(np.array(errors)[:, 1:])
-    print("squared error, proposal and chance:", by_proposal, by_chance)
-    assert by_proposal < by_chance
-    assert programme_text(best).count("ramp to") == len(best.steps)
-
-
-def test_what_is_promised_is_what_the_posterior_has_after_the_run() -> None:
-    rng = np.random.default_rng(5)
-    own = np.zeros(5)
-    known = known_of(rng, own)
-    found = next_run(random_model(1), known, NOISE_OF_RUNS, MEAN_S, "paper", Price(90.0, 150.0, 4.0))
-    assert found.before_dph == pytest.approx(known.rms_sigma_dph())
-    hours = [p.programme.hours for p in found.proposals]
-    assert all(h <= 4.0 for h in hours)
-    for one in found.proposals:
-        after = as_prior(known).with_runs(measured(rng, own, list(one.programme.steps)))
-        assert one.programme.sigma_dph == pytest.approx(after.rms_sigma_dph(), rel=1e-3)
-        assert one.removed_share == pytest.approx(1.0 - (one.programme.sigma_dph / found.before_dph) ** 2, abs=1e-9)
-        assert one.price == pytest.approx(150.0 + 90.0 * one.programme.hours)
-    worth = [p.removed_share / p.price for p in found.proposals]
-    assert found.best == int(np.argmax(worth))
-
-
-@pytest.mark.parametrize(
-    ("price", "option"),
-    [
-        (Price(0.0), "--price-per-hour"),
-        (Price(1.0, -1.0), "--price-per-run"),
-        (Price(1.0, 1.0, 0.01), "--hours"),
-        (Price(1.0, 1.0, float("nan")), "--hours"),
-    ],
-)
-def test_what_is_no_price_is_reported(price: Price, option: str) -> None:
-    known = known_of(np.random.default_rng(6), np.zeros(5))
-    with pytest.raises(InputError, match=option):
-        next_run(random_model(1), known, NOISE_OF_RUNS, MEAN_S, "paper", price)
 
 
 @pytest.mark.parametrize("n", [1, 15, 16, 47, 121])

@@ -78,7 +78,7 @@ def test_the_main_job_loads_no_extra() -> None:
         "nptdms",
     }
     program = (
-        "import sys, gyrotc.jobs.calibration, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.short\n"
+        "import sys, gyrotc.jobs.calibration, gyrotc.jobs.diagnosis, gyrotc.fleet.run, gyrotc.pages.report\n"
         f"sys.exit(' '.join({extras} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -76,9 +76,8 @@ COMMANDS = {
     "build": ("build", "data/RLG-1", "--method", "constant", "--target", "host-gcc-O2", "--out", "B"),
     "compare": ("compare", "data/RLG-1", "--out", "M"),
     "diagnose": ("diagnose", "data/RLG-1", "--out", "D"),
-    "plan": ("plan", "paper-20C", "--out", "P"),
 }
-SLOW = ("report", "verify", "evaluate", "build", "compare", "diagnose", "plan")
+SLOW = ("report", "verify", "evaluate", "build", "compare", "diagnose")
 WRITE_NOTHING = {"schema"}  # but to standard output
 # A file by `write_atomically`, as check --json, of units that take minutes; a folder by `result_folder`, as fit.
 AS_OTHERS = {"lot"}

@@ -154,7 +154,7 @@ def test_folders_of_others_are_refused(out: Path) -> None:
 
 def test_another_kind_and_another_serial_are_refused(out: Path) -> None:
     write(out, "one")
-    with pytest.raises(InputError, match=r"holds the result of gyrotc build"), result_folder(out, "plan"):
+    with pytest.raises(InputError, match=r"holds the result of gyrotc build"), result_folder(out, "compare"):
         pytest.fail("began")
     with pytest.raises(InputError, match="serial A, and this is of B"):
         write(out, "two", serial="B")
@@ -313,10 +313,10 @@ def test_a_link_is_followed(tmp_path: Path) -> None:
 def test_json_replaces_only_what_gyrotc_wrote(tmp_path: Path) -> None:
     path = tmp_path / "new" / "x.json"
     for number in range(2):
-        write_result(path, json.dumps({"schema": "gyrotc.plan/1", "n": number}))
+        write_result(path, json.dumps({"schema": "gyrotc.check/1", "n": number}))
     assert json.loads(path.read_text())["n"] == 1
-    write_result(path, json.dumps({"x": {"schema": "gyrotc.plan/1"}}))
-    write_result(path, json.dumps({"x": {"schema": "gyrotc.plan/1"}}))
+    write_result(path, json.dumps({"x": {"schema": "gyrotc.check/1"}}))
+    write_result(path, json.dumps({"x": {"schema": "gyrotc.check/1"}}))
     (tmp_path / "mine.json").write_text('{"name": "mine"}')
     (tmp_path / "run-01.csv").write_text("time_s\n")
     for other in ("mine.json", "run-01.csv", "new"):
@@ -401,7 +401,6 @@ def test_a_firmware_project_is_not_taken_for_a_result(decoy: str, made: Path, tm
     if decoy != "c":
         return
     refused(gyrotc, tmp_path, "simulate", "paper", "--out", project, reported="was not written by gyrotc")
-    refused(gyrotc, tmp_path, "plan", "paper", "--out", project, reported="was not written by gyrotc")
 
 
 def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> None:
@@ -427,7 +426,6 @@ def test_a_job_of_another_kind_or_serial_is_refused(made: Path, tmp_path: Path, 
     out = tmp_path / "result"
     assert gyrotc("fit", made / "A", "--out", out).returncode == 0
     refused(gyrotc, tmp_path, "fit", made / "B", "--out", out, reported="holds the result of serial A")
-    refused(gyrotc, tmp_path, "plan", "paper", "--out", out, reported="holds the result of gyrotc fit")
     refused(gyrotc, tmp_path, "compare", made / "A", "--out", out, reported="holds the result of gyrotc fit")
     (out / MARKER).unlink()
     refused(gyrotc, tmp_path, "fit", made / "A", "--out", out, reported=MARKER)

@@ -124,7 +124,6 @@ COMMANDS = {
     "compare": ("compare", "RLG-1", "--out", "out"),
     "diagnose": ("diagnose", "RLG-1", "--out", "out"),
     "fleet": ("fleet", "lot", "--out", "out"),
-    "plan": ("plan", "paper", "--out", "out"),
     "verify": ("verify", "made"),
     "emit": ("emit", "made", "--out", "out"),
 }
@@ -258,7 +257,7 @@ def test_bash_completes_commands_and_options(tmp_path: Path) -> None:
     [
         ("simulate paper --format", ["csv", "parquet"]),
         ("simulate paper --noise cl", ["class"]),
-        ("plan paper --noise", ["paper", "class"]),
+        ("simulate paper --noise", ["paper", "class"]),
         ("build data --method cu", ["cubic", "cubic_slope"]),
         ("build data --numeric f32,", ["f32,q31"]),
         ("build data --axis a", ["all"]),
@@ -288,7 +287,7 @@ def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types
 
 def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
     for command, right in (
-        (("plan", "paper", "--noise", "none"), NoiseLevel),
+        (("simulate", "paper", "--out", "R", "--noise", "none"), NoiseLevel),
         (("simulate", "paper", "--out", "R", "--format", "xml"), RunFormat),
     ):
         done = invoked(*command)
@@ -342,7 +341,7 @@ def test_json_on_standard_output_is_alone_there(tmp_path: Path, gyrotc: Command)
 def test_every_command_writes_its_json_by_the_same_function() -> None:
     commands = [c.callback for c in application().registered_commands if c.callback]
     found = {c.__name__ for c in commands if "json_file" in inspect.signature(c).parameters}
-    assert {"build", "check", "compare", "diagnose", "emit", "fit", "fleet", "plan", "verify"} <= found
+    assert {"build", "check", "compare", "diagnose", "emit", "fit", "fleet", "verify"} <= found
     for command in commands:
         parameter = inspect.signature(command, eval_str=True).parameters.get("json_file")
         assert parameter is None or parameter.annotation == base.JsonOption, command.__name__

@@ -11,10 +11,9 @@ from conftest import HOST, run_here
 from gyrotc.common import InputError
 from gyrotc.diagnose import Refitting, records_of
 from gyrotc.jobs import load_lot, lot_of
-from gyrotc.lot import plan_with_lot
 from gyrotc.model import load_model
 from gyrotc.recordings import load
-from gyrotc.results import LotPlan, NextRun, json_text
+from gyrotc.results import json_text
 from gyrotc.train import FitOptions, joined, predict
 from gyrotc.train.prior import prior_of
 
@@ -96,43 +95,6 @@ def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> N
     again = run_here("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
     other = run_here("fleet", data, "--out", out, "--jobs", "1")
     assert "done before" not in first and "done before" in again and "done before" not in other
-
-
-def test_a_plan_with_the_lot_is_shorter_and_keeps_its_promise(world: Path, tmp_path: Path) -> None:
-    lot = load_lot(world / "lot.json")
-    before = prior_of(lot).alone().rms_sigma_dph()
-    asked = ("--lot", world / "lot.json", "--require", f"accuracy={0.5 * before:.3g}")
-    reported = run_here("plan", world / "whole.toml", *asked, "--out", tmp_path / "plan")
-    assert "with the lot: " in reported and "without: " in reported
-    found = LotPlan.model_validate_json((tmp_path / "plan" / "plan.json").read_text())
-    assert found.with_lot.reached and found.with_lot.sigma_dph <= found.accuracy_dph < found.before_dph
-    assert 0.0 < found.with_lot.hours < found.without.hours
-    rows = (tmp_path / "plan" / "programme.csv").read_text().splitlines()
-    assert rows[0] == "time_min,set_point_c" and float(rows[-1].split(",")[0]) == pytest.approx(
-        60 * found.with_lot.hours
-    )
-    assert len((tmp_path / "plan" / "programme.txt").read_text().splitlines()) == len(found.with_lot.steps) + 1
-    steeper = plan_with_lot(lot, str(world / "whole.toml"), 0.4 * before)
-    assert steeper.with_lot.hours > found.with_lot.hours
-    with pytest.raises(InputError, match="--require"):
-        run_here("plan", "paper", "--lot", world / "lot.json", "--require", "hysteresis=1e-4")
-
-
-def test_the_next_run_of_a_unit_is_proposed_at_a_price(world: Path, tmp_path: Path) -> None:
-    unit, scenario = world / "fleet" / "LOT-0005-001", world / "whole.toml"
-    price = ("--hours", "0.5", "--price-per-hour", "90", "--price-per-run", "150")
-    reported = run_here("plan", scenario, "--unit", unit, *price, "--out", tmp_path / "next")
-    found = NextRun.model_validate_json((tmp_path / "next" / "plan.json").read_text())
-    assert found.serial == "LOT-0005-001" and f"price {found.proposals[found.best].price:.4g}" in reported
-    assert all(p.programme.hours <= 0.5 and 0.0 <= p.removed_share < 1.0 for p in found.proposals)
-    assert (tmp_path / "next" / "programme.csv").read_text().startswith("time_min,set_point_c")
-    run_here("plan", scenario, "--unit", unit, "--lot", world / "lot.json", *price, "--json", tmp_path / "lot.json")
-    with_lot = NextRun.model_validate_json((tmp_path / "lot.json").read_text())
-    assert with_lot.before_dph != found.before_dph
-    with pytest.raises(InputError, match="--unit"):
-        run_here("plan", scenario, "--unit", world, *price)
-    with pytest.raises(InputError, match="--require"):
-        run_here("plan", scenario, "--unit", unit, "--require", "accuracy=1e-4")
 
 
 def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> None:

@@ -10,13 +10,12 @@ from typing import Any
 
 import pytest
 from browser import CHROMIUM, Browser, browser
-from campaigns import scenario
 from conftest import HOST, Command
 from recordings import columns, toml, write_csv
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
 
-PAGES = ("unit", "axes", "fleet", "diagnosis", "plan")
+PAGES = ("unit", "axes", "fleet", "diagnosis")
 
 _CONTRAST = """(() => {
   const channel = v => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4 };
@@ -71,9 +70,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> dict[str
     gyrotc("fleet", folder / "d", "--out", folder / "fleet")
     found = {"unit": folder / "unit" / "report.html", "axes": folder / "axes" / "report.html"}
     gyrotc("diagnose", folder / "d" / "RLG-0", "--out", folder / "diagnosis")
-    gyrotc("plan", scenario(folder), "--out", folder / "plan")
-    found |= {name: folder / name / "report.html" for name in ("diagnosis", "plan")}
-    found |= {"fleet": folder / "fleet" / "fleet.html"}
+    found |= {"diagnosis": folder / "diagnosis" / "report.html", "fleet": folder / "fleet" / "fleet.html"}
     assert [name for name, page in found.items() if not page.is_file()] == []
     return found
 

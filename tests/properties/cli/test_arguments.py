@@ -23,7 +23,7 @@ from recordings import columns, toml, write_csv
 SEED = 26
 COMMANDS: dict[str, Any] = typer.main.get_command(application()).commands  # type: ignore[attr-defined]
 LEFT_OUT = {"scheduler", "help", "install_completion", "show_completion", "wait"}  # a host, a shell, a minute
-SLOW = {"build", "compare", "diagnose", "evaluate", "fleet", "plan", "verify"}  # seconds each where all is in order
+SLOW = {"build", "compare", "diagnose", "evaluate", "fleet", "verify"}  # seconds each where all is in order
 MAY_FAIL = re.compile(r"exit status 1|fail|differ|not met|1 where", re.IGNORECASE)
 NUMBERS = [
     "0", "-0", "1", "2", "-1", "0.5", "1e-320", "1e7", "1e308", "-1e308", "nan", "inf", "-inf", "1e999", "9" * 30,
@@ -120,7 +120,7 @@ def test_any_arguments_end_by_a_known_status(calls: int, place: Path) -> None:
 
 @pytest.mark.parametrize("option", ["--out", "--json"])
 def test_a_loop_of_links_is_one_message(option: str, place: Path) -> None:
-    """Before: `plan ... --out loop` ended with 70; the drawn calls found it."""
+    """Before: exit status 70; the drawn calls found it."""
     words = ("emit", "result") if option == "--out" else ("check", "data")
     done = run_gyrotc(*words, option, "loop")
     assert done.returncode in (0, 2) and "internal fault" not in done.stderr, done.stderr
