@@ -326,7 +326,7 @@ def test_noise_as_declared_has_no_finding_and_no_discrepancy(campaign: Campaign)
     assert noise_findings(search, DECLARED, causes=False) == []
     found = ensemble_of(search, DECLARED)
     assert min(d.p_value for d in found.discrepancies) > 0.01
-    assert found.residual == pytest.approx(search.y - search.bank.map @ search.map_weights())
+    assert found.residual == pytest.approx(search.y - search.bank.map @ (search.bank.map.T @ search.y))
 
 
 @pytest.mark.parametrize("ratio", [0.7, 1.4])
