@@ -21,7 +21,5 @@ from .learn import sums_of as sums_of
 from .unit_means import UnitMeans as UnitMeans
 from .unit_means import means_of_unit as means_of_unit
 from .use import LotPrior as LotPrior
-from .use import MapPosterior as MapPosterior
-from .use import MapPrior as MapPrior
 from .use import known_map as known_map
 from .use import prior_of as prior_of
