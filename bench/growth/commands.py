@@ -145,7 +145,7 @@ def _centers(folder: Path) -> Iterator[_Job]:
 
 
 def _units(folder: Path) -> Iterator[_Job]:
-    gyrotc(["simulate", "lot", "--units", str(max(_SERIALS)), "--out", str(folder)])
+    gyrotc(["simulate", "paper", "--units", str(max(_SERIALS)), "--out", str(folder)])
     for serials in _SERIALS:
         manifest, out = folder / f"{serials}.toml", folder / f"out-{serials}"
         names = sorted(path.parent.name for path in folder.glob("*/dataset.toml"))[:serials]

@@ -20,7 +20,7 @@ def fleet(serials: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="gyrotc-fleet-") as work:
         data, out = Path(work) / "data", Path(work) / "out"
         say(f"simulating {serials} gyros")
-        gyrotc(["simulate", "lot", "--units", str(serials), "--out", str(data)])
+        gyrotc(["simulate", "paper", "--units", str(serials), "--out", str(data)])
         load, begun = os.getloadavg()[0], time.monotonic()
         cost = gyrotc(["fleet", str(data), "--out", str(out), "--jobs", str(_JOBS)])
         elapsed = time.monotonic() - begun

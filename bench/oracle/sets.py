@@ -234,9 +234,9 @@ def _lot(s: Steps) -> None:
     """A fleet, what its units share, and a new unit of the lot with one short run."""
     runs = {"whole": '"slow", "fast", "slow"', "short": '"fast"'}
     s.write(lambda f: [_text(f"{n}.toml", f"{_CYCLES}profiles = [{p}]\n")(f) for n, p in runs.items()])
-    made = ("simulate", "lot", "--seed", 5, "--family", 0.95, "--format", "parquet")
-    s.run(*made, "--units", 9, "--unrelated", 1, "--base", "whole.toml", "--out", "whole")
-    s.run(*made, "--units", 10, "--base", "short.toml", "--out", "short", name="simulate a new unit")
+    lot = ("--seed", 5, "--family", 0.95, "--format", "parquet")
+    s.run("simulate", "whole.toml", *lot, "--units", 9, "--unrelated", 1, "--out", "whole")
+    s.run("simulate", "short.toml", *lot, "--units", 10, "--out", "short", name="simulate a new unit")
     s.write(_reversed_unit, name="a unit with its sign reversed")
     s.run("fleet", "whole", "--out", "fleet", "--jobs", 1, "--json", "fleet.json")
     s.run("lot", "fleet", "--out", "lot.json")

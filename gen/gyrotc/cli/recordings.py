@@ -165,7 +165,7 @@ def _ask(question: str) -> str | None:
 
 @app.command()
 def simulate(
-    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...), a scenario file, or lot.")],
+    scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
     out: OutOption,
     seed: SeedOption = 1,
     row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
@@ -175,35 +175,32 @@ def simulate(
     noise: Annotated[
         NoiseLevel, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
     ] = NoiseLevel.paper,
-    units: Annotated[int | None, typer.Option("--units", help="Of a lot: number of gyros, a data set each.")] = None,
-    family: Annotated[
-        float | None, typer.Option("--family", help="Of a lot: how much units share, 0 (nothing) ... 1; default 0.9.")
+    units: Annotated[
+        int | None, typer.Option("--units", help="Simulate a lot of so many gyros, each in a folder of its own.")
     ] = None,
-    clusters: Annotated[
-        int | None, typer.Option("--clusters", help="Of a lot: groups with a center each; default 1.")
+    family: Annotated[
+        float | None,
+        typer.Option("--family", help="With --units: how much gyros share, 0 (nothing) ... 1; default 0.9."),
     ] = None,
     unrelated: Annotated[
-        int | None, typer.Option("--unrelated", help="Of a lot: units that belong to none; default 0.")
-    ] = None,
-    base: Annotated[
-        str | None,
-        typer.Option("--base", help="Of a lot: the scenario that its units run, default paper."),
+        int | None,
+        typer.Option("--unrelated", help="With --units: gyros that share nothing with the others; default 0."),
     ] = None,
 ) -> None:
     """Make a data set from the physical simulation, and truth.json beside it; or a lot of gyros, a data set each.
 
     Example: gyrotc simulate paper --seed 1 --out demo-data
-    Example: gyrotc simulate lot --units 60 --family 0.94 --seed 1 --out lot-data
+    Example: gyrotc simulate paper --units 60 --family 0.94 --seed 1 --out lot-data
     """
     from ..simulate.campaign import simulate as run
 
-    of_lot = {"units": units, "family": family, "clusters": clusters, "unrelated": unrelated}
-    given = {name: value for name, value in of_lot.items() if value is not None}
-    if scenario == "lot":
-        _simulate_lot(given, base or "paper", seed, out, (row_s, raw_hz, pulses, format), noise)
+    of_lot = {"family": family, "unrelated": unrelated}
+    stated = {name: value for name, value in of_lot.items() if value is not None}
+    if units is not None:
+        _simulate_lot(scenario, {"units": units, **stated}, seed, out, (row_s, raw_hz, pulses, format), noise)
         return
-    if given or base:
-        raise InputError(f"--{next(iter(given), 'base')}", "is an option of lots", "gyrotc simulate lot")
+    if stated:
+        raise InputError(f"--{next(iter(stated))}", "without --units", "the number of gyros of the lot")
     with progress() as say:
         run(
             scenario,
@@ -220,31 +217,29 @@ def simulate(
 
 
 def _simulate_lot(
-    given: dict[str, Any],
-    base: str,
+    scenario: str,
+    stated: dict[str, Any],
     seed: int,
     out: Path,
     rows: tuple[float, float | None, bool, RunFormat],
     noise: NoiseLevel,
 ) -> None:
-    """`gyrotc simulate lot`."""
+    """Simulates a lot of gyros."""
     from ..simulate.campaign import RowForm
     from ..simulate.lot import LotOrder, simulate_lot
 
-    if "units" not in given:
-        raise InputError("--units", "is missing", "the number of gyros of the lot")
-    order = LotOrder(**given)
+    order = LotOrder(**stated)
     with progress() as say:
         simulate_lot(
             order,
             seed=seed,
             out=out,
-            scenario=base,
+            scenario=scenario,
             form=RowForm.of(*rows[:3], rows[3].value),
             noise=noise.value,
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
-    tell(f"{out}: {order.units} data sets of scenario {base}, family {order.family:g}, seed {seed}")
+    tell(f"{out}: {order.units} data sets of scenario {scenario}, family {order.family:g}, seed {seed}")
 
 
 @app.command()

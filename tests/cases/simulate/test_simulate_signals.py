@@ -276,14 +276,12 @@ def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
         LotOrder(**wrong)  # type: ignore[arg-type]
 
 
-def test_the_command_asks_for_the_number_of_units(short: Path, tmp_path: Path) -> None:
-    done = invoked("simulate", "lot", "--units", "2", "--base", short, "--out", tmp_path / "lot")
+def test_the_command_makes_one_unit_or_a_lot(short: Path, tmp_path: Path) -> None:
+    done = invoked("simulate", short, "--units", "2", "--out", tmp_path / "lot")
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in (tmp_path / "lot").iterdir()) == ["LOT-0001-001", "LOT-0001-002"]
-    missing = invoked("simulate", "lot", "--out", tmp_path / "none")
-    assert isinstance(missing.exception, InputError) and "--units" in str(missing.exception)
-    other = invoked("simulate", "paper", "--family", "0.5", "--out", tmp_path / "none")
-    assert isinstance(other.exception, InputError) and "--family" in str(other.exception)
+    alone = invoked("simulate", "paper", "--family", "0.5", "--out", tmp_path / "none")
+    assert isinstance(alone.exception, InputError) and "--family: without --units" in str(alone.exception)
     assert not (tmp_path / "none").exists()
 
 

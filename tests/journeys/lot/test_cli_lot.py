@@ -44,9 +44,9 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("lot")
     for name, profiles in (("whole", '"slow", "fast", "slow"'), ("short", '"fast"')):
         (place / f"{name}.toml").write_text(RUNS.replace("PROFILES", profiles), "utf-8")
-    made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet")
-    run_here(*made, "--units", "5", "--base", place / "whole.toml", "--out", place / "whole")
-    run_here(*made, "--units", "6", "--base", place / "short.toml", "--out", place / "short")
+    lot = ("--seed", "5", "--family", "0.95", "--format", "parquet")
+    run_here("simulate", place / "whole.toml", *lot, "--units", "5", "--out", place / "whole")
+    run_here("simulate", place / "short.toml", *lot, "--units", "6", "--out", place / "short")
     run_here("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
     reported = run_here("lot", place / "fleet", "--out", place / "lot.json")
     assert "5 units" in reported and "before any run" in reported
@@ -100,8 +100,8 @@ def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> N
 def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> None:
     """The map beside the causes, from one of three runs, has less error on the others; a single cycle goes without."""
     (tmp_path / "fast.toml").write_text(RUNS.replace("PROFILES", '"fast", "slow", "fast"'), "utf-8")
-    made = ("simulate", "lot", "--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "6")
-    run_here(*made, "--base", tmp_path / "fast.toml", "--out", tmp_path / "units")
+    lot = ("--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "6")
+    run_here("simulate", tmp_path / "fast.toml", *lot, "--out", tmp_path / "units")
     dataset, lot = load(tmp_path / "units" / "LOT-0005-006"), load_lot(world / "lot.json")
     records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
     left = []
