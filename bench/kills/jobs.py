@@ -145,18 +145,18 @@ def commands(root: Path) -> list[Case]:
     def case(name: str, line: Callable[[int], Sequence[object]], *results: Path) -> Case:
         return Case(name, lambda version: command(name, *line(version)), results)
 
-    targets, numerics = ("host-gcc-O2", "host-clang-O2"), ("f32", "q31")
+    targets, numerics, methods = ("host-gcc-O2", "host-clang-O2"), ("f32", "q31"), ("linear", "cubic")
     return [
         case("simulate", lambda v: [scenario, "--seed", v, "--out", root / "made"], root / "made"),
-        case("build", lambda v: [data, "--out", out, "--numeric", "f32", "--seed", v], out),
-        case("fit", lambda v: [data, "--out", root / "fitted", "--seed", v, "--json", root / "fit.json"],
+        case("build", lambda v: [data, "--out", out, "--numeric", "f32", "--method", methods[v % 2]], out),
+        case("fit", lambda v: [data, "--out", root / "fitted", "--method", methods[v % 2], "--json", root / "fit.json"],
              root / "fitted", root / "fit.json"),
         case("emit", lambda v: [out / "model.json", "--out", other, "--numeric", numerics[v % 2]], other),
         case("verify", lambda v: [other, "--target", targets[v % 2]], other),
-        case("evaluate", lambda v: [other, data, "--trace", other / "trace", "--average-s", 100 + v], other),
+        case("evaluate", lambda _: [other, data, "--trace", other / "trace"], other),
         case("report", lambda _: [out], out),
-        case("compare", lambda v: [data, "--out", root / "compared", "--seed", v], root / "compared"),
-        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--seed", v], root / "diagnosed"),
+        case("compare", lambda _: [data, "--out", root / "compared"], root / "compared"),
+        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--method", methods[v % 2]], root / "diagnosed"),
         case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
              root / "imported"),
         case("check", lambda _: [data, "--json", root / "check.json"], root / "check.json"),

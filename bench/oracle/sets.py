@@ -102,7 +102,7 @@ def _text(name: str, text: str) -> Callable[[Path], object]:
 def _paper(s: Steps) -> None:
     """All that can be done with one unit without a compiler."""
     s.run("simulate", "paper", "--seed", 1, "--out", "data")
-    s.run("check", "data", "--json", "check.json", "--envelope", "-40:60,-5:5")
+    s.run("check", "data", "--json", "check.json")
     s.run("fit", "data", "--out", "result", "--json", "fit.json")
     s.run("emit", "result/model.json", "--out", "result", "--json", "emit.json")
     s.run("evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json")
@@ -197,22 +197,6 @@ def _pulses(s: Steps) -> None:
     s.run("check", "data", "--json", "check.json")
     for method in ("constant", "linear", "cubic", "cubic_slope", "mrbf_t", "mrbf", "bank"):
         s.run("fit", "data", "--method", method, "--out", method, name=f"fit {method}")
-    s.run(
-        "fit",
-        "data",
-        "--centers",
-        6,
-        "--block-s",
-        20,
-        "--average-s",
-        200,
-        "--seed",
-        3,
-        "--out",
-        "c",
-        name="fit 6",
-    )
-    s.run("fit", "data", "--method", "mrbf", "--rho", 0.1, "--out", "rho", name="fit rho")
 
 
 _CYCLES = """title = "Two short cycles"
@@ -418,14 +402,13 @@ def _wrong(s: Steps) -> None:
     s.run("fit", "RLG-1", "--out", "result")
     s.run("emit", "result/model.json", "--out", "result")
     for words in (
-        ("fit", "RLG-1", "--rho", "2"), ("fit", "RLG-1", "--rho", "-1"), ("fit", "RLG-1", "--centers", "-1"),
-        ("fit", "RLG-1", "--block-s", "0"), ("fit", "RLG-1", "--average-s", "1e9"), ("fit", "RLG-1", "--method", "x"),
+        ("fit", "RLG-1", "--method", "x"),
         ("fit", "RLG-1", "--axis", "x"), ("fit", "RLG-1", "--lot", "none.json"), ("fit", "RLG-1", "--prior", "none"),
         ("fit", "nowhere"), ("build", "RLG-1", "--numeric", "f99"), ("build", "RLG-1", "--limits", "bad.toml"),
         ("fleet", "fleet.toml", "--out", "fleet"), ("fleet", "nowhere", "--out", "fleet"),
         ("simulate", "bad.toml", "--out", "made"), ("simulate", "nothing", "--out", "made"),
         ("lot", "nowhere", "--out", "lot.json"),
-        ("import", "RLG-1/a.csv", "--out", "made", "--rate-unit", "apples"), ("diagnose", "RLG-1", "--model", "x"),
+        ("import", "RLG-1/a.csv", "--out", "made", "--rate-unit", "apples"),
         ("certificate", "result", "--number", "1", "--out", "made"), ("verify", "nowhere"), ("schema", "nothing"),
         ("emit", "bad.toml"), ("report", "nowhere"), ("x",),
     ):  # fmt: skip

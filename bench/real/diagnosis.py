@@ -33,7 +33,7 @@ Result = dict[str, Any]
 def diagnosed(data: Path, axis: str, out: Path) -> Result:
     """One run of the installed command."""
     command = [Path(sys.executable).with_name("gyrotc"), "diagnose", data, "--axis", axis, "--out", out]
-    done = subprocess.run([*command, "--average-s", str(AVERAGE_S)], check=True, capture_output=True, text=True)
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
     print(done.stdout.splitlines()[0])
     return dict(json.loads((out / "diagnose.json").read_text("utf-8")))
 
@@ -135,6 +135,8 @@ def isothermal(results: dict[str, Result]) -> Iterator[str]:
 def _data(source: Path, work: Path, name: str) -> Path:
     folder = work / f"{name}-diagnosis-data"
     with_exam(source / name, folder, CUT_S[name])
+    with (folder / "dataset.toml").open("a") as description:
+        description.write(f"[fit]\naverage_s = {AVERAGE_S}\n")
     return folder
 
 

@@ -20,7 +20,7 @@ from rich.text import Text
 from typer.core import TyperGroup
 
 from .. import __version__
-from ..common.inputs import CEILINGS, set_ceilings
+from ..common.inputs import MOVABLE, set_ceilings
 from ..common.texts import terminal_line, terminal_text
 from ..train.options import AUTO, DEFAULTS, METHODS, BuildOptions, flag_of, help_of
 
@@ -244,10 +244,10 @@ def _targets_begun(incomplete: str) -> list[str]:
     return completing(("all", *all_targets()))(incomplete)
 
 
-AnyAverageOption = Annotated[float | None, _of_build("average_s")]
-
-
-SeedOption = Annotated[int, _of_build("seed")]
+SeedOption = Annotated[
+    int,
+    typer.Option("--seed", min=0, help="Number from which everything random is drawn; the same number, the same data."),
+]
 NumericOption = Annotated[
     str | None,
     typer.Option(
@@ -427,7 +427,7 @@ def _main(
             "--max",
             metavar="NAME=VALUE",
             callback=lambda texts: set_ceilings(texts or []),
-            help="Move a ceiling of inputs, before the command; may be repeated: " + ", ".join(CEILINGS) + ".",
+            help="Move a ceiling of inputs, before the command; may be repeated: " + ", ".join(MOVABLE) + ".",
         ),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")] = False,

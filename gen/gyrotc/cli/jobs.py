@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..common.errors import CheckFailed, InputError
-from ..train.options import BuildOptions
+from ..common.errors import CheckFailed
 from .base import (
     BUILD,
     COMPARE,
@@ -112,7 +111,7 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
 
 
 @app.command()
-@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s", "channels")
+@with_build_options("method", "channels")
 def build(
     dataset: DatasetArg,
     out: OutOption = Path("build"),
@@ -213,13 +212,11 @@ def _print_built(result: Built) -> None:
 
 
 @app.command()
-@with_build_options("seed", "block_s", "average_s")
 def compare(
     dataset: DatasetArg,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")] = None,
     axis: AxisOption = None,
     *,
-    options: dict[str, Any],
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
@@ -234,13 +231,12 @@ def compare(
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
 
-    trained = BuildOptions(**options)
     with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
         subtracted = applied_in(applied)
         recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
         if stage:
             stage.of(recordings.serial, axis)
-        result = with_published(run(recordings, trained, progress=say))
+        result = with_published(run(recordings, progress=say))
         if stage:
             write_atomically(stage.folder / "compare.json", json_text(result.content()))
             write_atomically(stage.folder / "compare.svg", comparison_picture(result))
@@ -250,13 +246,9 @@ def compare(
 
 
 @app.command()
-@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s")
+@with_build_options("method")
 def diagnose(
     dataset: DatasetArg,
-    model: Annotated[
-        Path | None,
-        typer.Option("--model", help="A model.json made before, whose method, block and number of centers are used."),
-    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
@@ -276,18 +268,14 @@ def diagnose(
     Example: gyrotc diagnose recordings --out diagnosis
     """
     from ..jobs.diagnosis import diagnose_dataset
-    from ..model import load_model
     from ..recordings.loading import asked_axes, load
     from ..recordings.records import Dataset
     from ..results.folder import result_folder
     from ..train.fitting import FitOptions
 
-    if lot is not None and model is not None:
-        raise InputError("--lot", "with --model, whose way of fitting is taken", "one of the two")
-    known = load_model(model) if model else None
     fitting = FitOptions(**options, prior=lot_in(lot))
     subtracted = applied_in(applied)
-    axes = asked_axes(dataset, axis or (known.axis if known else None))
+    axes = asked_axes(dataset, axis)
     several = len(axes) > 1 or axis == "all"
     results: dict[str, Diagnosed] = {}
 
@@ -297,8 +285,7 @@ def diagnose(
             results[name or ""] = diagnose_dataset(
                 recordings,
                 into,
-                model=known,
-                options=fitting if known is None else None,
+                options=fitting,
                 progress=say,
                 accept_events=accept_events,
             ).result

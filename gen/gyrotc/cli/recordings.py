@@ -246,9 +246,6 @@ def _simulate_lot(
 def check(
     dataset: DatasetArg,
     axis: AxisOption = None,
-    envelope: Annotated[
-        str | None, typer.Option("--envelope", help="What training should cover, C and C/min, e.g. -40:60,-5:5.")
-    ] = None,
     applied: AppliedOption = None,
     trust_units: TrustUnitsOption = False,
     previous: Annotated[
@@ -258,17 +255,15 @@ def check(
 ) -> None:
     """Report all errors and warnings of recordings at once, also while they still grow.
 
-    Example: gyrotc check recordings --envelope=-40:60,-5:5
+    Example: gyrotc check recordings
     """
     from ..assess.changes import earlier_models
     from ..quality.inspection import check as run
-    from ..quality.inspection import envelope_of
 
     with progress() as say:
         result = run(
             dataset,
             axis=axis,
-            envelope=envelope_of(envelope) if envelope is not None else None,
             applied=applied_in(applied),
             trust_units=trust_units,
             earlier=earlier_models(previous) if previous else None,

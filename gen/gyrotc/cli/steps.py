@@ -11,14 +11,12 @@ import typer
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..train.options import BuildOptions
 from .base import (
     EMIT,
     ERR,
     FIT,
     VERIFY,
     AgeingOption,
-    AnyAverageOption,
     AppliedOption,
     AxisOption,
     DatasetArg,
@@ -90,7 +88,7 @@ def _inside(folder: Path, trace: Path | None) -> Path | None:
 
 
 @app.command()
-@with_build_options("method", "seed", "centers", "rho", "block_s", "average_s", "channels")
+@with_build_options("method", "channels")
 def fit(
     dataset: DatasetArg,
     out: OutOption,
@@ -119,7 +117,7 @@ def fit(
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
         recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
         stage.of(recordings.serial, recordings.axis)
-        fitting = with_prior(fitting, recordings, prior, ageing)
+        fitting = with_prior(fitting.with_stated(recordings.fit), recordings, prior, ageing)
         fitted = fit_dataset(recordings, fitting, progress=say)
         fitted.model.save(stage.folder / "model.json")
         write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
@@ -274,7 +272,6 @@ def evaluate(
     dataset: DatasetArg,
     numeric: NumericOption = None,
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
-    average_s: AnyAverageOption = None,
     applied: AppliedOption = None,
     trust_code: TrustOption = False,
     trust_units: TrustUnitsOption = False,
@@ -289,15 +286,11 @@ def evaluate(
     from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
 
-    if average_s is not None:
-        BuildOptions(average_s=average_s)
     axis = load_model(folder / "model.json").axis
     subtracted = applied_in(applied)
     recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
-        result = run(
-            folder, recordings, numeric=numeric, average_s=average_s, trace=traces, trust_code=trust_code, progress=say
-        )
+        result = run(folder, recordings, numeric=numeric, trace=traces, trust_code=trust_code, progress=say)
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())
     show(evaluation_table(result))

@@ -36,22 +36,25 @@ class Ceiling:
 
     default: float
     meaning: str
+    movable: bool = False
 
 
 CEILINGS: dict[str, Ceiling] = {
-    "memory_gib": Ceiling(4.0, "memory that the rows of one recording, or its blocks, may take, GiB"),
-    "recording_mib": Ceiling(8192.0, "size of one recording, trace or noise file, MiB"),
-    "rows": Ceiling(1e8, "rows of one recording"),
-    "columns": Ceiling(256.0, "columns of one recording"),
+    "memory_gib": Ceiling(4.0, "memory that the rows of one recording, or its blocks, may take, GiB", movable=True),
+    "recording_mib": Ceiling(8192.0, "size of one recording, trace or noise file, MiB", movable=True),
+    "rows": Ceiling(1e9, "rows of one recording"),
+    "columns": Ceiling(256.0, "columns of one recording", movable=True),
     "parquet_ratio": Ceiling(250.0, "size of a Parquet file once unpacked over its size, above 64 MiB"),
-    "parser_s": Ceiling(20.0, "processor time of the reader of a logger's file for each 8 MiB of it, s"),
+    "parser_s": Ceiling(20.0, "processor time of the reader of a logger's file for each 8 MiB of it, s", movable=True),
     "text_mib": Ceiling(4.0, "size of a dataset.toml, manifest, scenario, limits file or model.json, MiB"),
     "result_mib": Ceiling(32.0, "size of a JSON result, truth.json, picture or board log, MiB"),
     "nesting": Ceiling(32.0, "depth of tables and lists within one another in TOML and JSON"),
     "runs": Ceiling(2000.0, "runs of one data set"),
     "units": Ceiling(100_000.0, "gyros of one fleet"),
 }
-"""All ceilings by name."""
+"""All ceilings by name; a user moves those of memory, size, columns and time, and the others protect these."""
+
+MOVABLE = tuple(name for name, one in CEILINGS.items() if one.movable)
 
 
 def ceiling(name: str) -> float:
@@ -81,8 +84,8 @@ def _moved(text: str) -> dict[str, float]:
     for part in text.replace(",", " ").split():
         name, _, value = part.partition("=")
         where = f"--max or {ENVIRONMENT}, {name}"
-        if name not in CEILINGS:
-            raise InputError(where, "is not known", f"one of {', '.join(CEILINGS)}")
+        if name not in MOVABLE:
+            raise InputError(where, "is not known", f"one of {', '.join(MOVABLE)}")
         try:
             moved[name] = float(value)
         except ValueError:
@@ -100,7 +103,8 @@ def refuse_above(name: str, value: float, where: str, unit: str) -> None:
     """
     most = ceiling(name)
     if value > most:
-        raise InputError(where, f"{value:.10g} {unit}", f"at most {most:.10g} (--max {name}=...)")
+        remedy = f" (--max {name}=...)" if CEILINGS[name].movable else ""
+        raise InputError(where, f"{value:.10g} {unit}", f"at most {most:.10g}{remedy}")
 
 
 def need_memory(octets: float, where: str, why: str) -> None:
@@ -332,7 +336,7 @@ def _look_through(content: Any, where: str, *, finite: bool = False) -> None:
             return
         if depth > deepest:
             break
-    raise InputError(where, "is nested too deep", f"at most {deepest} levels (--max nesting=...)")
+    raise InputError(where, "is nested too deep", f"at most {deepest} levels")
 
 
 def _look_at(value: Any, where: str) -> None:

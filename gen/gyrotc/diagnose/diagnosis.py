@@ -30,7 +30,7 @@ from ..results.diagnosed import (
 from ..results.training import Training
 from ..train.channels import StandIn
 from ..train.data import TrainingData, training_spans
-from ..train.fitting import HOLD_S, FitOptions, fit_dataset, map_method, model_of, training_of
+from ..train.fitting import HOLD_S, FitOptions, fit_dataset, model_of, training_of
 from ..train.plausibility import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
 from .attribution import LEVEL, Attribution
@@ -74,7 +74,6 @@ class Diagnosis:
 def diagnose(
     dataset: Dataset,
     *,
-    model: Model | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
     accept_events: bool = False,
@@ -83,8 +82,7 @@ def diagnose(
 
     Args:
         dataset: Recordings. `truth.json` beside them is never opened.
-        model: A model made before: its method, block and number of centers are those of the refit.
-        options: As for `fit`; default: those of `model`, else of `fit`.
+        options: As for `fit`, whose defaults are taken where there are none.
         progress: Called with what is being done.
         accept_events: Goes on without what the events that are found say to leave out.
 
@@ -95,7 +93,7 @@ def diagnose(
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
     events = found_events(dataset)
-    found = _diagnosed(without_events(whole, events) if accept_events else whole, options or _options_of(model), say)
+    found = _diagnosed(without_events(whole, events) if accept_events else whole, options or FitOptions(), say)
     reported = {"events": tuple(events), "events_accepted": accept_events}
     steps = (*_about(events, accept_events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
@@ -166,14 +164,6 @@ def _undecidable(records: Records) -> str:
     if fits_exactly(records):
         return f"A map of (T, dT/dt) fits {records.size} blocks of {records.block_s:.4g} s exactly: record more."
     return ""
-
-
-def _options_of(model: Model | None) -> FitOptions:
-    if model is None:
-        return FitOptions()
-    centers = model.n_centers if map_method(model.method) == model.method else None
-    method = map_method(model.method)
-    return FitOptions(method=method, seed=model.seed, centers=centers, block_s=model.block_s, average_s=model.average_s)
 
 
 def _extended_model(

@@ -205,7 +205,7 @@ def build_into(
 
 
 def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
-    options = with_prior(options, dataset, order.prior, order.ageing_dph, order.limits)
+    options = with_prior(options.with_stated(dataset.fit), dataset, order.prior, order.ageing_dph, order.limits)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, progress=say)
@@ -338,6 +338,7 @@ def compare(
     """
     say = progress or (lambda _: None)
     say("reading")
+    options = options.with_stated(dataset.fit)
     data, held, judged_on = _samples(dataset, options)
     _fit(methods[0], data, options)  # what a first call loads is not training time
     judged = []

@@ -12,7 +12,6 @@ from typing import Any
 from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
-from ..model import Model
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
@@ -27,7 +26,6 @@ def diagnose_dataset(
     dataset: Dataset,
     out: Path | None = None,
     *,
-    model: Model | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
     accept_events: bool = False,
@@ -41,10 +39,11 @@ def diagnose_dataset(
     Raises:
         InputError: As `diagnose` and `result_folder`.
     """
+    chosen = (options or FitOptions()).with_stated(dataset.fit)
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        found = diagnose(dataset, model=model, options=options, progress=progress, accept_events=accept_events)
+        found = diagnose(dataset, options=chosen, progress=progress, accept_events=accept_events)
         return _saved(stage.folder, found, progress) if stage else found
 
 

@@ -9,7 +9,6 @@ from .fits import WalkNoise as WalkNoise
 from .fits import evidence_beside_memories as evidence_beside_memories
 from .inspection import CheckResult as CheckResult
 from .inspection import check as check
-from .inspection import envelope_of as envelope_of
 from .inspection import findings_of_run as findings_of_run
 from .outliers import departing as departing
 from .outliers import departing_rows as departing_rows

@@ -41,13 +41,8 @@ from .outliers import departing_rows, spike_findings
 from .thermometers import temperature_findings_of, thermometer_findings
 from .timing import time_findings
 
-Envelope = tuple[tuple[float, float], tuple[float, float]]
-"""Lowest and highest temperature (C), lowest and highest temperature rate (C/min)."""
-
 _HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
 _PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample rate by more
-_ENVELOPE_CELLS = (20, 8)  # of T and of dT/dt: 5 C and 1.25 C/min of the paper's range
-_ENVELOPE_MARGIN = 0.05  # share of the range: chambers do not reach their ends to the degree
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,26 +99,10 @@ class CheckResult:
         )
 
 
-def envelope_of(text: str) -> Envelope:
-    """`-40:60,-5:5`: lowest and highest temperature, C, and rate, C/min.
-
-    Raises:
-        InputError: It is not of that form.
-    """
-    try:
-        (t0, t1), (r0, r1) = (tuple(float(v) for v in part.split(":")) for part in text.split(","))
-    except ValueError:
-        t0 = t1 = r0 = r1 = np.nan
-    if not (-np.inf < t0 < t1 < np.inf and -np.inf < r0 < r1 < np.inf):
-        raise InputError("envelope", repr(text), "T0:T1,R0:R1 in C and C/min, such as -40:60,-5:5")
-    return (t0, t1), (r0, r1)
-
-
 def check(
     folder: Path,
     *,
     axis: str | None = None,
-    envelope: Envelope | None = None,
     applied: Applied | None = None,
     trust_units: bool = False,
     earlier: Mapping[str, Model] | None = None,
@@ -134,7 +113,6 @@ def check(
     Args:
         folder: The data set.
         axis: Axis of three-axis recordings; None or "all": every one.
-        envelope: Temperatures and rates that the training runs should cover.
         applied: Model that was subtracted while recording, if the data set says that there was one.
         trust_units: Values that contradict their units are a warning, not a problem.
         earlier: Models of an earlier calibration of this gyro, by axis ("" where the recordings have one rate).
@@ -163,7 +141,7 @@ def check(
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")
                 looked.append(_looked_at(run))
             of_axis = [f for f, _ in looked]
-            together = _of_all_runs(dataset, of_axis, envelope, earlier)
+            together = _of_all_runs(dataset, of_axis, earlier)
             _see(warnings, (*together, *(warning for _, of_run in looked for warning in of_run)), one)
             _see(untold, open_questions(dataset, of_axis, earlier), one)
             facts += [(one, f) for f in of_axis]
@@ -269,9 +247,7 @@ def _looked_at(run: Run) -> tuple[RunFacts, list[Finding]]:
     return f, found
 
 
-def _of_all_runs(
-    dataset: Dataset, facts: Sequence[RunFacts], envelope: Envelope | None, earlier: Mapping[str, Model] | None
-) -> Iterator[Finding]:
+def _of_all_runs(dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None) -> Iterator[Finding]:
     """What all runs together raise."""
     for warning in dataset.warnings:
         where, _, text = warning.partition(": ")
@@ -283,8 +259,6 @@ def _of_all_runs(
     training = [f for f in facts if f.role == "train" and len(f.slopes_c_per_min)]
     if training and not isothermal:
         yield from _of_holds(training)
-    if envelope is not None:
-        yield from _of_coverage(training, envelope)
 
 
 def _between_runs(facts: Sequence[RunFacts]) -> Iterator[Finding]:
@@ -303,21 +277,3 @@ def _of_holds(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     if holds > _HOLDS:
         text = f"{holds:.0%} of the training time is held at one temperature: little is learnt about its rate"
         yield finding("mostly_holds", text)
-
-
-def _of_coverage(facts: Sequence[RunFacts], envelope: Envelope) -> Iterator[Finding]:
-    """What the training runs do not show of the requested envelope."""
-    slopes = np.concatenate([f.slopes_c_per_min for f in facts] or [np.zeros(0)])
-    temperatures = np.concatenate([f.temperatures_c for f in facts] or [np.zeros(0)])
-    for name, unit, values, (low, high) in (
-        ("temperature", "C", temperatures, envelope[0]),
-        ("temperature rate", "C/min", slopes, envelope[1]),
-    ):
-        margin = _ENVELOPE_MARGIN * (high - low)
-        reached = (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
-        if not (reached[0] <= low + margin and reached[1] >= high - margin):
-            text = f"{name} covers {reached[0]:.4g} ... {reached[1]:.4g} of {low:.4g} ... {high:.4g} {unit}"
-            yield finding("envelope_not_reached", text)
-    seen, *_ = np.histogram2d(temperatures, slopes, bins=_ENVELOPE_CELLS, range=envelope)
-    text = f"{np.mean(seen > 0):.0%} of the cells of temperature and its rate hold training data"
-    yield finding("envelope_coverage", text)

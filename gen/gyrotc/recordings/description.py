@@ -215,6 +215,7 @@ class Description(_Part):
     source: Sources = ()
     meta: Annotated[dict[str, Any], BeforeValidator(_json_value)] = {}
     noise: NoiseEntry | None = None
+    fit: dict[Label, Any] = {}
     run: Annotated[tuple[RunEntry, ...], Field(min_length=1)]
 
 

@@ -481,6 +481,7 @@ def _dataset(
         channels=channels,
         warnings=warnings,
         units=dict(description.units),
+        fit=dict(description.fit),
         trusted=trusted,
         sources=tuple(entry.model_dump() for entry in description.source),
     )

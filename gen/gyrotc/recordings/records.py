@@ -298,6 +298,7 @@ class Dataset:
         noise: Declared noise, None if not declared.
         applied_table: Hash of the model that was subtracted while recording, None: none.
         meta: Free facts, JSON types only.
+        fit: `[fit]` as stated: options of training by name.
         runs: In the order of the description.
         channels: Auxiliary channels that every run has.
         warnings: What a user should know of what was done to the data.
@@ -322,6 +323,7 @@ class Dataset:
     channels: tuple[str, ...]
     warnings: tuple[str, ...]
     units: dict[str, str] = field(default_factory=dict)
+    fit: dict[str, Any] = field(default_factory=dict)
     trusted: tuple[str, ...] = ()
     sources: tuple[dict[str, Any], ...] = ()
     shared: tuple[SharedRows, ...] = ()

@@ -175,8 +175,6 @@ ADVICE = {
     "constant_channel": "Look whether the sensor was connected; take the column out if it says nothing.",
     "counter_wrapped": "Add the range of the counter behind each such place, or store the counts with their sign.",
     "earth_rate_not_stated": 'Say in dataset.toml what was done about it: earth_rate = "removed", "none" or "compute".',
-    "envelope_coverage": "Record runs that pass through the cells that are empty.",
-    "envelope_not_reached": "Record a run that goes there, or state the envelope that the product needs.",
     "gaps": "Look at the logger (buffer, disk, cable) at these times. Blocks with fewer than half of their rows are "
     "left out by themselves.",
     "jump_in_temperature": "Look for a loose contact or a change of the thermometer there; leave the stretch out by "

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from annotated_types import Interval
@@ -18,6 +18,7 @@ from ..common.inputs import MOST_CENTERS, AverageLength, BlockLength, refused
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
+    from typing_extensions import Self
 
 SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "constant": ((0, 0),),
@@ -75,13 +76,26 @@ class BuildOptions:
             if value is not option.default:
                 object.__setattr__(self, option.name, _checked(option.name, value, flag_of(option.name)))
 
+    def with_stated(self, stated: Mapping[str, Any]) -> Self:
+        """Return these options with those at their default taken from `[fit]` of a data set.
+
+        Raises:
+            InputError: A name is not known, or a value is of another type or out of its range.
+        """
+        known = options_in(stated, "dataset.toml, field fit.")
+        mine = {option.name: getattr(self, option.name) != option.default for option in fields(BuildOptions)}
+        return replace(self, **{name: value for name, value in known.items() if not mine[name]})
+
 
 DEFAULTS = BuildOptions()
 
 
+_TYPED = ("method", "channels")  # options of the command line; the others are stated in `[fit]` of a data set
+
+
 def flag_of(name: str) -> str:
-    """How a user types an option."""
-    return "--" + name.replace("_", "-")
+    """Return an option as a user states it: on the command line, or by its name in `[fit]`."""
+    return "--" + name if name in _TYPED else name
 
 
 def help_of(name: str) -> str:

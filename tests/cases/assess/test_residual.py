@@ -117,12 +117,12 @@ def recorded(folder: Path, spikes: int = 0) -> Path:
             rate[rng.choice(time.size, spikes, replace=False)] += 5.0
         write_csv(folder / f"{k}.csv", {"time_s": time, "temperature_c": t, "rate_dph": rate})
         text += f'[[run]]\nfile = "{k}.csv"\n'
-    (folder / "dataset.toml").write_text(text)
+    (folder / "dataset.toml").write_text(text + "[fit]\nblock_s = 50.0\n")
     return folder
 
 
 def test_runs_without_an_exam_are_judged_by_each_left_out_and_without_their_spikes(tmp_path: Path) -> None:
-    text = run_here("build", recorded(tmp_path / "d", 12), *HOST, "--out", tmp_path / "r", "--block-s", "50")
+    text = run_here("build", recorded(tmp_path / "d", 12), *HOST, "--out", tmp_path / "r")
     result = json.loads((tmp_path / "r" / "evaluate.json").read_text())
     left_out = result["left_out"]
     assert result["exam"] is None and left_out["samples"] > 200

@@ -324,8 +324,9 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
     run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
     (data / "dataset.toml").write_text(
         f'schema = 1\nserial = "R1"\n{run}to_s = {cut_s}\n{run}from_s = {cut_s}\nrole = "exam"\n'
+        "[fit]\naverage_s = 10.0\n"
     )
-    done = gyrotc("diagnose", data, "--axis", axis, "--average-s", 10, "--out", folder / "out")
+    done = gyrotc("diagnose", data, "--axis", axis, "--out", folder / "out")
     assert done.returncode == 0, done.stderr
     return dict(json.loads((folder / "out" / "diagnose.json").read_text()))
 

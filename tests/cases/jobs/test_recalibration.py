@@ -211,17 +211,16 @@ def dataset(folder: Path, seed: int, day: str, *, check: bool, change: Change | 
         columns = {"time_s": mine.time_s, "temperature_c": mine.temperature_c, "rate_dph": mine.bias_dph}
         write_csv(folder / f"run-{k}.csv", columns)
         text += f'[[run]]\nfile = "run-{k}.csv"\nstarted = {day}T00:00:00Z\nenvironment = "e{k}"\n'
-    (folder / "dataset.toml").write_text(text, "utf-8")
+    (folder / "dataset.toml").write_text(text + "[fit]\nblock_s = 50.0\n", "utf-8")
     return folder
 
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("recalibration")
-    block = ("--block-s", "50")
-    run_here("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old", *block)
+    run_here("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old")
     dataset(place / "check", 12, "2026-01-01", check=True)
-    reported = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new", *block)
+    reported = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new")
     assert "earlier model: the model " in reported and "is confirmed" in reported
     return place
 
@@ -231,10 +230,9 @@ def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path
     assert training.prior is not None and training.prior.date == "2025-01-01"
     assert "is confirmed" in json.loads((world / "new" / "model.json").read_text())["meta"]["prior"]
     bumped = dataset(tmp_path / "bumped", 13, "2026-06-01", check=True, change=CHANGES["local"])
-    block = ("--block-s", "50")
-    reported = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad", *block)
+    reported = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad")
     assert "no longer holds" in reported and "finding prior_does_not_hold" in reported
-    reported = run_here("fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged", *block)
+    reported = run_here("fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged")
     assert "ageing of 0.005 deg/h" in reported
 
 
@@ -255,8 +253,7 @@ def proven(result: Path) -> None:
 
 def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: Path, tmp_path: Path) -> None:
     out = tmp_path / "built"
-    block = ("--block-s", "50")
-    run_here("build", world / "check", "--prior", world / "old", *HOST, "--out", out, *block)
+    run_here("build", world / "check", "--prior", world / "old", *HOST, "--out", out)
     proven(out)
     prior = read_result(out / "training.json", Training).prior
     assert prior is not None and prior.accepted
@@ -266,7 +263,7 @@ def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: P
     assert page.count("<td>within</td>") == len(prior.cells) and "<td>outside</td>" not in page
     [header] = (out / "c").glob("gtc_rlg*.h")
     assert "prior:" in header.read_text() and load_model(world / "old" / "model.json").hash[:12] in page
-    run_here("fit", world / "check", "--out", tmp_path / "alone", *block)
+    run_here("fit", world / "check", "--out", tmp_path / "alone")
     assert sigma_dph(out) < sigma_dph(tmp_path / "alone"), "the table's sigma is that of both together"
     earlier = json.loads((out / "changes.json").read_text())
     assert earlier, "the earlier model is also what the result is compared with"
@@ -276,7 +273,7 @@ def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: P
 def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path) -> None:
     out = tmp_path / "built"
     bumped = dataset(tmp_path / "bumped", 15, "2026-06-01", check=True, change=CHANGES["local"])
-    run_here("build", bumped, "--prior", world / "old", *HOST, "--out", out, "--block-s", "50")
+    run_here("build", bumped, "--prior", world / "old", *HOST, "--out", out)
     proven(out)
     prior = read_result(out / "training.json", Training).prior
     assert prior is not None and prior.chosen == "full" and prior.accepted and prior.change is not None

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.assess import earlier_models
-from gyrotc.common import InputError
-from gyrotc.quality import CheckResult, check, envelope_of, finding
+from gyrotc.quality import CheckResult, check, finding
 from gyrotc.quality.findings import __file__ as findings_file
 from gyrotc.recordings import earth_rate
 from gyrotc.results import Facts, Finding, FleetEntry
@@ -150,25 +149,6 @@ def test_row_periods_that_differ(tmp_path: Path) -> None:
     write_csv(tmp_path / "RLG-1" / "a.csv", long())
     write_csv(tmp_path / "RLG-1" / "b.csv", long() | {"time_s": 2.0 * long()["time_s"]})
     assert "row_periods_differ" in ids(check(tmp_path / "RLG-1"))
-
-
-def test_coverage_of_a_requested_envelope(tmp_path: Path) -> None:
-    folder = tmp_path / "RLG-1"
-    checked(folder, long())
-    wide = check(folder, envelope=((-40.0, 60.0), (-5.0, 5.0)))
-    assert {"envelope_not_reached", "envelope_coverage"} == ids(wide)
-    texts = [d.text for d in wide.warnings]
-    assert any(t.startswith("temperature covers 20.") and "-40 ... 60 C" in t for t in texts)
-    assert any(t.startswith("temperature rate covers") and "-5 ... 5 C/min" in t for t in texts)
-    near = check(folder, envelope=((20.5, 49.5), (-0.55, 0.55)))
-    assert "envelope_not_reached" not in ids(near)
-
-
-def test_an_envelope_on_the_command_line() -> None:
-    assert envelope_of("-40:60,-5:5") == ((-40.0, 60.0), (-5.0, 5.0))
-    for text in ("", "-40:60", "60:-40,-5:5", "a:b,c:d", "nan:1,2:3", "1:2,3:4,5:6"):
-        with pytest.raises(InputError, match="T0:T1,R0:R1"):
-            envelope_of(text)
 
 
 def test_a_recording_that_still_grows(tmp_path: Path) -> None:

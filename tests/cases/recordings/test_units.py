@@ -248,10 +248,12 @@ def test_a_noisy_gyro_a_fast_board_and_wild_readings_are_not_suspected(tmp_path:
 
 def test_the_command_refuses_and_takes_the_users_word(tmp_path: Path, gyrotc: Command) -> None:
     folder = made(tmp_path / "R", dps(columns(600)))
+    with (folder / "dataset.toml").open("a") as file:
+        file.write("[fit]\ncenters = 0\n")
     refused = gyrotc("fit", folder, "--out", tmp_path / "out")
     assert refused.returncode == 2 and '[units] rate = "deg/s"' in refused.stderr
     assert not (tmp_path / "out").exists()
-    taken = gyrotc("fit", folder, "--out", tmp_path / "out", "--centers", "0", "--trust-units")
+    taken = gyrotc("fit", folder, "--out", tmp_path / "out", "--trust-units")
     assert taken.returncode == 0, taken.stderr
     training = json.loads((tmp_path / "out" / "training.json").read_text())
     assert "white noise" in training["units"]["trusted"][0]

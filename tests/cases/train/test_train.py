@@ -226,7 +226,7 @@ def test_bad_arguments_are_refused() -> None:
         ({"centers": -1}, "512"),
         ({"centers": 513}, "512"),
         ({"rho": 1.5}, "rho"),
-        ({"average_s": 0.0}, "--average-s"),
+        ({"average_s": 0.0}, "average_s"),
     ):
         with pytest.raises(InputError, match=message):
             fit(data, **options)  # type: ignore[arg-type]

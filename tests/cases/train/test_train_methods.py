@@ -282,7 +282,7 @@ def test_a_block_that_whole_rows_make_too_long_is_refused(tmp_path: Path) -> Non
     recordings = load(one_run(tmp_path / "RLG-1"))
     runs = [replace(run, row_period_s=130.0) for run in recordings.runs]
     assert front_end(runs, 3500.0).block_s == 3510.0
-    with pytest.raises(InputError, match=r"--block-s: 3640\.0; expected"):
+    with pytest.raises(InputError, match=r"block_s: 3640\.0; expected"):
         front_end(runs, 3600.0)
 
 

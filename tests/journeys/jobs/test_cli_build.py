@@ -303,7 +303,6 @@ def test_every_other_command_that_reads_a_model_refuses(demo: Path, tmp_path: Pa
         ("build", data, "--applied", result / "model.json", "--out", tmp_path / "o"),
         ("check", data, "--applied", result / "model.json"),
         ("compare", data, "--applied", result / "model.json"),
-        ("diagnose", data, "--model", result / "model.json"),
     ):
         done = gyrotc(*command)
         assert done.returncode == 2, (command, done.stdout, done.stderr)

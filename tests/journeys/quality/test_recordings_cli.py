@@ -140,14 +140,6 @@ def test_check_takes_every_axis_and_fit_names_them(tmp_path: Path, gyrotc: Comma
     assert gyrotc("check", tmp_path / "IMU", "--axis", "y").returncode == 0
 
 
-def test_an_envelope_is_checked_against(tmp_path: Path, gyrotc: Command) -> None:
-    described(tmp_path / "RLG-1")
-    done = gyrotc("check", tmp_path / "RLG-1", "--envelope=-40:60,-5:5")
-    assert done.returncode == 0
-    assert "of -40 ... 60 C" in done.stdout
-    assert gyrotc("check", tmp_path / "RLG-1", "--envelope", "wide").returncode == 2
-
-
 def test_the_model_does_not_depend_on_the_form_of_a_recording(tmp_path: Path, gyrotc: Command) -> None:
     """The same numbers give the same model, but for name and hash of the file."""
     models = []

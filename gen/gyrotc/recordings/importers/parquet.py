@@ -88,7 +88,9 @@ def _refuse_bomb(name: str, size: int, unpacked: int) -> None:
     """
     if unpacked > _HARMLESS_BYTES and unpacked > ceiling("parquet_ratio") * size:
         found = f"{size} bytes that unpack to {unpacked} or more"
-        raise InputError(name, found, f"at most {ceiling('parquet_ratio'):g} times (--max parquet_ratio=...)")
+        raise InputError(
+            name, found, f"at most {ceiling('parquet_ratio'):g} times; write it again with less compression"
+        )
 
 
 def _short(error: Exception) -> str:
