@@ -612,7 +612,8 @@ def test_a_correction_hardly_depends_on_the_length_of_a_block(tmp_path: Path) ->
         effects = [Effect.of(state) for state in cycle_of(refitting.records).states]
         (chain,) = refitting.on_exam([effects])
         left.append(float(np.sqrt(np.mean(np.concatenate([a.after_dph for a in chain]) ** 2))))
-    assert max(left) < 1.05 * min(left), left
+    # A start takes three rows of 5 s, most of a block of 20 s.
+    assert max(left) < 1.1 * min(left), left
 
 
 def test_spans_that_touch_are_one_run(tmp_path: Path) -> None:
