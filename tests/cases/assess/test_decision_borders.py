@@ -1,0 +1,257 @@
+"""Decisions near their thresholds, and worst cases in every position.
+
+Each threshold has a case on either side, in which nothing but the statistic of this decision differs; what is the worst
+of several runs, axes or arithmetics is tried in the first place, in the middle and in the last. Factors of coverage are
+those of scipy's t distribution; the rest is arithmetic by hand.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from gyrotc.assess.budget import budget_of, figure_uncertainties
+from gyrotc.assess.findings import findings_of
+from gyrotc.assess.limits import AtMost, Limits, decided, held_against, worst_of
+from gyrotc.common.errors import InputError
+from gyrotc.common.metrics import Averages, statistics, time_statistics
+from gyrotc.jobs.certificate import reason_of_release
+from gyrotc.model import Model
+from gyrotc.recordings.load import load
+from gyrotc.recordings.records import Dataset
+from gyrotc.results.evaluation import (
+    EvaluatedRun,
+    Evaluation,
+    FigureUncertainty,
+    ModelSizes,
+    Pooled,
+    RunStatistics,
+    Statistics,
+)
+from gyrotc.results.release import DecisionRule, JudgedOn
+from recordings import columns, toml, write_csv
+from scipy import stats
+
+NEAR = 0.02
+"""Share of a guard band or limit by which a case lies on its side."""
+RULES: tuple[DecisionRule, ...] = ("guard_band", "guard_band_binary", "simple_acceptance")
+
+
+def k_of(freedom: float | None) -> float:
+    """Of 95.45 %: as far as 2 sigma of a normal distribution, by JCGM 100:2008, G.3.4."""
+    upper = stats.norm.cdf(2.0)
+    return float(stats.norm.ppf(upper) if freedom is None else stats.t.ppf(upper, freedom))
+
+
+def verdict_of(measured: float, rule: DecisionRule, freedom: float | None, part: JudgedOn, sign: float) -> str:
+    known = FigureUncertainty(standard=0.05, freedom=freedom, method="by hand")
+    return decided("at_most.rms_dph", measured, 1.0, sign, rule, known, part).verdict or ""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("freedom", [None, 5.0, 12.0])
+@pytest.mark.parametrize("rule", RULES)
+def test_a_figure_is_decided_at_its_acceptance_limit_and_at_its_limit(
+    rule: DecisionRule, freedom: float | None, sign: float
+) -> None:
+    """ILAC-G8:09/2019, 4.2: PASS up to the limit less U, FAIL beyond the limit, between them as the rule says."""
+    band = 0.0 if rule == "simple_acceptance" else k_of(freedom) * 0.05
+    between = {"guard_band": "CONDITIONAL PASS", "guard_band_binary": "FAIL", "simple_acceptance": "PASS"}[rule]
+    for away, expected in (
+        (band + NEAR * 0.05, "PASS"),
+        (band - NEAR * 0.05, between if band else "FAIL"),
+        (NEAR * 0.05, between),
+        (-NEAR * 0.05, "FAIL"),
+    ):
+        assert verdict_of(1.0 - sign * away, rule, freedom, "exam", sign) == expected, away
+
+
+@pytest.mark.parametrize(("freedom", "expected"), [(4.9, "CONDITIONAL PASS"), (5.0, "PASS")])
+@pytest.mark.parametrize("rule", RULES)
+def test_an_uncertainty_of_fewer_than_five_degrees_of_freedom_gives_no_plain_pass(
+    rule: DecisionRule, freedom: float, expected: str
+) -> None:
+    expected = "PASS" if rule == "simple_acceptance" else expected
+    assert verdict_of(0.1, rule, freedom, "exam", 1.0) == expected
+
+
+@pytest.mark.parametrize(("part", "expected"), [("train", "CONDITIONAL PASS"), ("left_out", "PASS"), ("exam", "PASS")])
+@pytest.mark.parametrize("rule", RULES)
+def test_training_runs_alone_give_no_plain_pass(rule: DecisionRule, part: JudgedOn, expected: str) -> None:
+    assert verdict_of(0.1, rule, 30.0, part, 1.0) == expected
+
+
+@pytest.mark.parametrize("order", list(permutations(("PASS", "CONDITIONAL PASS", "FAIL"))))
+def test_the_gravest_verdict_counts_wherever_it_is(order: Any) -> None:
+    assert worst_of(order) == "FAIL"
+    assert worst_of(v for v in order if v != "FAIL") == "CONDITIONAL PASS"
+    assert worst_of([None, *order[:1], None]) == order[0]
+
+
+@pytest.mark.parametrize("worst", range(3))
+@pytest.mark.parametrize("verdict", ["FAIL", "CONDITIONAL PASS"])
+def test_a_unit_is_released_only_if_each_of_its_axes_is(verdict: str, worst: int, tmp_path: Any) -> None:
+    axes = [SimpleNamespace(decision="PASS", failures=[], named=lambda _: "") for _ in range(3)]
+    assert reason_of_release(tmp_path, axes, None) is None  # type: ignore[arg-type]
+    axes[worst].decision = verdict
+    with pytest.raises(InputError, match=f"its verdict is {verdict}"):
+        reason_of_release(tmp_path, axes, None)  # type: ignore[arg-type]
+
+
+NOTHING = dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
+OF_RUNS = ("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph")
+
+
+def evaluated(role: Literal["train", "exam"], **figures: float | None) -> EvaluatedRun:
+    after = RunStatistics(**NOTHING, **(dict.fromkeys(OF_RUNS, 1.0) | figures))
+    return EvaluatedRun(file="a.csv", role=role, environment=None, samples=9, before=Statistics(**NOTHING), after=after)
+
+
+def evaluation_of(runs: list[EvaluatedRun], **changes: Any) -> Evaluation:
+    pooled = Pooled(
+        before=Statistics(mean_dph=0.0, std_dph=0.01, rms_dph=0.01, max_abs_dph=0.03),
+        after=Statistics(mean_dph=0.0, std_dph=0.001, rms_dph=0.001, max_abs_dph=0.003),
+        improvement=10.0,
+        samples=1000,
+    )
+    role = "exam" if any(run.role == "exam" for run in runs) else "train"
+    content: dict[str, Any] = {
+        "gyrotc_version": "0", "serial": "RLG-0042", "axis": None, "numeric": "f32", "block_s": 10.0,
+        "average_s": 100.0, "noise_floor_dph": 0.001, "noise_floor_source": "estimated", "mismatches": 0,
+        "runs": tuple(runs), "train": None, "exam": None, "findings": (),
+        "model": ModelSizes(
+            method="mrbf", centers=4, table_bytes=104, rom_bytes=None, ram_bytes=None, sizes_on=None,
+            sum_abs_weights_dph=0.02,
+        ),
+        role: pooled,
+    }  # fmt: skip
+    return Evaluation(**(content | changes))
+
+
+@pytest.mark.parametrize("worst", range(3))
+@pytest.mark.parametrize("name", OF_RUNS)
+@pytest.mark.parametrize("role", ["exam", "train"])
+def test_a_limit_of_the_worst_run_sees_the_worst_one_wherever_it_is(
+    role: Literal["train", "exam"], name: str, worst: int, model_dict: dict[str, Any]
+) -> None:
+    runs = [evaluated(role, **{name: 3.0 if k == worst else 1.0}) for k in range(3)]
+    others = [evaluated("train", **{name: 99.0})] if role == "exam" else []
+    limits = Limits(schema=1, at_most=AtMost(**{name: 2.0}), decision_rule="simple_acceptance")
+    for made in (evaluation_of([*runs, *others]), evaluation_of([*others, *runs])):
+        (one,) = held_against(limits, Model.from_dict(model_dict), made, None).limits
+        assert (one.measured, one.verdict) == (3.0, "FAIL")
+
+
+@pytest.mark.parametrize("worst", range(3))
+def test_the_uncertainty_of_the_worst_run_is_that_of_the_worst_one(worst: int) -> None:
+    """RMS of m normal windows: its relative standard uncertainty is 1/√(2m)."""
+    rng = np.random.default_rng(worst)
+    averages, runs = [], []
+    for k in range(3):
+        n = 72 * (k + 1)  # of 100 s: 2, 4 and 6 hours
+        after = rng.normal(size=n) * (5.0 if k == worst else 1.0)
+        one = Averages(100.0 * (np.arange(n) + 0.5), after, after, np.zeros(n))
+        averages.append(one)
+        runs.append(evaluated("exam", **time_statistics(one, 100.0)))
+    found = figure_uncertainties(averages, runs, 100.0)
+    windows = {"rms_30min_dph": 4 * (worst + 1), "angle_1h_arcsec": 2 * (worst + 1), "first_10min_rms_dph": 6}
+    for name, count in windows.items():
+        value = getattr(runs[worst].after, name)
+        assert found[name].standard == pytest.approx(value / np.sqrt(2.0 * count)), name
+        assert found[name].freedom == count
+
+
+FLOOR = 1e-3
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    folder = tmp_path_factory.mktemp("runs") / "RLG-1"
+    write_csv(folder / "a.csv", columns(120))
+    (folder / "dataset.toml").write_text(toml('file = "a.csv"', head='schema = 1\nserial = "A"\nearth_rate = "none"'))
+    return load(folder)
+
+
+def outlier_files(dataset: Dataset, model: dict[str, Any], means: list[float], stds: list[float]) -> list[str]:
+    runs = [
+        {
+            "file": f"{k}.csv",
+            "samples": 100,
+            "after": {"mean_dph": m, "std_dph": s, "rms_dph": float(np.hypot(m, s)), "max_abs_dph": 1.0},
+        }
+        for k, (m, s) in enumerate(zip(means, stds, strict=True))
+    ]
+    result = {"noise_floor_dph": FLOOR, "runs": runs, "train": None, "exam": None}
+    found = findings_of(dataset, [], [], Model.from_dict(model), result)
+    return [str(f.file) for f in found if f.id == "run_outlier"]
+
+
+@pytest.mark.parametrize("place", [0, 3, 6])
+@pytest.mark.parametrize(
+    ("spread", "threshold"),
+    [
+        (0.05 * FLOOR, FLOOR),  # six scatters of the others are less than the noise floor, which then decides
+        (0.5 * FLOOR, 6.0 * 1.4826 * 0.5 * FLOOR),  # six scatters are more
+    ],
+)
+def test_a_run_is_an_outlier_beyond_six_scatters_and_beyond_the_floor(
+    spread: float, threshold: float, place: int, dataset: Dataset, model_dict: dict[str, Any]
+) -> None:
+    """Of the others four lie at ±spread and two between: median 0, median absolute deviation of all the spread."""
+    for factor, expected in ((1.05, [f"{place}.csv"]), (0.95, [])):
+        for sign in (1.0, -1.0):
+            means = [spread, -spread, 0.0, spread, -spread, 0.0]
+            means.insert(place, sign * factor * threshold)
+            assert outlier_files(dataset, model_dict, means, [FLOOR] * 7) == expected
+
+
+@pytest.mark.parametrize("place", [0, 2, 4])
+@pytest.mark.parametrize(("usual", "threshold"), [(0.2 * FLOOR, 3.0 * FLOOR), (2.0 * FLOOR, 6.0 * FLOOR)])
+def test_a_run_is_an_outlier_with_three_times_the_scatter_of_the_others_or_of_the_floor(
+    usual: float, threshold: float, place: int, dataset: Dataset, model_dict: dict[str, Any]
+) -> None:
+    for factor, expected in ((1.05, [f"{place}.csv"]), (0.95, [])):
+        stds = [usual] * 4
+        stds.insert(place, factor * threshold)
+        assert outlier_files(dataset, model_dict, [0.0] * 5, stds) == expected
+
+
+def training_like(samples: int) -> Any:
+    return SimpleNamespace(noise_floor_dph=FLOOR, samples=samples, block_s=10.0, average_s=100.0)
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(1.05, True), (0.95, False)])
+@pytest.mark.parametrize("source", ["estimated", "simulated"])
+def test_unseen_history_is_in_the_budget_only_beyond_two_standard_errors(
+    source: Literal["estimated", "simulated"], factor: float, shown: bool, model_dict: dict[str, Any]
+) -> None:
+    """RMS² of what was left out less floor² and the table's sigma², against its standard error by hand."""
+    samples, sigma, standard = 3000, 3e-4, 4e-5
+    of_floor = 0.0 if source == "simulated" else np.sqrt(0.75 / (samples * 10.0 / 100.0))
+    known, low, high = FLOOR**2 + sigma**2, 1e-3, 5e-3
+    for _ in range(60):  # the RMS whose excess is `factor` times two standard errors, by bisection
+        rms = 0.5 * (low + high)
+        error = np.hypot(2.0 * rms * standard, 2.0 * FLOOR**2 * of_floor)
+        low, high = (low, rms) if rms**2 - known > factor * 2.0 * error else (rms, high)
+    figures = Statistics(mean_dph=0.0, std_dph=rms, rms_dph=rms, max_abs_dph=5e-3)
+    exam = Pooled(before=figures, after=figures, improvement=1.0, samples=100)
+    made = evaluation_of(
+        [evaluated("exam"), evaluated("train")],
+        exam=exam,
+        noise_floor_source=source,
+        sigma_rms_dph=sigma,
+        uncertainty={"rms_dph": FigureUncertainty(standard=standard, freedom=20.0, method="by hand")},
+    )
+    budget = budget_of(Model.from_dict(model_dict), training_like(samples), made, None)
+    (unseen,) = (one for one in budget.contributions if one.id == "unseen")
+    assert unseen.contribution_dph == pytest.approx(np.sqrt(rms**2 - known) if shown else 0.0)
+
+
+def test_statistics_are_those_of_numpy() -> None:
+    x = np.array([3.0, -5.0, 1.0])
+    assert statistics(x) == pytest.approx(
+        {"mean_dph": x.mean(), "std_dph": np.std(x), "rms_dph": np.sqrt(35.0 / 3.0), "max_abs_dph": 5.0}
+    )

@@ -1,0 +1,159 @@
+"""The sigma that a table states, against the errors of simulated gyros whose true bias is known.
+
+Neither half nor double is accepted, for every training method, with offsets between runs, with a lot, and for what is
+added when a channel or the state of a term is lost. The truth is the simulated bias; numpy does the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from gyrotc.jobs.lot import lot_from
+from gyrotc.train.data import TrainingData
+from gyrotc.train.methods import METHODS, fit
+from gyrotc.train.prior.learn import Learned, learn
+from gyrotc.train.prior.unit_means import UnitMeans
+from gyrotc.train.prior.use import LotPrior, prior_of
+from gyrotc.train.result import Fit, predict
+from gyrotc.train.uncertainty import start_sigma, uncertainty
+from numpy.typing import NDArray
+from training_data import samples, true_bias
+
+Floats = NDArray[np.float64]
+CELLS = (6, 4)
+GYROS = 5
+FACTOR = 2.0
+"""A stated sigma may be smaller or larger than the error by less than this."""
+
+
+def gyro(seed: int, between_dph: float) -> TrainingData:
+    """Six runs of four hours; each has an offset of its own."""
+    rng = np.random.default_rng(seed)
+    halves = [samples(10 * seed + k) for k in range(2)]
+    offset = rng.normal(0.0, between_dph, (2, 3))
+    halves = [
+        replace(half, run=half.run + 3 * k, bias_dph=half.bias_dph + offset[k][half.run])
+        for k, half in enumerate(halves)
+    ]
+    names = TrainingData.__dataclass_fields__
+    return TrainingData(*(np.concatenate([getattr(half, name) for half in halves]) for name in names))
+
+
+def stated_at(data: TrainingData, known: dict[str, Any], found: Fit) -> Floats:
+    """The table's sigma at every sample: that of its cell of the envelope, by the formula of docs/numerics.md."""
+    columns, rows = known["cells"]
+    at = []
+    for x, (low, high), n in (
+        (data.temperature_c, found.scaling.temperature_c, columns),
+        (data.slope_c_per_min, found.scaling.slope_c_per_min, rows),
+    ):
+        at.append(np.clip(np.floor((x - low) / (high - low) * n), 0, n - 1).astype(int))
+    return np.asarray(np.array(known["rows"])[at[1], at[0]])
+
+
+def error_over_sigma(data: TrainingData, found: Fit, between_dph: float) -> float:
+    """Mean square error in the next run over the mean variance that is stated for it."""
+    sigma = stated_at(data, uncertainty(data, found, CELLS), found)
+    error = predict(found, data.temperature_c, data.slope_c_per_min)
+    error -= true_bias(data.temperature_c, data.slope_c_per_min)
+    return float((np.mean(error**2) + between_dph**2) / np.mean(sigma**2))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_method_states_the_error_that_it_makes(method: str) -> None:
+    """A map that cannot follow the bias, such as a constant, has an error far above its noise and must say so."""
+    gyros = [gyro(seed, 0.0) for seed in range(GYROS)]
+    ratios = [error_over_sigma(data, fit(data, method=method), 0.0) for data in gyros]
+    assert 1.0 / FACTOR < np.sqrt(np.mean(ratios)) < FACTOR, ratios
+
+
+@pytest.mark.parametrize("method", ["constant", "cubic_slope", "mrbf"])
+def test_an_offset_of_each_run_is_in_what_is_stated_for_the_next_one(method: str) -> None:
+    between = 6e-4
+    gyros = [gyro(50 + seed, between) for seed in range(2 * GYROS)]
+    ratios = [error_over_sigma(data, fit(data, method=method), between) for data in gyros]
+    assert 1.0 / FACTOR < np.sqrt(np.mean(ratios)) < FACTOR, ratios
+
+
+@pytest.mark.parametrize("offset_dph", [0.0, 6e-4])
+def test_the_rule_of_the_scatter_between_runs_is_its_true_size(offset_dph: float) -> None:
+    """What a field re-zero and a budget take from the table; six runs tell it to a third."""
+    found = [
+        uncertainty(data, fit(data), CELLS)["rules"]["between_dph"]
+        for data in (gyro(80 + seed, offset_dph) for seed in range(2 * GYROS))
+    ]
+    low, high = (offset_dph / FACTOR, FACTOR * offset_dph) if offset_dph else (0.0, 2e-4)
+    assert low <= np.sqrt(np.mean(np.square(found))) <= high, found
+
+
+ENVELOPE = ((-40.0, 60.0), (-4.2, 4.2))
+
+
+@cache
+def learnt_units() -> tuple[list[UnitMeans], Learned]:
+    """Sixteen units with the bias of `true_bias` and an offset of their own, calibrated all over the envelope."""
+    rng = np.random.default_rng(4)
+    units = []
+    for _ in range(16):
+        t, r = rng.uniform(*ENVELOPE[0], 300), rng.uniform(*ENVELOPE[1], 300)
+        bias = true_bias(t, r) + 2e-4 * rng.normal() + 7e-4 * rng.normal(size=300)
+        units.append(UnitMeans(t, r, bias, np.ones(300), 7e-4))
+    return units, learn(units, ENVELOPE, lambda _: None)
+
+
+def lot(between_dph: float) -> LotPrior:
+    units, learnt = learnt_units()
+    names = [(f"U{k}", "0" * 64) for k in range(len(units))]
+    return prior_of(lot_from(names, units, learnt, ENVELOPE, between_dph=between_dph))
+
+
+@pytest.mark.parametrize("between_dph", [0.0, 5e-4])
+def test_with_a_lot_the_scatter_between_runs_of_its_units_is_stated(between_dph: float) -> None:
+    """One run of a unit does not show how much the next one differs; its lot knows."""
+    prior = lot(between_dph)
+    ratios = []
+    for seed in range(GYROS):
+        rng = np.random.default_rng(seed)
+        own, runs = 2e-4 * rng.normal(), samples(seed)
+        one = runs.select(runs.run == 1)
+        one = replace(one, bias_dph=one.bias_dph + own)
+        found = fit(one, prior=prior)
+        assert found.lot is not None and found.lot.accepted
+        sigma = stated_at(one, uncertainty(one, found, CELLS), found)
+        error = predict(found, one.temperature_c, one.slope_c_per_min)
+        error -= true_bias(one.temperature_c, one.slope_c_per_min) + own
+        ratios.append((np.mean(error**2) + between_dph**2) / np.mean(sigma**2))
+    assert 1.0 / FACTOR < np.sqrt(np.mean(ratios)) < FACTOR, ratios
+
+
+def test_a_lost_channel_may_be_off_by_what_it_differed_in_training() -> None:
+    rng = np.random.default_rng(6)
+    volts = 12.0 + rng.normal(0.3, 0.5, 5000)
+    parameters = {"slope_dph_per_unit": -2e-3, "reference": 12.0}
+    stated = start_sigma("auxiliary", parameters, {}, samples(0), channel=[volts[:900], volts[900:]])
+    assert stated == pytest.approx(2e-3 * np.sqrt(np.mean((volts - 12.0) ** 2)))
+
+
+def lagged(x: Floats, step_s: float, tau_s: float, start: float) -> Floats:
+    """First-order lag of a temperature, from a state on."""
+    state, followed = start, []
+    for value in x:
+        state += (1.0 - np.exp(-step_s / tau_s)) * (value - state)
+        followed.append(state)
+    return np.array(followed)
+
+
+def test_a_memory_may_begin_as_far_from_the_temperature_as_it_was_in_training() -> None:
+    data, tau_s, amplitude = samples(2), 1200.0, 3e-3
+    away = []
+    for run in range(3):
+        t = data.temperature_c[data.run == run]
+        away.append(lagged(t, 10.0, tau_s, t[0]) - t)
+    expected = amplitude * np.sqrt(np.mean(np.concatenate(away) ** 2))
+    parameters = {"tau_s": tau_s, "amplitude_dph_per_c": amplitude}
+    stated = start_sigma("thermal_gradient", parameters, {}, data)
+    assert stated == pytest.approx(expected, rel=1e-6)
