@@ -1,0 +1,320 @@
+"""Figures of the page, the certificate, the terminal and JSON, against values computed here from the recordings.
+
+pandas reads the recordings and the traces and makes the means; numpy and allantools do the statistics. Each series of a
+picture is found by its colour and the words of the legend, and compared with the data that it claims to show.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import allantools
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import run_gyrotc
+from gyrotc.model import load_model
+from numpy.typing import NDArray
+from read_pictures import PanelRead, number, panels_of, pictures_of, tables_of
+from scipy.spatial import cKDTree
+
+Floats = NDArray[np.float64]
+
+AVERAGE_S = 100.0
+NOT_CORRECTED = 8
+"""Status bit of rows before the first correction (docs/numerics.md): they are in the picture over time alone."""
+NEAR = 0.11
+"""Points of a picture: places are rounded to a tenth, and those of dots to half a point."""
+REST_C_PER_MIN = 0.1
+RUNS = tuple(f"run-{k:02d}.csv" for k in range(1, 13))
+EXAM = RUNS[6:]
+
+
+def averaged(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means over 100 s from the first row on."""
+    cell = np.floor((rows["time_s"] - rows["time_s"].iloc[0]) / AVERAGE_S + 1e-9)
+    return rows.groupby(cell).mean()
+
+
+@cache
+def run_of(folder: Path, file: str) -> pd.DataFrame:
+    """Rows of a recording with the correction of the trace, and what remains."""
+    recorded = pd.read_csv(folder / "data" / file)
+    trace = pd.read_csv(folder / "result" / "trace" / file)
+    assert np.array_equal(recorded["time_s"], trace["time_s"]), "a row of the trace for each of the recording"
+    rows = recorded.assign(status=trace["status"], bias_dph=trace["bias_dph"])
+    return rows.assign(remains_dph=rows["rate_dph"] - rows["bias_dph"])
+
+
+@cache
+def means_of(folder: Path, file: str, *, corrected: bool = True) -> pd.DataFrame:
+    rows = run_of(folder, file)
+    if corrected:
+        cell = np.floor((rows["time_s"] - rows["time_s"].iloc[0]) / AVERAGE_S + 1e-9)
+        judged = (rows["status"] & NOT_CORRECTED) == 0
+        return rows[judged].groupby(cell[judged]).mean()
+    return averaged(rows)
+
+
+def pooled(folder: Path, files: tuple[str, ...], column: str) -> Floats:
+    return np.concatenate([means_of(folder, file)[column].to_numpy() for file in files])
+
+
+def statistics(x: Floats) -> dict[str, float]:
+    return {
+        "rms_dph": float(np.sqrt(np.mean(x**2))),
+        "std_dph": float(np.std(x)),
+        "mean_dph": float(np.mean(x)),
+        "max_abs_dph": float(np.abs(x).max()),
+    }
+
+
+@pytest.fixture(scope="module")
+def page(demo: Path) -> str:
+    return (demo / "result" / "report.html").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def evaluation(demo: Path) -> dict[str, Any]:
+    return dict(json.loads((demo / "result" / "evaluate.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def training(demo: Path) -> dict[str, Any]:
+    return dict(json.loads((demo / "result" / "training.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def panels(page: str) -> list[PanelRead]:
+    return [panel for picture in pictures_of(page) for panel in panels_of(picture)]
+
+
+def table_with(page: str, heading: str) -> list[list[str]]:
+    (found,) = (t for t in tables_of(page) if any(heading in cell for cell in t[0]))
+    return found
+
+
+def row_of(table: list[list[str]], *names: str) -> list[str]:
+    (found,) = (row for row in table if tuple(row[: len(names)]) == names)
+    return found
+
+
+def digits(text: str, value: float, *, share: float = 6e-3) -> bool:
+    """Whether a text of three digits (two: share 6e-2) says a value."""
+    return number(text) == pytest.approx(value, rel=share)
+
+
+@pytest.mark.parametrize("files", [EXAM, RUNS[:6]], ids=["exam", "train"])
+def test_json_has_the_statistics_of_the_recordings(demo: Path, evaluation: dict[str, Any], files: Any) -> None:
+    role = "exam" if files is EXAM else "train"
+    before, after = pooled(demo, files, "rate_dph"), pooled(demo, files, "remains_dph")
+    stated = evaluation[role]
+    assert stated["samples"] == after.size
+    assert stated["before"] == pytest.approx(statistics(before), rel=1e-6, abs=1e-9)
+    assert stated["after"] == pytest.approx(statistics(after), rel=1e-4, abs=1e-8)
+    expected = statistics(before)["rms_dph"] / statistics(after)["rms_dph"]
+    assert stated["improvement"] == pytest.approx(expected, rel=1e-4)
+    for run in (r for r in evaluation["runs"] if r["role"] == role):
+        own = means_of(demo, run["file"])
+        for side, column in (("before", "rate_dph"), ("after", "remains_dph")):
+            expected_of = statistics(own[column].to_numpy())
+            assert {k: run[side][k] for k in expected_of} == pytest.approx(expected_of, rel=1e-4, abs=1e-8)
+
+
+def test_the_page_says_how_many_times_smaller_the_rms_and_the_scatter_became(demo: Path, page: str) -> None:
+    before, after = statistics(pooled(demo, EXAM, "rate_dph")), statistics(pooled(demo, EXAM, "remains_dph"))
+    table = table_with(page, "before ÷ after")
+    for name, key in (("RMS, the mean included", "rms_dph"), ("standard deviation about the mean", "std_dph")):
+        row = row_of(table, name)
+        assert digits(row[1], before[key]) and digits(row[2], after[key], share=0.06), row
+        assert digits(row[3], before[key] / after[key]), row
+    assert digits(row_of(table, "mean")[1], before["mean_dph"])
+    assert digits(row_of(table, "largest magnitude")[1], before["max_abs_dph"])
+    assert digits(row_of(table, "largest magnitude")[2], after["max_abs_dph"], share=0.06)
+    for label, key in (("RMS, the mean included", "rms_dph"), ("standard deviation about the mean", "std_dph")):
+        shown = re.search(rf'class="value">([^<]*)</div><div class="label">{label}</div>', page)
+        assert shown and digits(shown[1], before[key] / after[key])
+
+
+def test_the_page_says_of_each_run_what_its_recording_gives(demo: Path, page: str, evaluation: dict[str, Any]) -> None:
+    table = table_with(page, "angle in 1 h, arcsec")
+    for run in evaluation["runs"]:
+        own = means_of(demo, run["file"])
+        before, after = statistics(own["rate_dph"].to_numpy()), statistics(own["remains_dph"].to_numpy())
+        row = row_of(table, run["file"])
+        assert row[1] == run["role"] and int(row[3]) == len(own)
+        assert digits(row[4], before["rms_dph"]) and digits(row[5], after["rms_dph"]), row
+        assert digits(row[6], after["std_dph"]) and digits(row[8], after["max_abs_dph"], share=0.06), row
+        hours = own["remains_dph"].groupby(np.floor((own["time_s"] - own["time_s"].iloc[0]) / 3600.0 + 1e-9))
+        angle = 3600.0 * hours.mean()[hours.count() >= 0.9 * 36]  # 1 deg/h is 1 arcsec/s
+        assert digits(row[9], float(np.sqrt(np.mean(angle**2)))), row
+
+
+def test_the_noise_floor_is_the_allan_deviation_at_the_averaging_time(demo: Path, page: str) -> None:
+    """Of the corrected training runs; allantools gives each run's, pooled here by the number of differences."""
+    squares, weights = [], []
+    for file in RUNS[:6]:
+        remains = run_of(demo, file)["remains_dph"].to_numpy()[10:]
+        _, deviation, _, n = allantools.oadev(remains, rate=0.1, data_type="freq", taus=[AVERAGE_S])
+        squares.append(deviation[0] ** 2)
+        weights.append(n[0])
+    expected = float(np.sqrt(np.average(squares, weights=weights)))
+    table = table_with(page, "of the bias before compensation")
+    (row,) = (r for r in table if r[0].startswith("noise floor of 100 s means"))
+    assert digits(row[1], expected, share=0.05)
+
+
+def test_slopes_of_the_bias_are_those_of_a_plane(demo: Path, page: str) -> None:
+    """By least squares over means of the training runs; the target sees dT/dt with a lag, hence the tolerance."""
+    means = [means_of(demo, file) for file in RUNS[:6]]
+    slope = np.concatenate([np.gradient(m["temperature_c"], m["time_s"] / 60.0) for m in means])
+    t, rate = (np.concatenate([m[name] for m in means]) for name in ("temperature_c", "rate_dph"))
+    columns = np.column_stack([np.ones_like(t), t, slope])
+    plane, *_ = np.linalg.lstsq(columns, rate, rcond=None)
+    table = table_with(page, "of the bias before compensation")
+    assert digits(row_of(table, "slope in temperature, deg/h/C")[1], plane[1], share=0.05)
+    assert digits(row_of(table, "slope in temperature rate, deg/h/(C/min)")[1], plane[2], share=0.1)
+
+
+def test_candidates_are_compared_with_a_constant_the_right_way_round(page: str, training: dict[str, Any]) -> None:
+    """A constant leaves so many times what this correction leaves: above 1 for a better one."""
+    table = table_with(page, "a constant leaves")[1:]
+    assert len(table) == len(training["candidates"])
+    rms = {row["id"]: row["left_out_rms_dph"] for row in training["candidates"]}
+    for cells, row in zip(table, training["candidates"], strict=True):
+        assert digits(cells[1], row["left_out_rms_dph"], share=0.06)
+        assert digits(cells[2], rms["constant"] / row["left_out_rms_dph"], share=0.05)
+        assert (cells[4] == "chosen") == row["chosen"]
+
+
+def test_the_terminal_says_the_same(demo: Path) -> None:
+    text = (demo / "printed.txt").read_text()
+    before, after = statistics(pooled(demo, EXAM, "rate_dph")), statistics(pooled(demo, EXAM, "remains_dph"))
+    about_zero = re.search(r"improvement about zero ([\d.]+)", text)
+    about_mean = re.search(r"about the mean ([\d.]+)", text)
+    alone = re.search(r"a constant alone: ([\d.]+)", text)
+    assert about_zero and about_mean and alone
+    assert float(about_zero[1]) == pytest.approx(before["rms_dph"] / after["rms_dph"], abs=0.006)
+    assert float(about_mean[1]) == pytest.approx(before["std_dph"] / after["std_dph"], abs=0.006)
+    constant = pooled(demo, RUNS[:6], "rate_dph").mean()  # of the training runs
+    left = np.sqrt(np.mean((pooled(demo, EXAM, "rate_dph") - constant) ** 2))
+    assert float(alone[1]) == pytest.approx(before["rms_dph"] / left, abs=0.02)
+    for file in RUNS:
+        (line,) = (x for x in text.splitlines() if x.strip().startswith(file))
+        own, cells = means_of(demo, file), line.split()
+        assert digits(cells[-4], statistics(own["rate_dph"].to_numpy())["rms_dph"]), line
+        assert digits(cells[-3], statistics(own["remains_dph"].to_numpy())["rms_dph"]), line
+        assert digits(cells[-2], statistics(own["remains_dph"].to_numpy())["std_dph"]), line
+        assert int(cells[-1]) == len(own)
+
+
+def test_the_bias_over_time_shows_measured_and_compensated_means(
+    demo: Path, panels: list[PanelRead], evaluation: dict[str, Any]
+) -> None:
+    for run in evaluation["runs"]:
+        (panel,) = (p for p in panels if p.title == f"{run['environment']} ({run['role']})")
+        means = means_of(demo, run["file"], corrected=False)
+        hours = (means["time_s"] - means["time_s"].iloc[0]).to_numpy() / 3600.0
+        lines = {s.colour: s for s in panel.series if s.kind == "line"}
+        assert panel.pixels_off(lines["before"], hours, means["rate_dph"].to_numpy()) < NEAR
+        assert panel.pixels_off(lines["after"], hours, means["remains_dph"].to_numpy()) < NEAR
+        labels = {s.label for s in lines.values()} - {""}
+        assert not labels or (lines["before"].label, lines["after"].label) == ("measured", "compensated")
+
+
+def drawn_on(panel: PanelRead, colour: str, x: Floats, y: Floats, label: str | None = None) -> None:
+    """Each dot of a colour is at a place of the data, and each of these has a dot."""
+    (dots,) = (s for s in panel.series if s.kind == "dots" and s.colour == colour and label in (None, s.label))
+    wanted = panel.places(x, y)
+    for some, others in ((dots.pixels, wanted), (wanted, dots.pixels)):
+        away, _ = cKDTree(others).query(some, p=np.inf)
+        assert away.max() < 0.25 + NEAR, panel.title
+
+
+def test_the_bias_over_temperature_shows_each_branch_before_and_after(demo: Path, panels: list[PanelRead]) -> None:
+    means = [means_of(demo, file, corrected=False) for file in RUNS]
+    t, before, after = (np.concatenate([m[c] for m in means]) for c in ("temperature_c", "rate_dph", "remains_dph"))
+    slope = np.concatenate([np.gradient(m["temperature_c"], m["time_s"] / 60.0) for m in means])
+    held, heating, cooling = np.abs(slope) <= REST_C_PER_MIN, slope > REST_C_PER_MIN, slope < -REST_C_PER_MIN
+    by_title = {panel.title: panel for panel in panels}
+    branches = (("covered", held), ("before", heating), ("after", cooling))
+    for colour, of in branches:
+        label = {"covered": "held", "before": "heating", "after": "cooling"}[colour]
+        drawn_on(by_title["measured, and the map"], colour, t[of], before[of], label)
+        drawn_on(by_title["what remains, over temperature"], colour, t[of], after[of])
+        drawn_on(by_title["what remains, over dT/dt"], colour, slope[of], after[of])
+    both = by_title["before and after, on one scale"]
+    drawn_on(both, "covered", t, before, "before")
+    for colour, label, of in (
+        ("accent", "after, held", held),
+        ("before", "after, heating", heating),
+        ("after", "after, cooling", cooling),
+    ):
+        drawn_on(both, colour, t[of], after[of], label)
+    model = load_model(demo / "result" / "model.json")
+    first = by_title["measured, and the map"]
+    line = first.labelled("map at rest")
+    assert first.pixels_off(line, line.x, model.map_dph(line.x, 0.0 * line.x)) < 2 * NEAR
+    for of in (heating, cooling):
+        rate = float(np.median(slope[of]))
+        line = first.labelled(f"map at {rate:+.2g} C/min".replace("-", "−"))
+        assert first.pixels_off(line, line.x, model.map_dph(line.x, np.full(line.x.size, rate))) < 2 * NEAR
+
+
+def test_cuts_through_the_map_are_those_of_the_model(demo: Path, panels: list[PanelRead]) -> None:
+    model = load_model(demo / "result" / "model.json")
+    (cuts,) = (p for p in panels if p.title == "cuts through the map")
+    rates = np.linspace(*model.envelope.slope_c_per_min, 3)
+    assert len(cuts.series) == 3
+    for rate in rates:
+        line = cuts.labelled(f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−"))
+        assert cuts.pixels_off(line, line.x, model.map_dph(line.x, np.full(line.x.size, rate))) < 2 * NEAR
+
+
+def test_the_allan_picture_shows_the_deviation_of_what_remains(demo: Path, panels: list[PanelRead]) -> None:
+    (panel,) = (p for p in panels if p.x.words.startswith("averaging time"))
+    line = panel.labelled("compensated training records")
+    taus = 10.0 * 2.0 ** np.arange(len(line.x))
+    squares, weights = np.zeros(len(taus)), np.zeros(len(taus))
+    for file in RUNS[:6]:
+        remains = run_of(demo, file)["remains_dph"].to_numpy()[10:]
+        found, deviation, _, n = allantools.oadev(remains, rate=0.1, data_type="freq", taus=taus)
+        squares[: len(found)] += n * deviation**2
+        weights[: len(found)] += n
+    assert line.x == pytest.approx(taus, rel=0.02)
+    assert line.y[:8] == pytest.approx(np.sqrt(squares / weights)[:8], rel=0.1)
+    (arw,) = (s for s in panel.series if s.label.startswith("N = "))
+    assert arw.y == pytest.approx(60.0 * number(arw.label[4:]) / np.sqrt(arw.x), rel=0.03)
+
+
+def test_a_certificate_says_what_the_recordings_give(demo: Path, tmp_path: Path) -> None:
+    """A build with limits; each figure of the certificate, before its ±, is that of the exam runs."""
+    limits = tmp_path / "limits.toml"
+    names = ("rms_dph", "std_dph", "max_abs_dph")
+    limits.write_text("schema = 1\n[at_most]\n" + "".join(f"{name} = 1.0\n" for name in names))
+    out = tmp_path / "out"
+    build = ("build", demo / "data", "--out", out, "--numeric", "f32", "--target", "host-gcc-O2", "--limits", limits)
+    done = run_gyrotc(*build)
+    assert done.returncode == 0, done.stderr
+    done = run_gyrotc("certificate", out, "--out", tmp_path / "cert", "--draft")
+    assert done.returncode == 0, done.stderr
+    table = table_with((tmp_path / "cert" / "certificate.html").read_text("utf-8"), "measured ± U")
+    after = statistics(pooled(demo, EXAM, "remains_dph"))
+    known = json.loads((out / "evaluate.json").read_text())["uncertainty"]
+    shown = {name: cells for cells in table[1:] for name in names if LIMIT_WORDS[name] in cells[0]}
+    assert set(shown) == set(names), table
+    for name, cells in shown.items():
+        assert digits(cells[1], after[name], share=0.06), cells
+        spread = cells[1].split("±")[1]
+        expanded = float(cells[2]) * known[name]["standard"]
+        exponent = re.search(r"10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", spread)
+        scale = number("1·" + exponent[0]) if exponent else 1.0
+        assert float(re.findall(r"[\d.]+", spread)[0]) * scale == pytest.approx(expanded, rel=0.06), cells
+        assert cells[4] == "PASS"
+
+
+LIMIT_WORDS = {"rms_dph": "RMS", "std_dph": "standard deviation", "max_abs_dph": "largest"}
