@@ -10,6 +10,7 @@ from .certification import LaboratoryFacts as LaboratoryFacts
 from .certification import certificate as certificate
 from .certification import laboratory_facts as laboratory_facts
 from .certification import missing_facts as missing_facts
+from .certification import reason_of_release as reason_of_release
 from .certification import unit_of as unit_of
 from .diagnosis import extended_scenario as extended_scenario
 from .lot import checksum_of as checksum_of

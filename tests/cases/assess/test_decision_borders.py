@@ -13,16 +13,21 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from gyrotc.assess.budget import budget_of, figure_uncertainties
-from gyrotc.assess.findings import findings_of
-from gyrotc.assess.limits import AtMost, Limits, decided, held_against, worst_of
-from gyrotc.common.errors import InputError
-from gyrotc.common.metrics import Averages, statistics, time_statistics
-from gyrotc.jobs.certificate import reason_of_release
+from gyrotc.assess import (
+    AtMost,
+    Limits,
+    budget_of,
+    decided,
+    figure_uncertainties,
+    findings_of,
+    held_against,
+    worst_of,
+)
+from gyrotc.common import Averages, InputError, statistics_of, time_statistics
+from gyrotc.jobs import reason_of_release
 from gyrotc.model import Model
-from gyrotc.recordings.load import load
-from gyrotc.recordings.records import Dataset
-from gyrotc.results.evaluation import (
+from gyrotc.recordings import Dataset, load
+from gyrotc.results import (
     EvaluatedRun,
     Evaluation,
     FigureUncertainty,
@@ -31,13 +36,12 @@ from gyrotc.results.evaluation import (
     RunStatistics,
     Statistics,
 )
-from gyrotc.results.release import DecisionRule, JudgedOn
 from recordings import columns, toml, write_csv
 from scipy import stats
 
 NEAR = 0.02
 """Share of a guard band or limit by which a case lies on its side."""
-RULES: tuple[DecisionRule, ...] = ("guard_band", "guard_band_binary", "simple_acceptance")
+RULES = ("guard_band", "guard_band_binary", "simple_acceptance")
 
 
 def k_of(freedom: float | None) -> float:
@@ -46,7 +50,7 @@ def k_of(freedom: float | None) -> float:
     return float(stats.norm.ppf(upper) if freedom is None else stats.t.ppf(upper, freedom))
 
 
-def verdict_of(measured: float, rule: DecisionRule, freedom: float | None, part: JudgedOn, sign: float) -> str:
+def verdict_of(measured: float, rule: Any, freedom: float | None, part: Any, sign: float) -> str:
     known = FigureUncertainty(standard=0.05, freedom=freedom, method="by hand")
     return decided("at_most.rms_dph", measured, 1.0, sign, rule, known, part).verdict or ""
 
@@ -55,7 +59,7 @@ def verdict_of(measured: float, rule: DecisionRule, freedom: float | None, part:
 @pytest.mark.parametrize("freedom", [None, 5.0, 12.0])
 @pytest.mark.parametrize("rule", RULES)
 def test_a_figure_is_decided_at_its_acceptance_limit_and_at_its_limit(
-    rule: DecisionRule, freedom: float | None, sign: float
+    rule: Any, freedom: float | None, sign: float
 ) -> None:
     """ILAC-G8:09/2019, 4.2: PASS up to the limit less U, FAIL beyond the limit, between them as the rule says."""
     band = 0.0 if rule == "simple_acceptance" else k_of(freedom) * 0.05
@@ -72,7 +76,7 @@ def test_a_figure_is_decided_at_its_acceptance_limit_and_at_its_limit(
 @pytest.mark.parametrize(("freedom", "expected"), [(4.9, "CONDITIONAL PASS"), (5.0, "PASS")])
 @pytest.mark.parametrize("rule", RULES)
 def test_an_uncertainty_of_fewer_than_five_degrees_of_freedom_gives_no_plain_pass(
-    rule: DecisionRule, freedom: float, expected: str
+    rule: Any, freedom: float, expected: str
 ) -> None:
     expected = "PASS" if rule == "simple_acceptance" else expected
     assert verdict_of(0.1, rule, freedom, "exam", 1.0) == expected
@@ -80,7 +84,7 @@ def test_an_uncertainty_of_fewer_than_five_degrees_of_freedom_gives_no_plain_pas
 
 @pytest.mark.parametrize(("part", "expected"), [("train", "CONDITIONAL PASS"), ("left_out", "PASS"), ("exam", "PASS")])
 @pytest.mark.parametrize("rule", RULES)
-def test_training_runs_alone_give_no_plain_pass(rule: DecisionRule, part: JudgedOn, expected: str) -> None:
+def test_training_runs_alone_give_no_plain_pass(rule: Any, part: Any, expected: str) -> None:
     assert verdict_of(0.1, rule, 30.0, part, 1.0) == expected
 
 
@@ -252,6 +256,6 @@ def test_unseen_history_is_in_the_budget_only_beyond_two_standard_errors(
 
 def test_statistics_are_those_of_numpy() -> None:
     x = np.array([3.0, -5.0, 1.0])
-    assert statistics(x) == pytest.approx(
+    assert statistics_of(x) == pytest.approx(
         {"mean_dph": x.mean(), "std_dph": np.std(x), "rms_dph": np.sqrt(35.0 / 3.0), "max_abs_dph": 5.0}
     )

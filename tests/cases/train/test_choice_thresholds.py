@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.train.data import Fold
-from gyrotc.train.selection import CANDIDATES, CandidateScores
+from gyrotc.train import CANDIDATES, CandidateScores, Fold
 from numpy.typing import NDArray
 from scipy import stats
 

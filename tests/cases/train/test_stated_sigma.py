@@ -12,14 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.jobs.lot import lot_from
-from gyrotc.train.data import TrainingData
-from gyrotc.train.methods import METHODS, fit
-from gyrotc.train.prior.learn import Learned, learn
-from gyrotc.train.prior.unit_means import UnitMeans
-from gyrotc.train.prior.use import LotPrior, prior_of
-from gyrotc.train.result import Fit, predict
-from gyrotc.train.uncertainty import start_sigma, uncertainty
+from gyrotc.jobs import lot_from
+from gyrotc.train import METHODS, Fit, TrainingData, fit, predict, start_sigma, uncertainty_of
+from gyrotc.train.prior import Learned, LotPrior, UnitMeans, learn_prior, prior_of
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 
@@ -57,7 +52,7 @@ def stated_at(data: TrainingData, known: dict[str, Any], found: Fit) -> Floats:
 
 def error_over_sigma(data: TrainingData, found: Fit, between_dph: float) -> float:
     """Mean square error in the next run over the mean variance that is stated for it."""
-    sigma = stated_at(data, uncertainty(data, found, CELLS), found)
+    sigma = stated_at(data, uncertainty_of(data, found, CELLS), found)
     error = predict(found, data.temperature_c, data.slope_c_per_min)
     error -= true_bias(data.temperature_c, data.slope_c_per_min)
     return float((np.mean(error**2) + between_dph**2) / np.mean(sigma**2))
@@ -83,7 +78,7 @@ def test_an_offset_of_each_run_is_in_what_is_stated_for_the_next_one(method: str
 def test_the_rule_of_the_scatter_between_runs_is_its_true_size(offset_dph: float) -> None:
     """What a field re-zero and a budget take from the table; six runs tell it to a third."""
     found = [
-        uncertainty(data, fit(data), CELLS)["rules"]["between_dph"]
+        uncertainty_of(data, fit(data), CELLS)["rules"]["between_dph"]
         for data in (gyro(80 + seed, offset_dph) for seed in range(2 * GYROS))
     ]
     low, high = (offset_dph / FACTOR, FACTOR * offset_dph) if offset_dph else (0.0, 2e-4)
@@ -102,7 +97,7 @@ def learnt_units() -> tuple[list[UnitMeans], Learned]:
         t, r = rng.uniform(*ENVELOPE[0], 300), rng.uniform(*ENVELOPE[1], 300)
         bias = true_bias(t, r) + 2e-4 * rng.normal() + 7e-4 * rng.normal(size=300)
         units.append(UnitMeans(t, r, bias, np.ones(300), 7e-4))
-    return units, learn(units, ENVELOPE, lambda _: None)
+    return units, learn_prior(units, ENVELOPE, lambda _: None)
 
 
 def lot(between_dph: float) -> LotPrior:
@@ -123,7 +118,7 @@ def test_with_a_lot_the_scatter_between_runs_of_its_units_is_stated(between_dph:
         one = replace(one, bias_dph=one.bias_dph + own)
         found = fit(one, prior=prior)
         assert found.lot is not None and found.lot.accepted
-        sigma = stated_at(one, uncertainty(one, found, CELLS), found)
+        sigma = stated_at(one, uncertainty_of(one, found, CELLS), found)
         error = predict(found, one.temperature_c, one.slope_c_per_min)
         error -= true_bias(one.temperature_c, one.slope_c_per_min) + own
         ratios.append((np.mean(error**2) + between_dph**2) / np.mean(sigma**2))
