@@ -7,6 +7,5 @@ docs/results.md from it.
 import sys
 from pathlib import Path
 
-sys.path.append(
-    str(Path(__file__).resolve().parents[1] / "tests" / "support")
-)  # recordings and builds that tests use too
+_TESTS = Path(__file__).resolve().parents[1] / "tests"
+sys.path += [str(_TESTS / "support"), str(_TESTS)]  # recordings and builds that tests use, too

@@ -230,7 +230,10 @@ def test_500_hostile_files_are_read_or_refused_within_limits(tmp_path: Path) -> 
     assert shutil.which("strace"), "strace is not installed: tools/setup.sh test installs it"
     command = ["strace", "-f", "-qq", "-e", "trace=%file", "-o", str(log), *command]
     (tmp_path / "work").mkdir()
-    environment = os.environ | {"PYTHONPATH": str(TESTS), "XDG_CACHE_HOME": str(tmp_path / "work" / "cache")}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join((str(TESTS), str(TESTS.parent))),
+        "XDG_CACHE_HOME": str(tmp_path / "work" / "cache"),
+    }
     done = subprocess.run(command, cwd=TESTS, env=environment, capture_output=True, text=True, check=False)
     results = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     assert len(results) == count, done.stderr[-2000:]
