@@ -383,10 +383,11 @@ def _channel_name(name: str, unit: str | None, native: str) -> str:
     """A plain name; with the ending of the unit that it is converted to, where its unit is known."""
     plain = "_".join(words_of_name(split_unit(name)[0])).encode("ascii", "ignore").decode() or "channel"
     endings = {"V": "v", "hPa": "hpa", "A": "ma", "uT": "ut", "degC": "c"}
-    if unit and native in endings and channel_unit(f"{plain}_{endings[native]}") is not None:
-        try:
-            conversion(unit, str(channel_unit(f"x_{endings[native]}")))
-        except UnitError:
-            return plain
-        return f"{plain}_{endings[native]}"
-    return plain
+    ending = f"_{endings[native]}" if native in endings else ""
+    if not unit or not ending or plain.endswith(ending) or channel_unit(plain + ending) is None:
+        return plain
+    try:
+        conversion(unit, str(channel_unit(f"x{ending}")))
+    except UnitError:
+        return plain
+    return plain + ending
