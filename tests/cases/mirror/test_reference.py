@@ -28,7 +28,7 @@ from gyrotc.mirror import table as layout
 from gyrotc.model import Term
 from gyrotc.tables.quantisation import NUMERICS, _limits, outside, quantise
 from libc_build import ROOT, UNGUARDED, runtime
-from models import bank_of, bank_with_channels, random_channels, random_history, random_model, random_terms
+from models import bank_of, bank_with_channels, random_history, random_model, random_terms
 
 COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
 BUILDS = [
@@ -55,43 +55,6 @@ def test_maps_agree_bit_for_bit(numeric: str, build: tuple[str, tuple[str, ...]]
     got_status, got_bits = c.maps(table, inputs)
     np.testing.assert_array_equal(status, got_status)
     np.testing.assert_array_equal(bits, got_bits)
-    assert c.out_of_range() == 0
-
-
-@pytest.mark.parametrize("numeric", NUMERICS)
-@pytest.mark.parametrize("seed", quick_and_slow(range(16), range(16, 40)))
-def test_histories_with_faults_agree_bit_for_bit(numeric: str, seed: int) -> None:
-    model = random_model(seed)
-    table = quantise(model, numeric)
-    samples_per_block = int(np.random.default_rng(seed).choice([1, 2, 3, 7, 10, 50]))
-    x, missed = random_history(model, seed, 1500, samples_per_block)
-    channels = table.encode_inputs(x[:, None])
-    want = replay(table, channels, missed=missed, samples_per_block=samples_per_block)
-    c = runtime("gcc", ("-O2", COUNTED))
-    status, bits = c.steps(table, channels, missed, samples_per_block)
-    np.testing.assert_array_equal(want.missed_status, status[:, 0])
-    np.testing.assert_array_equal(want.sample_status, status[:, 1])
-    np.testing.assert_array_equal(want.status, status[:, 2])
-    np.testing.assert_array_equal(want.bits, bits)
-    assert c.out_of_range() == 0
-
-
-@pytest.mark.parametrize("numeric", NUMERICS)
-@pytest.mark.parametrize("seed", quick_and_slow(range(16), range(16, 40)))
-def test_terms_agree_bit_for_bit(numeric: str, seed: int) -> None:
-    model = random_model(seed, terms=random_terms(seed))
-    table = quantise(model, numeric)
-    samples_per_block = int(np.random.default_rng(seed).choice([1, 2, 7, 50]))
-    x, missed = random_history(model, seed, 1500, samples_per_block)
-    missed[700] = 10**6
-    channels = table.encode_inputs(np.column_stack([x, random_channels(model, seed, 1500)]))
-    want = replay(table, channels, missed=missed, samples_per_block=samples_per_block)
-    c = runtime("gcc", ("-O2", COUNTED))
-    assert c.check(table) == 0
-    status, bits = c.steps(table, channels, missed, samples_per_block)
-    np.testing.assert_array_equal(want.sample_status, status[:, 1])
-    np.testing.assert_array_equal(want.status, status[:, 2])
-    np.testing.assert_array_equal(want.bits, bits)
     assert c.out_of_range() == 0
 
 

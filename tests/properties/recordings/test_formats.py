@@ -18,7 +18,6 @@ import xarray
 from conftest import run_gyrotc
 from drawn import examples
 from gyrotc import load
-from gyrotc.common.metrics import Averager
 from hypothesis import given
 from hypothesis import strategies as st
 from nptdms import ChannelObject, TdmsWriter
@@ -117,25 +116,3 @@ def test_every_format_of_the_same_numbers_gives_the_same_rows(name: str, table: 
     rounding = 1e-15 if name == "Excel" else 0.0  # openpyxl writes 16 digits
     for column, values in table.items():
         np.testing.assert_allclose(found[column], values, rtol=rounding, atol=0.0, err_msg=column)
-
-
-@examples(60)
-@given(data=st.data())
-def test_means_of_rows_that_come_in_parts_are_those_of_the_whole(data: st.DataObject) -> None:
-    """Also with rows that count nowhere, gaps, and parts of one row."""
-    n = data.draw(st.integers(2, 200))
-    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
-    time = np.cumsum(rng.choice([1.0, 1.0, 1.0, 25.0], n))
-    temperature, before, after = rng.normal(0.0, 1.0, (3, n))
-    used = rng.random(n) < 0.8
-    cuts = sorted(data.draw(st.sets(st.integers(0, n), max_size=8)))
-    means = []
-    for ends in ([], cuts):
-        averager = Averager(time, 10.0)
-        for start, end in zip([0, *ends], [*ends, n], strict=True):
-            part = slice(start, end)
-            averager.add(time[part], temperature[part], before[part], after[part], used[part])
-        means.append(averager.averages())
-    whole, parts = means
-    for name in ("time_s", "before_dph", "after_dph", "temperature_c"):
-        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-12, atol=1e-12, err_msg=name)
