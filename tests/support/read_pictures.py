@@ -125,7 +125,11 @@ def _axis(after: list[ET.Element], anchor: str) -> Axis | None:
         return None
     rotated = anchor == "end"
     words = [t.text or "" for t in after if t.tag == "text" and bool(t.get("transform")) == rotated]
-    values = np.array([_value(t.text or "") for t in ticks])
+    texts = [t.text or "" for t in ticks]
+    try:
+        values = np.array([_value(text) for text in texts])
+    except ValueError:  # words in place of numbers: rows, counted
+        values = np.arange(len(texts), dtype=np.float64)
     places = np.array([float(t.get("y") or 0) - 4.0 if rotated else float(t.get("x") or 0) for t in ticks])
     # The power of ten that the numbers are written without stands before the unit.
     power = re.search(r"10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", words[0]) if words else None

@@ -28,4 +28,5 @@ from .tables import part_of as part_of
 from .units import UnitError as UnitError
 from .units import channel_unit as channel_unit
 from .units import conversion as conversion
+from .units import meaning as meaning
 from .units import quantity_of as quantity_of

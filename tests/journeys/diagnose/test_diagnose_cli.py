@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
+import pandas as pd
 import pytest
 from campaigns import GRADIENT, simulated
 from conftest import HOST, Command
@@ -39,6 +40,8 @@ from gyrotc.recordings import Dataset, load
 from gyrotc.results import DiagnosisVerdict, NamedCause
 from gyrotc.simulate import read, simulate
 from gyrotc.train import FitOptions, fitting, joined
+from numpy.typing import NDArray
+from read_pictures import panels_of, pictures_of
 from recordings import ACCEPTED, toml, write_csv
 
 
@@ -436,3 +439,52 @@ def test_a_cause_that_the_fixture_can_imitate_says_so_and_what_tells(id: str) ->
     assert len(reported) == 1 and (
         "rotated by 180 degrees" in reported[0] or "without touching the fixture" in reported[0]
     )
+
+
+def running(values: list[float], width: int) -> NDArray[np.float64]:
+    """Means over `width` neighbours, fewer at the ends, as pandas rolls them."""
+    padded = pd.Series(values)
+    means = [padded.iloc[max(k - width // 2, 0) : max(k - width // 2, 0) + width].mean() for k in range(len(padded))]
+    return np.array(means)
+
+
+def test_each_picture_shows_the_series_that_its_legend_names(built: Path) -> None:
+    """Found by colour and legend, and compared with `series.json` and `diagnose.json`; gains agree with both."""
+    folder = built / "result" / "diagnosis"
+    result, series = read_json(folder / "diagnose.json"), read_json(folder / "series.json")
+    page = (folder / "report.html").read_text("utf-8")
+    panels = [panel for picture in pictures_of(page) for panel in panels_of(picture)]
+    near = 0.15  # points: places are rounded to a tenth
+
+    width = round(1800.0 / series["block_s"])
+    over_time = [p for p in panels if any(s.label == "simulated, 95 %" and s.kind == "band" for s in p.series)]
+    assert len(over_time) == len(series["runs"])
+    for panel, run in zip(over_time, series["runs"], strict=True):
+        for label, values in (("measured", run["residual_dph"]), ("named causes", run["named_dph"])):
+            line = panel.labelled(label)
+            assert panel.pixels_off(line, np.array(run["hours"]), running(values, width)) < near, label
+        band = panel.labelled("simulated, 95 %", "band")
+        low, high = np.array(run["simulated_low_dph"]), np.array(run["simulated_high_dph"])
+        around = np.r_[run["hours"], run["hours"][::-1]], np.r_[low, high[::-1]]
+        assert panel.pixels_off(band, *map(np.array, around)) < near
+
+    shortest = min(len(run["hours"]) for run in series["scored"])
+    width = max(round(min(1800.0, shortest * series["average_s"] / 16.0) / series["average_s"]), 1)
+    gained = [p for p in panels if any(s.label == "with the causes" for s in p.series)]
+    assert len(gained) == len(series["scored"])
+    for panel, run in zip(gained, series["scored"], strict=True):
+        for label, key in (("without", "before_dph"), ("with the causes", "after_dph")):
+            line = panel.labelled(label)
+            assert panel.pixels_off(line, np.array(run["hours"]), running(run[key], width)) < near, label
+    for key, name in (("before_dph", "exam_rms_before_dph"), ("after_dph", "exam_rms_after_dph")):
+        pooled = np.concatenate([run[key] for run in series["scored"]])
+        assert np.sqrt(np.mean(pooled**2)) == pytest.approx(result["extended"]["gain"][name], rel=0.02)
+
+    (scores,) = (p for p in panels if any(s.label == "alone" for s in p.series))
+    for label, values in (("alone", series["scores"]["alone"]), ("beside the named causes", series["scores"]["beside"])):
+        bars = [s for s in scores.series if s.kind == "bars" and s.label == label]
+        assert len(bars) == len(series["scores"]["alone"])
+        for bar, id in zip(bars, series["scores"]["alone"], strict=True):
+            drawn = scores.places(np.array([values.get(id, 0.0)]), np.array([0.0]))[0, 0]
+            linear = values.get(id, 0.0) <= 20.0  # beyond it the axis is logarithmic
+            assert not linear or bar.pixels[1, 0] == pytest.approx(drawn, abs=1.0), id
