@@ -481,7 +481,10 @@ def test_each_picture_shows_the_series_that_its_legend_names(built: Path) -> Non
         assert np.sqrt(np.mean(pooled**2)) == pytest.approx(result["extended"]["gain"][name], rel=0.02)
 
     (scores,) = (p for p in panels if any(s.label == "alone" for s in p.series))
-    for label, values in (("alone", series["scores"]["alone"]), ("beside the named causes", series["scores"]["beside"])):
+    for label, values in (
+        ("alone", series["scores"]["alone"]),
+        ("beside the named causes", series["scores"]["beside"]),
+    ):
         bars = [s for s in scores.series if s.kind == "bars" and s.label == label]
         assert len(bars) == len(series["scores"]["alone"])
         for bar, id in zip(bars, series["scores"]["alone"], strict=True):
