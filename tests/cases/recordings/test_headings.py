@@ -38,7 +38,8 @@ UNITS: dict[tuple[str, str], tuple[float, float]] = {
     (TIME, "ms"): (1e-3, 0.0), (TIME, "0.01 s"): (0.01, 0.0), (TIME, "min"): (60.0, 0.0),
     (TEMPERATURE, "K"): (1.0, -273.15), (TEMPERATURE, "degF"): (5.0 / 9.0, -32.0 * 5.0 / 9.0),
     (TEMPERATURE, "degC"): (1.0, 0.0), ("V", "mV"): (1e-3, 0.0), ("hPa", "mbar"): (1.0, 0.0),
-    ("Pa", "psi"): (6894.757293168, 0.0), ("uT", "nT"): (1e-3, 0.0), ("A", "mA"): (1e-3, 0.0), ("Pa", "bar"): (1e5, 0.0),
+    ("Pa", "psi"): (6894.757293168, 0.0), ("uT", "nT"): (1e-3, 0.0), ("A", "mA"): (1e-3, 0.0),
+    ("Pa", "bar"): (1e5, 0.0),
 }  # fmt: skip
 
 
