@@ -486,8 +486,8 @@ def test_each_picture_shows_the_series_that_its_legend_names(built: Path) -> Non
         ("beside the named causes", series["scores"]["beside"]),
     ):
         bars = [s for s in scores.series if s.kind == "bars" and s.label == label]
-        assert len(bars) == len(of_search["alone"])
-        for bar, id in zip(bars, of_search["alone"], strict=True):
+        assert len(bars) == len(series["scores"]["alone"])
+        for bar, id in zip(bars, series["scores"]["alone"], strict=True):
             drawn = scores.places(np.array([values.get(id, 0.0)]), np.array([0.0]))[0, 0]
             linear = values.get(id, 0.0) <= 20.0  # beyond it the axis is logarithmic
             assert not linear or bar.pixels[1, 0] == pytest.approx(drawn, abs=1.0), id
