@@ -24,7 +24,8 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 from logger_binaries import BINARY_CASES
 from logger_files import CSV_CASES, truth
 from logger_foreign import FOREIGN
-from recordings import ACCEPTED, REFUSED, Columns, columns, write_csv
+from recordings import ACCEPTED, Columns, columns, write_csv
+from refused_recordings import REFUSED
 
 
 @dataclass(frozen=True)
