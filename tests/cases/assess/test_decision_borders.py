@@ -149,6 +149,17 @@ def test_a_limit_of_the_worst_run_sees_the_worst_one_wherever_it_is(
         assert (one.measured, one.verdict) == (3.0, "FAIL")
 
 
+@pytest.mark.parametrize("place", [(0, 0), (1, 2), (2, 1)])
+def test_a_limit_of_sigma_sees_the_worst_cell_wherever_it_is(place: Any, model_dict: dict[str, Any]) -> None:
+    rows = np.full((3, 3), 1e-4)
+    rows[place] = 3e-4
+    model = Model.from_dict(model_dict | {"uncertainty_dph": {"cells": [3, 3], "rows": rows.tolist()}})
+    for bound, expected in ((2.9e-4, "FAIL"), (3.1e-4, "PASS")):
+        limits = Limits(schema=1, at_most=AtMost(uncertainty_dph=bound))
+        (one,) = held_against(limits, model, evaluation_of([evaluated("exam")]), None).limits
+        assert (one.measured, one.verdict) == (3e-4, expected)
+
+
 @pytest.mark.parametrize("worst", range(3))
 def test_the_uncertainty_of_the_worst_run_is_that_of_the_worst_one(worst: int) -> None:
     """RMS of m normal windows: its relative standard uncertainty is 1/√(2m)."""

@@ -85,6 +85,16 @@ def test_the_rule_of_the_scatter_between_runs_is_its_true_size(offset_dph: float
     assert low <= np.sqrt(np.mean(np.square(found))) <= high, found
 
 
+@pytest.mark.parametrize("method", ["constant", "cubic", "mrbf"])
+def test_without_a_map_the_sigma_is_what_the_bias_itself_does(method: str) -> None:
+    """With the mean alone the error is the bias about it; with no correction at all it is the bias."""
+    data = gyro(120, 0.0)
+    truth = true_bias(data.temperature_c, data.slope_c_per_min)
+    rules = uncertainty_of(data, fit(data, method=method), CELLS)["rules"]
+    assert rules["none_dph"] == pytest.approx(np.sqrt(np.mean(truth**2)), rel=0.1)
+    assert rules["fallback_dph"] == pytest.approx(np.std(truth), rel=0.1)
+
+
 ENVELOPE = ((-40.0, 60.0), (-4.2, 4.2))
 
 
