@@ -1,6 +1,6 @@
 /* gtc_front.inl - samples in, correction in force out, in the numbers included before.
  *
- * docs/numerics.md, section 1, says every step; gen/gyrotc/target is its mirror.
+ * docs/numerics.md, section 1, says every step; gen/gyrotc/mirror is its mirror.
  *
  * SPDX-License-Identifier: MIT
  */

@@ -25,8 +25,8 @@ REPORTED_BY = {"entry": "fleet", "verify-axes": "verify"}
 PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
 #: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
-    "model", "recordings.load", "recordings.records", "train.methods", "train.fitting", "tables.quantise",
-    "tables.emit", "mirror.history", "verify.job", "assess.evaluate", "diagnose.diagnosis",
+    "model", "recordings.loading", "recordings.records", "train.methods", "train.fitting", "tables.quantisation",
+    "tables.emission", "mirror.history", "verify.job", "assess.evaluation", "diagnose.diagnosis",
     "simulate.campaign", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(

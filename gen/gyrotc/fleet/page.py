@@ -385,7 +385,7 @@ def _warm_up(kind: _Kind) -> Iterator[Reason]:
         if abs(level - usual) > max(_FAR * scatter, _LEAST_WARM_UP * sigma) and one_sign >= _ALIKE:
             text = (
                 f"warm-up: every run begins about {level:+.2g} deg/h away and settles within an hour; "
-                "gyrotc diagnose measures it, build --extend takes it into the table"
+                "gyrotc diagnose measures it, gyrotc build --extend takes it into the table"
             )
             yield _reason(entry, "warm_up", text)
 

@@ -26,7 +26,7 @@ _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followe
 _LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
 _GAP = 1.5  # median row periods
-_MAX_MISSED = 2**32 - 1  # what gtc_<n>_missed counts: 32 bits
+_MAX_MISSED = 2**32 - 1  # samples between two readings: the runtime counts them in 32 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,12 @@ class Settings:
 class Steps:
     """The corrections of a history, in the order in which they come into force.
 
-    `accepted[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the
-    same sample the later one wins); `kind` MAP (the map at `temperature`, `slope`), KEEP (the correction
-    before it stays, held) or FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
+    `accepted[i]`: sample i was accepted. For correction k: it is in force from sample `at[k]` on (at the same
+    sample the later one wins); `kind` FROM_MAP (the map at `temperature`, `slope`), FROM_KEPT (the correction
+    before it stays, held) or FROM_FALLBACK; `is_restart`: made by a sample, not by a block that closes; `remarks`:
     GTC_WARMING or 0; `missing`: samples without a reading in the block that it was made of. Where `kind` is not
-    MAP, temperature, slope, remarks and `missing` are those of the last map, 0 where there was none. Before the
-    first one the correction is 0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete;
+    FROM_MAP, temperature, slope, remarks and `missing` are those of the last map, 0 where there was none. Before
+    the first one the correction is 0, held. `valid[n]`, `mean[n]`: block n itself (the last one may be incomplete;
     its missing end counts as not valid).
     """
 

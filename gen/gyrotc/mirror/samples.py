@@ -1,4 +1,4 @@
-"""Samples as the front end sees them: counted, with the missing ones, and which of them are accepted.
+"""Decide which readings of a channel are accepted: range, plausibility, stuck readings, new starts.
 
 Long stretches without events are done at once; one sample at a time is looked at only from an event
 (a jump, a missing or stuck sample) until a sample is accepted again.
@@ -54,7 +54,9 @@ class Guarded:
 def judge_readings(
     arithmetic: Arithmetic, x: NumberArray, guard: Guarded, *, period_us: int, block_us: int, lost: Sequence[int] = ()
 ) -> NDArray[np.int8]:
-    """Verdict on every reading: HELD, ACCEPTED, or RESTART (readings that agreed with one another for long enough).
+    """Return the verdict on every reading: READING_HELD, READING_ACCEPTED or READING_RESTART.
+
+    A reading restarts when it and those before it agree with one another for long enough.
 
     Args:
         arithmetic: The numbers that the target computes with.

@@ -1,4 +1,4 @@
-"""Draw a certificate: the page for paper, and the digital calibration certificate (PTB's DCC, schema 3.3).
+"""Draw a certificate: the page for paper, and the digital calibration certificate (PTB's DCC, schema 3.2.0).
 
 Both are drawn from the same rows, so that a figure has the same digits in both and on the report.
 """

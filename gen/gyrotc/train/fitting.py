@@ -1,6 +1,6 @@
 """From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
 
-Joins the stages dataset → frontend → train → model; computes nothing of its own beyond the choice of
+Joins the stages recordings → mirror → train → model; computes nothing of its own beyond the choice of
 block, window and limits, and the refits with spans left out.
 """
 
@@ -67,12 +67,12 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitOptions(BuildOptions):
-    """Options of `gyrotc fit`: `method`, `seed`, `centers`, `rho`, `block_s`, `average_s`, `channels`, and `prior`.
+    """What `--method`, `--channels` and `[fit]` of a data set state, and what is known of the unit before its runs.
 
     `prior` is what is known of the unit before its runs: a lot, or an earlier model.
 
     Raises:
-        InputError: A value is out of its range; the message names the option of the command line.
+        InputError: A value is out of its range; the message names it as it was stated.
     """
 
     prior: Prior | None = None

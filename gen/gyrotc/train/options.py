@@ -44,7 +44,7 @@ class BuildOptions:
     """What `gyrotc fit`, `build`, `diagnose`, `compare` and a fleet take as options.
 
     Raises:
-        InputError: A value is out of its range; the message names the option of the command line.
+        InputError: A value is out of its range; the message names it as it was stated.
     """
 
     method: str = field(

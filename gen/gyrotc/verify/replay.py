@@ -34,7 +34,7 @@ from .toolchain import Target, compile_objects, link, run_program, runtime_objec
 
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _PART = 2**16  # rows that are answered together: bounds memory
-_MOST_MISSED = 2**32 - 1  # what gtc_<n>_missed counts
+_MOST_MISSED = 2**32 - 1  # samples between two readings, which the runtime counts in 32 bits
 
 
 @dataclass(frozen=True, slots=True)

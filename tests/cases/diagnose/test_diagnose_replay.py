@@ -227,7 +227,7 @@ def test_what_emitted_tables_leave_is_found_with_rows_or_histories_in_memory(
         assert not any(one() is not None for one in alive), "a history is made beside the rows"
         return follow_history(*given, **named)
 
-    monkeypatch.setattr(gain, "followed", without_rows)
+    monkeypatch.setattr(gain, "follow_history", without_rows)
     front = front_end(runs, BLOCK_S)
     terms = [[], [{"id": "thermal_gradient", "parameters": VALUES["thermal_gradient"], "channel": None}]]
     models = [_model(model_dict, front, one) for one in terms]

@@ -1,4 +1,4 @@
-"""What gyros of one type share: learning it, using it for a unit with few runs, planning with it (docs/lot.md)."""
+"""What is known of a gyro before its runs: what similar units share, or its own earlier calibration (docs/lot.md)."""
 
 import lazy_loader
 
