@@ -131,37 +131,6 @@ def test_ranges_and_needs(tmp_path: Path, model: Model) -> None:
     ]
 
 
-REFUSED = {
-    "no schema": ("[at_most]\nrms_dph = 1.0", "schema"),
-    "typing error": ("schema = 1\n[at_most]\nrms_dhp = 1.0", "at_most.rms_dhp"),
-    "text": ('schema = 1\n[at_most]\nrms_dph = "low"', "at_most.rms_dph"),
-    "not a number": ("schema = 1\n[at_most]\nrms_dph = nan", "at_most.rms_dph"),
-    "one end": ("schema = 1\n[covers]\ntemperature_c = [1]", "covers.temperature_c"),
-    "unknown target": ('schema = 1\n[needs]\ntargets = ["m4"]', "needs.targets"),
-    "unknown finding": ('schema = 1\n[needs]\nno_findings = ["outlier"]', "needs.no_findings"),
-    "unknown arithmetic": ('schema = 1\n[needs]\narithmetics = ["f64"]', "needs.arithmetics"),
-    "true": ("schema = 1\n[at_most]\nrms_dph = true", "at_most.rms_dph: True"),
-    "infinite": ("schema = 1\n[at_most]\nrms_dph = inf", "at_most.rms_dph"),
-    "schema true": ("schema = true", "schema"),
-    "reversed": ("schema = 1\n[covers]\ntemperature_c = [300, -300]", "covers.temperature_c"),
-    "reversed, in range": ("schema = 1\n[covers]\ntemperature_c = [30, -30]", "the lower end comes first"),
-    "end not a number": ("schema = 1\n[covers]\nslope_c_per_min = [nan, 1.0]", "covers.slope_c_per_min.0"),
-    "true as an end": ("schema = 1\n[covers]\nslope_c_per_min = [false, true]", "covers.slope_c_per_min.0"),
-    "unknown table": ("schema = 1\n[at_mots]\nrms_dph = 1.0", "at_mots"),
-    "broken": ("schema = ", "no TOML"),
-    "hash given": ('schema = 1\nsha256 = "x"', "sha256"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_wrong_limits_file_is_refused(case: str, tmp_path: Path) -> None:
-    text, reported = REFUSED[case]
-    (tmp_path / "product.toml").write_text(text)
-    with pytest.raises(InputError) as caught:
-        load_limits(tmp_path / "product.toml")
-    assert reported in str(caught.value) and "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(("shown", "met"), [(True, True), (False, False), (None, False)])
 def test_a_product_can_ask_for_a_correction_that_generalises(
     shown: bool | None, met: bool, tmp_path: Path, model: Model

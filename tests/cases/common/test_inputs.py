@@ -25,7 +25,7 @@ from gyrotc.fleet.run import Cluster, _connected
 from gyrotc.model import load_model
 from gyrotc.pages import report
 from gyrotc.recordings import load
-from gyrotc.results import EvaluatedRun, Evaluation, Verification, checked_result, read_result
+from gyrotc.results import EvaluatedRun, Evaluation, read_result
 from gyrotc.results import cache as kept
 from gyrotc.simulate import read, simulate, simulated_floor
 from gyrotc.train import run_blocks
@@ -209,23 +209,6 @@ def test_the_noise_of_a_truth(tmp_path: Path) -> None:
         assert "is no whole array of numbers" in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
 
 
-def test_results_of_other_types_are_refused_by_field() -> None:
-    content: dict[str, Any] = {"schema": "gyrotc.verify/1", "gyrotc_version": "0.1.0", "serial": "A", "axis": None}
-    content |= {"passed": 1, "failed": 0, "missing": 0, "targets": [], "emitted": [], "errors": []}
-    content |= {"model_hash": "00", "c_hash": "00", "error_bound_dph": 0.0}
-    content |= {"worst_error_dph": {"value": 0.0, "inputs_visited": 0}}
-    assert checked_result(content, Verification, "v.json").content() == content
-    for change, reported in (
-        ({"passed": "1"}, "v.json, field passed: '1'"),
-        ({"targets": [3]}, "v.json, field targets.0: 3"),
-        ({"targets": {}}, "v.json, field targets: {}"),
-        ({"failed": -1}, "v.json, field failed: -1"),
-        ({"schema": None}, "v.json, field schema: None"),
-    ):
-        assert reported in refused(lambda: checked_result(content | change, Verification, "v.json"))  # noqa: B023
-    assert "is not a JSON object" in refused(lambda: checked_result([], Verification, "v.json"))
-
-
 @pytest.mark.slow
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
     program = (
@@ -328,14 +311,6 @@ def test_a_programme_that_never_ends(steps: str, minutes: str, reported: str, tm
         '[[set]]\nstarted = 2026-03-02T08:00:00Z\nprofiles = ["a"]\n'
     )
     assert reported in refused(lambda: simulate(tmp_path / "a.toml", seed=1, out=tmp_path / "out"))
-
-
-@pytest.mark.parametrize(
-    "line", ['[[unit]]\ndataset = "a\\u0000b"', 'datasets = ["**a"]', 'datasets = [""]', 'limits = "\\u0000"']
-)
-def test_names_in_a_manifest_that_are_no_paths(line: str, tmp_path: Path) -> None:
-    (tmp_path / "fleet.toml").write_text(f"schema = 1\n{line}\n")
-    assert "fleet.toml, field " in refused(lambda: load_manifest(tmp_path / "fleet.toml"))
 
 
 @pytest.mark.parametrize("time", ["1e18", "nan", "5.0"])

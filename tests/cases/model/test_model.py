@@ -17,19 +17,6 @@ from gyrotc.common import InputError
 from gyrotc.model import Model, load_model, table_id
 
 
-def _set(content: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    changed = copy.deepcopy(content)
-    *parents, last = path.split(".")
-    node: Any = changed
-    for part in parents:
-        node = node[int(part)] if part.isdigit() else node[part]
-    if isinstance(node, list):
-        node[int(last)] = value
-    else:
-        node[last] = value
-    return changed
-
-
 def test_a_saved_model_reads_back_equal_with_the_same_hash(model_dict: dict[str, Any], tmp_path: Path) -> None:
     model = Model.from_dict(model_dict)
     model.save(tmp_path / "model.json")
@@ -102,73 +89,6 @@ def test_a_bank_is_continuous_over_the_overlap_of_its_regions(model_dict: dict[s
     t = np.linspace(-40, 60, 20001)
     assert np.abs(np.diff(model.map_dph(t, np.zeros_like(t)))).max() < 2e-5
     assert model.map_dph(60.0, 0.0) - model.map_dph(-40.0, 0.0) > 0.001
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("schema", "gyrotc.model/2"),
-        ("serial", "../../etc/passwd"),
-        ("serial", "x" * 65),
-        ("serial", "int main(void){}"),
-        ("axis", "w"),
-        ("block_s", 0.0),
-        ("block_s", "10"),
-        ("slope_blocks", 21),
-        ("slope_blocks", 2.5),
-        ("envelope.temperature_c", [60.0, -40.0]),
-        ("envelope.temperature_c", [-40.0]),
-        ("networks", []),
-        ("networks.0.w0", "0.007"),
-        ("networks.0.w0", True),
-        ("networks.0.weights", [0.001]),
-        ("networks.0.centers.0", [1e6, 0.0]),
-        ("networks.0.widths.0", [0.0, 1.0]),
-        ("coverage.rows", ["1111"]),
-        ("coverage.rows", ["1111", "10x1"]),
-        ("terms", [{"id": "cavity_lag", "parameters": {"tau_s": -1.0}}]),
-        ("terms", [{"id": "cavity_lag", "parameters": {"width_c": 1.0}}]),
-        ("terms", [{"id": "made_up", "parameters": {}}]),
-        ("terms", [{"id": "hysteresis", "parameters": {"width_c": 1.0, "reference_c": 20.0}}]),
-        ("terms", [{"id": "hysteresis", "parameters": {"width_c": 1.0, "amplitude_dph_per_c": 1e-4, "growth": 1e-6}}]),
-        ("data.0.sha256", "abc"),
-        ("unknown_field", 1),
-    ],
-)
-def test_tampered_fields_are_refused_by_name(model_dict: dict[str, Any], tmp_path: Path, path: str, value: Any) -> None:
-    file = tmp_path / "model.json"
-    file.write_text(json.dumps(_set(model_dict, path, value)))
-    with pytest.raises(InputError) as caught:
-        load_model(file)
-    assert str(file) in str(caught.value)
-    assert path.split(".", maxsplit=1)[0] in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "not json", "[1, 2]", "{", '{"schema": "gyrotc.model/1", "serial": NaN}', "\x00\x01", "[" * 100000],
-    ids=["empty", "text", "list", "cut", "nan", "binary", "deep"],
-)
-def test_files_that_are_no_model_are_refused(tmp_path: Path, text: str) -> None:
-    file = tmp_path / "model.json"
-    file.write_text(text)
-    with pytest.raises(InputError):
-        load_model(file)
-
-
-def test_infinite_numbers_and_absurd_sizes_are_refused(model_dict: dict[str, Any], tmp_path: Path) -> None:
-    file = tmp_path / "model.json"
-    file.write_text(json.dumps(model_dict).replace("0.007", "1e999", 1))
-    with pytest.raises(InputError):
-        load_model(file)
-    network = model_dict["networks"][0]
-    network |= {"centers": [[0.0, 0.0]] * 513, "widths": [[1.0, 1.0]] * 513, "weights": [0.0] * 513}
-    file.write_text(json.dumps(model_dict))
-    with pytest.raises(InputError, match="networks"):
-        load_model(file)
-    file.write_text(" " * (4 * 2**20 + 1))
-    with pytest.raises(InputError, match="4 MiB"):
-        load_model(file)
 
 
 def test_ids_follow_the_serial_and_never_collide_where_information_is_lost() -> None:

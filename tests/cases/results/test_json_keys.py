@@ -15,7 +15,6 @@ from conftest import Command
 from gyrotc import results
 from gyrotc.cli.main import application
 from gyrotc.cli.shell import kinds, tables
-from gyrotc.common import InputError
 from gyrotc.model import load_model
 from gyrotc.results import (
     At,
@@ -222,18 +221,9 @@ def test_a_result_is_read_back_as_it_was_written() -> None:
     assert [repr(limit.measured) for limit in again.limits] == ["6292", "(-40.0, 60.0)", "None"]
 
 
-def test_unknown_fields_are_let_through_and_wrong_ones_refused_by_name() -> None:
+def test_unknown_fields_are_let_through() -> None:
     content = json.loads(json.dumps(LIMITS.content()))
     assert checked_result(content | {"later": 1}, HeldLimits, "limits.json") == LIMITS
-    for change, reported in (
-        ({"met": "yes"}, "limits.json, field met: 'yes'"),
-        ({"axis": "w"}, "limits.json, field axis: 'w'"),
-        ({"limits": [{}]}, "limits.json, field limits.0.limit: is missing"),
-        ({"schema": "gyrotc.limits/2"}, "limits.json, field schema: 'gyrotc.limits/2'"),
-    ):
-        with pytest.raises(InputError) as caught:
-            checked_result(content | change, HeldLimits, "limits.json")
-        assert reported in str(caught.value)
 
 
 def test_an_entry_of_a_fleet_tells_the_summary_what_it_may_know() -> None:

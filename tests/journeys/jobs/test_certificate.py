@@ -150,23 +150,6 @@ def test_a_folder_that_was_changed_gets_no_certificate(built: Path, tmp_path: Pa
         table.write_bytes(before)
 
 
-@pytest.mark.parametrize(
-    ("text", "reported"),
-    [
-        ("schema = 1\nlabratory = 'x'", "labratory"),
-        ("schema = 1\ncountry = 'Germany'", "country"),
-        ("laboratory = 'x'", "field schema"),
-        ("schema = 1\ncalibrated_on = 'in March'", "calibrated_on"),
-        ("schema = 1\ncalibrated_on = { day = 2026-03-02 }", "calibrated_on"),
-        ("schema = 1\nissued = [2026-03-02, 10:00:00]", "issued"),
-    ],
-)
-def test_wrong_facts_are_refused(tmp_path: Path, text: str, reported: str) -> None:
-    (tmp_path / "facts.toml").write_text(text)
-    with pytest.raises(InputError, match=reported):
-        laboratory_facts({}, tmp_path / "facts.toml", None)
-
-
 def test_the_facts_file_comes_before_meta_and_the_command_line_before_both(tmp_path: Path) -> None:
     (tmp_path / "facts.toml").write_text("schema = 1\noperator = 'B'\nnumber = '2'")
     found = laboratory_facts({"operator": "A", "customer": "C", "chamber": 3}, tmp_path / "facts.toml", "3")
