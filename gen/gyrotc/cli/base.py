@@ -22,7 +22,7 @@ from typer.core import TyperGroup
 from .. import __version__
 from ..common.inputs import MOVABLE, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..train.options import AUTO, DEFAULTS, METHODS, BuildOptions, flag_of, help_of
+from ..recordings.fit_options import AUTO, DEFAULTS, METHODS, BuildOptions, flag_of, help_of
 
 if TYPE_CHECKING:
     from ..recordings.records import Applied

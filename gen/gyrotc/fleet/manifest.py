@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
+from ..recordings.fit_options import options_in
 from ..recordings.loading import asked_axes
 from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
-from ..train.options import options_in
 
 #: Files of a summary, beside the folders of the units.
 SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")

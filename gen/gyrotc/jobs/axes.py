@@ -77,7 +77,7 @@ def joint_texts(
 
 
 def axes_in(folder: Path) -> tuple[str, ...]:
-    """Axes of a result that `--axis all` made; none where the folder has a model of its own."""
+    """Return the axes of a result of several; none where the folder has a model of its own."""
     if (folder / "model.json").is_file():
         return ()
     return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())

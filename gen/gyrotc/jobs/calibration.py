@@ -31,6 +31,7 @@ from ..common.metrics import Averages, average_rows
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
+from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset, Run
 from ..results.diagnosed import Diagnosed
@@ -45,7 +46,6 @@ from ..tables.quantisation import applied_of
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit
-from ..train.options import COMPARED, DEFAULTS, BuildOptions
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify

@@ -127,7 +127,7 @@ def certificate(
     """Writes `certificate.html`, `dcc.xml` and, where Chromium is there, `certificate.pdf` into `out`.
 
     Args:
-        folder: What `build` wrote, also with `--axis all`.
+        folder: What `build` wrote, also of several axes.
         facts: A facts file of the laboratory.
         number: Number of the certificate.
         draft: Take what is missing as not stated: the page is marked as a draft, and there is no DCC.
@@ -225,8 +225,8 @@ def missing_facts(facts: LaboratoryFacts, units: Sequence[UnitResults]) -> Itera
     instruments = budget.instruments if budget else ()
     if budget and not any(one.quantity == "temperature" and one.certificate for one in instruments):
         yield (
-            "a thermometer with its certificate (only dataset.toml states instruments: [[meta.instrument]],"
-            ' quantity = "temperature"; then build again)'
+            "a thermometer with its certificate (state it as [[meta.instrument]] of dataset.toml or as [[instrument]]"
+            ' of the limits file of build, quantity = "temperature"; then build again)'
         )
 
 

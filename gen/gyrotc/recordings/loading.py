@@ -17,6 +17,7 @@ from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
 from .description import FILE, Description, Problems, RunEntry, arrange, check_serial, parse_description
 from .fingerprints import sketch
+from .fit_options import options_in
 from .overlap import counted_once, shared_rows
 from .plausibility import TRUSTED, Suspicion, curves_of, earth_rate, earth_suspicion, suspicions
 from .reading import Reader, Recording, open_file, open_recording
@@ -271,6 +272,7 @@ def load_reporting(
         return None
     check_description(description, applied, exam_only, problems)
     check_spans(description, problems)
+    _check_fit(description, problems)
     opened, with_rows = _recordings(folder, description, problems)
     recordings = of_axis(opened, axis, problems)
     if not recordings:
@@ -357,6 +359,13 @@ def _description(folder: Path, problems: Problems) -> Description | None:
         problems.add(refused(error, lambda _: f"{folder}, name of a recording"))
         return None
     return Description(serial=serial, run=runs)
+
+
+def _check_fit(description: Description, problems: Problems) -> None:
+    try:
+        options_in(description.fit, f"{FILE}, field fit.")
+    except InputError as error:
+        problems.add(error)
 
 
 def _recordings(folder: Path, description: Description, problems: Problems) -> tuple[dict[str, Recording], set[int]]:

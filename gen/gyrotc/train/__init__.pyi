@@ -37,10 +37,6 @@ from .methods import fit as fit
 from .methods import trained as trained
 from .networks import rescaled as rescaled
 from .objection import objection_to as objection_to
-from .options import COMPARED as COMPARED
-from .options import DEFAULTS as DEFAULTS
-from .options import METHODS as METHODS
-from .options import SIMPLE as SIMPLE
 from .plausibility import channel_guard as channel_guard
 from .plausibility import longest_same_s as longest_same_s
 from .plausibility import stuck_after_s as stuck_after_s

@@ -20,6 +20,7 @@ from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
 from ..model import Model
 from ..quality.outliers import outliers_of, stretches_left_out
+from ..recordings.fit_options import AUTO, SIMPLE, BuildOptions
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..results.base import Finding
@@ -30,7 +31,6 @@ from .data import RunSpan, TrainingData, cleaned_samples, joined, scaling_of, tr
 from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
 from .methods import fit
 from .networks import snapped
-from .options import AUTO, SIMPLE, BuildOptions
 from .plausibility import AGREE_S, longest_same_s, stuck_after_s
 from .prior.given import Prior
 from .prior.unit_means import means_of_unit

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.metrics import LEAST_SPAN_C
+from ..recordings.fit_options import AUTO, DEFAULTS, METHODS, SIMPLE, BuildOptions
 from .bank import fit_bank
 from .data import Scaling, TrainingData, cleaned_samples, scaling_of
 from .evidence import TrainingFailed, floor_dph
@@ -15,7 +16,6 @@ from .mrbf import fit_mrbf, fit_mrbf_t
 from .networks import network
 from .objection import objection_to
 from .ols import RIDGE, fit_ols
-from .options import AUTO, DEFAULTS, METHODS, SIMPLE, BuildOptions
 from .prior.given import Prior
 from .result import Fit, Outcome, predict
 from .selection import chosen_by_cross_validation, fit_mixed

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from .. import _core
 from ..common.arrays import FloatArray
 from ..common.metrics import median
+from ..recordings.fit_options import SIMPLE
 from .data import Scaling, TrainingData, average_samples, edges_of, mean_cells, turning_points
 from .evidence import GRID, MEAN_S, TrainingFailed, floor_dph
 from .networks import NetworkEntry, network
-from .options import SIMPLE
 from .result import Outcome
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone

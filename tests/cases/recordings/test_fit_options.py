@@ -41,3 +41,5 @@ def test_a_wrong_option_of_a_description_is_named(tmp_path: Path, gyrotc: Comman
         done = gyrotc(command, tmp_path / "RLG-1", "--out", tmp_path / "out")
         assert done.returncode == 2 and f"dataset.toml, field fit.{field}" in done.stderr, done.stderr
         assert not (tmp_path / "out").exists()
+    checked = gyrotc("check", tmp_path / "RLG-1")
+    assert checked.returncode == 2 and f"dataset.toml, field fit.{field}" in checked.stdout

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from gyrotc.common import InputError
-from gyrotc.recordings import Dataset, Run, load
+from gyrotc.recordings import SIMPLE, Dataset, Run, load
 from gyrotc.train import (
     CANDIDATES,
-    SIMPLE,
     CandidateScores,
     Fit,
     FitOptions,

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from gyrotc.jobs import lot_from
-from gyrotc.train import METHODS, Fit, TrainingData, fit, predict, start_sigma, uncertainty_of
+from gyrotc.recordings import METHODS
+from gyrotc.train import Fit, TrainingData, fit, predict, start_sigma, uncertainty_of
 from gyrotc.train.prior import Learned, LotPrior, UnitMeans, learn_prior, prior_of
 from numpy.typing import NDArray
 from training_data import samples, true_bias

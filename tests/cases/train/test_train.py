@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gyrotc.common import InputError
-from gyrotc.recordings import load
+from gyrotc.recordings import COMPARED, load
 from gyrotc.simulate import simulate, simulated_floor
 from gyrotc.train import (
-    COMPARED,
     Fit,
     RBFNetworkRegressor,
     TrainingData,

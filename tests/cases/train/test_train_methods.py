@@ -12,8 +12,8 @@ from gyrotc.cli.main import application
 from gyrotc.common import InputError
 from gyrotc.fleet import load_manifest
 from gyrotc.model import Model
-from gyrotc.recordings import load
-from gyrotc.train import DEFAULTS, FitOptions, TrainingData, average_samples, fit, fit_dataset, front_end, predict
+from gyrotc.recordings import DEFAULTS, load
+from gyrotc.train import FitOptions, TrainingData, average_samples, fit, fit_dataset, front_end, predict
 from numpy.typing import NDArray
 from recordings import columns, toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias

@@ -133,7 +133,9 @@ def test_who_states_no_thermometer_is_sent_to_the_data_set(
     assert unit.budget is not None
     unit.budget = unit.budget.model_copy(update={"instruments": ()})
     (line,) = missing_facts(laboratory_facts({}, built.parent / "facts.toml", "1"), [unit])
-    assert "only dataset.toml states instruments: [[meta.instrument]]" in line and "build again" in line
+    assert (
+        "[[meta.instrument]] of dataset.toml or as [[instrument]] of the limits file" in line and "build again" in line
+    )
     (tmp_path / "facts.toml").write_text("schema = 1\n[[instrument]]\nname = 'Pt100'\n")
     with pytest.raises(InputError, match="instrument"):
         laboratory_facts({}, tmp_path / "facts.toml", None)

@@ -11,11 +11,11 @@ from conftest import Command
 from gyrotc.assess import evaluate
 from gyrotc.common import InputError
 from gyrotc.jobs import compare
-from gyrotc.recordings import load
+from gyrotc.recordings import COMPARED, load
 from gyrotc.results import Comparison
 from gyrotc.simulate import simulate, simulated_floor
 from gyrotc.tables import emit
-from gyrotc.train import COMPARED, FitOptions, TrainingData, fit, fit_dataset, front_end, predict, samples_of
+from gyrotc.train import FitOptions, TrainingData, fit, fit_dataset, front_end, predict, samples_of
 
 
 @pytest.fixture(scope="module")

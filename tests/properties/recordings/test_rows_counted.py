@@ -490,4 +490,4 @@ def test_what_loggers_do_is_read(steps: list[tuple[str, int]], end: str) -> None
 def test_the_count_is_printed(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join([*PREAMBLE, NAMES, *rows(three, 0, 60), NAMES]) + "\n")
     done = run_gyrotc("import", tmp_path / "a.csv", "--out", tmp_path / "R")
-    assert "61 read below 4 lines of other text, 1 left out: repeated header lines" in done.stdout
+    assert "61 read, 1 left out: repeated header lines; lines of text above them: 4" in done.stdout

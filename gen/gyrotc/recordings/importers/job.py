@@ -159,14 +159,15 @@ def import_summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[
         length = _period(*entry["period_s"])
         means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(cells[:, 2:].mean(axis=0)))
         left = "".join(f", {count} left out: {reason}" for reason, count in entry["left_out"].items())
-        above = f" below {entry['above']} lines of other text" if entry["above"] else ""
+        above = f"; lines of text above them: {entry['above']}" if entry["above"] else ""
         yield (
             f"{out / entry['file']}: {entry['rows']} rows of {length} s, {low:.4g} ... {high:.4g} C, "
-            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}; {entry['read']} read{above}{left}"
+            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}; {entry['read']} read{left}{above}"
         )
         for text in entry["trusted"]:
             yield f"  {TRUSTED}{text}"
-    yield f"{out / 'map.toml'}: reads the next file of this logger: gyrotc import FILE --map map.toml --out ..."
+    kept = out / "map.toml"
+    yield f"{kept}: reads the next file of this logger: gyrotc import FILE --map {kept} --out ..."
 
 
 _EXACT = 1e-6  # of a period: what stamps in microseconds leave of rows of a second

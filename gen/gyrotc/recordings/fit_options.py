@@ -116,6 +116,11 @@ def _range_of(name: str) -> str:
     return ""
 
 
+def _kind_in_words(name: str) -> str:
+    stated = get_type_hints(BuildOptions, include_extras=True)[name]
+    return "a whole number" if int in (stated, *get_args(stated)) or "int" in str(stated) else "a number"
+
+
 @functools.cache
 def _kind_of(name: str) -> TypeAdapter[Any]:
     from pydantic import ConfigDict, TypeAdapter
@@ -131,7 +136,7 @@ def _checked(name: str, value: Any, where: str, *, strict: bool = False) -> Any:
         taken = _kind_of(name).validate_python(value, strict=strict)
     except ValidationError as error:
         if limits := _range_of(name):
-            raise InputError(where, repr(value), f"a number, {limits}") from error
+            raise InputError(where, repr(value), f"{_kind_in_words(name)}, {limits}") from error
         raise refused(error, lambda _: where) from error
     if name == "method" and taken not in (AUTO, *METHODS):
         raise InputError(where, repr(value), "one of " + ", ".join((AUTO, *METHODS)))
