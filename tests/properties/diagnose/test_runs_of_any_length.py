@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn import examples
 from gyrotc.causes import CATALOGUE, History
 from gyrotc.diagnose import diagnose, records_of
 from gyrotc.quality import Change, RowArrays, WalkNoise, changes_of, found_events
 from gyrotc.recordings import load
 from gyrotc.results import Diagnosed
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from recordings import Columns, toml, write_csv
 
@@ -51,7 +52,7 @@ def placed(found: list[Change], order: list[int], clocks: list[float]) -> list[t
     return sorted((order[one.run], one.kind, round(one.time_s[0] - clocks[one.run], 1)) for one in found)
 
 
-@settings(max_examples=12, deadline=None)
+@examples(12)
 @given(shorts=shorts, row_s=st.sampled_from([10.0, 60.0]), clock_s=clocks_s, data=st.data())
 def test_a_step_of_a_long_run_is_found_beside_any_other_runs(
     shorts: list[tuple[float, float, float]], row_s: float, clock_s: float, data: st.DataObject
@@ -69,7 +70,7 @@ def test_a_step_of_a_long_run_is_found_beside_any_other_runs(
     assert step.size[1] <= 1.1 * STEP_DPH and step.size[2] >= 0.9 * STEP_DPH
 
 
-@settings(max_examples=6, deadline=None)
+@examples(6)
 @given(shorts=shorts, data=st.data())
 def test_order_and_clocks_move_no_change(shorts: list[tuple[float, float, float]], data: st.DataObject) -> None:
     rng = np.random.default_rng(SEED)

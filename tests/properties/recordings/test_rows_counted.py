@@ -14,10 +14,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import Command, run_gyrotc
+from drawn import examples
 from gyrotc.common import InputError
 from gyrotc.recordings.importers import ImportOptions, Map, import_files
 from gyrotc.results import ImportedFile, ImportedFiles, read_result
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 NAMES = "time_s,temperature_c,rate_dph"
@@ -464,7 +465,7 @@ def import_text(text: str) -> tuple[dict[str, int], dict[str, int], set[float]] 
     steps=st.lists(st.tuples(st.sampled_from(sorted(DAMAGES | HARMLESS)), at_rows), max_size=3),
     end=ends,
 )
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_every_line_of_a_damaged_file_is_counted_or_the_file_is_refused(steps: list[tuple[str, int]], end: str) -> None:
     body = damaged(steps)
     found = import_text(end.join([NAMES, *body]) + end)
@@ -480,7 +481,7 @@ def test_every_line_of_a_damaged_file_is_counted_or_the_file_is_refused(steps: l
     steps=st.lists(st.tuples(st.sampled_from(sorted(HARMLESS)), at_rows), max_size=5, unique_by=lambda step: step[1]),
     end=ends,
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_what_loggers_do_is_read(steps: list[tuple[str, int]], end: str) -> None:
     """From the last row on upwards, so that every step meets a row as it was."""
     downwards = sorted(steps, key=lambda step: -step[1])
