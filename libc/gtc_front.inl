@@ -267,7 +267,7 @@ static int FN(agrees)(const STATE *state, const INPUT *in, const gtc_word_t *gua
 static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
 {
     const uint_least32_t least_us = guard[GUARD_AGREE].bits;
-    int verdict = (least_us == 0U) ? IS_NEW_START : IS_HELD;
+    int verdict = IS_HELD;
 
     if (!FN(agrees)(state, in, guard, x)) {
         in->series_us = 0U;
@@ -275,6 +275,9 @@ static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, N
         verdict = IS_NEW_START;
     } else {
         /* too few, or not for long enough */
+    }
+    if (least_us == 0U) {
+        verdict = IS_NEW_START;
     }
     in->candidate = x;
     in->candidate_us = 0U;
