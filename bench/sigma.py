@@ -352,6 +352,9 @@ def cost() -> list[dict[str, Any]]:
         c = Path(place) / "c"
         for name in _CORES:
             target = all_targets()[name]
+            if target.missing():
+                say(f"{name} is left out: {target.missing()} is not installed")
+                continue
             for numeric in ("f32", "q31"):
                 source = Path(place) / f"{name}-{numeric}.c"
                 text = (HERE / "snapshot.c").read_text("utf-8")

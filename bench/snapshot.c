@@ -5,6 +5,8 @@
 
 #include "gtc_sim_0003.h"
 
+#define PERIOD_US 1000000UL
+
 #if defined(OF_F32)
 #define NAME(x) gtc_f32_##x
 #define TABLE gtc_sim_0003_f32
@@ -51,16 +53,18 @@ static void measure(void (*volatile function)(void))
 int main(void)
 {
     int i;
-    if (NAME(init)(&state, &TABLE, 1000000UL) != 0) {
+    if (NAME(init)(&state, &TABLE, PERIOD_US) != 0) {
         return 1;
     }
     for (i = 0; i < 300; i++) {
         const num_t t = (num_t)(C(20) + ((num_t)(i % 2) * (C(1) / 64)));
-        said = NAME(sample)(&state, &t);
+        said = NAME(sample)(&state, PERIOD_US, &t);
     }
     measure(nothing);
     measure(snapshot);
-    said = NAME(missed)(&state, 55U);
+    for (i = 0; i < 55; i++) {
+        said = NAME(sample)(&state, PERIOD_US, 0);
+    }
     measure(nothing);
     measure(snapshot);
     return (now.age_blocks == 0U) ? 1 : 0;

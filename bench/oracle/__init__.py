@@ -13,7 +13,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +53,8 @@ def table(record: Record) -> ResultsTable:
     """Return every step that differs, with the first differences of each file."""
     text = f"Commit {record['base']} against this tree: {record['steps']} steps of {len(record['sets'])} sets."
     rows: list[tuple[object, ...]] = [(*row, "") for row in record["moved"]]
-    rows.append(("steps that differ", "", "", "", Figure(record["differ"], at_most=0)))
-    return ResultsTable(text, ("set", "step", "place", "change", "count "), rows)
+    rows.append(("steps that differ", "", "", "", "", Figure(record["differ"], at_most=0)))
+    return ResultsTable(text, ("set", "step", "file", "place", "change", "count "), rows)
 
 
 def _compared(before: Path, now: Path, names: list[str]) -> dict[str, Any]:
@@ -64,15 +63,14 @@ def _compared(before: Path, now: Path, names: list[str]) -> dict[str, Any]:
         for name in names:
             one, other = (json.loads((folder / f"{name}.json").read_text("utf-8")) for folder in (before, now))
             steps += len(other)
-            by_file: dict[tuple[str, str], list[tuple[str, str, str, str]]] = {}
-            for step, place, change in moved(one, other):
-                every.write(f"{name}, {step}: {place}: {change}\n")
-                by_file.setdefault((step, place.partition("/document/")[0]), []).append((name, step, place, change))
-            differ += len({step for step, _ in by_file})
-            for rows in by_file.values():
-                shown += islice(rows, _EACH)
-                if len(rows) > _EACH:
-                    shown.append((*rows[0][:2], "", f"and {len(rows) - _EACH} more"))
+            steps_of_set = set()
+            for step, file, found in moved(one, other):
+                steps_of_set.add(step)
+                every.writelines(f"{name}, {step}: {file}: {place}: {change}\n" for place, change in found)
+                shown += [(name, step, file, place, change) for place, change in found[:_EACH]]
+                if len(found) > _EACH:
+                    shown.append((name, step, file, "", f"and {len(found) - _EACH} more"))
+            differ += len(steps_of_set)
     return {"steps": steps, "differ": differ, "moved": shown}
 
 

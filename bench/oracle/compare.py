@@ -6,15 +6,19 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-#: Characters of a value that are shown.
-_SHOWN = 80
+#: Characters of a value that are shown, and how many of them stand before the first that differs.
+_SHOWN, _BEFORE = 80, 30
 
 
-def moved(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield step, place and change of everything that differs between the outcomes of a set."""
+def moved(earlier: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
+    """Yield step, file and its differences, of all that differ between the outcomes of a set."""
     for step in dict.fromkeys([*earlier, *now]):
-        for place, change in differences(earlier.get(step, {}), now.get(step, {})):
-            yield step, place, change
+        one, other = earlier.get(step, {}), now.get(step, {})
+        for file in dict.fromkeys([*one, *other]):
+            if file not in one or file not in other:
+                yield step, file, [("", _only(file in one))]
+            elif found := list(differences(one[file], other[file])):
+                yield step, file, found
 
 
 def differences(one: Any, other: Any, path: str = "") -> Iterator[tuple[str, str]]:
@@ -23,21 +27,25 @@ def differences(one: Any, other: Any, path: str = "") -> Iterator[tuple[str, str
         for name in dict.fromkeys([*one, *other]):
             here = f"{path}/{name}" if path else name
             if name not in one or name not in other:
-                yield here, f"only in {'the earlier commit' if name in one else 'this tree'}"
+                yield here, _only(name in one)
             else:
                 yield from differences(one[name], other[name], here)
     elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         for number, pair in enumerate(zip(one, other, strict=True)):
-            yield from differences(*pair, f"{path}/{number}")
+            yield from differences(*pair, f"{path}/{number}" if path else str(number))
     elif json.dumps(one) != json.dumps(other):
-        yield path, f"{_shown(one)} → {_shown(other)}{_ratio(one, other)}"
+        yield path, _change(one, other)
 
 
-def _ratio(one: Any, other: Any) -> str:
+def _only(earlier: bool) -> str:
+    return f"only in {'the earlier commit' if earlier else 'this tree'}"
+
+
+def _change(one: Any, other: Any) -> str:
+    """Return both values, from a little before the place where they part, and the ratio of numbers."""
+    was, now = (json.dumps(value, ensure_ascii=False) for value in (one, other))
+    parts = next((k for k, (a, b) in enumerate(zip(was, now, strict=False)) if a != b), min(len(was), len(now)))
+    start = max(parts - _BEFORE, 0)
+    shown = (f"{'...' * bool(start)}{x[start : start + _SHOWN]}{'...' * (len(x) > start + _SHOWN)}" for x in (was, now))
     numbers = all(isinstance(value, float | int) and not isinstance(value, bool) for value in (one, other))
-    return f" ({other / one - 1.0:+.2g})" if numbers and one else ""
-
-
-def _shown(value: Any) -> str:
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + " ..."
+    return " → ".join(shown) + (f" ({other / one - 1.0:+.2g})" if numbers and one else "")
