@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 #: Significant digits of a number in a record: more than any page prints.
 _DIGITS = 6
 #: Characters of a line of a record.
-_WIDTH = 300
+_WIDTH = 500
 _MARK = re.compile(r"([^\s|(*]+)(<!--= ([^;>]+); ([^;>]+?) -->)")
 
 Record = dict[str, Any]
