@@ -37,7 +37,7 @@ CAUSE = Cause(
     words=Wording(
         name="The static map is too coarse",
         signature="residual repeats over T, heating and cooling alike, finer than the map",
-        remedy="no map follows it, and more centers do not help: count it in the error budget, or find its source in "
+        remedy="no map follows it, and more centers hardly help: count it in the error budget, or find its source in "
         "the gyro, such as a relay, a resonance or the glass transition of an adhesive",
         experiment="one slow ramp over the full range in both directions",
         telling=Telling.STATIC,
