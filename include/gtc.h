@@ -92,12 +92,12 @@ typedef struct {
  *   check           4520    460       3650    480
  *   open            2810    500       2600    520
  *   init             530     60        550     70
- *   sample          6350    310       6960    490
+ *   sample          6350    320       6970    490
  *   bias              90      0         90     10
  *   snapshot        1310     50       2190    150
  *   rezero          1770     50       2990    180
- *   save            2170     80       1640    100
- *   restore         2970    620       2450    680 */
+ *   save            2180     80       1660    100
+ *   restore         2990    620       2480    680 */
 
 /* Boot self-test of a compiled-in table, before gtc_<n>_init(), which relies on it: layout, arithmetic (f32:
  * rounding, ties, no fused products, no excess precision, order of sums, subnormals), checksum, range of every word

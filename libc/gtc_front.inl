@@ -269,15 +269,15 @@ static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, N
     const uint_least32_t least_us = guard[GUARD_AGREE].bits;
     int verdict = IS_HELD;
 
+    if (least_us == 0U) {
+        verdict = IS_NEW_START;
+    }
     if (!FN(agrees)(state, in, guard, x)) {
         in->series_us = 0U;
     } else if ((in->series_us > in->candidate_us) && (in->series_us >= least_us)) {
         verdict = IS_NEW_START;
     } else {
         /* too few, or not for long enough */
-    }
-    if (least_us == 0U) {
-        verdict = IS_NEW_START;
     }
     in->candidate = x;
     in->candidate_us = 0U;
