@@ -167,6 +167,7 @@ def lot_from(
             )
             for n, m, c in zip(np.bincount(state.cluster), state.means, state.covariances, strict=True)
         ),
+        directions=tuple(file_numbers(d) for d in state.directions.T),
         rest=process_result(state.rest),
         of_mean=process_result(state.of_mean),
         noise_dph=float(np.median([u.sigma_dph for u in inside])),
@@ -216,7 +217,7 @@ def _in_words(names: Sequence[tuple[str, str]], found: Learned) -> str:
         shared = f"the mean map explains {1.0 - (left / alone) ** 2:.0%} of what a unit's own mean leaves"
     else:
         shared = "no family: the mean map explains nothing that a unit's own mean does not"
-    text = f"{int(found.inside.sum())} units; {shared}"
+    text = f"{int(found.inside.sum())} units, {found.state.rank} directions; {shared}"
     if len(size) > 1:
         text += f"; {len(size)} clusters of {', '.join(map(str, size))} units"
     outliers = [name for (name, _), kept in zip(names, found.inside, strict=True) if not kept]

@@ -299,7 +299,8 @@ class Lot(Result):
     clusters: Annotated[tuple[LotCluster, ...], Field(min_length=1)] = Field(
         description="one, where no more were found"
     )
-    rest: LotProcess = Field(description="what is each unit's own")
+    directions: tuple[Figures, ...] = Field(description="in which units differ: coefficients of one standard deviation")
+    rest: LotProcess = Field(description="what is each unit's own besides")
     of_mean: LotProcess = Field(description="smoothness of the mean maps")
     noise_dph: Positive = Field(description="median noise of means over `mean_s`, deg/h")
     mean_s: Positive = Field(description="length of these means, s")

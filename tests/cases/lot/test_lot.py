@@ -1,4 +1,4 @@
-"""A lot: what is learnt from units that resemble each other, what a new unit gains, who does not belong."""
+"""A lot: what is learnt from units that share directions, what a new unit gains, who does not belong."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_evidence_is_that_of_the_normal_distribution_of_the_recordings() -> None
         full = multivariate_normal.logpdf(y, values @ mean, values @ covariance @ values.T + noise)
         known.append(full - multivariate_normal.logpdf(y, np.zeros(30), noise))
     assert evidence(sums, mean, covariance) == pytest.approx(known, rel=1e-9)
-    state = fitted(sums, basis, np.zeros(2, dtype=np.int64), 0)
+    state = fitted(sums, basis, 0, np.zeros(2, dtype=np.int64), 0)
     wide = np.diag(basis.variance(state.of_mean))
     own = np.diag(basis.variance(state.rest))
     values = [basis.values(u.temperature_c, u.slope_c_per_min) for u in units]
@@ -120,8 +120,9 @@ def test_each_further_round_raises_the_evidence() -> None:
     units = [calibrated(rng, unit_map(rng, 3e-4)) for _ in range(10)]
     basis = LotBasis.over(*ENVELOPE)
     sums, together = sums_of(units, basis, 7e-3, 1e-3), np.zeros(10, dtype=np.int64)
-    found = [fitted(sums, basis, together, rounds).evidence for rounds in (0, 3, 8, 16)]
+    found = [fitted(sums, basis, 0, together, rounds).evidence for rounds in (0, 3, 8, 16)]
     assert found == sorted(found)
+    assert fitted(sums, basis, 1, together, 16).evidence > found[-1] - 1.0
     assert PRIOR_LOG.shape == (8,)
 
 

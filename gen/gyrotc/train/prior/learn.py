@@ -4,11 +4,12 @@ In the coordinates in which lot and noise are both diagonal, a unit of the lot h
 its runs were. The most powerful test of a given deviation against one that is some times larger weighs their squares
 by what runs can tell of each; the sum is, for a unit of the lot, a sum of weighted chi-squares.
 
-Coefficients of the map of unit u, which belongs to cluster c:  w_u = m_c + e_u,  with m_c ~ N(0, K(θ_m)) and
-e_u ~ N(0, S(θ_e)): a mean map, and a smooth rest of each unit's own. K and S are diagonal (`basis.py`). What a unit's
-recordings say of w_u is a Gaussian with known precision and moment; so everything but θ_m, θ_e and the clusters is
-integrated out exactly, and these are found by expectation and maximisation (priors of processes from many tasks:
-Schwaighofer, Tresp and Yu 2005). The mean keeps its covariance: a lot of few units knows its mean badly, and says so.
+Coefficients of the map of unit u, which belongs to cluster c:  w_u = m_c + W z_u + e_u,  with m_c ~ N(0, K(θ_m)),
+z_u ~ N(0, I), e_u ~ N(0, S(θ_e)): a mean map, a few directions in which units differ, and a smooth rest of each unit's
+own. K and S are diagonal (`basis.py`). What a unit's recordings say of w_u is a Gaussian with known precision and
+moment; so everything but W, θ_m, θ_e and the clusters is integrated out exactly, and these by expectation and
+maximisation (factor analysis: Rubin and Thayer 1982; priors of processes from many tasks: Schwaighofer, Tresp and
+Yu 2005). The mean keeps its covariance: a lot of few units knows its mean badly, and says so.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ _LEAST_FREEDOM = 3  # below it Student's t has no variance, and a prior must hav
 _TELLING = 1.0  # variance by the lot over variance by noise, from which on a score says how wide the lot is
 
 
-def freedom_of(units: int, clusters: int) -> float:
+def freedom_of(units: int, clusters: int, directions: int) -> float:
     """Degrees of freedom of a lot's spread: units less what was fitted to them; 3 at least."""
-    return float(max(units - clusters, _LEAST_FREEDOM))
+    return float(max(units - clusters - directions, _LEAST_FREEDOM))
 
 
 def student_variance(freedom: float) -> float:
@@ -114,6 +115,7 @@ class LotState:
 
     Attributes:
         basis: The functions.
+        directions: W, shape (n, rank).
         rest, of_mean: Log parameters of the two processes.
         cluster: Cluster of each unit that it was fitted to, shape (units,).
         means: Posterior mean of every cluster's mean, shape (clusters, n).
@@ -122,6 +124,7 @@ class LotState:
     """
 
     basis: LotBasis
+    directions: FloatArray
     rest: FloatArray
     of_mean: FloatArray
     cluster: NDArray[np.int64]
@@ -130,42 +133,60 @@ class LotState:
     evidence: float
 
     @property
+    def rank(self) -> int:
+        return int(self.directions.shape[1])
+
+    @property
     def freedom(self) -> float:
         """Degrees of freedom of the spread."""
-        return freedom_of(len(self.cluster), len(self.means))
+        return freedom_of(len(self.cluster), len(self.means), self.rank)
 
     def spread(self) -> FloatArray:
-        """Variances of units' coefficients about the mean of their cluster, shape (n,)."""
-        return self.basis.variance(self.rest)
+        """Covariance of units about the mean of their cluster, shape (n, n)."""
+        return np.asarray(np.diag(self.basis.variance(self.rest)) + self.directions @ self.directions.T)
 
 
 def fitted(
-    units: UnitSums, basis: LotBasis, cluster: NDArray[np.int64], rounds: int, start: LotState | None = None
+    units: UnitSums, basis: LotBasis, rank: int, cluster: NDArray[np.int64], rounds: int, start: LotState | None = None
 ) -> LotState:
     """Expectation and maximisation over a number of rounds; clusters stay as given."""
     first = PRIOR_LOG.copy()
     of_mean = first.copy()
     of_mean[0] = CONSTANT
     n = len(basis.kept)
-    state = LotState(basis, first, of_mean, cluster, np.zeros((0, n)), np.zeros((0, n, n)), -np.inf)
+    empty = np.zeros((n, 0))
+    state = LotState(basis, empty, first, of_mean, cluster, np.zeros((0, n)), np.zeros((0, n, n)), -np.inf)
     if start is not None:
-        state = replace(state, rest=start.rest, of_mean=start.of_mean)
+        state = replace(state, rest=start.rest, of_mean=start.of_mean, directions=start.directions)
     for number in range(rounds):
-        state = _round(units, state, fit=number % _EVERY == _EVERY - 1)
+        state = _round(units, state, rank, fit=number % _EVERY == _EVERY - 1)
     state, posterior, _ = _conditioned(units, state)
     return replace(state, evidence=_log_evidence(units, state, *posterior))
 
 
-def _round(units: UnitSums, state: LotState, *, fit: bool) -> LotState:
+def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotState:
     state, (posterior, _), moved = _conditioned(units, state)
     n, basis = len(units), state.basis
-    squares = (np.diagonal(posterior, axis1=1, axis2=2).sum(axis=0) + np.sum(moved**2, axis=0)) / n
-    rest = fitted_parameters(basis, squares, n, state.rest)  # of the deviations from the clusters' means
+    second = posterior.sum(axis=0) + moved.T @ moved  # of the deviations from the clusters' means
+    directions, rest = state.directions, state.rest
+    if directions.shape[1] < rank:
+        values, vectors = np.linalg.eigh(second / n)
+        top = slice(len(values) - rank, None)
+        directions = vectors[:, top] * np.sqrt(np.maximum(0.5 * values[top], 1e-12))
+        return replace(state, directions=directions)
+    left = np.diag(second) / n
+    if rank:
+        back = np.linalg.solve(state.spread(), directions).T
+        scores = n * (np.eye(rank) - back @ directions) + back @ second @ back.T
+        cross = second @ back.T
+        directions = np.linalg.solve(scores, cross.T).T
+        left = (np.diag(second) - np.sum(directions * cross, axis=1)) / n
+    rest = fitted_parameters(basis, left, n, rest)
     of_mean = state.of_mean
     if fit:
         squares = (state.means**2 + np.diagonal(state.covariances, axis1=1, axis2=2)).mean(axis=0)
         of_mean = fitted_parameters(basis, squares, len(state.means), of_mean, free=False)
-    return replace(state, rest=rest, of_mean=of_mean)
+    return replace(state, directions=directions, rest=rest, of_mean=of_mean)
 
 
 def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, tuple[FloatArray, FloatArray], FloatArray]:
@@ -175,7 +196,7 @@ def _conditioned(units: UnitSums, state: LotState) -> tuple[LotState, tuple[Floa
     cluster's mean m has the precision G − G P G = S⁻¹ − S⁻¹ P S⁻¹ and the moment b − G P b = S⁻¹ P b; its deviation
     from m is P (b − G m) = P (b + S⁻¹ m) − m. One inverse is all that a unit costs.
     """
-    inverse: FloatArray = np.diag(1.0 / state.spread())
+    inverse: FloatArray = np.asarray(np.linalg.inv(state.spread()), dtype=np.float64)
     posterior, log_determinant = posteriors(inverse, units.precision)
     known = state.basis.variance(state.of_mean)
     member = np.eye(int(state.cluster.max()) + 1)[:, state.cluster]  # 1 where a unit is in a cluster
@@ -195,7 +216,7 @@ def _log_evidence(units: UnitSums, state: LotState, posterior: FloatArray, log_d
     totals = np.linalg.solve(state.covariances, state.means[..., None])[..., 0]
     value = 0.5 * float(np.sum(units.moment * _times(posterior, units.moment)))
     value += 0.5 * float(log_determinant.sum())
-    value -= 0.5 * len(units) * float(np.sum(np.log(state.spread())))
+    value -= 0.5 * len(units) * float(np.linalg.slogdet(state.spread())[1])
     value += 0.5 * float(np.sum(totals * state.means))
     value += 0.5 * float(np.linalg.slogdet(state.covariances)[1].sum())
     return value - 0.5 * len(state.means) * float(np.sum(np.log(known)))
@@ -208,7 +229,7 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 def predictive(state: LotState) -> list[tuple[FloatArray, FloatArray]]:
     """Mean and covariance of the coefficients of a unit that was not seen, one for each cluster."""
-    spread = np.diag(state.spread())
+    spread = state.spread()
     return [(m, spread + c) for m, c in zip(state.means, state.covariances, strict=True)]
 
 
@@ -225,9 +246,11 @@ def evidence(units: UnitSums, mean: FloatArray, covariance: FloatArray) -> Float
 Envelope = tuple[tuple[float, float], tuple[float, float]]
 
 LEAST_UNITS = 3  # with two there is no telling what is shared
-_MOST_CLUSTERS = 4
+_MOST_DIRECTIONS = 6  # beyond them no lot has gained
+_UNITS_A_DIRECTION = 5  # with fewer a direction is a portrait of one of them
+_MOST_CLUSTERS = 4  # each that is tried costs as much time as all directions
 _LEAST_IN_CLUSTER = 3  # units: as for a lot
-_ROUNDS = (8, 16)  # with all functions, with those that count: the evidence changes by < 1 then
+_ROUNDS = (8, 16, 20)  # with all functions, with those that count, for each model: the evidence changes by < 1 then
 _SAMPLE = 256  # units at most that say which functions count: a variance from so many is known to a tenth
 _AGAIN = 6  # rounds of a model that starts from another of nearly the same units
 _COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing
@@ -273,7 +296,7 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -
     every = LotBasis.over(*envelope)
     say("smoothness of the maps")
     sample = sums_of(units[:: -(-len(units) // _SAMPLE)], every, center, unit)
-    first = fitted(sample, every, np.zeros(len(sample), dtype=np.int64), _ROUNDS[0])
+    first = fitted(sample, every, 0, np.zeros(len(sample), dtype=np.int64), _ROUNDS[0])
     used = that_count(sample, every.variance(first.rest) + every.variance(first.of_mean))
     basis = every.only(used)
     sums = sums_of(units, basis, center, unit)
@@ -312,21 +335,48 @@ def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:
 
 
 def _chosen(sums: UnitSums, basis: LotBasis, say: Progress) -> LotState:
-    """The model with as many clusters as raise the evidence by more than it costs to say who is in which."""
-    plain = fitted(sums, basis, np.zeros(len(sums), dtype=np.int64), _ROUNDS[1])
-    best = plain
+    """The model with the largest evidence, each direction paid for by half the logarithm of the units a number."""
+    together = np.zeros(len(sums), dtype=np.int64)
+    plain = fitted(sums, basis, 0, together, _ROUNDS[1])
+    price = 0.5 * np.log(len(sums)) * _freedom(sums, plain)
+    best, value = _with_directions(sums, plain, plain.evidence, price, say)
     for number in range(2, _MOST_CLUSTERS + 1):
         say(f"{number} clusters")
         parted = _clustered(sums, plain, number)
-        if parted is None or _worth(parted) <= _worth(best):
+        if parted is None:
             break
-        best = parted
+        split, its = _with_directions(sums, parted, _worth(parted), price, say)
+        if its <= value:
+            break
+        best, value = split, its
     return best
 
 
+def _with_directions(
+    sums: UnitSums, state: LotState, value: float, price: float, say: Progress
+) -> tuple[LotState, float]:
+    """As many shared directions as pay for themselves; clusters are held against one cloud with the same freedom."""
+    paid = value - state.evidence
+    for rank in range(1, min(_MOST_DIRECTIONS, len(sums) // _UNITS_A_DIRECTION) + 1):
+        say(f"{rank} directions")
+        tried = fitted(sums, state.basis, rank, state.cluster, _ROUNDS[2], start=state)
+        its = tried.evidence + paid - rank * price
+        if its <= value:
+            break
+        state, value = tried, its
+    return state, value
+
+
+def _freedom(sums: UnitSums, state: LotState) -> float:
+    """How many numbers recordings of a unit tell of its deviation."""
+    inverse: FloatArray = np.asarray(np.linalg.inv(state.spread()), dtype=np.float64)
+    shrunk = np.sum(inverse * posteriors(inverse, sums.precision)[0].mean(axis=0))
+    return len(state.basis.kept) - float(shrunk)
+
+
 def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
-    """The best model with so many clusters; None where no partition has enough units in each."""
-    tried = [fitted(sums, plain.basis, cluster, _AGAIN, start=plain) for cluster in _partitions(sums, plain, number)]
+    """The best model with so many clusters and no direction; None where no partition has enough units in each."""
+    tried = [fitted(sums, plain.basis, 0, cluster, _AGAIN, start=plain) for cluster in _partitions(sums, plain, number)]
     tried.sort(key=_worth, reverse=True)
     found: list[LotState] = []
     for first in tried[:_REFINED]:
@@ -336,7 +386,7 @@ def _clustered(sums: UnitSums, plain: LotState, number: int) -> LotState | None:
             nearest = np.argmax([evidence(sums, *way) for way in ways], axis=0)
             if np.array_equal(nearest, state.cluster) or _smallest(nearest, number) < _LEAST_IN_CLUSTER:
                 break
-            state = fitted(sums, plain.basis, nearest, _AGAIN, start=state)
+            state = fitted(sums, plain.basis, 0, nearest, _AGAIN, start=state)
         found.append(state)
     return max(found, key=_worth, default=None)
 
@@ -387,7 +437,7 @@ def _left_out(sums: UnitSums, state: LotState) -> tuple[FloatArray, float, NDArr
     for fold in range(int(folds.max()) + 1):
         rest = folds != fold
         _, cluster = np.unique(state.cluster[rest], return_inverse=True)
-        seen = fitted(sums.select(rest), state.basis, cluster, _AGAIN, start=state)
+        seen = fitted(sums.select(rest), state.basis, state.rank, cluster, _AGAIN, start=state)
         ways = predictive(seen)
         factors = [np.linalg.cholesky(covariance) for _, covariance in ways]
         nearest = np.argmax([evidence(sums.select(~rest), *way) for way in ways], axis=0)

@@ -259,8 +259,10 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
         InputError: The file contradicts itself: lengths that differ, a covariance that is none.
     """
     basis = LotBasis.read(lot.functions)
-    rest = np.diag(basis.variance(processed(lot.rest)))
-    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters))
+    kept = basis.kept
+    directions = np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
+    rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
+    freedom = freedom_of(sum(c.units for c in lot.clusters), len(lot.clusters), len(directions))
     scale = lot.cross_validation.spread_scale * student_variance(freedom)
     means, covariances = _of_clusters(lot, scale, rest, where)
     sizes = np.array([cluster.units for cluster in lot.clusters], dtype=np.float64)
