@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -20,7 +20,15 @@ from ..pages.display import (
 
 if TYPE_CHECKING:
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
-    from ..results.release import HeldLimits, JointVerification, ReadLog, Verification, VerifiedFile
+    from ..results.release import (
+        EmittedTable,
+        HeldLimits,
+        JointVerification,
+        MapError,
+        ReadLog,
+        Verification,
+        VerifiedFile,
+    )
     from ..results.training import Training
 
 
@@ -100,6 +108,20 @@ def verified_line(result: Verification) -> str:
     return f"bit for bit as the reference: {where}"
 
 
+# Growth of the RMS from which on a command says what rounding costs; a smaller one is in the results only.
+_NOTABLE_GROWTH = 0.01
+
+
+def rounding_lines(tables: Iterable[EmittedTable | MapError]) -> Iterator[str]:
+    """One line for each table whose rounding costs more than the third digit of an RMS."""
+    for table in tables:
+        if table.rms_growth is not None and table.rms_growth > _NOTABLE_GROWTH:
+            yield (
+                f"{table.numeric}: rounding can raise an RMS at the noise floor by {table.rms_growth:.1%} of it; "
+                "at_most.error_bound_dph of a limits file refuses what is too much"
+            )
+
+
 def not_installed_lines(result: Verification) -> Iterator[str]:
     """One line with the targets whose tools are not installed, where there are some."""
     names, packages = result.not_installed
@@ -118,6 +140,7 @@ def verify_notes(result: Verification) -> Iterator[str]:
         yield from (f"{who}: {text}" for text in found if text)
     yield from file_notes(result)
     yield from _log_notes(result.log) if result.log else ()
+    yield from rounding_lines(result.errors)
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (

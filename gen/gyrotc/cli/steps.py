@@ -44,6 +44,7 @@ from .results import (
     evaluation_table,
     file_notes,
     prediction_line,
+    rounding_lines,
     training_lines,
     verify_notes,
     verify_table,
@@ -162,6 +163,7 @@ def emit(
     from ..results.release import Emitted, EmittedTable
     from ..tables.emission import emit as run
     from ..tables.map_grid import csv_text, grid_of_map, map_result
+    from ..tables.quantisation import rms_growth
 
     loaded = load_model(model)
     source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
@@ -179,7 +181,12 @@ def emit(
         axis=loaded.axis,
         id=loaded.id,
         tables=tuple(
-            EmittedTable(numeric=t.numeric, table_bytes=t.table_bytes, error_bound_dph=t.error_bound_dph)
+            EmittedTable(
+                numeric=t.numeric,
+                table_bytes=t.table_bytes,
+                error_bound_dph=t.error_bound_dph,
+                rms_growth=rms_growth(loaded, t),
+            )
             for t in emission.tables.values()
         ),
         refused=emission.refused,
@@ -192,6 +199,8 @@ def emit(
         tell(f"{map_file}: {grid.summary}")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
+    for line in rounding_lines(result.tables):
+        tell(line)
     tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
 
 

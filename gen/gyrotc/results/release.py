@@ -164,12 +164,18 @@ STATED = (
 """Files and folders of an axis that say something of the unit, by their paths in its folder."""
 
 
+_RMS_GROWTH = (
+    "largest share by which rounding can raise the RMS of a residual at the noise floor; null if no floor is known"
+)
+
+
 class EmittedTable(Part):
     """Size and error bound of one table."""
 
     numeric: ArithmeticName = Field(description="its arithmetic")
     table_bytes: Count = Field(description="size of the table, bytes (section 3)")
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
+    rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
 
 
 class Emitted(UnitResult):
@@ -290,6 +296,7 @@ class MapError(Part):
     numeric: str = Field(description="arithmetic")
     status: PassOrFail = Field(description="whether the largest departure keeps to the bound")
     bound_dph: float = Field(description="proven for every input, deg/h")
+    rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
     worst_dph: float = Field(description="largest found, deg/h")
     arithmetic_dph: float | None = Field(
         default=None, description="largest in the middle of a cell of inputs, deg/h; only of `--exhaustive`"

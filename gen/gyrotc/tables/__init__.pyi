@@ -17,6 +17,7 @@ from .quantisation import NUMERICS as NUMERICS
 from .quantisation import applied_of as applied_of
 from .quantisation import channels_of as channels_of
 from .quantisation import quantise as quantise
+from .quantisation import rms_growth as rms_growth
 from .record import RECORD as RECORD
 from .record import read_options as read_options
 from .text import amalgamate as amalgamate

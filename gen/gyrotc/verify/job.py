@@ -38,6 +38,7 @@ from ..results.release import (
     WorstError,
 )
 from ..tables.emission import expected_answers
+from ..tables.quantisation import rms_growth
 from ..tables.vectors import Vectors, make_vectors
 from .board import board_entries, log_entries
 from .emitted import (
@@ -385,6 +386,7 @@ def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> MapError:
         numeric=numeric,
         status="pass" if worst <= table.error_bound_dph else "fail",
         bound_dph=table.error_bound_dph,
+        rms_growth=rms_growth(model, table),
         worst_dph=worst,
         inputs_visited=int(usable.sum()),
     )
@@ -399,6 +401,7 @@ def _every_input(job: Job, model: Model, progress: Progress) -> MapError:
         numeric="q31",
         status="pass" if sound else "fail",
         bound_dph=table.error_bound_dph,
+        rms_growth=rms_growth(model, table),
         worst_dph=visited.worst_dph,
         arithmetic_dph=visited.arithmetic_dph,
         mean_dph=visited.mean_dph,
