@@ -66,6 +66,9 @@ def _of_a_fleet(record: Record) -> Iterator[tuple[str, Figure]]:
     words = f"`fleet` of {fleet['serials']:,} serials"
     yield f"{words}, elapsed seconds in {fleet['jobs']} processes", Figure(fleet["elapsed_s"], ".0f")
     yield f"{words}, CPU seconds of a serial", Figure(fleet["cpu_s"] / fleet["serials"], ".2f")
+    if "bytes" in fleet:
+        kilobytes = fleet["bytes"] / fleet["serials"] / 1e3
+        yield f"{words}, kB of a serial", Figure(kilobytes, ".0f", at_most=80.0)
     yield f"{words}, serials that failed", Figure(fleet["failed"], "d", at_most=0)
     yield (
         f"{words}, RMS ÷ estimated noise floor, median",

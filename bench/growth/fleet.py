@@ -25,6 +25,8 @@ def fleet(serials: int) -> dict[str, Any]:
         cost = gyrotc(["fleet", str(data), "--out", str(out), "--jobs", str(_JOBS)])
         elapsed = time.monotonic() - begun
         lot = gyrotc(["lot", str(out), "--out", str(Path(work) / "lot.json")])
+        units = [path for folder in out.iterdir() if (folder / "entry.json").is_file() for path in folder.rglob("*")]
+        sizes = [path.stat().st_size for path in units if path.is_file()]
         summary = json.loads((out / "fleet.json").read_text("utf-8"))
     ratio = summary["figures"]["rms_over_floor"]
     return {
@@ -33,6 +35,7 @@ def fleet(serials: int) -> dict[str, Any]:
         "failed": summary["failed"],
         "elapsed_s": elapsed,
         "cpu_s": cost["seconds"],
+        "bytes": sum(sizes),
         "load": load,
         "lot_s": lot["seconds"],
         "lot_mib": lot["peak_mib"],

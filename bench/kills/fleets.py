@@ -54,7 +54,7 @@ def fleet(root: Path, scenario: Path) -> Case:
 
 def _calls_of_a_unit(root: Path, manifest: Path) -> int:
     wanted = load_manifest(manifest)
-    task = Task(wanted.units[0], "alone", wanted, root / "alone", full=False, program=program_of())
+    task = Task(wanted.units[0], "alone", wanted, root / "alone", program=program_of())
     end = run(lambda: _refuse_failed(do_unit(task)), root)
     shutil.rmtree(root / "alone")
     if end.status != 0:

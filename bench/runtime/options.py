@@ -113,7 +113,7 @@ def costs() -> dict[str, Any]:
             (folder / name).write_bytes(data)
         program = _PROGRAM.format(id=model.id, symbol=model.symbol)
         (folder / "program.c").write_text(program, encoding="ascii")
-        whole = {name: 1 for name in needs_of([model]) if name.startswith("GTC_WITH_")} | _FULL
+        whole = {name: 1 for name in needs_of(model) if name.startswith("GTC_WITH_")} | _FULL
         for core, level in columns:
             found: dict[str, tuple[int, int, int]] = {}  # many pairs begin with the whole runtime
             for row, option in zip(rows, OPTIONS, strict=True):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import gyrotc
 from gyrotc.model import Model
-from gyrotc.tables import config_text, emit_texts, quantise_all
+from gyrotc.tables import config_text, emit_texts, joint_needs, needs_of, quantise_all
 from gyrotc.verify import Target, link, run_to_end
 from models import random_model, random_terms
 
@@ -45,7 +45,7 @@ def models(n: int = TABLES) -> list[Model]:
 def write_sources(folder: Path, n: int = TABLES) -> list[Path]:
     """Runtime, float32 tables and program in `folder`; the C files."""
     includes, rows = [], []
-    (folder / "gtc_config.h").write_bytes(config_text(models(n)))
+    (folder / "gtc_config.h").write_bytes(config_text(joint_needs(map(needs_of, models(n)))))
     for model in models(n):
         texts = emit_texts(model, quantise_all(model, ["f32"]))
         (t0, t1), r = model.envelope.temperature_c, model.envelope.slope_c_per_min[1] * model.block_s / 60.0

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..common.errors import CheckFailed, InputError
+from ..common.errors import CheckFailed
+from ..common.texts import toml_key
 from ..pages.display import sci, words
 from .base import (
     LOT,
     AcceptOption,
     DirArg,
     JsonOption,
-    LotOption,
     OutOption,
     app,
-    lot_in,
     progress,
     tell,
     write_json,
@@ -43,14 +41,6 @@ def fleet(
     wait: Annotated[
         int, typer.Option("--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits.")
     ] = 60,
-    full: Annotated[
-        bool, typer.Option("--full", help="A whole build for each: compiled, verified, with its report.")
-    ] = False,
-    release: Annotated[
-        list[str] | None, typer.Option("--release", metavar="SERIAL", help="Release it although a finding bars it.")
-    ] = None,
-    why: Annotated[str, typer.Option("--reason", help="Why, for --release.")] = "",
-    lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Many serials: read, fit, emit and check each; one summary, and those that are outliers.
@@ -63,16 +53,11 @@ def fleet(
     from ..fleet.page import summary_of
     from ..fleet.run import Cluster, run_fleet
 
-    if bool(release) != bool(why.strip()):
-        raise InputError("--release", "and --reason go together", "--release SERIAL --reason TEXT")
-    releases = dict.fromkeys(release or (), " ".join(why.split()))
     wanted = load_manifest(manifest)
-    options = replace(wanted.options, prior=lot_in(lot))
-    wanted = replace(wanted, options=options)
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
     with progress() as say:
         done = _Done(len(wanted.units), say)
-        entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, full=full, releases=releases, done=done)
+        entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, done=done)
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     _tell_comparison(summary)
@@ -101,7 +86,7 @@ def _tell_comparison(summary: FleetSummary) -> None:
         if unit.barred:
             tell(
                 f"{unit.name}: not released, in no lot: {', '.join(unit.barred)}; look at it, or "
-                f"--release {unit.serial} --reason TEXT"
+                f"release it in the manifest: [release] {toml_key(unit.serial or unit.name)} = REASON"
             )
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,13 +13,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..assess.limits import Limits, load_limits
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import read_toml, refuse_above, refused
+from ..jobs.lot import load_lot
 from ..recordings.fit_options import options_in
 from ..recordings.loading import asked_axes
 from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
+from ..train.prior.use import prior_of
 
-#: Files of a summary, beside the folders of the units.
 SUMMARY = ("fleet.json", "fleet.csv", "fleet.html")
+"""Files of a summary, beside the folders of the units."""
+RUNTIME = "runtime"
+"""Folder of the runtime that all units share, beside theirs."""
+OF_FLEET = (*SUMMARY, RUNTIME)
+"""All that a fleet writes beside the folders of the units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +49,8 @@ class Unit:
     @property
     def refused(self) -> str:
         """Why no result folder may have this name; empty if it may."""
-        if self.folder.casefold() in SUMMARY:
-            return "is the name of a file of the summary; give the data set another name"
+        if self.folder.casefold() in OF_FLEET:
+            return "is a name in the folder of a fleet; give the data set another name"
         if not self.folder.strip("-xyz") or self.folder.startswith("."):
             return "a name that is empty or begins with a dot is no name for a result"
         return ""
@@ -52,12 +58,16 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """What is to be done, and how."""
+    """What is to be done, and how.
+
+    `releases`: Reasons, by serial, for which units are released although a finding bars them.
+    """
 
     units: tuple[Unit, ...]
     options: FitOptions
     numerics: tuple[str, ...] | None
     limits: Limits | None
+    releases: Mapping[str, str] = field(default_factory=dict)
 
 
 class _Part(BaseModel):
@@ -65,6 +75,7 @@ class _Part(BaseModel):
 
 
 _Place = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00-\x1f]+$")]
+_Reason = Annotated[str, Field(max_length=1024, pattern=r"\S")]
 _Axis = Literal["x", "y", "z", "all"] | None
 
 
@@ -81,6 +92,8 @@ class _Manifest(_Part):
     options: dict[str, Any] = {}
     numeric: Annotated[list[Literal["f32", "q31"]], Field(min_length=1)] | None = None
     limits: _Place | None = None
+    lot: _Place | None = None
+    release: dict[str, _Reason] = {}
 
 
 def load_manifest(path: Path) -> Fleet:
@@ -107,9 +120,11 @@ def load_manifest(path: Path) -> Fleet:
     )
     units = tuple(unit for folder, axis in named for unit in _units(folder, axis))
     limits = load_limits(path.parent / manifest.limits) if manifest.limits else None
-    options = FitOptions(**options_in(manifest.options, f"{path}, field options."))
+    prior = prior_of(load_lot(path.parent / manifest.lot)) if manifest.lot else None
+    options = FitOptions(**options_in(manifest.options, f"{path}, field options."), prior=prior)
     numerics = tuple(manifest.numeric) if manifest.numeric else None
-    return _distinct(path, Fleet(units, options, numerics, limits))
+    releases = {serial: " ".join(reason.split()) for serial, reason in manifest.release.items()}
+    return _distinct(path, Fleet(units, options, numerics, limits, releases))
 
 
 def _units(folder: Path, axis: str | None) -> Iterator[Unit]:

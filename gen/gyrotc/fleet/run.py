@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ from ..results.cache import program_of
 from ..results.files import Lock, deferred
 from ..results.fleet import FleetEntry
 from ..results.marker import KINDS, check_contents, check_separate, final_place
-from .manifest import SUMMARY, Fleet, printable
+from .manifest import OF_FLEET, SUMMARY, Fleet, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
@@ -223,8 +223,6 @@ def run_fleet(
     *,
     jobs: int = 2,
     cluster: Cluster | None = None,
-    full: bool = False,
-    releases: Mapping[str, str] | None = None,
     done: Done | None = None,
 ) -> list[FleetEntry]:
     """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
@@ -233,8 +231,6 @@ def run_fleet(
         out: A folder for each unit goes into it, and the files of the summary.
         jobs: Processes on this machine.
         cluster: To use instead; its workers see the same folders.
-        full: A whole `build` for each unit: compiled, verified on the targets found, with its report.
-        releases: Reasons, by serial, for which units are released although a finding bars them.
         done: Called with each entry as it comes, those of earlier calls first.
 
     Raises:
@@ -244,7 +240,7 @@ def run_fleet(
     place = _checked_place(fleet, out)
     lock = Lock(place / "fleet.json", "fleet")
     try:
-        return _run(fleet, place, jobs, cluster, full, done or (lambda _: None), releases or {})
+        return _run(fleet, place, jobs, cluster, done or (lambda _: None))
     finally:
         with deferred():
             try:
@@ -258,21 +254,20 @@ def _checked_place(fleet: Fleet, out: Path) -> Path:
     place = final_place(out)
     folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
     check_separate(out, place, folders, whole=True)
-    check_contents(out, place, KINDS["fleet"], frozenset(SUMMARY))
+    check_contents(out, place, KINDS["fleet"], frozenset(OF_FLEET))
     place.mkdir(parents=True, exist_ok=True)
     return place
 
 
-def tasks_of(fleet: Fleet, out: Path, full: bool) -> list[Task]:
+def tasks_of(fleet: Fleet, out: Path) -> list[Task]:
     """A task for each unit; none of them carries the others to another process."""
-    program, common = program_of(), replace(fleet, units=())
+    program, common = program_of(), replace(fleet, units=(), releases={})
     return [
         Task(
             replace(unit, dataset=unit.dataset.absolute()),
             printable(str(unit.dataset)),
             common,
             out / unit.folder,
-            full,
             program,
         )
         for unit in fleet.units
@@ -284,12 +279,10 @@ def _run(
     out: Path,
     jobs: int,
     cluster: Cluster | None,
-    full: bool,
     say: Done,
-    releases: Mapping[str, str],
 ) -> list[FleetEntry]:
     clean_units(out, [unit.folder for unit in fleet.units])
-    tasks = [task.keyed() for task in tasks_of(fleet, out, full)]
+    tasks = [task.keyed() for task in tasks_of(fleet, out)]
     entries = {}
     for number, task in enumerate(tasks):
         if (known := made_before(task)) and known.status == "done":
@@ -305,7 +298,7 @@ def _run(
         entries[waiting[k]] = entry
         say(entry)
     found = [
-        entry.model_copy(update={"released": why}) if (why := releases.get(entry.serial or "")) else entry
+        entry.model_copy(update={"released": why}) if (why := fleet.releases.get(entry.serial or "")) else entry
         for entry in _one_of_each_serial([entries[number] for number in range(len(tasks))])
     ]
     write_summary(out, found)

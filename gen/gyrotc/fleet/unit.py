@@ -1,4 +1,4 @@
-"""One serial of a fleet: read, fit, emit, check against the reference, judge; or a whole `build`."""
+"""Do one gyro of a fleet: read, fit, emit, check against the reference, judge."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import itertools
 import os
 import socket
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from .. import __version__
 from ..assess.limits import coverage_factor
@@ -19,13 +18,14 @@ from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.calibration import Built, build_into
 from ..quality.events import found_events
-from ..recordings.loading import load
+from ..recordings.loading import calibration_day, load, stated_identity
 from ..recordings.records import Dataset
 from ..results.cache import input_hashes, program_of
 from ..results.files import Lock, digest_of, json_text, write_atomically
 from ..results.fleet import Facts, FleetEntry
 from ..results.folder import clean, leftovers, result_folder
 from ..results.marker import KINDS, read_marker, result_faults, survey_folder
+from ..tables.runtime import needs_of
 from .manifest import Fleet, Unit, printable
 from .outliers import gyro_facts
 
@@ -80,7 +80,6 @@ class Task:
         shown: The path as the user has typed it.
         fleet: The options; without the other units.
         out: Where the result goes, absolute.
-        full: As of `run_fleet`.
         program: Hash of the program that asks for it.
         key: Hash of what it is to be made of, as the one who asks has found it; empty: that could not be read.
         version: Of the gyrotc that asks for it.
@@ -90,7 +89,6 @@ class Task:
     shown: str
     fleet: Fleet
     out: Path
-    full: bool
     program: str
     key: str = ""
     version: str = __version__
@@ -109,7 +107,7 @@ class Task:
         limits = self.fleet.limits.sha256 if self.fleet.limits else None
         prior = self.fleet.options.prior
         plain = asdict(replace(self.fleet.options, prior=None)) | {"prior": prior.key if prior else None}
-        options = [self.unit.axis, plain, self.fleet.numerics, limits, self.full]
+        options = [self.unit.axis, plain, self.fleet.numerics, limits]
         return digest_of([self.program, options, input_hashes(self.unit.dataset)])
 
 
@@ -163,8 +161,15 @@ def failed(task: Task, reason: str) -> FleetEntry:
         stays = "; its folder holds an earlier result" if (task.out / "model.json").exists() else ""
     except OSError:
         stays = ""
+    serial, day = stated_identity(task.unit.dataset)
     return FleetEntry(
-        name=task.unit.name, dataset=task.shown, axis=task.unit.axis, status="failed", reason=printable(reason) + stays
+        name=task.unit.name,
+        dataset=task.shown,
+        axis=task.unit.axis,
+        status="failed",
+        serial=serial,
+        date=day,
+        reason=printable(reason) + stays,
     )
 
 
@@ -186,7 +191,6 @@ def _built(task: Task) -> FleetEntry:
             fleet.options,
             numerics=fleet.numerics,
             limits=fleet.limits,
-            compiled=task.full,
             watch=lambda run, averages: runs.append((run.file, averages)),
         )
         if task.found() != key:
@@ -201,7 +205,6 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
     role, judged = built.evaluation.judged() or (None, None)
     floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None
     held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
-    days = [run.started.date().isoformat() for run in dataset.runs if run.started is not None]
     entry = FleetEntry(
         name=task.unit.name,
         dataset=task.shown,
@@ -225,10 +228,11 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
         limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
         limits_held=len(held.limits) if held and held.limits else None,
         expanded_uncertainty_dph=coverage_factor(known.freedom) * known.standard if known else None,
-        date=_day_of(built.model.meta, days),
+        date=calibration_day(dataset.meta, (run.started for run in dataset.runs)),
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),
         sketch="".join(f"{word:016x}" for word in dataset.sketch),
+        runtime_options=needs_of(built.model),
         key=key,
     )
     return entry.model_copy(update={"reason": "; ".join(built.failures)}) if built.failures else entry
@@ -241,9 +245,3 @@ def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]])
         return facts
     named = (f for f in built.evaluation.findings if f.id == "run_outlier")
     return facts.model_copy(update={"own": (*found_events(dataset), *named)})
-
-
-def _day_of(meta: Mapping[str, Any], days: Sequence[str]) -> str | None:
-    """Day of a calibration: as stated, else that of the last run."""
-    stated = meta.get("calibrated_on")
-    return str(stated) if stated is not None else max(days, default=None)

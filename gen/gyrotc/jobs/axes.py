@@ -13,8 +13,9 @@ from ..pages.report import axes_page
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
 from ..results.release import JointVerification, Verification
-from ..tables.emission import config_text, emitted_tables, runtime_texts
+from ..tables.emission import emitted_tables
 from ..tables.record import RECORD, joint_record_text
+from ..tables.runtime import joint_needs, needs_of, runtime_texts
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.toolchain import all_targets, compile_c, run_program
@@ -60,8 +61,7 @@ def joint_texts(
     """
     headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
     held = [n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers]  # of all axes
-    texts = runtime_texts(models.values(), held)
-    texts["gtc_config.h"] = config_text(list(models.values()))
+    texts = runtime_texts(joint_needs(needs_of(model) for model in models.values()), held)
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}

@@ -105,7 +105,7 @@ class _Order:
     previous: Path | None
     prior: Path | None = None
     ageing_dph: float | None = None
-    compiled: bool = True
+    in_fleet: bool = False
     watch: Watch | None = None
     targets: Sequence[str] = ()
 
@@ -187,20 +187,20 @@ def build_into(
     *,
     numerics: Sequence[str] | None = None,
     limits: Limits | None = None,
-    compiled: bool = True,
     watch: Watch | None = None,
 ) -> Built:
-    """The main job for one axis, into a folder that is there; the caller sees to it that it appears whole.
+    """Do the main job for a gyro of a fleet, into a folder that is there; the caller sees that it appears whole.
+
+    Nothing is compiled or drawn: what the C code answers is taken from the reference, which is the same bit for bit.
+    The runtime is not written, as all gyros of the fleet share it.
 
     Args:
-        compiled: False: no compiler and no drawing. What the C code answers is taken from the reference, which is the
-            same bit for bit; traces and `report.html` are left out.
         watch: Called with each run and its means.
 
     Raises:
         CheckFailed: Every arithmetic is refused.
     """
-    order = _Order(numerics, False, limits, None, compiled=compiled, watch=watch)
+    order = _Order(numerics, False, limits, None, in_fleet=True, watch=watch)
     return _build_axis(dataset, work, options, order, lambda _: None)
 
 
@@ -221,19 +221,19 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training.content())
     say("emitting C")
-    emission = emit(fitted.model, work, numerics=order.numerics)
+    emission = emit(fitted.model, work, numerics=order.numerics, runtime_apart=order.in_fleet)
     verification = verify(
-        work, targets=order.targets, compiled=order.compiled, progress=lambda name: say(f"verifying {name}")
+        work, targets=order.targets, compiled=not order.in_fleet, progress=lambda name: say(f"verifying {name}")
     )
     _write(work / "verify.json", verification.content())
     evaluation = evaluate(
         work,
         dataset,
         average_s=options.average_s,
-        trace=work / "trace" if order.compiled else None,
+        trace=None if order.in_fleet else work / "trace",
         trace_rows=_TRACE_ROWS,
         training=fitted.training,
-        compiled=order.compiled,
+        compiled=not order.in_fleet,
         progress=lambda file: say(f"replaying {file}"),
         watch=order.watch,
     )
@@ -251,7 +251,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         _write(work / "changes.json", changes.content())
     budget = budget_of(fitted.model, fitted.training, evaluation, verification, limits=order.limits, changes=changes)
     _write(work / "budget.json", budget.content())
-    if order.compiled:
+    if not order.in_fleet:
         say("drawing the report")
         write_report(work)
     return Built(fitted.model, fitted.training, evaluation, verification, emission.refused, diagnosis, held, changes)

@@ -59,6 +59,7 @@ class Problems:
 
 
 FILE = "dataset.toml"
+UNKNOWN_SERIAL = "unknown"  # stands for a serial that is refused, so that the rest can be looked at
 _ATTEMPTS = 3  # a field taken out can bring another error to light
 _SERIAL = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _SERIAL_FORM = "1 to 64 of the characters A-Z a-z 0-9 . _ -, at least one of them a letter or digit"
@@ -261,7 +262,7 @@ def _dropped(content: dict[str, Any], detail: ErrorDetails) -> bool:
             return False
         content["run"][location[1]].pop(location[2], None)
     elif location[0] == "serial":
-        content["serial"] = "unknown"
+        content["serial"] = UNKNOWN_SERIAL
     else:
         content.pop(str(location[0]), None)
     return True

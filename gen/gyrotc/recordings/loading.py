@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from itertools import combinations
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,16 @@ from pydantic_core import PydanticCustomError, ValidationError
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
-from .description import FILE, Description, Problems, RunEntry, arrange, check_serial, parse_description
+from .description import (
+    FILE,
+    UNKNOWN_SERIAL,
+    Description,
+    Problems,
+    RunEntry,
+    arrange,
+    check_serial,
+    parse_description,
+)
 from .fingerprints import sketch
 from .fit_options import options_in
 from .overlap import counted_once, shared_rows
@@ -27,6 +37,7 @@ from .units import NATIVE_UNITS
 __all__ = [
     "asked_axes",
     "axes_of",
+    "calibration_day",
     "check_channel_units",
     "check_description",
     "check_spans",
@@ -37,6 +48,7 @@ __all__ = [
     "load_reporting",
     "of_axis",
     "place_of",
+    "stated_identity",
     "suspected",
     "suspected_of_earth",
 ]
@@ -216,6 +228,26 @@ def load(
     return dataset
 
 
+def calibration_day(meta: Mapping[str, Any], starts: Iterable[datetime | None]) -> str | None:
+    """Return the day of a calibration: `calibrated_on` of `[meta]`, else that of the last run; None: not stated."""
+    stated = meta.get("calibrated_on")
+    known = [start.date().isoformat() for start in starts if start is not None]
+    return str(stated) if stated is not None else max(known, default=None)
+
+
+def stated_identity(folder: Path) -> tuple[str | None, str | None]:
+    """Return the serial that a data set states and the day of its calibration, also where it is refused."""
+    problems = Problems(collect=True)
+    try:
+        description = _description(folder, problems)
+    except OSError:
+        description = None
+    if description is None:
+        return None, None
+    serial = None if description.serial == UNKNOWN_SERIAL else description.serial
+    return serial, calibration_day(description.meta, (run.started for run in description.run))
+
+
 def axes_of(folder: Path) -> tuple[str, ...]:
     """Axes that `load` can choose from; empty where the recordings have one rate.
 
@@ -352,7 +384,7 @@ def _description(folder: Path, problems: Problems) -> Description | None:
         where = f"{folder}, name of the folder as serial"
         expected = f"{error.message()}, or a {FILE} that gives the serial"
         problems.add(InputError(where, repr(serial), expected))
-        serial = "unknown"
+        serial = UNKNOWN_SERIAL
     try:
         runs = tuple(RunEntry(file=name, power_on_s="unknown") for name in files)
     except ValidationError as error:  # a name that no description could hold

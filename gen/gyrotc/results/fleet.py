@@ -76,7 +76,8 @@ class FleetUnit(Part):
     outlier_reason: str | None = Field(default=None, description="why it is an outlier, as in `reasons` of the fleet")
 
     released: str | None = Field(
-        default=None, description="why it is released although a finding bars it (`--release`); null: it is not"
+        default=None,
+        description="why it is released although a finding bars it (`[release]` of the manifest); null: it is not",
     )
 
     @property
@@ -131,6 +132,9 @@ class FleetEntry(FleetUnit):
     facts: Facts | None = Field(default=None, description="what it is compared with others by")
     sketch: Annotated[str, Field(pattern="^([0-9a-f]{16})*$")] = Field(
         default="", description="the 16-digit hashes of some rows, chosen by their value: copies share them"
+    )
+    runtime_options: dict[str, Count] | None = Field(
+        default=None, description="options of the runtime that its table needs, by name; null without a table"
     )
     key: Sha256 | None = Field(default=None, description="SHA-256 over recordings, options, limits and program")
     _kept: bool = PrivateAttr(default=False)

@@ -1,12 +1,8 @@
-from .emission import COSTS as COSTS
-from .emission import SWITCHES as SWITCHES
 from .emission import Emission as Emission
-from .emission import config_text as config_text
 from .emission import emit as emit
 from .emission import emit_texts as emit_texts
 from .emission import emitted_tables as emitted_tables
 from .emission import expected_answers as expected_answers
-from .emission import needs_of as needs_of
 from .emission import quantise_all as quantise_all
 from .emission import write_texts as write_texts
 from .error_bounds import channel_error_dph as channel_error_dph
@@ -20,5 +16,10 @@ from .quantisation import quantise as quantise
 from .quantisation import rms_growth as rms_growth
 from .record import RECORD as RECORD
 from .record import read_options as read_options
+from .runtime import COSTS as COSTS
+from .runtime import SWITCHES as SWITCHES
+from .runtime import config_text as config_text
+from .runtime import joint_needs as joint_needs
+from .runtime import needs_of as needs_of
 from .text import amalgamate as amalgamate
 from .vectors import make_vectors as make_vectors

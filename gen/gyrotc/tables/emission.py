@@ -1,19 +1,14 @@
 """Write the C files of a model: tables, runtime, image, vectors, board test, example.
 
-A pure function of the model: no date,
-no path, no host, no version, so one model gives the same bytes on every machine. All arithmetic was
-done in `tables.quantise`; here integers are printed.
-
-`gtc_config.h` names the smallest runtime that holds the tables, and what each of its options costs: the costs were
-measured (`make bench ONLY=runtime`) and stand in `costs.json`.
+A pure function of the model: no date, no path, no host, no version, so one model gives the same bytes on every
+machine. All arithmetic was done in `tables.quantise`; here integers are printed.
 """
 
 from __future__ import annotations
 
 import functools
-import json
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
@@ -23,69 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
-from ..common.inputs import runtime_folders
 from ..common.texts import CText, c_code, c_environment, c_literal
 from ..mirror.history import answers
 from ..mirror.table import LAYOUT, Table
-from ..model import Model, RuntimePart
+from ..model import Model
 from ..results.files import write_own
 from ..results.folder import result_folder
 from .error_bounds import MARGIN, channel_error_dph
 from .quantisation import NUMERICS, quantise
-from .record import RECORD, Options, read_options, record_text
+from .record import RECORD, SHARED_RUNTIME, Options, read_options, record_text
 from .rounding import channel_names
-from .text import amalgamate, example_values, table_text
+from .runtime import needs_of, runtime_texts
+from .text import example_values, table_text
 from .vectors import MISSING_READING, Vectors, answers_text, make_vectors
-
-COSTS = Path(__file__).resolve().parent / "costs.json"
-#: Options of gtc_config.h by the part that a product may leave out.
-SWITCHES: dict[RuntimePart, str] = {
-    "uncertainty": "GTC_WITH_UNCERTAINTY",
-    "rezero": "GTC_WITH_REZERO",
-    "coverage": "GTC_WITH_COVERAGE",
-    "known_answers": "GTC_WITH_PROBES",
-    "image": "GTC_WITH_IMAGE",
-    "saved_state": "GTC_WITH_SAVE",
-    "time": "GTC_WITH_TIME",
-}
-
-
-def needs_of(models: Sequence[Model]) -> dict[str, int]:
-    """The least options of the runtime that hold the tables of all these models, by name."""
-    terms = max(max(len(m.terms), len(channel_names(m))) for m in models)
-    needs = {
-        "GTC_MAX_SLOPE_BLOCKS": max(m.slope_blocks for m in models),
-        "GTC_MAX_TERMS": terms,
-        "GTC_WITH_BANK": int(any(len(m.networks) > 1 for m in models)),
-    }
-    return needs | {switch: int(any(part not in m.left_out for m in models)) for part, switch in SWITCHES.items()}
-
-
-def config_text(models: Sequence[Model]) -> bytes:
-    """`gtc_config.h` of the tables of models that stand in one folder."""
-    needs = needs_of(models)
-    template = c_environment().get_template("gtc_config.h.j2")
-    text = template.render(
-        options=[{"name": name, "value": value} for name, value in needs.items()], cost_lines=list(_cost_lines(needs))
-    )
-    return text.encode("ascii")
-
-
-@functools.cache
-def _costs() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(COSTS.read_text("ascii"))
-    return found
-
-
-def _cost_lines(needs: dict[str, int]) -> Iterator[str]:
-    """A table of the costs in a comment: flash/RAM/stack by core and level."""
-    costs = _costs()
-    yield f"{'':<28} " + " ".join(f"{column:>16}" for column in costs["columns"])
-    for row in costs["rows"]:
-        cells = ("/".join(map(str, cell)) for cell in row["cells"])
-        state = f"{needs.get(row['option'], 0)}"
-        yield f"{row['name']:<24} {state:>3} " + " ".join(f"{cell:>16}" for cell in cells)
-
 
 __all__ = [
     "Emission",
@@ -96,7 +41,6 @@ __all__ = [
     "expected_answers",
     "image_of",
     "quantise_all",
-    "runtime_texts",
     "write_texts",
 ]
 
@@ -140,12 +84,20 @@ def emit(
     *,
     numerics: Sequence[str] | None = None,
     zero_at: float | None = None,
+    runtime_apart: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Emission:
-    """Writes `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced."""
+    """Write `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced.
+
+    Args:
+        numerics: The arithmetics; None: every one that the runtime has.
+        zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+        runtime_apart: Write the tables only: the runtime is in `SHARED_RUNTIME`, once for many gyros.
+        progress: Called with what is being done.
+    """
     emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics, progress)
     progress("answering the vectors")
-    texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at)
+    texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at, runtime_apart=runtime_apart)
     write_texts(out, texts, model)
     return emission
 
@@ -174,17 +126,30 @@ def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
 
 
 def emit_texts(
-    model: Model, emission: Emission, *, asked: bool = False, zero_at: float | None = None
+    model: Model,
+    emission: Emission,
+    *,
+    asked: bool = False,
+    zero_at: float | None = None,
+    runtime_apart: bool = False,
 ) -> dict[str, bytes]:
-    """All files of `c/` by name.
+    """Return all files of `c/` by name.
 
     Args:
         model: The model, before `zero_at` shifts it.
         emission: Its tables.
         asked: The arithmetics were asked for by name.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
+        runtime_apart: Without runtime, vectors, board test and example: these are made again where they are needed.
     """
-    return dict(_texts(_Made.of(model, emission), asked, zero_at))
+    options = Options.model_validate(
+        {
+            "numeric": tuple(emission.tables) if asked else None,
+            "zero_at_c": zero_at,
+            "runtime": SHARED_RUNTIME if runtime_apart else None,
+        }
+    )
+    return dict(_texts(_Made.of(model, emission), options))
 
 
 def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.uint32]]:
@@ -222,26 +187,29 @@ def _expected(made: _Made) -> dict[str, NDArray[np.uint32]]:
 
 
 @functools.lru_cache(maxsize=2)
-def _texts(made: _Made, asked: bool, zero_at: float | None) -> dict[str, bytes]:
+def _texts(made: _Made, options: Options) -> dict[str, bytes]:
     model, emission = made.model, made.emission
     numerics = tuple(emission.tables)
-    options = Options.model_validate({"numeric": numerics if asked else None, "zero_at_c": zero_at})
-    vectors = _vectors(made)
-    texts = _from_templates(model, emission, options, vectors)
-    texts["board_test.c"] = board_test_text(model, numerics, vectors.n_channels)
-    texts |= runtime_texts([model], numerics)
-    texts["gtc_config.h"] = config_text([model])
+    named = {f"gtc_{model.id}.h": "table.h.j2", f"gtc_{model.id}.c": "table.c.j2"}
+    if options.runtime is None:
+        named |= {f"vectors_{model.id}.h": "vectors.h.j2", "main.c": "main.c.j2"}
+    texts = _from_templates(named, model, emission, options, _vectors(made))
+    if options.runtime is None:
+        texts["board_test.c"] = board_test_text(model, numerics, _vectors(made).n_channels)
+        texts |= runtime_texts(needs_of(model), numerics)
+        texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
         texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(image_of(table)).encode("ascii")
-    texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     texts[RECORD] = record_text(model, options, texts)
     return texts
 
 
-def _from_templates(model: Model, emission: Emission, options: Options, vectors: Vectors) -> dict[str, bytes]:
-    """Header, table, vectors and example of a model."""
+def _from_templates(
+    named: Mapping[str, str], model: Model, emission: Emission, options: Options, vectors: Vectors
+) -> dict[str, bytes]:
+    """Files by name of which `named` gives the template."""
     numerics = tuple(emission.tables)
     values: dict[str, Any] = {
         "id": model.id,
@@ -261,25 +229,14 @@ def _from_templates(model: Model, emission: Emission, options: Options, vectors:
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(model, emission)),
-        "needs": needs_of([model]),
+        "needs": needs_of(model),
+        "runtime": options.runtime,
         "left_out": ", ".join(part.replace("_", " ") for part in model.left_out),
         "macros": list(_macros(model, emission)),
         "warnings": list(model.warnings),
         **example_values(model),
     }
-    named = {
-        f"gtc_{model.id}.h": "table.h.j2",
-        f"gtc_{model.id}.c": "table.c.j2",
-        f"vectors_{model.id}.h": "vectors.h.j2",
-        "main.c": "main.c.j2",
-    }
     return {name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()}
-
-
-def runtime_texts(models: Iterable[Model], numerics: Iterable[str]) -> dict[str, bytes]:
-    """Files of the runtime for these tables in these arithmetics, by name."""
-    header, source = amalgamate(*runtime_folders(), numerics=tuple(sorted(numerics)))
-    return {"gtc.h": header.encode("ascii"), "gtc.c": source.encode("ascii")}
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -21,15 +21,21 @@ from ..results.base import Axis, Numbered
 from ..results.files import json_text
 
 RECORD = "emission.json"
+SHARED_RUNTIME: Final = "../../runtime"
+"""Folder of the runtime of a fleet, as the `c/` of one of its gyros names it."""
 
 
 class Options(BaseModel):
-    """Options of `emit`: arithmetics asked for by name (None: every one there is), where the map is shifted to 0."""
+    """Options of `emit`: arithmetics asked for by name (None: every one there is), where the map is shifted to 0.
+
+    `runtime`: Folder of the runtime that many gyros share; None: `c/` is complete by itself.
+    """
 
     model_config = ConfigDict(frozen=True, strict=True, extra="ignore", allow_inf_nan=False)
 
     numeric: Annotated[tuple[Numeric, ...], Field(min_length=1, max_length=2)] | None = None
     zero_at_c: Annotated[float, Field(ge=-200.0, le=400.0)] | None = None
+    runtime: Literal["../../runtime"] | None = None
 
     @property
     def text(self) -> str:
@@ -53,6 +59,9 @@ class EmissionRecord(Numbered):
         default=None, description="arithmetics asked for by `--numeric`, in their order, or null"
     )
     zero_at_c: float | None = Field(default=None, description="`--zero-at`, C, or null")
+    runtime: str | None = Field(
+        default=None, description="folder of `gtc.c`, `gtc.h` and `gtc_config.h`, from here; null: they are here"
+    )
     axes: dict[str, str] = Field(
         default={}, description="where several axes stand in one folder: hash of each axis's model"
     )
@@ -67,6 +76,7 @@ def record_text(model: Model, options: Options, files: Mapping[str, bytes]) -> b
         model_hash=model.hash,
         numeric=options.numeric,
         zero_at_c=options.zero_at_c,
+        runtime=options.runtime,
         files=_hashes(files),
     )
     return _text(record)
@@ -108,4 +118,4 @@ def read_options(c_folder: Path) -> Options:
         field = ".".join(str(part) for part in first["loc"])
         where = f"{path}, field {field}" if field else str(path)
         raise InputError(where, f"is damaged ({first['msg']})", "the record that emit wrote") from error
-    return Options(numeric=found.numeric, zero_at_c=found.zero_at_c)
+    return Options(numeric=found.numeric, zero_at_c=found.zero_at_c, runtime=found.runtime)

@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..common.inputs import read_input
 from ..mirror.history import answers
+from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
 from ..tables.vectors import Vectors
-from .emitted import Job, board_files, checked_sources
+from .emitted import Job, board_files, checked_sources, table_files
 from .sizes import function_costs
 from .toolchain import (
     Object,
@@ -267,9 +268,13 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
     """Compiles runtime and table once, and a test program for each arithmetic."""
     shared: _Shared | CheckFailed
     functions: dict[str, dict[str, FunctionCost]] = {}
-    files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
+    files = table_files(job.model)
+    if not job.board_test:
+        files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
     try:
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
+        for name, data in job.board_test.items():
+            write_own(c / name, data)
         runtime = runtime_object(target, c, work, fresh=job.trusted)
         shared = _shared(job, target, c, work, runtime)
         functions = function_costs(runtime)

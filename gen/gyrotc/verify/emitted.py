@@ -15,7 +15,7 @@ import os
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +31,14 @@ from ..results.marker import MARKER, sha256
 from ..results.release import VerifiedFile
 from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
+from ..tables.runtime import CONFIG, RUNTIME_FILES, joint_needs, needs_of, runtime_texts
 from ..tables.text import ARITHMETICS, amalgamate
 
 #: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
 EDITABLE = frozenset({"main.c"})
 _SHOWN = 160  # characters of a line
+_MAX_CONFIG = 2**16  # bytes of gtc_config.h, which has 3,000
+_OPTION = re.compile(r"^#define (GTC_[A-Z_]+) ([0-9]{1,2})$", re.MULTILINE)
 _BEYOND = 2**16  # bytes that are read of a file beyond its right length
 
 
@@ -48,6 +51,7 @@ class Job:
     tables: dict[str, Table]
     expected: dict[str, NDArray[np.uint32]]
     trusted: bool = False  # the user takes the code of the folder as it is
+    board_test: Mapping[str, bytes] = field(default_factory=dict)  # of the board test, which the folder does not have
 
 
 def c_hash(c_folder: Path) -> str:
@@ -78,7 +82,48 @@ def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
 
 def texts_again(model: Model, options: Options, emission: Emission) -> dict[str, bytes]:
     """What must lie in an emitted folder, by name."""
-    return emit_texts(model, emission, asked=options.numeric is not None, zero_at=options.zero_at_c)
+    return emit_texts(
+        model,
+        emission,
+        asked=options.numeric is not None,
+        zero_at=options.zero_at_c,
+        runtime_apart=options.runtime is not None,
+    )
+
+
+def board_files_again(model: Model, emission: Emission) -> dict[str, bytes]:
+    """Return the board test of a model and its vectors, by name."""
+    texts = emit_texts(model, emission)
+    return {name: texts[name] for name in ("board_test.c", f"vectors_{model.id}.h")}
+
+
+def runtime_place(c_folder: Path) -> Path:
+    """Return the folder of the runtime of an emitted folder: the folder itself, or that of its fleet."""
+    try:
+        shared = read_options(c_folder).runtime
+    except InputError:  # the record is then among the files that differ
+        shared = None
+    return c_folder / shared if shared else c_folder
+
+
+def shared_runtime_entries(c_folder: Path, model: Model, shared: str) -> Iterator[VerifiedFile]:
+    """One entry for each file of the runtime that a gyro shares with its fleet.
+
+    The options in `gtc_config.h` may be larger than this gyro needs, as other gyros of the fleet may need more.
+    """
+    place = c_folder / shared
+    config = _content(place / CONFIG, _MAX_CONFIG) or b""
+    stated = {name: int(value) for name, value in _OPTION.findall(config.decode("latin-1"))}
+    needs = needs_of(model)
+    options = joint_needs([needs, {name: value for name, value in stated.items() if name in needs}])
+    for name, data in runtime_texts(options, ARITHMETICS).items():
+        found = _content(place / name, len(data))
+        if found is None:
+            yield VerifiedFile(file=f"{shared}/{name}", verdict="missing", status="fail", mismatches=1)
+        elif found == data:
+            yield VerifiedFile(file=f"{shared}/{name}", verdict="equal", status="pass", mismatches=0)
+        else:
+            yield _differing(f"{shared}/{name}", found, data, allowed=False)
 
 
 def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()) -> Iterator[VerifiedFile]:
@@ -233,21 +278,22 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
     """The folder to compile from: `work` with a copy of these files, and of nothing else.
 
     Args:
-        trusted: The user takes the folder as it is; then it is compiled where it lies.
+        trusted: The user takes the folder as it is; one that is complete by itself is compiled where it lies.
 
     Raises:
         CheckFailed: A file is missing, or is not what gyrotc writes.
     """
-    if trusted:
+    runtime = runtime_place(c_folder)
+    if trusted and runtime == c_folder:
         return c_folder
     for name, check in files.items():
-        path = c_folder / name
+        path = (runtime if name in RUNTIME_FILES else c_folder) / name
         if not path.is_file():
             raise CheckFailed(f"{path} is missing")
         if path.stat().st_size > _MAX_BYTES:
             raise CheckFailed(f"{path} is larger than {_MAX_BYTES} bytes")
         data = path.read_bytes()
-        fault = check(data)
+        fault = None if trusted else check(data)
         if fault is not None:
             raise CheckFailed(
                 f"{path} {fault}: it is not compiled, as its code would run on this machine; "

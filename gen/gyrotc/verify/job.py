@@ -44,10 +44,12 @@ from .board import board_entries, log_entries
 from .emitted import (
     EDITABLE,
     Job,
+    board_files_again,
     c_hash,
     checked_sources,
     file_entries,
     made_again,
+    shared_runtime_entries,
     table_files,
     texts_again,
 )
@@ -251,9 +253,12 @@ def verify(
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
-    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
+    tests = board_files_again(model, emission) if options.runtime and compiled else {}
+    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code, tests)
     texts = texts_again(model, options, emission)
     emitted = tuple(file_entries(job.c_folder, texts, edited))
+    if options.runtime and compiled:
+        emitted += tuple(shared_runtime_entries(job.c_folder, model, options.runtime))
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
     identity = (model.hash, c_hash(folder / "c"))

@@ -17,7 +17,19 @@ from conftest import EXAMPLE, GOLDEN, ROOT, Command
 from gyrotc.common import CheckFailed, InputError
 from gyrotc.mirror import MAGIC, Table, evaluate_map, gauss
 from gyrotc.model import Guard, Model, Term, load_model
-from gyrotc.tables import COSTS, NUMERICS, SWITCHES, config_text, emit, emit_texts, quantise, quantise_all, rms_growth
+from gyrotc.tables import (
+    COSTS,
+    NUMERICS,
+    SWITCHES,
+    config_text,
+    emit,
+    emit_texts,
+    joint_needs,
+    needs_of,
+    quantise,
+    quantise_all,
+    rms_growth,
+)
 from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.
@@ -170,10 +182,10 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
 
 def test_the_options_of_several_tables_are_those_of_all(tmp_path: Path) -> None:
     one, other = random_model(3), random_model(4).model_copy(update={"left_out": ("image", "time")})
-    both = config_text([one, other]).decode()
+    both = config_text(joint_needs([needs_of(one), needs_of(other)])).decode()
     assert "#define GTC_WITH_IMAGE 1\n" in both
     assert f"#define GTC_MAX_SLOPE_BLOCKS {max(one.slope_blocks, other.slope_blocks)}\n" in both
-    assert "#define GTC_WITH_TIME 0\n" in config_text([other]).decode()
+    assert "#define GTC_WITH_TIME 0\n" in config_text(needs_of(other)).decode()
 
 
 def test_the_costs_of_options_are_those_of_all_three_cores() -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet
+from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet, write_summary
 from gyrotc.results import FleetEntry
 from gyrotc.train import FitOptions
 from gyrotc.verify import verify
@@ -40,6 +40,8 @@ def three(tmp_path: Path) -> Path:
         gyro(tmp_path / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
     gyro(tmp_path / "data" / "RLG-3", "RLG-3")
     (tmp_path / "data" / "RLG-3" / "run-01.csv").write_text("time_s,rate_dph\n")
+    with (tmp_path / "data" / "RLG-3" / "dataset.toml").open("a") as file:
+        file.write("started = 2026-03-02T08:00:00Z\n")
     return tmp_path / "data"
 
 
@@ -60,8 +62,9 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     assert [row["status"] for row in rows] == ["done", "done", "failed"]
     assert "RLG-3" in (out / "fleet.html").read_text()
 
-    verified = gyrotc("verify", out / "RLG-1", "--target", "host-gcc-O2")
-    assert verified.returncode == 0, verified.stderr
+    refused = summary["serials"][2]
+    assert (refused["serial"], refused["date"]) == ("RLG-3", "2026-03-02")
+    assert refused["reason"].startswith("run-01.csv, line 1: no column temperature_c")
     before = {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")}
     gyro(three / "RLG-3", "RLG-3", seed=3)
     again = gyrotc("fleet", three, "--out", out, "--jobs", "1")
@@ -70,16 +73,91 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     assert {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")} == before
 
 
+@pytest.fixture
+def fleet(tmp_path: Path) -> Path:
+    """A fleet of two gyros, one with a longer window of the slope."""
+    for k in (1, 2):
+        gyro(tmp_path / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    run_fleet(load_manifest(tmp_path / "data"), tmp_path / "out", jobs=1)
+    return tmp_path / "out"
+
+
+def test_a_gyro_takes_80_kilobytes_beside_one_runtime_for_all(fleet: Path) -> None:
+    for name in ("RLG-1", "RLG-2"):
+        files = [path for path in (fleet / name).rglob("*") if path.is_file()]
+        assert sum(path.stat().st_size for path in files) <= 80_000
+        assert not [path.name for path in files if path.name.startswith(("gtc.", "vectors_")) or path.suffix == ".html"]
+    assert sorted(path.name for path in (fleet / "runtime").iterdir()) == ["gtc.c", "gtc.h", "gtc_config.h"]
+
+
+def test_a_gyro_of_a_fleet_is_verified_with_the_shared_runtime(fleet: Path, gyrotc: Command) -> None:
+    done = gyrotc("verify", fleet / "RLG-1", "--target", "host-gcc-O2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    verified = json.loads((fleet / "RLG-1" / "verify.json").read_text())
+    assert {entry["status"] for entry in verified["targets"]} == {"pass"}
+    assert {"../../runtime/gtc.c", "../../runtime/gtc.h", "../../runtime/gtc_config.h"} < {
+        entry["file"] for entry in verified["emitted"]
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("gtc.c", b"gtc_f32_map(", b"gtc_f32_Map("),
+        ("gtc_config.h", b"GTC_MAX_SLOPE_BLOCKS ", b"GTC_MAX_SLOPE_BLOCKS 0"),
+        ("gtc_config.h", b"#endif", b"#endif\nint x;"),
+    ],
+)
+def test_a_changed_runtime_fails_the_gyros_that_share_it(
+    fleet: Path, gyrotc: Command, name: str, old: bytes, new: bytes
+) -> None:
+    path = fleet / "runtime" / name
+    assert old in path.read_bytes()
+    path.write_bytes(path.read_bytes().replace(old, new, 1))
+    done = gyrotc("verify", fleet / "RLG-1", "--target", "host-gcc-O2")
+    assert done.returncode == 1
+    assert f"../../runtime/{name}" in done.stdout
+
+
+def test_a_folder_that_was_taken_out_of_its_fleet_lacks_the_runtime(
+    fleet: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    shutil.copytree(fleet / "RLG-1", tmp_path / "elsewhere" / "RLG-1")
+    done = gyrotc("verify", tmp_path / "elsewhere" / "RLG-1", "--target", "host-gcc-O2")
+    assert done.returncode == 1 and "../../runtime/gtc.c: missing" in done.stdout
+    emitted = gyrotc("emit", fleet / "RLG-1" / "model.json", "--out", tmp_path / "complete")
+    assert emitted.returncode == 0, emitted.stderr
+    done = gyrotc("verify", tmp_path / "complete", "--target", "host-gcc-O2")
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_options_of_the_shared_runtime_hold_every_gyro(tmp_path: Path) -> None:
+    needs = ({"GTC_MAX_TERMS": 0, "GTC_WITH_BANK": 1}, {"GTC_MAX_TERMS": 2, "GTC_WITH_BANK": 0})
+    write_summary(
+        tmp_path,
+        [FleetEntry(name=f"u{k}", axis=None, status="done", runtime_options=one) for k, one in enumerate(needs)],
+    )
+    config = (tmp_path / "runtime" / "gtc_config.h").read_text()
+    assert "#define GTC_MAX_TERMS 2\n" in config and "#define GTC_WITH_BANK 1\n" in config
+
+
+def test_the_page_of_a_gyro_is_drawn_when_it_is_asked_for(fleet: Path, gyrotc: Command) -> None:
+    done = gyrotc("report", fleet / "RLG-1")
+    assert done.returncode == 0, done.stderr
+    assert "RLG-1" in (fleet / "RLG-1" / "report.html").read_text()
+
+
 @pytest.mark.slow
 def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyrotc: Command) -> None:
     """What the reference says that the C code does is what the C code does."""
     fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
     [entry] = run_fleet(fleet, tmp_path / "quick", jobs=1)
-    [whole] = run_fleet(fleet, tmp_path / "full", jobs=1, full=True)
-    assert entry.model_copy(update={"key": None}) == whole.model_copy(update={"key": None})
-    assert (tmp_path / "full" / "RLG-1" / "report.html").is_file()
-    for name in ("model.json", "c/gtc_rlg_1.c", "c/gtc_rlg_1.bin"):
-        assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (tmp_path / "full" / "RLG-1" / name).read_bytes()
+    done = gyrotc("build", three / "RLG-1", "--out", tmp_path / "whole", "--numeric", "f32")
+    assert done.returncode == 0, done.stderr
+    built = json.loads((tmp_path / "whole" / "evaluate.json").read_text())
+    assert entry.after_rms_dph == built["left_out"]["after"]["rms_dph"]
+    for name in ("model.json", "c/gtc_rlg_1.bin"):
+        assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
 @pytest.mark.slow

@@ -50,7 +50,7 @@ def task(tmp_path: Path) -> Task:
     """One gyro, not done yet."""
     gyro(tmp_path / "data" / "RLG-1", "RLG-1")
     fleet = Fleet((Unit(tmp_path / "data" / "RLG-1", None),), FitOptions(), ("f32",), None)
-    return Task(fleet.units[0], "RLG-1", fleet, tmp_path / "out" / "RLG-1", False, program_of())
+    return Task(fleet.units[0], "RLG-1", fleet, tmp_path / "out" / "RLG-1", program_of())
 
 
 def test_done_is_done_until_a_byte_of_a_recording_changes(task: Task) -> None:
@@ -73,7 +73,6 @@ def test_options_limits_and_program_are_part_of_what_is_done(task: Task, tmp_pat
     others = {"options": FitOptions(seed=1), "numerics": None, "limits": load_limits(tmp_path / "limits.toml")}
     for name, value in others.items():
         assert done_before(replace(task, fleet=replace(task.fleet, **{name: value}))) is None, name
-    assert done_before(replace(task, full=True)) is None
     assert done_before(replace(task, program="0" * 64)) is None
     other = do_unit(replace(task, program="0" * 64))
     assert other.status == "failed" and "where the fleet was started" in (other.reason or "")
@@ -159,7 +158,7 @@ def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
     assert run_fleet(fleet, out)[0].status == "done"
-    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, *SUMMARY}
+    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, "runtime", *SUMMARY}
 
 
 @pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
@@ -269,7 +268,7 @@ def test_strange_folders_concern_themselves_alone(tmp_path: Path) -> None:
     }  # fmt: skip
     assert "Permission denied" in rows["locked"]["reason"] or "cannot be read" in rows["locked"]["reason"]
     for name in ("fleet.json", "Fleet.CSV"):
-        assert "name of a file of the summary" in rows[name]["reason"]
+        assert "is a name in the folder of a fleet" in rows[name]["reason"]
     assert len(list(csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines()))) == 6
     assert r"RLG-\xff" in (out / "fleet.html").read_text("utf-8")
     assert len(done.stdout.splitlines()) == 7, "a line for each, whatever its name"

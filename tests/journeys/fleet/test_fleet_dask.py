@@ -170,7 +170,7 @@ def test_a_worker_that_finds_other_recordings_refuses_them(
     reason = entries[0].reason or ""
     assert str(lab / "RLG-1") in reason and keys[0][:16] in reason
     assert any(f"on worker {name}" in reason for name in WORKERS), reason
-    found = running.tasks_of(load_manifest(lab), tmp_path / "out", False)[0].found()
+    found = running.tasks_of(load_manifest(lab), tmp_path / "out")[0].found()
     assert found != keys[0] and found[:16] in reason
     assert not (tmp_path / "out" / "RLG-1").exists()
 
@@ -383,7 +383,7 @@ def test_a_worker_with_another_gyrotc_refuses_with_both_versions(world: Path, al
     alone.worker("anna", "--no-nanny", preload=older)
     fleet = load_manifest(world / "lab" / "few")
     entries = run_fleet(fleet, tmp_path / "out", cluster=Cluster(alone.address, LIMIT_S))
-    [task, *_] = running.tasks_of(fleet, tmp_path / "out", False)
+    [task, *_] = running.tasks_of(fleet, tmp_path / "out")
     for entry in entries:
         assert entry.status == "failed"
         assert f"worker anna: is 0.0.1 ({16 * '0'}), and {task.version} ({task.program[:16]})" in (entry.reason or "")

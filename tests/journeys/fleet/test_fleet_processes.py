@@ -63,7 +63,7 @@ def test_a_task_does_not_carry_the_fleet(tmp_path: Path) -> None:
     sizes = []
     for count in (10, 10000):
         units = tuple(Unit(tmp_path / f"RLG-{k:05d}", None) for k in range(count))
-        sizes.append(len(pickle.dumps(tasks_of(Fleet(units, FitOptions(), None, None), tmp_path, False)[0])))
+        sizes.append(len(pickle.dumps(tasks_of(Fleet(units, FitOptions(), None, None), tmp_path)[0])))
     assert sizes[0] == sizes[1] < 5000
 
 

@@ -12,27 +12,31 @@ from gyrotc.jobs import lot as job
 from gyrotc.results import FleetEntry, FleetSummary, FleetUnit, read_result
 from recordings import columns, toml, write_csv
 
+MANIFEST = 'schema = 1\ndatasets = ["d/*"]\n'
+
 
 def gyro(folder: Path) -> None:
     write_csv(folder / "d" / "RLG-1" / "run-01.csv", columns(720, seed=1))
     head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"'
     (folder / "d" / "RLG-1" / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
-    (folder / "fleet.toml").write_text('schema = 1\ndatasets = ["d/*"]\n')
+    (folder / "fleet.toml").write_text(MANIFEST)
 
 
 def test_a_barred_unit_stays_so_until_it_is_released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gyro(tmp_path)
-    manifest, out = load_manifest(tmp_path / "fleet.toml"), tmp_path / "out"
+    out = tmp_path / "out"
     summed = run._one_of_each_serial
     monkeypatch.setattr(
         run,
         "_one_of_each_serial",
         lambda entries: [e.model_copy(update={"findings": ("sign_reversed",)}) for e in summed(entries)],
     )
-    run.run_fleet(manifest, out, jobs=1)
+    run.run_fleet(load_manifest(tmp_path / "fleet.toml"), out, jobs=1)
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
     assert unit.barred == ("sign_reversed",)
-    run.run_fleet(manifest, out, jobs=1, releases={"RLG-1": "mounted upside down, see log"})
+    released = MANIFEST + '[release]\nRLG-1 = "mounted upside down,  see log"\n'
+    (tmp_path / "fleet.toml").write_text(released)
+    run.run_fleet(load_manifest(tmp_path / "fleet.toml"), out, jobs=1)
     [unit] = read_result(out / "fleet.json", FleetSummary).serials
     assert (unit.barred, unit.released) == ((), "mounted upside down, see log")
 
@@ -82,7 +86,8 @@ def test_findings_that_bar_a_unit(finding: str) -> None:
 
 def test_a_release_needs_its_reason(tmp_path: Path, gyrotc: Command) -> None:
     gyro(tmp_path)
-    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out", "--release", "RLG-1")
+    (tmp_path / "fleet.toml").write_text(MANIFEST + '[release]\nRLG-1 = " "\n')
+    result = gyrotc("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "out")
     assert result.returncode == 2
-    assert "--reason" in result.stderr
+    assert "release.RLG-1" in result.stderr
     assert not (tmp_path / "out").exists()

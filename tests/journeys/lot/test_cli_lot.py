@@ -91,8 +91,10 @@ def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> N
     data, out = world / "few", world / "few-out"
     data.mkdir()
     (data / "LOT-0005-006").symlink_to(world / "short" / "LOT-0005-006")
-    first = run_here("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
-    again = run_here("fleet", data, "--out", out, "--jobs", "1", "--lot", world / "lot.json")
+    manifest = world / "few.toml"
+    manifest.write_text('schema = 1\ndatasets = ["few/*"]\nlot = "lot.json"\n', "utf-8")
+    first = run_here("fleet", manifest, "--out", out, "--jobs", "1")
+    again = run_here("fleet", manifest, "--out", out, "--jobs", "1")
     other = run_here("fleet", data, "--out", out, "--jobs", "1")
     assert "done before" not in first and "done before" in again and "done before" not in other
 
