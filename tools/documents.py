@@ -1,11 +1,17 @@
-"""Documents that run: executes the console blocks of Markdown pages that are marked so, and compares what they print.
+"""Run the blocks of Markdown pages as a reader would, and compare what the commands print with the page.
 
-A block is marked by its fence: ```` ```console run ````. In it a line that begins with `$ ` is a command of bash (one
-that ends in a backslash goes on in the next line), the lines behind it are what it prints; `...` stands for anything,
-as a part of a line or, alone in a line, for any lines. The blocks of a page run in order in one folder, a copy of the
-sources' tracked files, with gyrotc of the environment on the PATH. A command whose exit status is not 0 is wrong unless
-the page says `$? = N` in the line behind its output. `needs: program` in the fence skips a block where it is missing.
-A block whose fence is ```` ```c file: lab/main.c ```` (any language) is a file: it is written there.
+What is done with a block stands behind the language of its fence:
+
+- ```` ```console run ````: a line that begins with `$ ` is a command of bash (one that ends in a backslash goes on in
+  the next line), the lines behind it are what it prints; `...` stands for anything, as a part of a line or, alone in a
+  line, for any lines. A command whose exit status is not 0 is wrong unless the page says `$? = N` behind its output.
+- ```` ```c file: lab/main.c ```` (any language): the block is that file.
+- ```` ```diff file: gen/a.py ````: the block is a change of that file. The file must contain the lines without `+`
+  exactly once and without others between them.
+- ```` ```sh not run: REASON ```` (any language): the block is only shown.
+
+The blocks of a page run in order in one folder, a copy of the sources with `.venv` in it. `gyrotc` and `import gyrotc`
+are those of the copy, so that a page may add to the package.
 
     python tools/documents.py docs/tutorial.md    runs a page; exit status 1 and the difference if it is wrong
 """
@@ -17,56 +23,87 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
+import textwrap
+import venv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 _FENCE = re.compile(
-    r"^```(?:console run(?: needs: (?P<needs>[\w -]+))?|\w+ file: (?P<file>[\w./-]+))\n(?P<body>.*?)^```$",
-    re.MULTILINE | re.DOTALL,
+    r"^(?P<indent> *)```(?P<language>\w*)(?P<words>[^\n`]*)\n(?P<body>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
 )
+_GYROTC = """#!{python}
+from gyrotc.cli.main import main
+main()
+"""
 
 
 @dataclass
 class Step:
-    """A command of a page with what it prints; or a file, with its text as `text`."""
+    """A command of a page with what it prints; or a file, with its text; or a change of a file."""
 
     command: str
     line: int
-    needs: tuple[str, ...]
     output: list[str] = field(default_factory=list)
     status: int = 0
     text: str | None = None
+    changes: bool = False
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A block that is not run: the line of its fence, its language, and the reason, empty if the page has none."""
+
+    line: int
+    language: str
+    reason: str
 
 
 def steps(text: str) -> list[Step]:
-    """Every command of the marked blocks, and every file, in order."""
+    """Return every command of the marked blocks, every file and every change of one, in order."""
     found: list[Step] = []
     for block in _FENCE.finditer(text):
-        line = text[: block.start("body")].count("\n")
-        needs = tuple((block["needs"] or "").split())
-        if block["file"]:
-            found.append(Step(block["file"], line, needs, text=block["body"]))
-            continue
-        open_line = False
-        for content in block["body"].splitlines():
-            line += 1
-            if open_line:
-                found[-1].command += "\n" + content
-            elif content.startswith("$ "):
-                found.append(Step(content[2:], line, needs))
-            elif match := re.fullmatch(r"\$\? = (\d+)", content):
-                found[-1].status = int(match[1])
-            else:
-                found[-1].output.append(content)
-            open_line = content.endswith("\\") and (open_line or content.startswith("$ "))
+        line, words = text[: block.start("body")].count("\n"), block["words"].strip()
+        body = textwrap.dedent(block["body"])
+        if words.startswith("file: "):
+            found.append(Step(words[6:], line, text=body, changes=block["language"] == "diff"))
+        elif words == "run":
+            found += _commands(body, line)
+    return found
+
+
+def shown(text: str) -> list[Shown]:
+    """Return the blocks of a page that are not run."""
+    blocks = [(text[: b.start("body")].count("\n"), b["language"], b["words"].strip()) for b in _FENCE.finditer(text)]
+    return [
+        Shown(line, language, words.removeprefix("not run:").strip() if words.startswith("not run:") else "")
+        for line, language, words in blocks
+        if not words.startswith("file: ") and words != "run"
+    ]
+
+
+def _commands(body: str, line: int) -> list[Step]:
+    found: list[Step] = []
+    open_line = False
+    for content in body.splitlines():
+        line += 1
+        if open_line:
+            found[-1].command += "\n" + content
+        elif content.startswith("$ "):
+            found.append(Step(content[2:], line))
+        elif match := re.fullmatch(r"\$\? = (\d+)", content):
+            found[-1].status = int(match[1])
+        else:
+            found[-1].output.append(content)
+        open_line = content.endswith("\\") and (open_line or content.startswith("$ "))
     return found
 
 
 def agrees(printed: str, wanted: list[str]) -> bool:
-    """Whether output is what a page says, `...` standing for anything."""
+    """Test whether output is what a page says, `...` standing for anything."""
     parts = [
         r"(?:.*\n)*?" if line.strip() == "..." else ".*?".join(map(re.escape, line.rstrip().split("..."))) + r"[ \t]*\n"
         for line in wanted
@@ -75,56 +112,79 @@ def agrees(printed: str, wanted: list[str]) -> bool:
     return re.fullmatch("".join(parts), text) is not None
 
 
-def run(page: Path) -> Iterator[str]:
-    """What is wrong with a page: one text for each command that prints or ends otherwise.
+def changed(text: str, change: str) -> str | None:
+    """Put the `+` lines of a change into a text; None if the text does not contain the other lines exactly once."""
+    lines = change.splitlines(keepends=True)
+    before = "".join(line[1:] for line in lines if not line.startswith("+"))
+    return text.replace(before, "".join(line[1:] for line in lines)) if text.count(before) == 1 else None
 
-    Missing programs are reported as `skipped: ...`.
+
+def run(page: Path, folder: Path) -> Iterator[str]:
+    """Run a page in `folder`/gyrotc, a copy of the sources; yield a text for each step that is not as the page says."""
+    work = copy_of_sources(folder)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")} | {
+        "PATH": f"{work / '.venv' / 'bin'}:{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "COLUMNS": "120", "LC_ALL": "C.UTF-8",
+    }  # fmt: skip
+    for step in steps(page.read_text("utf-8")):
+        where = f"{page.name}:{step.line}"
+        if step.text is not None:
+            path = work / step.command
+            text = changed(path.read_text("utf-8"), step.text) if step.changes else step.text
+            if text is None:
+                yield f"{where}: the lines around the change are not, or not once, in {step.command}"
+                continue
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, "utf-8")
+            continue
+        done = subprocess.run(
+            ["bash", "-c", step.command], cwd=work, env=environment, text=True, check=False, timeout=600,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        if done.returncode != step.status:
+            yield f"{where}: {step.command}\n  ends with {done.returncode}, not {step.status}:\n{done.stdout}"
+        elif not agrees(done.stdout, step.output):
+            yield f"{where}: {step.command}\n  prints\n{done.stdout}  and not\n" + "\n".join(step.output)
+
+
+def copy_of_sources(folder: Path) -> Path:
+    """Return `folder`/gyrotc: the sources without results of builds, with a `.venv` whose gyrotc they are.
+
+    Whatever else is installed is found where it is. An editable installation finds its modules by a line of a `.pth`
+    file, which Python does not read in folders that another such file names.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        work = _copy(Path(folder))
-        environment = os.environ | {
-            "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "120", "LC_ALL": "C.UTF-8",
-        }  # fmt: skip
-        for step in steps(page.read_text("utf-8")):
-            where = f"{page.name}:{step.line}"
-            if step.text is not None:
-                (work / step.command).parent.mkdir(parents=True, exist_ok=True)
-                (work / step.command).write_text(step.text, "utf-8")
-                continue
-            missing = [name for name in step.needs if shutil.which(name) is None]
-            if missing:
-                yield f"skipped: {where} needs {', '.join(missing)}"
-                continue
-            done = subprocess.run(
-                ["bash", "-c", step.command], cwd=work, env=environment, text=True, check=False, timeout=600,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            )  # fmt: skip
-            if done.returncode != step.status:
-                yield f"{where}: {step.command}\n  ends with {done.returncode}, not {step.status}:\n{done.stdout}"
-            elif not agrees(done.stdout, step.output):
-                yield f"{where}: {step.command}\n  prints\n{done.stdout}  and not\n" + "\n".join(step.output)
+    import gyrotc._core
 
-
-def _copy(folder: Path) -> Path:
-    """The sources' files without results of builds, for commands that write beside them."""
     work = folder / "gyrotc"
-    ignored = shutil.ignore_patterns("build", "dist", ".venv", ".git", "__pycache__", ".*_cache", "corpus", "*.png")
+    ignored = shutil.ignore_patterns("build", "dist", ".venv", ".git", ".*_cache", "corpus", "*.png")
     shutil.copytree(ROOT, work, ignore=ignored, symlinks=True)
+    shutil.copy(gyrotc._core.__file__, work / "gen" / "gyrotc")
+    venv.create(work / ".venv", symlinks=True)
+    (own,) = (work / ".venv").glob("lib/python*/site-packages")
+    (own / "gyrotc.pth").write_text(f"{work / 'gen'}\n{sysconfig.get_path('platlib')}\n", "utf-8")
+    command = work / ".venv" / "bin" / "gyrotc"
+    command.write_text(_GYROTC.format(python=command.with_name("python")), "utf-8")
+    command.chmod(0o755)
     return work
 
 
 def pages() -> list[Path]:
-    """Every page of the sources."""
+    """Return every page of the sources."""
     folders = ("docs", "examples", "libc")
     return sorted([*ROOT.glob("*.md"), *(p for f in folders for p in (ROOT / f).rglob("*.md"))])
 
 
 def main() -> int:
-    """Runs the pages that are named, by default all that have something to run."""
+    """Run the pages that are named, by default all that have something to run; list what is only shown of them."""
     named = [Path(word).resolve() for word in sys.argv[1:]] or [p for p in pages() if steps(p.read_text("utf-8"))]
-    wrong = [text for page in named for text in run(page)]
+    wrong = []
+    for page in named:
+        for one in shown(page.read_text("utf-8")):
+            print(f"{page.name}:{one.line}: {one.language} block is not run: {one.reason or 'no reason is given'}")
+        with tempfile.TemporaryDirectory() as folder:
+            wrong += list(run(page, Path(folder)))
     print("\n".join(wrong) or f"{len(named)} pages are what they say")
-    return 1 if any(not text.startswith("skipped") for text in wrong) else 0
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":

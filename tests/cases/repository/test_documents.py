@@ -1,4 +1,4 @@
-"""Pages are what they say: marked blocks run and print it."""
+"""The tool that runs the blocks of pages, and what a page says of figures that the code or a command has."""
 
 from __future__ import annotations
 
@@ -14,22 +14,6 @@ sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools" / "check_libc")]
 
 import analysers  # noqa: E402
 import documents  # noqa: E402
-
-PAGES = documents.pages()
-RUNNING = [page for page in PAGES if documents.steps(page.read_text("utf-8"))]
-
-
-def _name(page: Path) -> str:
-    return page.relative_to(ROOT).as_posix()
-
-
-@pytest.mark.parametrize("page", RUNNING, ids=_name)
-@pytest.mark.slow
-def test_what_a_page_shows_is_what_happens(page: Path) -> None:
-    reported = list(documents.run(page))
-    assert [text for text in reported if not text.startswith("skipped")] == []
-    if reported:
-        pytest.skip("; ".join(reported))
 
 
 def test_the_readme_shows_what_make_demo_prints(demo: Path) -> None:
@@ -52,10 +36,24 @@ def _words(text: str) -> str:
 
 
 def test_commands_output_and_status_of_a_page() -> None:
-    text = "x\n```console run needs: gcc\n$ echo a \\\n  b\na b\n$ false\n$? = 1\n```\n```console\n$ rm -rf /\n```\n"
+    text = "x\n```console run\n$ echo a \\\n  b\na b\n$ false\n$? = 1\n```\n```console\n$ rm -rf /\n```\n"
     first, second = documents.steps(text)
-    assert (first.command, first.line, first.needs, first.output) == ("echo a \\\n  b", 3, ("gcc",), ["a b"])
+    assert (first.command, first.line, first.output) == ("echo a \\\n  b", 3, ["a b"])
     assert (second.command, second.output, second.status) == ("false", [], 1)
+
+
+def test_a_block_that_is_not_run_says_why() -> None:
+    text = "```sh not run: it takes hours\n$ make blind\n```\n\n1. Do it:\n\n   ```\n   make\n   ```\n"
+    assert documents.steps(text) == []
+    assert documents.shown(text) == [documents.Shown(1, "sh", "it takes hours"), documents.Shown(7, "", "")]
+
+
+@pytest.mark.parametrize(
+    ("change", "after"),
+    [(" a\n+x\n b\n", "a\nx\nb\nc\nb\n"), (" b\n+x\n", None), (" d\n+x\n", None)],
+)
+def test_a_change_is_put_in_where_its_other_lines_stand_once(change: str, after: str | None) -> None:
+    assert documents.changed("a\nb\nc\nb\n", change) == after
 
 
 @pytest.mark.parametrize(
@@ -76,18 +74,18 @@ def test_three_dots_stand_for_anything(printed: str, wanted: list[str], same: bo
 
 
 def test_a_page_that_says_something_else_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(documents, "_copy", lambda folder: folder)
+    monkeypatch.setattr(documents, "copy_of_sources", lambda folder: folder)
     page = tmp_path / "page.md"
     page.write_text("```console run\n$ echo a\nb\n$ exit 3\n$ echo c\nc\n```\n")
-    wrong = list(documents.run(page))
+    wrong = list(documents.run(page, tmp_path))
     assert [text.splitlines()[0] for text in wrong] == ["page.md:2: echo a", "page.md:4: exit 3"]
 
 
 def test_a_block_that_is_a_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(documents, "_copy", lambda folder: folder)
+    monkeypatch.setattr(documents, "copy_of_sources", lambda folder: folder)
     page = tmp_path / "page.md"
     page.write_text("```c file: a/main.c\nint x;\n```\n```console run\n$ cat a/main.c\nint x;\n```\n")
-    assert list(documents.run(page)) == []
+    assert list(documents.run(page, tmp_path)) == []
 
 
 def test_the_table_of_deviations_is_what_the_sources_declare() -> None:

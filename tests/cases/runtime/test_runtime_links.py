@@ -206,7 +206,7 @@ def test_the_snippet_of_the_readme_compiles_links_and_corrects(name: str, tmp_pa
     target = all_targets()[name]
     if missing := target.missing():
         pytest.skip(f"{missing} is not installed")
-    snippet = re.findall(r"```c\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    snippet = re.findall(r"```c [^\n]*\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     model = random_model(1, serial="SIM-0001")
     emit(model, tmp_path)
     middle = sum(model.envelope.temperature_c) / 2.0
