@@ -54,11 +54,13 @@ if TYPE_CHECKING:
 
 
 def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
-    """Return the verdict, events with the lines that leave them out, named causes and what to do next.
+    """Return what the simulation gets wrong, the verdict, events with the lines that leave them out, and what is next.
 
     The page and the JSON have the rest.
     """
     axis = f" {result.axis}" if result.axis else ""
+    if result.discrepancy:
+        yield f"{result.serial}{axis} against the simulation: {result.discrepancy}"
     yield f"{result.serial}{axis}: {result.verdict.replace('_', ' ')}. {result.text}"
     if result.lot is not None:
         yield f"lot: {result.lot}"
@@ -84,20 +86,9 @@ def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
 
 
 def _not_shipped(result: Diagnosed) -> str:
-    """Why no extension is, chosen from what unseen runs say of the causes."""
-    if not result.physical:
-        return "no extension is shipped: no cause was named"
-    gains = [cause.gain.shown for cause in result.physical if cause.gain is not None]
-    if not gains:
-        return "no extension is shipped: nothing corrects what is named"
-    if not any(cause.sure for cause in result.physical):
-        return "no extension is shipped: no cause is likelier than all others together"
-    if "gain" in gains:
-        return (
-            "no extension is shipped: it gains on runs it was not fitted to, but pieces of the training history left "
-            "out in turn do not agree that it holds"
-        )
-    return "no extension is shipped: no cause is shown to gain on runs it was not fitted to"
+    """Why no extension is."""
+    reason = result.shipping.reason if result.physical and result.shipping else "no cause was named"
+    return f"no extension is shipped: {reason}"
 
 
 _WORTH_A_LINE = 0.01  # a probability that is 0 % in print says nothing

@@ -14,14 +14,15 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
-from ..results.diagnosed import LIKELIER_THAN_ALL_ELSE
-from .candidates import Candidate, searched
+from ..results.diagnosed import NOTHING, UNNAMED
+from .candidates import Candidate, price_of, searched
 from .detection import Found, detect
 from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
+from .posterior import Rival, odds_of, probabilities_of, remaining
 from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
 from .refinement import Refined, model_columns, refine, sized
-from .rivals import NOTHING, UNNAMED, Rival, calibrated, near_of, no_cause, odds_of, probabilities_of, ranked_rivals
+from .rivals import calibrated, kinds_of, ranked_rivals
 from .search import Search
 from .unexplained import Contest, Misfit, contest, explained, misfit
 from .wide_memory import WideMemory, outlasts, rate_independent
@@ -41,13 +42,13 @@ class Attribution:
         detected: Whether it found anything that is likelier than nothing.
         causes: The chosen causes, strongest first.
         p_values: The p-value of each cause, adjusted for the whole search.
-        rivals: For each, other causes in its place that explain the recordings as well, nearest first.
-        probabilities: For each, of every cause in its place, itself first, of something unnamed and, where there is
-            one cause, of nothing, by id.
+        rivals: For each, what remains possible in its place, the likeliest first.
+        probabilities: For each, of every cause in its place, itself first, of something unnamed and of nothing, by id.
         gain: Twice the log-likelihood ratio of all causes together.
         left: What all causes leave.
         last: The search after the last cause.
         other: The best shape that no cause has, and its lead over the causes.
+        refuted: Whether the causes make left-out history worse (`shipping`), so that none is named.
         wide: Hysteresis of any form, by which `left` is judged where one play leaves something; else None.
     """
 
@@ -62,18 +63,11 @@ class Attribution:
     other: Contest
     probabilities: tuple[dict[str, float], ...] = ()
     wide: WideMemory | None = None
+    refuted: bool = False
 
     def without_causes(self) -> Attribution:
         """The same with nothing named."""
         return replace(self, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
-
-    @property
-    def sure(self) -> list[bool]:
-        """Whether each cause is likelier than all else in its place."""
-        return [
-            place[c.candidate.id] > LIKELIER_THAN_ALL_ELSE
-            for c, place in zip(self.causes, self.probabilities, strict=True)
-        ]
 
     @property
     def columns(self) -> FloatArray:
@@ -125,27 +119,32 @@ def attribute(search: Search) -> Attribution:
             stage = _beside(search, gains, stage, pair)
     stage = _widened(search, gains, stage)
     order = _by_strength(singles, stage.chosen)
-    refined = tuple(stage.refined[k] for k in order)
-    taken = tuple(stage.chosen[k] for k in order)
+    stage = replace(
+        stage,
+        chosen=tuple(stage.chosen[k] for k in order),
+        refined=tuple(stage.refined[k] for k in order),
+    )
     ahead = _ahead(gains, stage, singles)
-    ranked, likely = _rivals(weigher, singles, pairs, taken, ahead)
-    other = _contest(gains, stage.wide, refined, tuple(map(near_of, ranked)))
-    others = [no_cause(UNNAMED, -other.lead)]
-    if len(taken) == 1:
-        others.append(no_cause(NOTHING, weigher.over_nothing(singles, single) + ahead))
-        if odds_of(others[-1]) > max(odds_of(others[0]), 1.0):
+    places = [_place(search, weigher, singles, pairs, stage, k) for k in range(len(stage.chosen))]
+    ranked = [_ranked(weigher, place, stage.chosen, k, ahead) for k, place in enumerate(places)]
+    other = _contest(gains, stage.wide, stage.refined, tuple(map(remaining, ranked)))
+    rivals = []
+    for k, (place, near) in enumerate(zip(places, ranked, strict=True)):
+        without = [Rival(UNNAMED, -other.lead), Rival(NOTHING, place.over_nothing + _more(stage.chosen[k], ahead))]
+        if len(places) == 1 and odds_of(without[1]) > max(odds_of(without[0]), 1.0):
             return nothing
+        rivals.append((*calibrated(gains, place.pool, stage.chosen, k, near), *without))
     return Attribution(
         first=first,
         detected=True,
-        causes=refined,
-        p_values=tuple(_p_value(first, r.candidate) for r in refined),
-        rivals=tuple(map(near_of, likely)),
+        causes=stage.refined,
+        p_values=tuple(_p_value(first, r.candidate) for r in stage.refined),
+        rivals=tuple(map(remaining, rivals)),
         gain=stage.gain,
         left=stage.left,
         last=stage.found,
         other=other,
-        probabilities=tuple(probabilities_of(c.id, [*all_, *others]) for c, all_ in zip(taken, likely, strict=True)),
+        probabilities=tuple(probabilities_of(c.id, of) for c, of in zip(stage.chosen, rivals, strict=True)),
         wide=stage.wide,
     )
 
@@ -155,7 +154,7 @@ def _single(gains: Gains, singles: list[Point], weigher: MarginalLikelihood) -> 
     best = weigher.preferred(singles)
     if CATALOGUE[best.members[0].id].family != "thermal_memory":
         return best
-    near = ranked_rivals(singles, [], best.members, gains.size)[0]
+    near = ranked_rivals(singles, best.members, 0, gains.size)
     behind = [r.distance for r in weigher.judged(singles, best.members, 0, near) if searched(r.id).loops]
     rival = max(best.criterion(gains.size), weigher.criterion(best.members, np.zeros(gains.size, dtype=bool)))
     if not behind or not outlasts(gains, behind[0], rival):
@@ -163,26 +162,53 @@ def _single(gains: Gains, singles: list[Point], weigher: MarginalLikelihood) -> 
     return best_of([p for p in singles if searched(p.members[0].id).loops], gains.size)
 
 
-def _rivals(
-    weigher: MarginalLikelihood,
-    singles: list[Point],
-    pairs: list[Point],
-    taken: tuple[Candidate, ...],
-    ahead: float,
-) -> tuple[list[tuple[Rival, ...]], list[tuple[Rival, ...]]]:
-    """Of each cause, nearest first; and with odds that simulation bears out, likeliest first.
+@dataclass(frozen=True)
+class _Place:
+    """The place of one of the chosen causes.
+
+    Attributes:
+        pool: All models in which something stands in it beside the other causes.
+        over_nothing: By how much the criterion of the chosen cause is better than that of nothing in its place.
+    """
+
+    pool: list[Point]
+    over_nothing: float
+
+
+def _place(
+    search: Search, weigher: MarginalLikelihood, singles: list[Point], pairs: list[Point], stage: _Stage, k: int
+) -> _Place:
+    """The place of the k-th cause: beside two others the search begins anew with these in every model."""
+    gains, chosen = weigher.gains, stage.chosen
+    size, others = gains.size, (*chosen[:k], *chosen[k + 1 :])
+    if not others:
+        best = max((p for p in singles if kinds_of(p.members) == kinds_of(chosen)), key=lambda p: p.criterion(size))
+        return _Place(singles, weigher.over_nothing(singles, best))
+    if len(others) == 1:
+        pool, without = pairs, max(p.criterion(size) for p in singles if kinds_of(p.members) == kinds_of(others))
+    else:
+        beside = Gains(_with(search, (*stage.refined[:k], *stage.refined[k + 1 :]))[0])
+        pool = [Point((*others, *point.members), point.gain) for point in beside.single()]
+        without = -sum(map(price_of, others)) * float(np.log(size))
+    own = max(p.criterion(size) for p in pool if kinds_of(p.members) == kinds_of(chosen))
+    return _Place(pool, own - without)
+
+
+def _ranked(
+    weigher: MarginalLikelihood, place: _Place, chosen: tuple[Candidate, ...], k: int, ahead: float
+) -> tuple[Rival, ...]:
+    """Other causes in the place of the k-th, nearest first.
 
     Args:
         ahead: By how much hysteresis in the form that it was found in is ahead of the play that stands for it.
     """
-    gains = weigher.gains
-    pool = singles if len(taken) == 1 else pairs
-    ranked = []
-    for k, near in enumerate(ranked_rivals(singles, pairs, taken, gains.size)):
-        more = ahead if searched(taken[k].id).loops else 0.0
-        judged = weigher.judged(pool, taken, k, near)
-        ranked.append(tuple(_behind(rival, more) for rival in judged))
-    return ranked, [calibrated(gains, pool, taken, k, rivals) for k, rivals in enumerate(ranked)]
+    near = ranked_rivals(place.pool, chosen, k, weigher.gains.size)
+    judged = weigher.judged(place.pool, chosen, k, near)
+    return tuple(_behind(rival, _more(chosen[k], ahead)) for rival in judged)
+
+
+def _more(candidate: Candidate, ahead: float) -> float:
+    return ahead if searched(candidate.id).loops else 0.0
 
 
 def _behind(rival: Rival, more: float) -> Rival:

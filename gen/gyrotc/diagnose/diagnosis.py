@@ -37,15 +37,17 @@ from .attribution import LEVEL, Attribution
 from .blocks import Records, centred_slope, name_of, records_of
 from .candidates import diagnosable_causes
 from .detection import Found
-from .extension import Extension, Refitting, extend, stand_ins_of
+from .extension import Extension, extend, stand_ins_of
 from .gain import emitted_means, floor_of, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
 from .refinement import Refined
 from .refit import Effect, added_range, mean_count, terms_of
+from .refitting import Refitting
 from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .static_map import fits_exactly
-from .summary import holds, not_testable, result_of
+from .summary import not_testable, result_of
+from .verdict import holds
 
 __all__ = ["Diagnosis", "diagnose", "series_of"]
 
@@ -134,24 +136,38 @@ def _of_long_runs(dataset: Dataset, records: Records, chosen: FitOptions, say: P
     cycle = cycle_of(records) if refitting.single_cycle else None
     if not refitting.takes(analysis.attribution.causes):
         analysis = replace(analysis, attribution=analysis.attribution.without_causes(), separations=())
-    named = analysis.attribution.causes if holds(analysis.attribution) else ()
-    states = named if cycle is None else cycle.able
-    left_dph = analysis.left_dph(named=bool(named)) if cycle is None else cycle.residual - cycle.explained
-    sure = analysis.attribution.sure if cycle is None and named else [True] * len(states)
-    extension = extend(refitting, states, sure, floor_of(records, left_dph, chosen.average_s), say)
+    extension = _extension(refitting, analysis, cycle, say)
     if cycle is not None:
-        cycle = replace(cycle, preferred=bool(extension.shipped))
+        cycle = replace(cycle, refuted=bool(extension.refuted))
         analysis = replace(
             analysis,
             attribution=cycle.attribution(analysis.attribution),
             separations=tuple({} for _ in cycle.causes),
             extended=None,
         )
-    causes = named if cycle is None else cycle.causes
+    elif extension.refuted:
+        analysis = replace(analysis, attribution=replace(analysis.attribution, refuted=True))
+        extension = _extension(refitting, analysis, None, say)
+    causes = cycle.causes if cycle is not None else _named(analysis)
     extended, training = _extended_model(dataset, refitting, extension, chosen)
     extension = _as_emitted(dataset, refitting, extension, extended, chosen)
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
+
+
+def _named(analysis: Analysis) -> tuple[Refined, ...]:
+    return analysis.attribution.causes if holds(analysis.attribution) else ()
+
+
+def _extension(refitting: Refitting, analysis: Analysis, cycle: Cycle | None, say: Progress) -> Extension:
+    """The model extended with the named causes, or tried with the states of a single cycle."""
+    records, average_s = refitting.records, refitting.average_s
+    if cycle is not None:
+        floor = floor_of(records, cycle.residual - cycle.explained, average_s)
+        return extend(refitting, cycle.able, (), floor, say)
+    named = _named(analysis)
+    likely = [place[c.candidate.id] for c, place in zip(named, analysis.attribution.probabilities, strict=False)]
+    return extend(refitting, named, likely, floor_of(records, analysis.left_dph(named=bool(named)), average_s), say)
 
 
 def _undecidable(records: Records) -> str:

@@ -26,8 +26,9 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, CandidateKey, diagnosable_causes, price_of
+from .posterior import LOOKED_AT, Rival, odds_of
 from .profile_likelihood import CauseSet, Gains, Point, best_of
-from .rivals import LOOKED_AT, Kinds, Rival, kinds_of, odds_of, rival_key
+from .rivals import Kinds, kinds_of, rival_key
 
 _Near = dict[Kinds, list[Point]]
 

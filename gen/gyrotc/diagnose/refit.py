@@ -364,32 +364,51 @@ def _simulated(run: Played, effect: Effect) -> FloatArray:
     return effect.term.bias(scene, effect.values, np.random.default_rng(0))
 
 
+def samples_beside(
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    power_on: NDArray[np.int64],
+    kept: Sequence[NDArray[np.bool_]] | None = None,
+) -> TrainingData:
+    """Return the samples that a map beside the effects is fitted to: those `kept`, without intercepts of power-ons.
+
+    Args:
+        power_on: Number of the power-on of each run.
+    """
+    return without_intercepts(_chosen(runs, effects, kept), power_on)
+
+
 def fit_extended(
     runs: Sequence[Played],
     effects: Sequence[Effect],
     arguments: dict[str, Any],
     kept: Sequence[NDArray[np.bool_]] | None = None,
     *,
+    beside: bool = True,
     rate: bool = True,
 ) -> Fit:
-    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
-    data = _chosen(runs, effects, kept)
-    offsets = [e.values["std_dph"] for e in effects if e.term.kind == "random"]
-    if offsets:
-        data = levelled(data, max(offsets))
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone.
+
+    Where it is not one `beside` effects it is what would be emitted without any.
+    """
+    data = samples_beside(runs, effects, arguments["power_on"], kept) if beside else _chosen(runs, effects, kept)
     return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
 
 
-def levelled(data: TrainingData, std_dph: float) -> TrainingData:
-    """Samples without the offset of each run, as far as a map of the evidence process beside them says what it is.
+def without_intercepts(data: TrainingData, power_on: NDArray[np.int64]) -> TrainingData:
+    """Return the samples less the intercept of every power-on, as far as a map beside them tells it from noise.
+
+    The intercepts are draws of one normal distribution, whose variance is what the means of the residuals scatter by
+    beyond their noise: where power-ons do not differ nothing is taken off.
 
     Args:
-        data: Samples of one run or more.
-        std_dph: Standard deviation of the offsets, deg/h.
+        power_on: Number of the power-on of each run.
     """
-    out = data
-    _, index = np.unique(data.run, return_inverse=True)
+    _, index = np.unique(power_on[data.run], return_inverse=True)
     count = np.bincount(index)
+    if count.size < 2:
+        return data
+    out = data
     for _ in range(_LEVELLINGS):
         try:
             samples = cleaned_samples(out)
@@ -398,8 +417,10 @@ def levelled(data: TrainingData, std_dph: float) -> TrainingData:
             break
         at = scaling_of(samples).normalise(data.temperature_c, data.slope_c_per_min)
         left = data.bias_dph - process.mean_dph(*at)
-        share = std_dph**2 / (std_dph**2 + float(np.var(left)) / count)
-        offset = share * np.bincount(index, left) / count
+        mean = np.bincount(index, left) / count
+        noise = np.bincount(index, (left - mean[index]) ** 2) / count / count
+        variance = max(float(mean.var(ddof=1)) - float(noise.mean()), 0.0)
+        offset = mean * variance / (variance + noise)
         out = replace(data, bias_dph=data.bias_dph - (offset - offset.mean())[index])
     return out
 

@@ -20,100 +20,29 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .candidates import Candidate, price_of
 from .joined import INDEPENDENT, ratio_of
+from .posterior import LOOKED_AT, Rival, odds_of
 from .profile_likelihood import Gains, Point
-
-EQUIVALENT = 8.0
-"""Difference of the criterion (twice the log-likelihood, priced) within which two explanations count as equal: odds
-below e^4, about 50 to 1, name no cause."""
-
-LOOKED_AT = 3.0 * EQUIVALENT
-"""Farther behind, a rival has odds below 1 in 700 of the tempered likelihood."""
-
-_TEMPER = 2.0 * float(np.log(9.0)) / EQUIVALENT
-"""How much of a difference of the criterion counts in odds: so that one other explanation at the edge of what counts as
-equal has 1 in 10. Map, noise colour and grid are known less well than the likelihood takes them to be."""
-
-_SURELY = 300.0  # logarithm of odds beyond which more is no surer
-_SURE = 0.9  # probability from which one cause is reported as the explanation
-
-UNNAMED, NOTHING = "unnamed", "nothing"
-"""In the place of a cause: something that is not in the catalogue; the map and the noise alone."""
-
-_BEFOREHAND = 3.0  # odds of either before the recordings speak: each is more common than any one cause
 
 RivalKey = tuple[str, str]  # cause and channel ("" for none)
 Kinds = tuple[RivalKey, ...]  # of a model, sorted
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True)
-class Rival:
-    """Another cause, or channel, in place of a chosen one.
+def ranked_rivals(pool: Sequence[Point], chosen: tuple[Candidate, ...], k: int, size: int) -> tuple[Rival, ...]:
+    """Return all other causes in the place of the k-th chosen one, everything else kept in kind, nearest first.
 
-    Attributes:
-        distance: How far its criterion is behind, 0 is equal.
-        odds: Against the chosen one, where simulation has given them; None: those of the distance.
+    Args:
+        pool: All models with as many causes as are chosen.
+        size: Number of blocks.
     """
-
-    id: str
-    distance: float
-    channel: str | None = None
-    odds: float | None = None
-
-
-def probabilities_of(chosen: str, ranked: Sequence[Rival]) -> dict[str, float]:
-    """Of all causes in one place, by id, the chosen one first."""
-    odds = {chosen: 1.0}
-    for rival in ranked:
-        if rival.id not in odds:  # another channel, or the chosen cause at another place, is no other cause
-            odds[rival.id] = odds_of(rival)
-    total = sum(odds.values())
-    return {id: value / total for id, value in odds.items()}
-
-
-def odds_of(rival: Rival) -> float:
-    """Of a rival against the chosen cause."""
-    return float(np.exp(-0.5 * _TEMPER * rival.distance)) if rival.odds is None else rival.odds
-
-
-def no_cause(id: str, distance: float) -> Rival:
-    """`UNNAMED` or `NOTHING` as a rival of all causes, from how far its criterion is behind theirs."""
-    return Rival(id, distance, odds=_BEFOREHAND * float(np.exp(min(-0.5 * _TEMPER * distance, _SURELY))))
-
-
-def near_of(ranked: Sequence[Rival]) -> tuple[Rival, ...]:
-    """Those of all rivals, the likeliest first, that explain the recordings as well as the chosen cause.
-
-    These are all within `EQUIVALENT`, and as many more as it takes until they and the chosen one have 0.9.
-    """
-    odds = np.array([1.0, *map(odds_of, ranked)])
-    enough = int(np.searchsorted(np.cumsum(odds) / odds.sum(), _SURE))
-    return tuple(r for k, r in enumerate(ranked) if k < enough or r.distance <= EQUIVALENT)
-
-
-def ranked_rivals(
-    singles: list[Point], pairs: list[Point], chosen: tuple[Candidate, ...], size: int
-) -> tuple[tuple[Rival, ...], ...]:
-    """Other causes in the place of each chosen one, everything else kept in kind: all of them, nearest first."""
-    kinds = [rival_key(c) for c in chosen]
-    pool = singles if len(chosen) == 1 else pairs
-    if len(chosen) > 2:
-        return tuple(() for _ in chosen)
-    best: dict[Kinds, float] = {}
-    for p in pool:
-        key = kinds_of(p.members)
-        best[key] = max(best.get(key, -np.inf), p.criterion(size))
-    own = best[kinds_of(chosen)]
-    out = []
-    for k in range(len(kinds)):
-        near: dict[RivalKey, float] = {}
-        for key, value in best.items():
-            kind = _beside(key, kinds[:k] + kinds[k + 1 :])
-            if kind is not None and kind != kinds[k]:
-                near[kind] = max(near.get(kind, -np.inf), value)
-        ranked = sorted(near.items(), key=lambda item: -item[1])
-        out.append(tuple(Rival(id, own - v, channel or None) for (id, channel), v in ranked))
-    return tuple(out)
+    own, others = rival_key(chosen[k]), [rival_key(c) for c in (*chosen[:k], *chosen[k + 1 :])]
+    best: dict[RivalKey, float] = {}
+    for point in pool:
+        kind = _beside([rival_key(member) for member in point.members], others)
+        if kind is not None:
+            best[kind] = max(best.get(kind, -np.inf), point.criterion(size))
+    ranked = sorted(((v, kind) for kind, v in best.items() if kind != own), reverse=True)
+    return tuple(Rival(id, best[own] - v, channel or None) for v, (id, channel) in ranked)
 
 
 def rival_key(candidate: Candidate) -> RivalKey:

@@ -6,8 +6,8 @@ and one or two states stand beside it, by an information criterion that counts i
 states, which every package has, unless plays are clearly better. What explains the recordings as well is reported.
 
 A static dT/dt, f(T) + g(T) dT/dt and flows that saturate, is a rival like any other: memory is named only where it
-is clearly better than every one of them, and never where the temperature does not turn. States that are not named may
-still be a good correction: that is for the unseen stretches of history to say (`extend`).
+is clearly better than every one of them, and never where the temperature does not turn or a branch that was left out
+refutes it. Nothing is shipped from a single cycle: its branches do not tell whether states hold on the next one.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from ..train.data import turning_points
 from .attribution import Attribution
 from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, price_of, searched, shape_parameter
+from .posterior import EQUIVALENT, Rival
 from .profile_likelihood import SEPARATION
 from .refinement import Interval, Refined
-from .rivals import EQUIVALENT, Rival
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
@@ -241,7 +241,7 @@ class Cycle:
         p_value: The p-value of the chosen states together.
         residual: What the map of T alone leaves, deg/h, shape (N,).
         explained: The chosen states' part of it, shape (N,).
-        preferred: Whether branches that were left out prefer the states to every correction without memory.
+        refuted: Whether the states make branches that were left out worse.
     """
 
     tried: tuple[Tried, ...]
@@ -254,7 +254,7 @@ class Cycle:
     p_value: float
     residual: FloatArray
     explained: FloatArray
-    preferred: bool = False
+    refuted: bool = False
 
     @property
     def able(self) -> tuple[Refined, ...]:
@@ -263,13 +263,8 @@ class Cycle:
 
     @property
     def causes(self) -> tuple[Refined, ...]:
-        """The states, where they are named: clearly better than these, or better and preferred by unseen branches."""
-        return self.able if self.chosen is not None and (self.preferred or self.lead >= EQUIVALENT) else ()
-
-    @property
-    def rate_would_do(self) -> bool:
-        """Whether a static dT/dt explains the recordings as well, so that unseen branches alone name the states."""
-        return bool(self.causes) and self.lead < EQUIVALENT
+        """The states, where they are named: clearly better than these, and not refuted by branches left out."""
+        return self.able if self.chosen is not None and self.lead >= EQUIVALENT and not self.refuted else ()
 
     @property
     def lead(self) -> float:
@@ -287,6 +282,8 @@ class Cycle:
             )
         if self.chosen is None or self.causes:
             return ""
+        if self.refuted:
+            return "memory that explains this cycle fails on branches left out: record the same cycle at another rate"
         return (
             f"a static dependence on dT/dt explains this cycle as well (memory leads by {self.lead:.1f} in twice the "
             f"log-likelihood, {EQUIVALENT:g} are needed): record the same cycle at another rate"

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as `diagnose.json` holds it: verdict, figures, words, and what to do next."""
+"""The result of a diagnosis, as `diagnose.json` holds it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from .. import __version__
-from ..causes import CATALOGUE, separate_by
+from ..causes import CATALOGUE
 from ..recordings.records import Dataset
 from ..results.base import Estimate
 from ..results.diagnosed import (
-    LIKELIER_THAN_ALL_ELSE,
     Baseline,
     ComparedStatistic,
     ConsideredCause,
     CycleResult,
     DetectionLimit,
     Diagnosed,
-    DiagnosisVerdict,
     ExtendedModel,
     GainOnUnseen,
     NamedCause,
@@ -29,8 +27,7 @@ from ..results.diagnosed import (
     WithoutRate,
 )
 from ..train.fitting import FitOptions, front_end
-from .attribution import Attribution
-from .candidates import diagnosable_causes, searched, shape_parameter
+from .candidates import diagnosable_causes
 from .detection import CauseLimit
 from .discrepancy import NoiseFinding
 from .extension import Extension
@@ -39,188 +36,10 @@ from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .refinement import Interval, Refined
 from .refit import terms_of
-from .rivals import UNNAMED
 from .single_cycle import Cycle, memories
-from .wide_memory import WideMemory
+from .verdict import VERDICTS, deciding_run, looks_like, next_steps, sentence_of, shows_as, verdict_of
 
-VERDICTS: dict[DiagnosisVerdict, str] = {
-    "consistent": "The simulation agrees with the recordings. The detection limits say what could still hide.",
-    "explained": "The causes listed account for what the simulation gets wrong.",
-    "ambiguous": "Two or more causes explain these recordings equally well.",
-    "partial": "A cause is named, and structure remains that it does not explain.",
-    "noise_differs": "Only the noise is not what the simulation declares.",
-    "unexplained": "There is structure that no cause of the catalogue explains: none is named.",
-    "not_testable": "These recordings cannot decide.",
-}
-
-_STEPS: dict[DiagnosisVerdict, str] = {
-    "consistent": "Nothing is needed. For lower detection limits record the programme of docs/howto-calibration.md.",
-    "explained": "Mend the cause and record again.",
-    "partial": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded input."
-    " Record supply, discharge current, pressure and magnetic field beside the rate.",
-    "noise_differs": "Declare the noise that was measured ([noise] of dataset.toml), or find out why it differs;"
-    " then diagnose again: detection limits follow the noise.",
-    "unexplained": "Run one profile twice: what repeats is memory or map, what does not is noise or an unrecorded"
-    " input. Record supply, discharge current, pressure and magnetic field beside the rate.",
-    "not_testable": "Record ramps over the product's range of temperature, up and down, at two rates at least.",
-}
-
-
-def next_steps(
-    verdict: DiagnosisVerdict,
-    causes: Sequence[NamedCause],
-    untestable: Sequence[str],
-    *,
-    gain: GainOnUnseen | None,
-) -> list[str]:
-    """Sentences, the most telling first.
-
-    Args:
-        verdict: One of `VERDICTS`.
-        causes: Causes and kinds of noise that were found.
-        untestable: Ids of the causes that these recordings cannot test.
-        gain: Of the extension that is shipped; None: none is.
-    """
-    steps = [_deciding_run(c) for c in causes if c.separate_by]
-    if gain is not None and gain.shown == "gain":
-        steps.append("Build with the extension (gyrotc build --extend).")
-    elif gain is not None:
-        steps.append("Build without the extension: runs that were not fitted to show no gain of it.")
-    if verdict == "explained" and gain is None:
-        remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
-        steps.append(f"Against it: {'; '.join(remedies)}.")
-    elif verdict != "ambiguous":
-        steps.append(_STEPS[verdict])
-    steps += [f"Paste {c.repair} into dataset.toml and build again." for c in causes if c.repair]
-    named = [CATALOGUE[c.id].words for c in causes if c.id in CATALOGUE]
-    steps += dict.fromkeys(words.advice for words in named if words.advice)
-    missing = [text for i in untestable if (text := CATALOGUE[i].words.recording)]
-    if missing and verdict != "not_testable":
-        steps.append(f"To test what these recordings cannot: {'; '.join(missing)}.")
-    return steps
-
-
-def _deciding_run(cause: NamedCause) -> str:
-    """The run to record in order to separate a cause from its likeliest rival, and what the present runs can do."""
-    rival, limits = cause.equivalent[0], cause.separable_from_d or {}
-    now = f" The present runs separate them from d = {limits[rival]:.2g} on." if rival in limits else ""
-    pair = f"{cause.id} from {rival}".replace("_", " ")
-    return f"To separate {pair}, record {cause.separate_by}.{now}"
-
-
-def sentence_of(
-    verdict: DiagnosisVerdict,
-    found: Sequence[NamedCause],
-    extended: ExtendedModel | None,
-    undecided: str,
-    wide: WideMemory | None = None,
-    rivals: Sequence[str] = (),
-) -> str:
-    """The finding in one to three sentences.
-
-    Args:
-        undecided: Why a single cycle cannot tell of memory.
-        wide: The form of hysteresis that is among the causes, where it is more than one play.
-        rivals: What explains the recordings as well and is no cause.
-    """
-    why = f" about memory of the temperature: {undecided}" if undecided else ""
-    causes = [c for c in found if c.family != "noise"]
-    names = "; ".join(
-        f"{name} (twice)" if sum(c.name == name for c in causes) > 1 else name
-        for name in dict.fromkeys(c.name for c in causes)
-    )
-    noise = "; ".join(c.name for c in found if c.family == "noise")
-    text = {
-        "consistent": "Nothing was found beyond the static map and the declared noise.",
-        "explained": f"{names}.",
-        "ambiguous": f"{names}, or equally well: {', '.join([*_rivals(causes), *rivals])}.",
-        "partial": f"{names}, and structure remains that no cause explains.",
-        "noise_differs": f"{noise}.",
-        "unexplained": "There is structure that no cause of the catalogue explains.",
-        "not_testable": f"The recordings cannot decide{why}.",
-    }[verdict]
-    text += f" Here {wide.text}." if wide is not None else ""
-    return text if extended is None else f"{text} {extended.gain.text}"
-
-
-def shows_as(cause: str, wide: WideMemory | None) -> str:
-    """How a cause shows; of hysteresis (`wide`: of a form that is more than one play) also how it differs from that."""
-    words = CATALOGUE[cause].words
-    if wide is None or not searched(cause).loops:
-        return words.signature
-    return f"{words.signature}; here {wide.text}"
-
-
-def _rivals(causes: Sequence[NamedCause]) -> Iterator[str]:
-    """Names of causes that explain the runs as well, with their channels."""
-    for cause in causes:
-        for id in cause.equivalent:
-            channels = ", ".join(cause.equivalent_channels or ())
-            yield CATALOGUE[id].words.name + (f" ({channels})" if CATALOGUE[id].needs.channel else "")
-
-
-_MISFITS = ((0.05, 0.5), (0.01, 0.8))
-"""p-value of what is left (`Misfit.worst`), and share of the structure below which the causes then explain too little.
-
-However clear the remainder: where four fifths are a cause and no other shape does better, it is that cause in another
-form than the catalogue's (relays in place of a play), and the remainder is reported beside it.
-"""
-
-_REMAINDER = 1e-3  # p-value of what is left below which "explained" would claim too much
-_SEEN = 0.05  # p-value over the whole search that at least one of the causes has itself
-
-
-def holds(attribution: Attribution) -> bool:
-    """Whether causes are given at all.
-
-    Not where most of the structure is none of them, where their families are not likelier than all else, where a
-    parameter is one that no gyro has, and not where the search sees none of them: something else was detected then.
-    """
-    left = attribution.left
-    little = any(left.worst < p and left.share < share for p, share in _MISFITS)
-    plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
-    seen = min(attribution.p_values, default=1.0) <= _SEEN
-    return plausible and seen and not little and all(map(_likely, attribution.probabilities))
-
-
-def _likely(probabilities: Mapping[str, float]) -> bool:
-    """Whether a cause is likelier than something unnamed, and its family likelier than all else together."""
-    named, *others = probabilities
-    family = [id for id in others if id in CATALOGUE and CATALOGUE[id].family == CATALOGUE[named].family]
-    share = sum(probabilities[id] for id in (named, *family))
-    return probabilities[named] > probabilities[UNNAMED] and share > LIKELIER_THAN_ALL_ELSE
-
-
-def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding]) -> DiagnosisVerdict:
-    """One of the verdicts of the interface; `not_testable` is given before any search.
-
-    Args:
-        attribution: What the search found.
-        noise: Findings of the family `noise`.
-    """
-    if attribution.detected and not holds(attribution):
-        return "unexplained"
-    if holds(attribution):
-        if attribution.left.p_value < _REMAINDER:
-            return "partial"
-        return "ambiguous" if any(attribution.rivals) else "explained"
-    return "noise_differs" if noise else "consistent"
-
-
-def looks_like(attribution: Attribution) -> str | None:
-    """What structure without a name resembles: another shape, or a cause with a parameter that no gyro has."""
-    if attribution.other.lead > 0.0:
-        return attribution.other.name
-    for cause in attribution.causes:
-        parameter = shape_parameter(cause.candidate.id)
-        if parameter is not None and not cause.plausible:
-            value = f"{parameter.name} = {cause.parameters[parameter.name].value:.2g} {parameter.unit}"
-            known = f"{parameter.low:g} to {parameter.high:g} {parameter.unit} are known"
-            return f"{cause.candidate.id.replace('_', ' ')} with {value}, where {known}"
-    return None
-
-
-_MOST_EQUIVALENT = 2  # rivals that are named; the page lists every cause with its p-value besides
+_MOST_EQUIVALENT = 3  # of what remains possible; the page has the probabilities of all
 
 
 def _block_s(dataset: Dataset, options: FitOptions) -> float:
@@ -268,11 +87,7 @@ def result_of(
         causes: Those that are named, as the extension took them.
         cycle: What a single chamber cycle tells; None where there are more.
     """
-    verdict = verdict_of(analysis.attribution, analysis.noise)
-    if cycle is not None and causes:
-        verdict = "ambiguous" if cycle.rivals or cycle.rate_would_do else "partial"
-    elif cycle is not None and cycle.not_testable:
-        verdict = "not_testable"
+    verdict = verdict_of(analysis.attribution, analysis.noise, cycle)
     listed = tuple(_cause(analysis, extension, k) for k in range(len(causes)))
     listed += tuple(_noise_cause(n) for n in analysis.noise)
     untestable = _untestable(analysis, cycle)
@@ -303,7 +118,6 @@ def result_of(
             extended,
             undecided,
             analysis.attribution.wide if causes else None,
-            ["a static dependence on dT/dt"] if cycle is not None and cycle.rate_would_do else [],
         ),
         meaning=VERDICTS[verdict],
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
@@ -379,7 +193,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         p_value=attribution.p_values[k],
         parameters={n: _estimate(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
         equivalent=rivals,
-        separate_by=separate_by(id, rivals[0]) if rivals else None,
+        separate_by=deciding_run(id, rivals[0]) if rivals else None,
         gain=_result(extension.steps[k]),
         signature=shows_as(id, attribution.wide),
         remedy=words.remedy,

@@ -7,6 +7,9 @@ from .base import read_optional as read_optional
 from .base import read_result as read_result
 from .cache import input_hashes as input_hashes
 from .cache import program_of as program_of
+from .diagnosed import NOTHING as NOTHING
+from .diagnosed import SURE as SURE
+from .diagnosed import UNNAMED as UNNAMED
 from .diagnosed import ConsideredCause as ConsideredCause
 from .diagnosed import DetectionLimit as DetectionLimit
 from .diagnosed import Diagnosed as Diagnosed
@@ -14,6 +17,8 @@ from .diagnosed import DiagnosisVerdict as DiagnosisVerdict
 from .diagnosed import ExtendedModel as ExtendedModel
 from .diagnosed import GainOnUnseen as GainOnUnseen
 from .diagnosed import NamedCause as NamedCause
+from .diagnosed import ShippingTrial as ShippingTrial
+from .diagnosed import Statistic as Statistic
 from .diagnosed import Unexplained as Unexplained
 from .evaluation import RMS_OVER_FLOOR as RMS_OVER_FLOOR
 from .evaluation import At as At

@@ -81,7 +81,11 @@ class Statistic(ComparedStatistic):
     extended: ComparedStatistic | None = Field(description="null where nothing was found")
 
 
-LIKELIER_THAN_ALL_ELSE = 0.5  # probability above which something is likelier than all else together
+UNNAMED, NOTHING = "unnamed", "nothing"
+"""In the place of a cause: an effect that is in no catalogue; no effect at all."""
+
+LIKELIER_THAN_ALL_ELSE = 0.5  # probability above which something is likelier than all else together, and is named
+SURE = 0.9  # probability from which it is the explanation; below, what else remains possible is listed
 
 
 class NamedCause(Part):
@@ -92,8 +96,13 @@ class NamedCause(Part):
     name: str = Field(description="in words")
     p_value: Figure = Field(description="adjusted for the whole search")
     parameters: dict[str, Estimate] = Field(description="fitted parameters by name")
-    equivalent: tuple[str, ...] = Field(description="ids of causes that explain the runs as well")
-    separate_by: str | None = Field(description="the experiment that would separate them")
+    equivalent: tuple[str, ...] = Field(
+        description="what else remains possible, the likeliest first: ids of causes, `unnamed` (an effect that is in "
+        "no catalogue) or `nothing`; none where the cause has 90 %"
+    )
+    separate_by: str | None = Field(
+        description="the experiment that would decide between it and the likeliest of these"
+    )
     probabilities: dict[str, float] | None = Field(
         default=None,
         description="of this cause, of all others in its place, of something `unnamed` and of `nothing`, by id",
@@ -109,11 +118,6 @@ class NamedCause(Part):
     equivalent_channels: tuple[str, ...] | None = Field(
         default=None, description="channels that explain the runs as well"
     )
-
-    @property
-    def sure(self) -> bool:
-        """Whether it is likelier than all else in its place, where probabilities are stated."""
-        return self.probabilities is None or self.probabilities[self.id] > LIKELIER_THAN_ALL_ELSE
 
 
 class Baseline(Part):
@@ -197,6 +201,7 @@ class ShippingTrial(Part):
         description="of what the rest has covered of them without it, deg/h; null: not tried"
     )
     rms_after_dph: Figure = Field(description="the same with it, deg/h; null: not tried")
+    reason: str | None = Field(description="why nothing is shipped; null where something is")
 
 
 class Unexplained(Part):
@@ -212,11 +217,11 @@ class Diagnosed(UnitResult):
     """What the static map does not explain, and why (`gyrotc diagnose`)."""
 
     schema_: Annotated[Literal["gyrotc.diagnose/1"], Field(alias="schema")] = "gyrotc.diagnose/1"
+    discrepancies: tuple[Statistic, ...] = Field(description="what the simulation gets wrong, the rarest first")
     verdict: DiagnosisVerdict = Field(description="see docs/diagnosis.md")
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Figure = Field(description="of means over `average_s` of the training runs, deg/h")
-    discrepancies: tuple[Statistic, ...] = Field(description="the rarest first")
     causes: tuple[NamedCause, ...] = Field(description="what was found")
     baseline: Baseline | None = Field(description="null where nothing could be decided")
     extended: ExtendedModel | None = Field(description="null where nothing gains on unseen runs")
@@ -238,6 +243,17 @@ class Diagnosed(UnitResult):
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
     series: str | None = Field(default=None, description="file of what the pictures show")
     lot: str | None = Field(default=None, description="with `--lot`: what was done with it; null without")
+
+    @property
+    def discrepancy(self) -> str:
+        """What the simulation gets wrong most clearly: statistic, simulated band, probability; empty if unknown."""
+        if not self.discrepancies:
+            return ""
+        first = min(self.discrepancies, key=lambda d: d.p_value)
+        unit = " deg/h" if first.statistic.endswith("_dph") else ""
+        name = first.statistic.removesuffix("_dph").replace("_", " ")
+        band = f"{first.simulated_low:.3g} to {first.simulated_high:.3g}{unit}"
+        return f"{name} is {first.measured:.3g}{unit}, where 95 % of simulations have {band} (p = {first.p_value:.2g})"
 
     @property
     def physical(self) -> tuple[NamedCause, ...]:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -57,10 +57,9 @@ _FEW_COLUMNS = ("constant", "cubic", "cubic_slope")
 _SIMPLE = (*_FEW_COLUMNS, "mixed")
 CANDIDATES = ("nothing", *_SIMPLE, "mrbf")
 """From the simplest to the richest."""
-_OF_NETWORK, _OF_STATES = 0.025, 0.05  # of the t test: states that a verdict names have evidence of their own
+_OF_NETWORK = 0.025  # of the t test
 _LEAST = 0.02  # share of RMS by which the network has to be better: what "no worse than trivial" allows (docs/real.md)
 _COVERED = 0.5  # of a piece at temperatures that the rest has seen: of less it is the map's ends that are judged
-_TWOFOLD = 2.0  # gain of states on every piece that needs no test: two pieces are too few for one
 _MUCH = 0.10  # share of RMS by which the constant has to be beaten where the t test is silent
 _UNDECIDED = 1.0  # t of the gain over a constant below which it is a coin (docs/training.md, section 2)
 _LEAST_NOISE = 1e-6  # of the range of the means: rates without any noise differ by rounding only
@@ -76,8 +75,8 @@ class CandidateScores:
         noise_dph: Noise of a mean over `average_s`, from all differences of neighbours.
         white_dph: The same without slopes and outliers.
         means: Number of means in each piece, shape (folds,).
-        covered_dph: As `rms_dph`, of means at temperatures that the rest of the history has seen; nan where these are
-            less than half of a piece.
+        covered_dph: As `rms_dph`, of means at temperatures that the rest of the history has seen, about the mean of a
+            whole run; nan where these are less than half of a piece.
         candidates: Names of the candidates, from the simplest to the richest.
     """
 
@@ -102,21 +101,10 @@ class CandidateScores:
         if "mrbf" in able and self._surely_better("mrbf", name, _OF_NETWORK):
             name = "mrbf"
         name = name if self.beats_constant(name) else "constant"
-        for states in (n for n in able if n not in CANDIDATES):
-            name = states if self._states_surely_better(states, name) else name
         return name
 
     def _surely_better(self, name: str, other: str, level: float) -> bool:
         return _surely(self._score(other) - self._score(name), level)
-
-    def _states_surely_better(self, name: str, other: str) -> bool:
-        """By the t test, or by a factor of two on every piece: of two pieces a t test asks for 6.3 standard errors.
-
-        On what is covered: at other temperatures an error of the map's ends is larger than what states do.
-        """
-        gains = self._log(self._covered(other)) - self._log(self._covered(name))
-        gains = gains[np.isfinite(gains)]
-        return _surely(gains, _OF_STATES) or (len(gains) > 1 and bool(gains.min() >= np.log(_TWOFOLD)))
 
     def _rms(self, name: str) -> FloatArray:
         return np.asarray(self.rms_dph[:, self.candidates.index(name)])
@@ -141,12 +129,9 @@ class CandidateScores:
         """t of the gain in score over a constant over pieces, and its degrees of freedom; 0 where there is none."""
         return t_statistic(self._score("constant") - self._score(name))
 
-    def with_states(self, name: str, other: CandidateScores) -> CandidateScores:
-        """Besides, the network of another comparison over the same pieces, beside states that a verdict names."""
-        at = [other.candidates.index("mrbf")]
-        rms = np.hstack([self.rms_dph, other.rms_dph[:, at]])
-        covered = np.hstack([self.covered_dph, other.covered_dph[:, at]])
-        return replace(self, rms_dph=rms, covered_dph=covered, candidates=(*self.candidates, name))
+    def covered_scores(self, name: str) -> FloatArray:
+        """Return log RMS (with the noise) of what is covered of each piece; nan where too little is."""
+        return self._log(self._covered(name))
 
     def rms_covered(self, name: str) -> float | None:
         """As `rms_of`, over what is covered."""
@@ -268,9 +253,14 @@ def _squares(fold: Fold, rest: Rest, average_s: float) -> list[list[float]]:
         correction = 0.0 * t if name == "nothing" else corrections["constant" if flat else name]
         left = None if correction is None else cells.mean(held.bias_dph - correction)
         squares.append(np.nan if left is None else weighted_mean(left**2, cells.weight))
-        judged = None if left is None or not enough else left[seen]
-        covered.append(np.nan if judged is None else weighted_mean(judged**2, cells.weight[seen]))
+        covered.append(np.nan if left is None or not enough else _square(left[seen], cells.weight[seen], fold.kind))
     return [squares, covered]
+
+
+def _square(left: FloatArray, weight: FloatArray, kind: str) -> float:
+    """Mean square of what is left of a piece; of a whole run about its mean, which its power-on has drawn."""
+    about = weighted_mean(left, weight) if kind == "run" else 0.0
+    return weighted_mean((left - about) ** 2, weight)
 
 
 class Rest:

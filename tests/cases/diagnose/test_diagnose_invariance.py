@@ -311,7 +311,6 @@ def left(dataset: Dataset, block_s: float = 10.0) -> float:
 
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
-STATIC_MAP_DPH = 1311.0  # a map of (T, dT/dt) on the x axis of the branch that it has not seen
 
 
 def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command) -> dict[str, Any]:
@@ -332,12 +331,17 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
 
 
 @pytest.mark.slow
-def test_memory_of_a_chamber_cycle_holds_on_the_branch_it_has_not_seen(tmp_path: Path, gyrotc: Command) -> None:
-    result = diagnosed("mpu6000-chamber-cycle", 3130.0, "x", tmp_path, gyrotc)
-    assert result["extended"]["exam_rms_dph"] < 0.5 * STATIC_MAP_DPH
-    assert result["extended"]["terms"] == ["thermal_gradient", "thermal_gradient"]
-    assert result["verdict"] == "ambiguous", "a static dT/dt explains the cycle as well, unseen branches do not"
-    assert "a static dependence on dT/dt" in result["text"]
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_no_name_of_a_measured_cycle_does_harm_on_the_branch_it_has_not_seen(
+    axis: str, tmp_path: Path, gyrotc: Command
+) -> None:
+    """The discrepancy is printed first, nothing is shipped from one cycle, and the run that would decide is named."""
+    result = diagnosed("mpu6000-chamber-cycle", 3130.0, axis, tmp_path, gyrotc)
+    assert result["extended"] is None and result["discrepancies"]
+    named = [c for c in result["causes"] if c["family"] != "noise"]
+    gain = result["single_cycle"]["gain"]
+    assert not named or gain["exam_rms_after_dph"] < gain["exam_rms_before_dph"]
+    assert "another rate" in result["text"] + " ".join(result["next"]) + result["shipping"]["reason"]
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "How much can be said" in page and "no memory: products of T and dT/dt" in page
     assert {"warm_up", "turn_on_offset", "ageing"} <= {c["id"] for c in result["considered"] if "not_testable" in c}
@@ -352,21 +356,13 @@ def without(part: str, folder: Path, axis: str, means_s: float) -> Dataset:
     return averaged(means_s)(dataset) if means_s else dataset
 
 
-def test_states_that_one_piece_alone_can_judge_are_not_shipped(tmp_path: Path) -> None:
-    """Without its cold end a cycle is two spans, and one of them has seen a third of the other's temperatures.
-
-    States were better on both by 17 %, of 500 and 3500 deg/h, and left 422 deg/h at the cold end instead of 181.
-    """
-    found = diagnose(without("the cold end", tmp_path, "y", 60.0), options=FitOptions(average_s=100.0)).result
-    assert found.extended is None and found.shipping is not None and found.shipping.beside == "cubic_slope"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("axis", "at_most"), [("x", 400.0), ("y", 150.0)])
-def test_states_of_a_chamber_cycle_gain_on_its_last_branch(tmp_path: Path, axis: str, at_most: float) -> None:
-    found = diagnose(without("branch 3", tmp_path, axis, 0.0), options=FitOptions(average_s=100.0)).result
-    assert found.extended is not None and found.extended.gain is not None
-    assert found.extended.gain.exam_rms_after_dph <= at_most < found.extended.gain.exam_rms_before_dph
+@pytest.mark.parametrize("part", ["the cold end", "branch 3"])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_nothing_is_shipped_from_a_single_cycle(part: str, axis: str, tmp_path: Path) -> None:
+    """Without its cold end states were better on both spans by 17 %, and left 422 deg/h there instead of 181."""
+    found = diagnose(without(part, tmp_path, axis, 60.0), options=FitOptions(average_s=100.0))
+    assert found.model is None and found.result.extended is None and found.result.shipping is not None
+    assert found.result.shipping.reason
 
 
 def cut_out(folder: Path, source: Path, spans: list[tuple[float, float]]) -> Dataset:

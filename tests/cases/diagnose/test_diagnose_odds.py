@@ -24,19 +24,8 @@ from gyrotc.diagnose import (
 )
 from gyrotc.diagnose.discrepancy import _discrepancy, _two_sided, ensemble_of, noise_findings
 from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood, _largest
-from gyrotc.diagnose.rivals import (
-    LOOKED_AT,
-    Rival,
-    _Place,
-    _points,
-    _Simulated,
-    calibrated,
-    near_of,
-    odds_of,
-    probabilities_of,
-    ranked_rivals,
-    rival_key,
-)
+from gyrotc.diagnose.posterior import LOOKED_AT, Rival, odds_of, probabilities_of, remaining
+from gyrotc.diagnose.rivals import _Place, _points, _Simulated, calibrated, ranked_rivals, rival_key
 from gyrotc.mirror import delayed, first_order
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
@@ -108,7 +97,7 @@ def _reported(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, flo
     singles = [p for p in gains.single() if p.members[0].id in MEMORIES]
     evidence = MarginalLikelihood(gains)
     chosen = (evidence.preferred(singles) if weighed else best_of(singles, gains.size)).members
-    [ranked] = ranked_rivals(singles, [], chosen, gains.size)
+    ranked = ranked_rivals(singles, chosen, 0, gains.size)
     near = evidence.judged(singles, chosen, 0, ranked) if weighed else ranked
     likely = calibrated(gains, singles, chosen, 0, near)
     return chosen[0].id, probabilities_of(chosen[0].id, likely)
@@ -177,7 +166,7 @@ def test_without_a_changed_input_nearby_the_likelihood_decides(campaign: Campaig
     evidence = MarginalLikelihood(gains)
     best = best_of(singles, gains.size)
     assert evidence.preferred(singles) is best and best.members[0].id == "hysteresis"
-    [ranked] = ranked_rivals(singles, [], best.members, gains.size)
+    ranked = ranked_rivals(singles, best.members, 0, gains.size)
     assert evidence.judged(singles, best.members, 0, ranked) == ranked
 
 
@@ -186,7 +175,7 @@ def test_rivals_keep_their_order_and_who_is_far_behind_stays_there(quiet: Gains,
     singles = list(gains.single())
     evidence = MarginalLikelihood(gains)
     chosen = evidence.preferred(singles).members
-    [ranked] = ranked_rivals(singles, [], chosen, gains.size)
+    ranked = ranked_rivals(singles, chosen, 0, gains.size)
     reported = evidence.judged(singles, chosen, 0, ranked)
     assert {r.id for r in reported} == {r.id for r in ranked}
     assert [r.distance for r in reported] == sorted(r.distance for r in reported) and reported[0].distance >= 0.0
@@ -260,7 +249,7 @@ def test_two_causes_with_one_signature_have_even_odds_at_any_price(campaign: Cam
     twin = Candidate("ageing", {}, "columns")
     gains.plain = [*gains.plain, (twin, at)]
     pool = [Point((twin,), best.gain), best]
-    [ranked] = ranked_rivals(pool, [], (twin,), gains.size)
+    ranked = ranked_rivals(pool, (twin,), 0, gains.size)
     assert ranked[0].distance > 5.0, "a straight line costs one parameter less than a play"
     assert probabilities_of("ageing", ranked)["ageing"] > 0.8
     found = calibrated(gains, pool, (twin,), 0, ranked)
@@ -272,7 +261,7 @@ def test_it_only_takes_away_from_the_named_cause(campaign: Campaign, size: float
     gains = _gains(campaign, size, HYSTERESIS)
     singles = list(gains.single())
     chosen = best_of(singles, gains.size).members
-    [ranked] = ranked_rivals(singles, [], chosen, gains.size)
+    ranked = ranked_rivals(singles, chosen, 0, gains.size)
     found = calibrated(gains, singles, chosen, 0, ranked)
     assert found == calibrated(gains, singles, chosen, 0, ranked), "the same each time"
     assert {replace(r, odds=None) for r in found} == set(ranked), "nobody is added or lost"
@@ -281,13 +270,13 @@ def test_it_only_takes_away_from_the_named_cause(campaign: Campaign, size: float
         assert before[rival.id, rival.channel] <= odds_of(rival) <= 1.0
     assert [odds_of(r) for r in found] == sorted(map(odds_of, found), reverse=True)
     if size == 40.0:
-        assert chosen[0].id == "hysteresis" and near_of(found) == (), "a clear cause stays clear"
+        assert chosen[0].id == "hysteresis" and remaining(found) == (), "a clear cause stays clear"
 
 
 def _said(gains: Gains, pool: Sequence[Point], simulated: bool) -> tuple[str, float]:
     """The named cause and its probability."""
     chosen = best_of(list(pool), gains.size).members
-    [ranked] = ranked_rivals(list(pool), [], chosen, gains.size)
+    ranked = ranked_rivals(list(pool), chosen, 0, gains.size)
     reported = calibrated(gains, pool, chosen, 0, ranked) if simulated else ranked
     return chosen[0].id, probabilities_of(chosen[0].id, reported)[chosen[0].id]
 

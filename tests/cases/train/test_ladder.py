@@ -137,35 +137,6 @@ def test_where_only_noise_is_left_the_likelihood_on_unseen_means_decides() -> No
     assert candidates(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.001] * 4, mrbf=noise).chosen() == "cubic"
 
 
-def test_states_are_one_candidate_more() -> None:
-    constant = [900.0, 1100.0, 1000.0, 950.0]
-    plain = candidates(constant=constant, cubic=[x / 10.0 for x in constant])
-    better = candidates(constant=constant, mrbf=[x / 20.0 for x in constant])
-    alike = candidates(constant=constant, mrbf=[80.0, 112.0, 99.0, 96.0])
-    assert plain.with_states("states", better).chosen() == "states"
-    assert plain.with_states("states", alike).chosen() == "cubic"
-
-
-def test_states_are_judged_at_temperatures_that_the_rest_has_covered() -> None:
-    """Elsewhere the ends of the map decide; two pieces have to agree, for which a factor of two on both is enough."""
-    states = candidates(
-        constant=[900.0, 1100.0, 1000.0, 950.0], mrbf=[x / 20.0 for x in (900.0, 1100.0, 1000.0, 950.0)]
-    )
-    plain = candidates(constant=[900.0, 1100.0, 1000.0, 950.0])
-    few = [np.nan] * 4
-
-    def chosen(before: list[float], after: list[float]) -> str:
-        beside = plain.with_states("states", states)
-        covered = np.column_stack([*np.tile(before, (len(beside.candidates) - 1, 1)), after])
-        return replace(beside, covered_dph=covered).chosen()
-
-    constant = plain.chosen()
-    assert chosen([900.0, 1400.0, *few[:2]], [400.0, 300.0, *few[:2]]) == "states"
-    assert chosen([900.0, 1400.0, *few[:2]], [600.0, 300.0, *few[:2]]) == constant, "t of 2.5 where 6.3 are asked"
-    assert chosen([900.0, *few[:3]], [30.0, *few[:3]]) == constant, "one piece agrees with none"
-    assert chosen(few, few) == constant
-
-
 def test_a_mixed_model_is_the_most_probable_map_of_a_linear_mixed_model() -> None:
     """Against plain matrices: columns with scatter between power-ons, an exponential drift, white noise."""
     data = average_samples(cleaned_samples(samples(0)), 50.0)

@@ -17,14 +17,13 @@ from conftest import HOST, Command
 from gyrotc.causes import CATALOGUE
 from gyrotc.diagnose import (
     VERDICTS,
-    Attribution,
     Effect,
     Records,
     Refitting,
+    choose_shipped,
     completed,
     diagnose,
     extend,
-    extension,
     gain_of,
     held_out_masks,
     known,
@@ -32,9 +31,9 @@ from gyrotc.diagnose import (
     not_testable,
     records_of,
     samples,
-    shipping,
 )
 from gyrotc.diagnose import diagnosis as stages
+from gyrotc.diagnose import refitting as refits
 from gyrotc.mirror import first_order
 from gyrotc.recordings import Dataset, load
 from gyrotc.results import DiagnosisVerdict, NamedCause
@@ -178,7 +177,7 @@ def test_structure_that_no_map_follows_is_named_and_not_corrected(tmp_path: Path
     (cause,) = [c for c in result["causes"] if c["family"] != "noise"]
     assert (cause["id"], cause["gain"], result["extended"]) == ("map_too_coarse", None, None)
     assert cause["remedy"] in (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "no extension is shipped: nothing corrects what is named" in done.stdout
+    assert "no extension is shipped: no cause was named that a map can be refitted beside" in done.stdout
     assert read_json(tmp_path / "out" / "series.json")["scored"] == []
     assert not (tmp_path / "out" / "model-extended.json").exists()
 
@@ -270,8 +269,8 @@ def test_rows_that_are_no_samples_are_left_out_with_the_stretch_beside_them(
     def searched(records: Records) -> None:
         seen.append(records)
 
-    monkeypatch.setattr(extension, "search_of", searched)
-    monkeypatch.setattr(extension, "choose", lambda search, count: ())
+    monkeypatch.setattr(refits, "search_of", searched)
+    monkeypatch.setattr(refits, "choose", lambda search, count: ())
     for early in (True, False):
         held = [(run.data.time_s < 1800.0) == early for run in late.train]
         late._chosen(held, 1)
@@ -308,15 +307,17 @@ def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     """An effect that is there is shipped, a wrong one and one that no table holds are not; the exam is not asked."""
     blind = Refitting(case.dataset, case.refitting.records, OPTIONS, single_cycle=False)
     blind.exam = []
-    found = shipping(blind, [GRADIENT_TO_REMOVE])
+    found = choose_shipped(blind, [GRADIENT_TO_REMOVE], [0.99])
     assert found.shipped == [GRADIENT_TO_REMOVE]
     assert found.before_dph is not None and found.after_dph is not None
     assert found.after_dph < 0.5 * found.before_dph
     wrong = replace(GRADIENT_TO_REMOVE, values={"tau_s": TAU_S, "amplitude_dph_per_c": -SIZE_DPH_PER_C})
-    assert shipping(blind, [wrong]).shipped == []
-    assert shipping(blind, [GRADIENT_TO_REMOVE, wrong]).shipped == [GRADIENT_TO_REMOVE], "what makes it worse is left"
+    assert choose_shipped(blind, [wrong], [0.99]).shipped == []
+    both = choose_shipped(blind, [GRADIENT_TO_REMOVE, wrong], [0.99, 0.99])
+    assert both.shipped == [GRADIENT_TO_REMOVE] and both.refuted == [1], "what makes it worse is left"
     offset = replace(GRADIENT_TO_REMOVE, id="turn_on_offset", values={"sigma_dph": 1e-3})
-    assert shipping(blind, [offset]).shipped == [], "no table holds it"
+    alone = choose_shipped(blind, [offset], [0.99])
+    assert alone.shipped == [] and alone.refuted == [] and alone.reason == "no table holds what is named"
 
 
 def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_path: Path) -> None:
@@ -353,19 +354,10 @@ def test_without_causes_there_is_no_extension(case: Case) -> None:
     assert found.baseline_rms > 2.0 * LEVEL, "the plain map leaves the gradient"
 
 
-def test_a_cause_that_is_not_likelier_than_all_others_is_measured_and_not_shipped(
-    case: Case, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Attribution, "sure", property(lambda found: [False] * len(found.causes)))
-    found = diagnose(case.dataset, options=OPTIONS)
-    assert found.extension is not None and found.model is None
-    assert [step.positive for step in found.extension.steps] == [True]
-
-
 def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     """The rows of a long recording and what the search remembers were in memory together: 612 MB of 1e8 rows."""
     order = []
-    played, searched = extension.play_runs, stages.analyse
+    played, searched = refits.play_runs, stages.analyse
 
     def playing(dataset: Any, runs: Any, front: Any, **options: Any) -> Any:
         order.extend(run.file for run in runs)
@@ -375,7 +367,7 @@ def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatc
         order.append("search")
         return searched(*arguments)
 
-    monkeypatch.setattr(extension, "play_runs", playing)
+    monkeypatch.setattr(refits, "play_runs", playing)
     monkeypatch.setattr(stages, "analyse", searching)
     monkeypatch.setattr(fitting, "_read", lambda *_, **__: pytest.fail("the training runs are read again"))
     found = diagnose(case.dataset, options=OPTIONS)

@@ -1,0 +1,171 @@
+"""Training and test runs as the target sees them, and every fit of the map beside effects that is asked of them.
+
+Where there are no test runs, training runs (or branches of few runs) are left out in turn, and causes and parameters
+are chosen anew without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..causes import CATALOGUE
+from ..common.arrays import BoolArray
+from ..common.metrics import Averages
+from ..recordings.records import Dataset
+from ..train.data import TrainingData, joined, training_spans
+from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
+from ..train.result import Fit
+from .attribution import choose
+from .blocks import Records
+from .pipeline import search_of
+from .refinement import Refined
+from .refit import (
+    Effect,
+    Played,
+    completed,
+    fit_extended,
+    known,
+    mean_count,
+    play_runs,
+    samples_beside,
+    scored_means,
+)
+from .single_cycle import cycle_of
+from .static_map import fits_exactly
+
+
+def is_corrected(cause: Refined) -> bool:
+    """Test whether the effect of a cause can be taken off beside the map: not where it is structure of the map."""
+    return CATALOGUE[cause.candidate.id].kind != "static"
+
+
+Chain = list[list[Averages]]
+"""Residuals of the scored runs for every set of causes, from none to all."""
+
+FOLDS = 3  # two thirds remain to learn from, at the cost of three fits; fewer runs cannot be left out whole
+_ROUNDING_S = 1e-6  # of times that are compared
+
+
+class Refitting:
+    """Training runs after the front end, and the options of every fit.
+
+    Of a single cycle the map beside any effect is one of T alone (see `cycle`).
+    """
+
+    def __init__(self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool) -> None:
+        self.records = records
+        self.single_cycle = single_cycle
+        self.runs = [r for r in dataset.runs if r.role == "train"]
+        self.front = front_end(self.runs, options.block_s)
+        self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
+        self.average_s = options.average_s
+        exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
+        self.exam = [run for run in exam if mean_count(run, self.average_s)]
+        self._fits: list[tuple[list[Effect], bool, Fit]] = []
+        self.arguments: dict[str, Any] = {
+            "method": map_method(options.method),
+            "power_on": power_ons(self.runs),
+            "seed": options.seed,
+            "centers": options.centers,
+            "rho": options.rho,
+            "average_s": options.average_s,
+            # Beside effects the map of a single cycle is one of T alone, which no lot knows.
+            "prior": None if single_cycle else options.prior,
+        }
+        self.plain = {"method": options.method, "prior": options.prior}
+
+    def read(self) -> Read:
+        """The training runs as `fit_dataset` reads them."""
+        return Read(
+            joined([run.data for run in self.train]),
+            {name: np.concatenate([run.seen[name] for run in self.train]) for name in self.train[0].seen},
+            [stretch for run in self.train for stretch in run.left_out],
+            max(run.longest_same_s for run in self.train),
+        )
+
+    def fit(self, effects: Sequence[Effect], kept: list[BoolArray] | None = None, *, beside: bool | None = None) -> Fit:
+        """The map beside the effects (`beside`: as if there were any), without any what would be emitted.
+
+        Fits on all samples are cached.
+        """
+        whole = kept is None or all(m.all() for m in kept)
+        with_map = bool(effects) if beside is None else beside
+        for fitted_beside, of_map, fitted in self._fits:
+            if whole and fitted_beside == list(effects) and of_map == with_map:
+                return fitted
+        arguments = self.arguments if with_map else self.arguments | self.plain
+        rate = not (self.single_cycle and with_map)
+        fitted = fit_extended(self.train, effects, arguments, None if whole else kept, beside=with_map, rate=rate)
+        if whole:
+            self._fits.append((list(effects), with_map, fitted))
+        return fitted
+
+    def samples_beside(self, effects: Sequence[Effect], whole: Sequence[Effect] = ()) -> TrainingData:
+        """Return what the map is fitted to beside effects: samples whose input is known beside the `whole` set too."""
+        masks = [known(run, whole) for run in self.train]
+        return samples_beside(self.train, effects, self.arguments["power_on"], masks)
+
+    def takes(self, causes: Sequence[Refined]) -> bool:
+        """Whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
+        effects = [effect for effect in map(Effect.of, causes) if effect.term.mended]
+        return all(any(known(run, [effect]).any() for run in self.train) for effect in effects)
+
+    def everything(self) -> list[BoolArray]:
+        """All training samples, per run."""
+        return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
+
+    def on_exam(self, stages: Sequence[Sequence[Effect]]) -> Chain:
+        """Residuals of the exam runs for each set of effects, of samples whose input is known beside all of them."""
+        all_of_them = [effect for stage in stages for effect in stage]
+        whole = [known(run, all_of_them) for run in self.exam]
+        return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
+
+    def left_out(self, held: list[BoolArray], causes: Sequence[Refined]) -> Chain:
+        """Residuals of held-out training samples; as many causes are chosen anew on the others."""
+        kept = [~m for m in held]
+        chosen = filter(is_corrected, self._chosen(held, len(causes)))
+        effects = completed(self.train, [Effect.of(c) for c in chosen], kept)
+        stages = (effects[:k] for k in range(sum(map(is_corrected, causes)) + 1))
+        scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
+        return [self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)]
+
+    def _residuals(
+        self,
+        kept: list[BoolArray],
+        runs: list[Played],
+        scored: list[BoolArray],
+        effects: Sequence[Effect],
+        *,
+        beside: bool | None = None,
+    ) -> list[Averages]:
+        fitted = self.fit(effects, kept, beside=beside)
+        return scored_means(fitted, runs, effects, self.average_s, scored)
+
+    def _chosen(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
+        """Best `count` causes on the records without the held-out samples; none where these can tell of none."""
+        masks = []
+        for run, played, out in zip(self.records.runs, self.train, held, strict=True):
+            # A row that is no sample's, as before the first, goes with the sample before it, or with the first.
+            of = np.searchsorted(played.data.time_s[1:], run.history.time_s + _ROUNDING_S, side="right")
+            masks.append(np.asarray(run.usable & ~np.append(out, False)[of], dtype=bool))
+        rest = self.records.without_rows(masks)
+        if count == 0 or not rest.runs:
+            return ()
+        if self.single_cycle:
+            return cycle_of(rest).states[:count]
+        return () if fits_exactly(rest) else choose(search_of(rest), count)
+
+
+def held_out_masks(refitting: Refitting) -> list[list[BoolArray]]:
+    """Held-out masks: groups of runs, or spans of few runs."""
+    sizes = [len(run.data.bias_dph) for run in refitting.train]
+    if len(refitting.train) >= FOLDS:
+        return [[np.full(n, k % FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)] for fold in range(FOLDS)]
+    data = joined([run.data for run in refitting.train])
+    return [
+        [span.contains(run.data.run, run.data.time_s) for run in refitting.train]
+        for span in training_spans(refitting.runs, data)
+    ]
