@@ -33,10 +33,12 @@ setup:
 ## the main job: data -> verified C and a report in build/demo (DATA=folder [AXIS=x] for your own recordings)
 demo: setup
 ifdef DATA
-	@$(GYROTC) build --out build/demo --any-serial $${SET_AXIS:+"--axis=$$SET_AXIS"} -- "$$SET_DATA"
+	@rm -rf build/demo
+	@$(GYROTC) build --out build/demo $${SET_AXIS:+"--axis=$$SET_AXIS"} -- "$$SET_DATA"
 else
 	@$(GYROTC) simulate paper --seed 1 --out build/demo-data
-	@$(GYROTC) build build/demo-data --out build/demo --any-serial
+	@rm -rf build/demo
+	@$(GYROTC) build build/demo-data --out build/demo
 endif
 
 ## what to run before a commit: C library, generator, one of each command; five minutes on two cores

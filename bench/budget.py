@@ -85,7 +85,7 @@ def coverage_of(number: int, seed: int) -> Covered:
         (work / "out").mkdir()
         simulate(plan, seed=seed, out=work / "data", format="parquet")
         limits = load_limits(work / "limits.toml")
-        built = build_into(work / "out", load(work / "data"), FitOptions(), limits=limits, compiled=False)
+        built = build_into(work / "out", load(work / "data"), FitOptions(), limits=limits)
         budget = read_result(work / "out" / "budget.json", Budget)
         exam = list(exam_of(plan, seed))
     table = quantise(built.model, "f32")

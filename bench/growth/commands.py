@@ -141,8 +141,8 @@ def _centers(folder: Path) -> Iterator[_Job]:
     gyrotc(["simulate", "paper-ripple-strong", "--out", str(folder)])
     stated = (folder / "dataset.toml").read_text("utf-8")
     for n in _CENTERS:
-        (folder / "dataset.toml").write_text(f"{stated}[fit]\ncenters = {n}\n", "utf-8")
-        yield n, ["fit", str(folder), "--method", "mrbf", "--out", f"{folder}-{n}"]
+        (folder / "dataset.toml").write_text(f'{stated}[fit]\nmethod = "mrbf"\ncenters = {n}\n', "utf-8")
+        yield n, ["fit", str(folder), "--out", f"{folder}-{n}"]
 
 
 def _units(folder: Path) -> Iterator[_Job]:

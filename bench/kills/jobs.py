@@ -6,6 +6,7 @@ A job takes the number of a version: with another number it writes something els
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -145,18 +146,22 @@ def commands(root: Path) -> list[Case]:
     def case(name: str, line: Callable[[int], Sequence[object]], *results: Path) -> Case:
         return Case(name, lambda version: command(name, *line(version)), results)
 
-    targets, numerics, methods = ("host-gcc-O2", "host-clang-O2"), ("f32", "q31"), ("linear", "cubic")
+    targets, numerics, described = ("host-gcc-O2", "host-clang-O2"), ("f32", "q31"), (data, root / "cubic")
+    shutil.copytree(data, described[1])
+    for folder, method in zip(described, ("linear", "cubic"), strict=True):
+        with (folder / "dataset.toml").open("a") as file:
+            file.write(f'[fit]\nmethod = "{method}"\n')
     return [
         case("simulate", lambda v: [scenario, "--seed", v, "--out", root / "made"], root / "made"),
-        case("build", lambda v: [data, "--out", out, "--numeric", "f32", "--method", methods[v % 2]], out),
-        case("fit", lambda v: [data, "--out", root / "fitted", "--method", methods[v % 2], "--json", root / "fit.json"],
+        case("build", lambda v: [described[v % 2], "--out", out, "--numeric", "f32"], out),
+        case("fit", lambda v: [described[v % 2], "--out", root / "fitted", "--json", root / "fit.json"],
              root / "fitted", root / "fit.json"),
         case("emit", lambda v: [out / "model.json", "--out", other, "--numeric", numerics[v % 2]], other),
         case("verify", lambda v: [other, "--target", targets[v % 2]], other),
         case("evaluate", lambda _: [other, data, "--trace", other / "trace"], other),
         case("report", lambda _: [out], out),
         case("compare", lambda _: [data, "--out", root / "compared"], root / "compared"),
-        case("diagnose", lambda v: [data, "--out", root / "diagnosed", "--method", methods[v % 2]], root / "diagnosed"),
+        case("diagnose", lambda v: [described[v % 2], "--out", root / "diagnosed"], root / "diagnosed"),
         case("import", lambda v: [data / "run-01.csv", "--out", root / "imported", "--serial", f"RLG-{v}"],
              root / "imported"),
         case("check", lambda _: [data, "--json", root / "check.json"], root / "check.json"),

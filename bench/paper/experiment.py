@@ -302,10 +302,8 @@ def draw_run(record: SimulatedRecord, title: str, path: Path) -> None:
         above.plot(hours[:-1], record.reading_c, color=BEFORE, linewidth=1.2, label="sensor on the block")
         above.plot(hours, record.cavity_c, color=AFTER, linewidth=0.8, linestyle="--", label="cavity")
         above.set_ylabel("C")
-        below.plot(
-            hours[average_rows::average_rows], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s"
-        )
-        below.plot(hours[average_rows::average_rows], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
+        below.plot(hours[cells::cells], 1e3 * measured, color=BEFORE, linewidth=0.7, label="measured, 100 s")
+        below.plot(hours[cells::cells], 1e3 * true, color=AFTER, linewidth=1.2, label="true bias")
         below.set_ylabel("1e-3 deg/h")
         below.set_xlabel("time, h")
         for ax in (above, below):

@@ -255,7 +255,7 @@ def intervals(event: Finding) -> list[tuple[float, float]]:
 def judge(folder: Path, planted: Planted, warnings: bool) -> Score:
     """What gyrotc tells of a folder, beside what was planted."""
     near, other = [], []
-    for event in found_events(load(folder, trust_units=True)):
+    for event in found_events(load(folder)):
         here = event.file == f"{planted.run}.parquet" and bool(planted.names)
         if here and planted.at_s is not None and not event.whole_run:
             here = any(low - NEAR_S <= planted.at_s <= high + NEAR_S for low, high in intervals(event))

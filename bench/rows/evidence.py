@@ -39,7 +39,7 @@ def found(kind: str, seed: int, number: int) -> set[str]:
         out.mkdir()
         try:
             dataset = load(written(Path(folder, "data"), runs))
-            built = build_into(out, dataset, FitOptions(method="cubic"), compiled=False)
+            built = build_into(out, dataset, FitOptions(method="cubic"))
         except CheckFailed as error:
             return {str(error)}
         except InputError:

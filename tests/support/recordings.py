@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -59,6 +60,26 @@ def described(folder: Path, *runs: str, **parts: str) -> None:
     """A folder with `run-01.csv` and a description (default: that run alone)."""
     write_csv(folder / "run-01.csv")
     (folder / "dataset.toml").write_text(toml(*(runs or ('file = "run-01.csv"',)), **parts), "utf-8")
+
+
+def state(folder: Path, line: str) -> Path:
+    """Put a line at the head of a description, which is made where there is none; returns the folder."""
+    path = folder / "dataset.toml"
+    if not path.exists():
+        files = sorted(file.name for file in folder.iterdir())
+        head = f'schema = 1\nserial = "{folder.name}"'
+        path.write_text(toml(*(f'file = "{name}"\npower_on_s = "unknown"' for name in files), head=head), "utf-8")
+    path.write_text(path.read_text("utf-8").replace("schema = 1\n", f"schema = 1\n{line}\n", 1), "utf-8")
+    return folder
+
+
+def state_fit(folder: Path, **options: object) -> Path:
+    """State `[fit]` in a description, in place of an earlier one at its end; returns the folder."""
+    path = folder / "dataset.toml"
+    text = path.read_text("utf-8").partition("\n[fit]\n")[0].rstrip("\n")
+    lines = (f"{name} = {json.dumps(value)}" for name, value in options.items())
+    path.write_text("\n".join([text, "", "[fit]", *lines, ""]), "utf-8")
+    return folder
 
 
 def with_text(change: Callable[[list[str]], Sequence[str]]) -> Callable[[Path], None]:

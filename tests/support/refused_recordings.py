@@ -281,7 +281,7 @@ REFUSED: dict[str, Refused] = {
         ("run 1 (run-01.csv), field axis_azimuth_deg", "missing"),
     ),
     "applied without model": Refused(
-        description(head=HEAD + f'\napplied_table = "{"a" * 64}"'), ("field applied_table", "--applied FILE")
+        description(head=HEAD + f'\napplied_table = "{"a" * 64}"'), ("field applied_table", 'applied_model = "FILE"')
     ),
     "applied no hash": Refused(description(head=HEAD + '\napplied_table = "yes"'), ("field applied_table",)),
 }

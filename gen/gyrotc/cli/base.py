@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import re
 import sys
 import time
@@ -11,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -22,10 +20,8 @@ from typer.core import TyperGroup
 from .. import __version__
 from ..common.inputs import MOVABLE, set_ceilings
 from ..common.texts import terminal_line, terminal_text
-from ..recordings.fit_options import AUTO, DEFAULTS, METHODS, BuildOptions, flag_of, help_of
 
 if TYPE_CHECKING:
-    from ..recordings.records import Applied
     from ..train.prior.use import LotPrior
 
 
@@ -36,13 +32,6 @@ class GyroAxis(str, Enum):
     x = "x"
     y = "y"
     z = "z"
-
-
-class NoiseLevel(str, Enum):
-    """Noise of a simulated gyro whose scenario states none."""
-
-    paper = "paper"
-    class_ = "class"
 
 
 def completing(words: Sequence[str]) -> Callable[[str], list[str]]:
@@ -232,12 +221,6 @@ AxisOption = Annotated[
 ]
 
 
-def _of_build(name: str) -> Any:
-    """An option of `BuildOptions`, which knows its meaning and refuses what is out of range."""
-    words = completing((AUTO, *METHODS)) if name == "method" else None
-    return typer.Option(flag_of(name), help=help_of(name), autocompletion=words)
-
-
 def _targets_begun(incomplete: str) -> list[str]:
     from ..verify.toolchain import all_targets
 
@@ -274,19 +257,6 @@ PriorOption = Annotated[
 AgeingOption = Annotated[
     float | None, typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h.")
 ]
-AppliedOption = Annotated[
-    Path | None, typer.Option("--applied", help="The model.json that was already subtracted while recording.")
-]
-TrustOption = Annotated[
-    bool,
-    typer.Option(
-        "--trust-code",
-        help="Compile and run DIR/c although it holds code that this gyrotc did not write: only what is your own.",
-    ),
-]
-TrustUnitsOption = Annotated[
-    bool, typer.Option("--trust-units", help="Take units that the values contradict; the result records it.")
-]
 AcceptOption = Annotated[
     str | None,
     typer.Option(
@@ -294,37 +264,6 @@ AcceptOption = Annotated[
     ),
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
-
-
-def with_build_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Gives a command these options of `BuildOptions`: its parameter `options` gets their values by name."""
-
-    def decorated(command: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(command)
-        def called(**given: Any) -> None:
-            options = {name: given.pop(name) for name in names}
-            command(**given, options=options)
-
-        # What typer makes options of: a parameter for each name in the place of `options`
-        own, types = inspect.signature(command, eval_str=True), get_type_hints(BuildOptions)
-        stated = [
-            inspect.Parameter(
-                name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=getattr(DEFAULTS, name),
-                annotation=Annotated[types[name], _of_build(name)],
-            )
-            for name in names
-        ]
-        parameters: list[inspect.Parameter] = []
-        for parameter in own.parameters.values():
-            named = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-            parameters += stated if parameter.name == "options" else [named]
-        called.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        vars(called)["__signature__"] = own.replace(parameters=parameters)
-        return called
-
-    return decorated
 
 
 @contextmanager
@@ -447,12 +386,3 @@ def lot_in(path: Path | None) -> LotPrior | None:
     from ..train.prior.use import prior_of
 
     return prior_of(load_lot(path))
-
-
-def applied_in(path: Path | None) -> Applied | None:
-    """The model of `--applied`. Raises as `applied_of`."""
-    if path is None:
-        return None
-    from ..tables.quantisation import applied_of  # with the reference: not for who has none
-
-    return applied_of(path)

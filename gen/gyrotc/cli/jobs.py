@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,7 +16,6 @@ from .base import (
     COMPARE,
     DIAGNOSE,
     AgeingOption,
-    AppliedOption,
     AxisOption,
     DatasetArg,
     JsonOption,
@@ -25,15 +24,12 @@ from .base import (
     OutOption,
     PriorOption,
     TargetOption,
-    TrustUnitsOption,
     app,
-    applied_in,
     lot_in,
     numerics_of,
     progress,
     show,
     tell,
-    with_build_options,
     write_json,
 )
 from .results import (
@@ -66,7 +62,7 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
         yield f"lot: {result.lot}"
     for event in result.events:
         yield f"event: {event.text}"
-        if event.exclude and not result.events_accepted:
+        if event.exclude:
             yield f"  {event.exclude}"
     for cause in result.causes:
         yield from _cause_lines(cause)
@@ -103,17 +99,12 @@ def _cause_lines(cause: NamedCause) -> Iterator[str]:
 
 
 @app.command()
-@with_build_options("method", "channels")
 def build(
     dataset: DatasetArg,
     out: OutOption = Path("build"),
     axis: AxisOption = None,
-    *,
-    options: dict[str, Any],
     numeric: NumericOption = None,
     target: TargetOption = None,
-    applied: AppliedOption = None,
-    trust_units: TrustUnitsOption = False,
     extend: Annotated[
         bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
     ] = False,
@@ -126,9 +117,6 @@ def build(
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
     ] = None,
-    any_serial: Annotated[
-        bool, typer.Option("--any-serial", help="The earlier result in --out may be of another serial.")
-    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
@@ -142,18 +130,15 @@ def build(
         results = run(
             dataset,
             out,
-            FitOptions(**options, prior=lot_in(lot)),
+            FitOptions(prior=lot_in(lot)),
             axis=axis,
             numerics=numerics_of(numeric),
             targets=target or (),
-            applied=applied,
-            trust_units=trust_units,
             extend=extend,
             limits=limits,
             previous=previous,
             prior=prior,
             ageing_dph=ageing,
-            any_serial=any_serial,
             progress=say,
         )
     if len(results) == 1:
@@ -209,15 +194,13 @@ def compare(
     dataset: DatasetArg,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")] = None,
     axis: AxisOption = None,
-    *,
-    applied: AppliedOption = None,
-    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Train every method on this data and show them side by side, as in the paper's Table 1.
 
     Example: gyrotc compare recordings --out comparison
     """
+    from ..jobs.applied import applied_in
     from ..jobs.calibration import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.loading import load
@@ -225,8 +208,7 @@ def compare(
     from ..results.folder import result_folder
 
     with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
-        subtracted = applied_in(applied)
-        recordings = load(dataset, axis=axis, applied=subtracted, trust_units=trust_units)
+        recordings = load(dataset, axis=axis, applied=applied_in(dataset))
         if stage:
             stage.of(recordings.serial, axis)
         result = with_published(run(recordings, progress=say))
@@ -239,48 +221,40 @@ def compare(
 
 
 @app.command()
-@with_build_options("method")
 def diagnose(
     dataset: DatasetArg,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
     ] = None,
     axis: AxisOption = None,
-    *,
-    options: dict[str, Any],
-    applied: AppliedOption = None,
-    trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
-    accept_events: Annotated[
-        bool, typer.Option("--accept-events", help="Go on without what the events that are found leave out.")
-    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
+    from ..jobs.applied import applied_in
     from ..jobs.diagnosis import diagnose_dataset
     from ..recordings.loading import asked_axes, load
     from ..recordings.records import Dataset
     from ..results.folder import result_folder
     from ..train.fitting import FitOptions
 
-    fitting = FitOptions(**options, prior=lot_in(lot))
-    subtracted = applied_in(applied)
+    fitting = FitOptions(prior=lot_in(lot))
+    subtracted = applied_in(dataset)
     axes = asked_axes(dataset, axis)
     several = len(axes) > 1 or axis == "all"
     results: dict[str, Diagnosed] = {}
 
     def one(name: str | None, into: Path | None) -> None:
-        recordings: Dataset = load(dataset, axis=name, applied=subtracted, trust_units=trust_units)
+        recordings: Dataset = load(dataset, axis=name, applied=subtracted)
         with progress(DIAGNOSE) as say:
             results[name or ""] = diagnose_dataset(
                 recordings,
                 into,
                 options=fitting,
                 progress=say,
-                accept_events=accept_events,
             ).result
 
     if not several or out is None:

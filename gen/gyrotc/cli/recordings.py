@@ -11,16 +11,12 @@ import typer
 
 from ..common.errors import InputError
 from .base import (
-    AppliedOption,
     AxisOption,
     DatasetArg,
     JsonOption,
-    NoiseLevel,
     OutOption,
     SeedOption,
-    TrustUnitsOption,
     app,
-    applied_in,
     progress,
     tell,
     write_json,
@@ -87,7 +83,9 @@ def import_(
             "--exam/--no-exam", help="The last file judges the correction and is not trained on; default: ask."
         ),
     ] = None,
-    trust_units: TrustUnitsOption = False,
+    trust_units: Annotated[
+        bool, typer.Option("--trust-units", help="Take units that the values contradict; dataset.toml records it.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show how the files would be read.")] = False,
     json_file: JsonOption = None,
 ) -> None:
@@ -168,13 +166,9 @@ def simulate(
     scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
     out: OutOption,
     seed: SeedOption = 1,
-    row_s: Annotated[float, typer.Option("--row-s", help="Length of a row, s.")] = 10.0,
     raw_hz: Annotated[float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")] = None,
     pulses: Annotated[bool, typer.Option("--pulses", help="Write integer pulses instead of a rate.")] = False,
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the files.")] = RunFormat.csv,
-    noise: Annotated[
-        NoiseLevel, typer.Option("--noise", help="paper, or class (a typical 0.008 deg/h unit).")
-    ] = NoiseLevel.paper,
     units: Annotated[
         int | None, typer.Option("--units", help="Simulate a lot of so many gyros, each in a folder of its own.")
     ] = None,
@@ -197,7 +191,7 @@ def simulate(
     of_lot = {"family": family, "unrelated": unrelated}
     stated = {name: value for name, value in of_lot.items() if value is not None}
     if units is not None:
-        _simulate_lot(scenario, {"units": units, **stated}, seed, out, (row_s, raw_hz, pulses, format), noise)
+        _simulate_lot(scenario, {"units": units, **stated}, seed, out, raw_hz, pulses, format)
         return
     if stated:
         raise InputError(f"--{next(iter(stated))}", "without --units", "the number of gyros of the lot")
@@ -206,11 +200,9 @@ def simulate(
             scenario,
             seed=seed,
             out=out,
-            row_s=row_s,
             raw_hz=raw_hz,
             pulses=pulses,
             format=format.value,
-            noise=noise.value,
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: data set of scenario {scenario}, seed {seed}")
@@ -221,8 +213,9 @@ def _simulate_lot(
     stated: dict[str, Any],
     seed: int,
     out: Path,
-    rows: tuple[float, float | None, bool, RunFormat],
-    noise: NoiseLevel,
+    raw_hz: float | None,
+    pulses: bool,
+    format: RunFormat,
 ) -> None:
     """Simulates a lot of gyros."""
     from ..simulate.campaign import RowForm
@@ -235,8 +228,7 @@ def _simulate_lot(
             seed=seed,
             out=out,
             scenario=scenario,
-            form=RowForm.of(*rows[:3], rows[3].value),
-            noise=noise.value,
+            form=RowForm.of(raw_hz=raw_hz, pulses=pulses, format=format.value),
             progress=lambda share: say(f"simulating {share:.0%}"),
         )
     tell(f"{out}: {order.units} data sets of scenario {scenario}, family {order.family:g}, seed {seed}")
@@ -246,8 +238,6 @@ def _simulate_lot(
 def check(
     dataset: DatasetArg,
     axis: AxisOption = None,
-    applied: AppliedOption = None,
-    trust_units: TrustUnitsOption = False,
     previous: Annotated[
         Path | None, typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?")
     ] = None,
@@ -258,14 +248,14 @@ def check(
     Example: gyrotc check recordings
     """
     from ..assess.changes import earlier_models
+    from ..jobs.applied import applied_in
     from ..quality.inspection import check as run
 
     with progress() as say:
         result = run(
             dataset,
             axis=axis,
-            applied=applied_in(applied),
-            trust_units=trust_units,
+            applied=applied_in(dataset),
             earlier=earlier_models(previous) if previous else None,
             progress=say,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -17,7 +17,6 @@ from .base import (
     FIT,
     VERIFY,
     AgeingOption,
-    AppliedOption,
     AxisOption,
     DatasetArg,
     DirArg,
@@ -27,16 +26,12 @@ from .base import (
     OutOption,
     PriorOption,
     TargetOption,
-    TrustOption,
-    TrustUnitsOption,
     app,
-    applied_in,
     lot_in,
     numerics_of,
     progress,
     show,
     tell,
-    with_build_options,
     write_json,
     written_place,
 )
@@ -89,15 +84,10 @@ def _inside(folder: Path, trace: Path | None) -> Path | None:
 
 
 @app.command()
-@with_build_options("method", "channels")
 def fit(
     dataset: DatasetArg,
     out: OutOption,
     axis: AxisOption = None,
-    *,
-    options: dict[str, Any],
-    applied: AppliedOption = None,
-    trust_units: TrustUnitsOption = False,
     lot: LotOption = None,
     prior: PriorOption = None,
     ageing: AgeingOption = None,
@@ -107,16 +97,16 @@ def fit(
 
     Example: gyrotc fit recordings --out result
     """
+    from ..jobs.applied import applied_in
     from ..jobs.recalibration import with_prior
     from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
     from ..train.fitting import FitOptions, fit_dataset
 
-    fitting = FitOptions(**options, prior=lot_in(lot))
-    known = applied_in(applied)
+    fitting = FitOptions(prior=lot_in(lot))
     with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
-        recordings = load(dataset, axis=axis, applied=known, trust_units=trust_units)
+        recordings = load(dataset, axis=axis, applied=applied_in(dataset))
         stage.of(recordings.serial, recordings.axis)
         fitting = with_prior(fitting.with_stated(recordings.fit), recordings, prior, ageing)
         fitted = fit_dataset(recordings, fitting, progress=say)
@@ -208,20 +198,12 @@ def emit(
 def verify(
     folder: DirArg,
     target: TargetOption = None,
-    dataset: Annotated[
-        Path | None, typer.Option("--dataset", help="Replay these recordings on every target besides.")
-    ] = None,
     log: Annotated[
         Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
     ] = None,
     exhaustive: Annotated[
         bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
     ] = False,
-    allow_edited: Annotated[
-        list[str] | None, typer.Option("--allow-edited", help="main.c: the example is yours now and may differ.")
-    ] = None,
-    trust_code: TrustOption = False,
-    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
@@ -231,13 +213,11 @@ def verify(
     """
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
-    from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
     from ..results.release import JointVerification, Verification
     from ..verify.job import verify as run
 
-    allowed = allow_edited or ()
     axes = axes_in(folder)
     if axes and log is not None:
         raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
@@ -245,23 +225,19 @@ def verify(
     with progress(VERIFY) as say:
         for part in [folder / axis for axis in axes] or [folder]:
             axis = load_model(part / "model.json").axis
-            recordings = load(dataset, axis=axis, trust_units=trust_units) if dataset else None
             with result_folder(part, "verify", entries=("verify.json",)) as stage:
                 results[str(axis)] = run(
                     part,
                     targets=target or (),
-                    dataset=recordings,
                     log=log,
                     exhaustive=exhaustive,
-                    edited=allowed,
-                    trust_code=trust_code,
                     progress=say,
                 )
                 write_atomically(stage.folder / "verify.json", json_text(results[str(axis)].content()))
     result: Verification | JointVerification = next(iter(results.values()))
     if axes:
         with result_folder(folder, "verify", entries=("verify.json",)) as stage:
-            result = verify_axes(folder, results, allowed)
+            result = verify_axes(folder, results)
             write_atomically(stage.folder / "verify.json", json_text(result.content()))
     write_json(json_file, result.content())
     for one in results.values():
@@ -281,9 +257,6 @@ def evaluate(
     dataset: DatasetArg,
     numeric: NumericOption = None,
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
-    applied: AppliedOption = None,
-    trust_code: TrustOption = False,
-    trust_units: TrustUnitsOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code, compare every step, measure.
@@ -291,15 +264,15 @@ def evaluate(
     Example: gyrotc evaluate result recordings --trace result/trace
     """
     from ..assess.evaluation import evaluate as run
+    from ..jobs.applied import applied_in
     from ..model import load_model
     from ..recordings.loading import load
     from ..results.files import json_text, write_atomically
 
     axis = load_model(folder / "model.json").axis
-    subtracted = applied_in(applied)
-    recordings = load(dataset, axis=axis, applied=subtracted, exam_only=True, trust_units=trust_units)
+    recordings = load(dataset, axis=axis, applied=applied_in(dataset), exam_only=True)
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
-        result = run(folder, recordings, numeric=numeric, trace=traces, trust_code=trust_code, progress=say)
+        result = run(folder, recordings, numeric=numeric, trace=traces, progress=say)
         write_atomically(stage / "evaluate.json", json_text(result.content()))
     write_json(json_file, result.content())
     show(evaluation_table(result))

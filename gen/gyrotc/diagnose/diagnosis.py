@@ -15,7 +15,7 @@ from ..common.arrays import FloatArray, Progress
 from ..common.metrics import HALF_HOUR_S, LEAST_SPAN_C, Averages
 from ..common.statistics import running_mean
 from ..model import Model
-from ..quality.events import found_events, without_events
+from ..quality.events import found_events
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.base import Finding
 from ..results.diagnosed import (
@@ -78,7 +78,6 @@ def diagnose(
     *,
     options: FitOptions | None = None,
     progress: Progress | None = None,
-    accept_events: bool = False,
 ) -> Diagnosis:
     """Runs the whole diagnosis on the training runs; exam runs measure the gain only.
 
@@ -86,7 +85,6 @@ def diagnose(
         dataset: Recordings. `truth.json` beside them is never opened.
         options: As for `fit`, whose defaults are taken where there are none.
         progress: Called with what is being done.
-        accept_events: Goes on without what the events that are found say to leave out.
 
     Raises:
         InputError: No training run, or nothing usable in them.
@@ -95,19 +93,19 @@ def diagnose(
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
     events = found_events(dataset)
-    found = _diagnosed(without_events(whole, events) if accept_events else whole, options or FitOptions(), say)
-    reported = {"events": tuple(events), "events_accepted": accept_events}
-    steps = (*_about(events, accept_events), *found.result.next)
+    found = _diagnosed(whole, options or FitOptions(), say)
+    reported = {"events": tuple(events)}
+    steps = (*_about(events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
 
 
-def _about(events: Sequence[Finding], accept: bool) -> list[str]:
+def _about(events: Sequence[Finding]) -> list[str]:
     """What to do about events before anything else."""
-    if accept or not any(event.leave_out_s or event.whole_run for event in events):
+    if not any(event.leave_out_s or event.whole_run for event in events):
         return []
     return [
-        "First look at the events: what is named may stand for them. Paste their exclude lines into dataset.toml, or "
-        "go on without them (gyrotc diagnose --accept-events)."
+        "First look at the events: what is named may stand for them. Paste their exclude lines into dataset.toml and "
+        "diagnose again."
     ]
 
 

@@ -16,6 +16,7 @@ from ..assess.limits import coverage_factor
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
+from ..jobs.applied import applied_in
 from ..jobs.calibration import Built, build_into
 from ..quality.events import found_events
 from ..recordings.loading import calibration_day, load, stated_identity
@@ -179,7 +180,7 @@ def _built(task: Task) -> FleetEntry:
     if task.key not in ("", key):
         found = f"is {key[:16]} on worker {_worker()}, and {task.key[:16]} where the fleet was started"
         raise InputError(f"{task.unit.dataset}: its contents", found, "the same recordings under one path everywhere")
-    dataset = load(task.unit.dataset, axis=task.unit.axis)
+    dataset = load(task.unit.dataset, axis=task.unit.axis, applied=applied_in(task.unit.dataset))
     moved_to = move_away(task.out)
     runs: list[tuple[str, Averages]] = []
     with result_folder(task.out, "fleet", kind=KINDS["build"], inputs=[task.unit.dataset]) as stage:

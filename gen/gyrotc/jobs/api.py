@@ -114,18 +114,17 @@ class Dataset(records.Dataset):
         return f"<table><caption>{escape(self.serial)}</caption>{head}{rows}</table>"
 
 
-def load(folder: _Place, *, axis: str | None = None, trust_units: bool = False) -> Dataset:
+def load(folder: _Place, *, axis: str | None = None) -> Dataset:
     """Reads a data set and checks every file.
 
     Args:
         folder: The data set, as `gyrotc import` or a person has written it (docs/recordings.md).
         axis: Axis of three-axis recordings: "x", "y" or "z".
-        trust_units: Values that contradict their units are taken nevertheless.
 
     Raises:
         InputError: Something is wrong; the first thing found is reported.
     """
-    found = _load(Path(folder), axis=axis, trust_units=trust_units)
+    found = _load(Path(folder), axis=axis)
     return Dataset(**{one.name: getattr(found, one.name) for one in fields(records.Dataset)})
 
 
@@ -161,7 +160,6 @@ def build(
             axis=data.axis,
             numerics=numerics,
             targets=targets,
-            trust_units=bool(data.trusted),
             extend=extend,
             limits=Path(limits) if limits is not None else None,
         )

@@ -86,7 +86,6 @@ def axes_in(folder: Path) -> tuple[str, ...]:
 def verify_axes(
     folder: Path,
     results: Mapping[str, Verification],
-    edited: Sequence[str] = (),
 ) -> JointVerification:
     """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
 
@@ -100,7 +99,7 @@ def verify_axes(
         raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
     numeric = next(iter(results.values())).errors[0].numeric
     texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
-    emitted = tuple(file_entries(folder / "c", texts, edited))
+    emitted = tuple(file_entries(folder / "c", texts))
     wrong = sum(file.status == "fail" for file in emitted)
     return JointVerification(
         gyrotc_version=__version__,

@@ -42,13 +42,13 @@ from ..results.marker import MARKER, sha256
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
 from ..tables.emission import emit
-from ..tables.quantisation import applied_of
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Fitted, fit_dataset, front_end, samples_of, units_of
 from ..train.methods import fit
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
 from ..verify.job import chosen_targets, verify
+from .applied import applied_in
 from .axes import join_axes
 from .recalibration import refuse_together, with_prior
 
@@ -118,14 +118,11 @@ def build(
     axis: str | None = None,
     numerics: Sequence[str] | None = None,
     targets: Sequence[str] = (),
-    applied: Path | None = None,
-    trust_units: bool = False,
     extend: bool = False,
     limits: Path | None = None,
     previous: Path | None = None,
     prior: Path | None = None,
     ageing_dph: float | None = None,
-    any_serial: bool = False,
     progress: Progress | None = None,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
@@ -136,15 +133,12 @@ def build(
         axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
             the runtime once with all tables; "all" the same, but refuses recordings of one rate.
         targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
-        applied: Model that was subtracted while recording.
-        trust_units: Values that contradict their units are taken nevertheless.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
         limits: A limits file that the result is held against.
         previous: An earlier result of the same gyro, to say what changed.
         prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
             check run) do not speak against it; also the `previous` one where none is given.
         ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
-        any_serial: An earlier result in `out` may be of another gyro.
 
     Raises:
         InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
@@ -153,7 +147,7 @@ def build(
     say = progress or (lambda _: None)
     say("reading")
     chosen_targets(targets)
-    known = applied_of(applied) if applied else None
+    known = applied_in(source)
     if extend and (options.prior is not None or prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
     refuse_together(options, prior, ageing_dph)
@@ -164,14 +158,14 @@ def build(
     axes = asked_axes(source, axis)
     with result_folder(out, "build", inputs=[source]) as stage:
         if len(axes) == 1 and axis != "all":
-            dataset = load(source, axis=axes[0], applied=known, trust_units=trust_units)
-            stage.of(dataset.serial, dataset.axis, any_serial=any_serial)
+            dataset = load(source, axis=axes[0], applied=known)
+            stage.of(dataset.serial, dataset.axis)
             return [_build_axis(dataset, stage.folder, options, order, say)]
         built = []
         names = [str(name) for name in axes]
         for k, name in enumerate(names, 1):
-            dataset = load(source, axis=name, applied=known, trust_units=trust_units)
-            stage.of(dataset.serial, any_serial=any_serial)
+            dataset = load(source, axis=name, applied=known)
+            stage.of(dataset.serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
                 say_axis = _of_axis(f"{name} ({k} of {len(axes)})", say)

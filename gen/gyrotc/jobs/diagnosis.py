@@ -28,7 +28,6 @@ def diagnose_dataset(
     *,
     options: FitOptions | None = None,
     progress: Progress | None = None,
-    accept_events: bool = False,
 ) -> Diagnosis:
     """Diagnoses a data set and writes the result into a folder.
 
@@ -43,7 +42,7 @@ def diagnose_dataset(
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        found = diagnose(dataset, options=chosen, progress=progress, accept_events=accept_events)
+        found = diagnose(dataset, options=chosen, progress=progress)
         return _saved(stage.folder, found, progress) if stage else found
 
 

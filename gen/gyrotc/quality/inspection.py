@@ -104,7 +104,6 @@ def check(
     *,
     axis: str | None = None,
     applied: Applied | None = None,
-    trust_units: bool = False,
     earlier: Mapping[str, Model] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CheckResult:
@@ -114,7 +113,6 @@ def check(
         folder: The data set.
         axis: Axis of three-axis recordings; None or "all": every one.
         applied: Model that was subtracted while recording, if the data set says that there was one.
-        trust_units: Values that contradict their units are a warning, not a problem.
         earlier: Models of an earlier calibration of this gyro, by axis ("" where the recordings have one rate).
 
     Raises:
@@ -130,7 +128,7 @@ def check(
     for one in axes:
         reported = Problems(collect=True)
         progress("reading")
-        dataset = load_reporting(folder, reported, axis=one, applied=applied, trust_units=trust_units)
+        dataset = load_reporting(folder, reported, axis=one, applied=applied)
         problems |= {str(problem): problem for problem in reported.found}
         marks |= reported.marks
         if dataset is not None:

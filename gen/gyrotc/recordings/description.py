@@ -208,6 +208,7 @@ class Description(_Part):
     latitude_sigma_deg: Level = 0.01
     axis_sigma_deg: Level = 0.1
     applied_table: Annotated[str, Field(pattern="^(none|[0-9a-f]{64})$")] = "none"
+    applied_model: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
     temperature_late_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
     columns: Columns = Columns()

@@ -1,14 +1,13 @@
-"""Names of the training methods, and the options of a build with their defaults, ranges and meanings.
+"""Options of training, with their defaults and ranges, and the names of the training methods.
 
-They stand here alone: the command line, the manifest of a fleet and Python callers make the same class, which pydantic
-checks. It is imported by what says `--help`, so pydantic is loaded with the first value that is not a default.
+Data sets, manifests of fleets and Python callers make the same class, which pydantic checks.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from annotated_types import Interval
@@ -35,46 +34,36 @@ AUTO = "auto"
 """Model selection: the simplest correction that does on unseen history what the best one does."""
 
 
-def _meaning(text: str) -> dict[str, str]:
-    return {"meaning": text}
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildOptions:
-    """What `gyrotc fit`, `build`, `diagnose`, `compare` and a fleet take as options.
+    """How a model is trained: `[fit]` of a data set, `[options]` of a fleet, options of Python callers.
+
+    Attributes:
+        method: `auto`: the simplest correction that holds on unseen history; or one of `METHODS`.
+        seed: Number from which everything random is drawn; the same number, the same result.
+        centers: Number of centers; None: the data decide.
+        rho: Threshold of error reduction, eq. (16) of Ding et al. 2014.
+        block_s: Length of a block, s.
+        average_s: Length of the means of which RMS figures are taken, s.
+        channels: Let recorded channels be inputs, those that hold on unseen history alone.
 
     Raises:
         InputError: A value is out of its range; the message names it as it was stated.
     """
 
-    method: str = field(
-        default=AUTO,
-        metadata=_meaning(
-            "auto (default): the simplest correction that holds on unseen history; or mrbf, cubic, constant, ..."
-        ),
-    )
-    seed: Annotated[int, Interval(ge=0, lt=2**63)] = field(
-        default=0, metadata=_meaning("Number from which everything random is drawn; the same number, the same result.")
-    )
-    centers: Annotated[int, Interval(ge=0, le=MOST_CENTERS)] | None = field(
-        default=None, metadata=_meaning("Number of centers; by default the data decide.")
-    )
-    rho: Annotated[float, Interval(ge=0.0, lt=1.0)] | None = field(
-        default=None, metadata=_meaning("Threshold of error reduction, eq. (16) of Ding et al. 2014.")
-    )
-    block_s: BlockLength = field(default=10.0, metadata=_meaning("Length of a block, s."))
-    average_s: AverageLength = field(
-        default=100.0, metadata=_meaning("Length of the means of which RMS figures are taken, s.")
-    )
-    channels: bool = field(
-        default=False, metadata=_meaning("Let recorded channels be inputs, those that hold on unseen history alone.")
-    )
+    method: str = AUTO
+    seed: Annotated[int, Interval(ge=0, lt=2**63)] = 0
+    centers: Annotated[int, Interval(ge=0, le=MOST_CENTERS)] | None = None
+    rho: Annotated[float, Interval(ge=0.0, lt=1.0)] | None = None
+    block_s: BlockLength = 10.0
+    average_s: AverageLength = 100.0
+    channels: bool = False
 
     def __post_init__(self) -> None:
         for option in fields(BuildOptions):
             value = getattr(self, option.name)
             if value is not option.default:
-                object.__setattr__(self, option.name, _checked(option.name, value, flag_of(option.name)))
+                object.__setattr__(self, option.name, _checked(option.name, value, option.name))
 
     def with_stated(self, stated: Mapping[str, Any]) -> Self:
         """Return these options with those at their default taken from `[fit]` of a data set.
@@ -88,21 +77,6 @@ class BuildOptions:
 
 
 DEFAULTS = BuildOptions()
-
-
-_TYPED = ("method", "channels")  # options of the command line; the others are stated in `[fit]` of a data set
-
-
-def flag_of(name: str) -> str:
-    """Return an option as a user states it: on the command line, or by its name in `[fit]`."""
-    return "--" + name if name in _TYPED else name
-
-
-def help_of(name: str) -> str:
-    """What an option means, and the range of a number."""
-    [option] = (option for option in fields(BuildOptions) if option.name == name)
-    meaning, limits = option.metadata["meaning"], _range_of(name)
-    return f"{meaning.removesuffix('.')} ({limits})." if limits else str(meaning)
 
 
 def _range_of(name: str) -> str:

@@ -35,6 +35,7 @@ from .records import Applied, Dataset, DeclaredNoise, EarthRate, Exclusion, Run,
 from .units import NATIVE_UNITS
 
 __all__ = [
+    "applied_model",
     "asked_axes",
     "axes_of",
     "calibration_day",
@@ -76,10 +77,11 @@ def check_description(description: Description, applied: Applied | None, exam_on
     stated = description.applied_table
     if stated != "none" and applied is None:
         found = f"the model {stated[:12]}... was subtracted while recording"
-        problems.add(InputError(f"{FILE}, field applied_table", found, "that model by --applied FILE"))
+        expected = 'applied_model = "FILE": the model.json with that hash'
+        problems.add(InputError(f"{FILE}, field applied_table", found, expected))
     if applied is not None and applied.hash != stated:
-        found = f"{stated!r}, and the model given is {applied.hash}"
-        problems.add(InputError(f"{FILE}, field applied_table", found, "the hash of the model given"))
+        found = f"{stated!r}, and applied_model has the hash {applied.hash}"
+        problems.add(InputError(f"{FILE}, field applied_table", found, "the hash of that model"))
 
 
 def check_spans(description: Description, problems: Problems) -> None:
@@ -192,7 +194,7 @@ def judge(suspicions: Sequence[Suspected], trust: bool, problems: Problems) -> l
         if trust:
             trusted.append((where, one.found))
         else:
-            expected = f'[units] {one.kind} = "{one.likely}" in {FILE}, or --trust-units if it is right as it is'
+            expected = f'[units] {one.kind} = "{one.likely}" in {FILE}, or trust_units = true if it is right as it is'
             problems.add(InputError(where, one.found, expected))
     return trusted
 
@@ -206,7 +208,6 @@ def load(
     axis: str | None = None,
     applied: Applied | None = None,
     exam_only: bool = False,
-    trust_units: bool = False,
 ) -> Dataset:
     """Reads the description of a data set and checks every file.
 
@@ -215,15 +216,12 @@ def load(
         axis: Axis of three-axis recordings, "x", "y" or "z"; None where there is one rate.
         applied: Model that was subtracted while recording, if the data set says that there was one.
         exam_only: A data set without a training run will do.
-        trust_units: Values that contradict their units are taken nevertheless.
 
     Raises:
         InputError: Something is wrong; the first thing found is reported.
     """
     problems = Problems(collect=False)
-    dataset = load_reporting(
-        folder, problems, axis=axis, applied=applied, exam_only=exam_only, trust_units=trust_units, once=True
-    )
+    dataset = load_reporting(folder, problems, axis=axis, applied=applied, exam_only=exam_only, once=True)
     assert dataset is not None
     return dataset
 
@@ -246,6 +244,15 @@ def stated_identity(folder: Path) -> tuple[str | None, str | None]:
         return None, None
     serial = None if description.serial == UNKNOWN_SERIAL else description.serial
     return serial, calibration_day(description.meta, (run.started for run in description.run))
+
+
+def applied_model(folder: Path) -> Path | None:
+    """Return the file of the model that was subtracted while recording; None if the data set names none."""
+    if not (folder / FILE).is_file():
+        return None
+    description = parse_description(folder / FILE, Problems(collect=True))
+    stated = description.applied_model if description else None
+    return folder / stated if stated is not None else None
 
 
 def axes_of(folder: Path) -> tuple[str, ...]:
@@ -287,7 +294,6 @@ def load_reporting(
     axis: str | None = None,
     applied: Applied | None = None,
     exam_only: bool = False,
-    trust_units: bool = False,
     once: bool = False,
 ) -> Dataset | None:
     """As `load`, with problems reported to `problems`.
@@ -335,7 +341,7 @@ def load_reporting(
     ]
     check_channel_units(description, recordings, problems)
     suspicions = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
-    trusted = judge(suspicions, trust_units or description.trust_units, problems)
+    trusted = judge(suspicions, description.trust_units, problems)
     warnings += [f"{name}: {TRUSTED}{text}" for name, text in trusted]
     trusted_texts = tuple(f"{name}: {text}" for name, text in trusted)
     if description.temperature_late_s:

@@ -238,7 +238,6 @@ class Diagnosed(UnitResult):
     meaning: str = Field(description="what the verdict means")
     next: tuple[str, ...] = Field(description="what to do, the most telling first")
     events: tuple[Finding, ...] = Field(default=(), description="what happened to the recordings, by run and time")
-    events_accepted: bool = Field(default=False, description="whether they were left out (`--accept-events`)")
     scenario: str | None = Field(default=None, description="file of a scenario that simulates what was found")
     pictures: tuple[str, ...] | None = Field(default=None, description="files of pictures")
     series: str | None = Field(default=None, description="file of what the pictures show")

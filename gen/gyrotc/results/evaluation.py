@@ -40,7 +40,7 @@ class Group(Part):
 class Method(Part):
     """What one training method makes of all environments."""
 
-    id: str = Field(description="as `--method` takes it")
+    id: str = Field(description="as `method` of `[fit]` takes it")
     groups: tuple[Group, ...] = Field(description="environment by environment")
     exam_rms_dph: Figure = Field(description="RMS over all environments, deg/h")
     exam_std_dph: Figure = Field(description="about the mean, deg/h")

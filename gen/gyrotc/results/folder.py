@@ -53,17 +53,13 @@ class Stage:
         self._job = job
         self._part = part
 
-    def of(self, serial: str, axis: str | None = None, *, any_serial: bool = False) -> None:
+    def of(self, serial: str, axis: str | None = None) -> None:
         """Says whose result it is: call it as soon as that is known, before the work.
-
-        Args:
-            any_serial: It may take the place of another gyro's.
 
         Raises:
             InputError: An earlier result there is another gyro's.
         """
-        self._job.any_serial |= any_serial
-        if not self._job.any_serial and not self._part:
+        if not self._part:
             check_same_serial(self._job.out, self._job.earlier, serial)
         parts = self._job.parts
         parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
@@ -172,7 +168,6 @@ class _Job:
             raise
         _open.append(self)
         unfinished.append(self.work)
-        self.any_serial = False
 
     def _begin(self) -> Path:
         work = self.place.parent / f"{self._prefix}{secrets.token_hex(4)}"

@@ -74,7 +74,7 @@ class ImportedFile(Part):
     rows: Count = Field(description="rows that were taken")
     left_out: dict[str, Count] = Field(description="rows that were not, by the reason")
     trusted: tuple[str, ...] = Field(
-        description="what values look like that contradicts their unit, but was taken (`--trust-units`)"
+        description="what values look like that contradicts their unit, but was taken (`trust_units`)"
     )
     source: OriginalFile = Field(description="the original")
 

@@ -280,7 +280,7 @@ class VerifiedFile(Part):
 
     file: str = Field(description="its name in `c/`")
     verdict: Literal["equal", "differs", "missing", "foreign", "edited"] = Field(
-        description="`foreign`: gyrotc does not make it; `edited`: it differs, which `--allow-edited` allows"
+        description="`foreign`: gyrotc does not make it; `edited`: the example differs, as its user may edit it"
     )
     status: PassOrFail = Field(description="whether it is as it has to be")
     mismatches: Count = Field(description="lines or words that differ; 1 for what has none")

@@ -155,7 +155,7 @@ class CandidateModel(Part):
 
 
 class ChannelTried(Part):
-    """A recorded channel, or a difference of thermometers, that was tried as an input (`--channels`)."""
+    """A recorded channel, or a difference of thermometers, that was tried as an input (`channels` of `[fit]`)."""
 
     name: str = Field(description='its column; "a - b": a difference, of "temperature_c" the gyro\'s own')
     verdict: Literal["taken", "not earned", "collinear", "refused"] = Field(description="what became of it")
@@ -240,7 +240,8 @@ class Training(UnitResult):
         description="figures of the method; `sizes` and `chosen` where it chose a number of centers"
     )
     channels: tuple[ChannelTried, ...] | None = Field(
-        default=None, description="recorded channels that were tried as inputs; absent without `--channels`"
+        default=None,
+        description="recorded channels that were tried as inputs; absent where `[fit]` does not ask for `channels`",
     )
     outliers: Outliers | None = Field(default=None, description="rows that were left out; absent of an extended model")
     means: MapMeans | None = Field(

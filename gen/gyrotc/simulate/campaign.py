@@ -117,7 +117,9 @@ class RowForm:
     format: FileFormat
 
     @classmethod
-    def of(cls, row_s: float, raw_hz: float | None, pulses: bool, format: FileFormat) -> RowForm:
+    def of(
+        cls, row_s: float = 10.0, raw_hz: float | None = None, pulses: bool = False, format: FileFormat = "csv"
+    ) -> RowForm:
         """Raises `InputError` for a length that cannot be."""
         if format not in ("csv", "parquet"):
             raise InputError("--format", repr(format), "csv or parquet")

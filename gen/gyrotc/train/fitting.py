@@ -67,7 +67,7 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitOptions(BuildOptions):
-    """What `--method`, `--channels` and `[fit]` of a data set state, and what is known of the unit before its runs.
+    """What `[fit]` of a data set states, and what is known of the unit before its runs.
 
     `prior` is what is known of the unit before its runs: a lot, or an earlier model.
 

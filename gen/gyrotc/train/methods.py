@@ -169,7 +169,7 @@ def _no_information(samples: TrainingData) -> dict[str, object]:
 def _beyond(method: str, against: str) -> dict[str, object]:
     return {
         "id": "map_beyond_data",
-        "text": f"The map of {method}, which was asked for by name, should not be used: {against}. Without --method "
+        "text": f"The map of {method}, which was asked for by name, should not be used: {against}. Without it "
         "model selection chooses a correction that keeps to the data.",
         "evidence": {"method": method},
     }

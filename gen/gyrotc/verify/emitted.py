@@ -14,7 +14,7 @@ import hashlib
 import os
 import re
 import stat
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,8 +34,8 @@ from ..tables.record import Options, read_options
 from ..tables.runtime import CONFIG, RUNTIME_FILES, joint_needs, needs_of, runtime_texts
 from ..tables.text import ARITHMETICS, amalgamate
 
-#: Files that a user may make their own: `verify --allow-edited`. All else is written by gyrotc alone.
-EDITABLE = frozenset({"main.c"})
+EXAMPLE = "main.c"
+"""The example is the user's to edit; all else is written by gyrotc alone."""
 _SHOWN = 160  # characters of a line
 _MAX_CONFIG = 2**16  # bytes of gtc_config.h, which has 3,000
 _OPTION = re.compile(r"^#define (GTC_[A-Z_]+) ([0-9]{1,2})$", re.MULTILINE)
@@ -126,13 +126,12 @@ def shared_runtime_entries(c_folder: Path, model: Model, shared: str) -> Iterato
             yield _differing(f"{shared}/{name}", found, data, allowed=False)
 
 
-def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[str] = ()) -> Iterator[VerifiedFile]:
+def file_entries(c_folder: Path, texts: Mapping[str, bytes]) -> Iterator[VerifiedFile]:
     """One entry for each file that should be there or is.
 
     Args:
         c_folder: The emitted folder.
         texts: What must lie there, by name.
-        edited: Names of `EDITABLE` that may differ, but not be missing.
     """
     there = set(os.listdir(c_folder))  # noqa: PTH208 names, not paths
     for name, data in sorted(texts.items()):
@@ -143,7 +142,7 @@ def file_entries(c_folder: Path, texts: Mapping[str, bytes], edited: Collection[
         if found == data:
             yield VerifiedFile(file=name, verdict="equal", status="pass", mismatches=0)
         else:
-            yield _differing(name, found, data, allowed=name in edited)
+            yield _differing(name, found, data, allowed=name == EXAMPLE)
     for name in sorted(there - set(texts) - {MARKER}):
         yield VerifiedFile(file=name, verdict="foreign", status="fail", mismatches=1)
 
@@ -296,8 +295,7 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
         fault = None if trusted else check(data)
         if fault is not None:
             raise CheckFailed(
-                f"{path} {fault}: it is not compiled, as its code would run on this machine; "
-                "emit it again, or say --trust-code if it is your own"
+                f"{path} {fault}: it is not compiled, as its code would run on this machine; emit it again"
             )
         write_own(work / name, data)
     return work

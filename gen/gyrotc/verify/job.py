@@ -42,7 +42,6 @@ from ..tables.quantisation import rms_growth
 from ..tables.vectors import Vectors, make_vectors
 from .board import board_entries, log_entries
 from .emitted import (
-    EDITABLE,
     Job,
     board_files_again,
     c_hash,
@@ -221,7 +220,6 @@ def verify(
     log: Path | None = None,
     exhaustive: bool = False,
     compiled: bool = True,
-    edited: Sequence[str] = (),
     trust_code: bool = False,
     progress: Progress | None = None,
 ) -> Verification:
@@ -235,7 +233,6 @@ def verify(
             `verify.json` of the same model and code; later calls keep them.
         exhaustive: Visit every input of the fixed-point table besides.
         compiled: False: no target; files and bounds are checked against model and reference alone.
-        edited: Files of `EDITABLE` that the user made their own: they may differ.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         progress: Called with the name of each target before it is tried.
 
@@ -244,7 +241,6 @@ def verify(
         CheckFailed: The log is not whole, or of another model.
     """
     say = progress or (lambda _: None)
-    _check_edited(edited)
     model = load_model(folder / "model.json")
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
     say("comparing files")
@@ -256,7 +252,7 @@ def verify(
     tests = board_files_again(model, emission) if options.runtime and compiled else {}
     job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code, tests)
     texts = texts_again(model, options, emission)
-    emitted = tuple(file_entries(job.c_folder, texts, edited))
+    emitted = tuple(file_entries(job.c_folder, texts))
     if options.runtime and compiled:
         emitted += tuple(shared_runtime_entries(job.c_folder, model, options.runtime))
     wrong = [file.file for file in emitted if file.status == "fail"]
@@ -308,18 +304,10 @@ def chosen_targets(names: Sequence[str]) -> list[Target]:
     return [t for t in known.values() if "all" in names or t.name in names]
 
 
-def _check_edited(names: Sequence[str]) -> None:
-    for name in names:
-        if name not in EDITABLE:
-            raise InputError(
-                "--allow-edited", repr(name), f"{', '.join(sorted(EDITABLE))}: the rest is not to be edited"
-            )
-
-
 def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[VerifiedTarget]:
     """Entries of targets for which nothing was compiled: files that differ are code of somebody else."""
     more = f" (and {len(wrong) - 1} more files)" if len(wrong) > 1 else ""
-    reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}; --trust-code runs it all the same"
+    reason = f"not compiled: {wrong[0]} is not what gyrotc makes of this model{more}"
     pairs = [(t.name, n) for t in targets for n in job.tables if n in t.numerics]
     return [VerifiedTarget(name=name, numeric=n, status="fail", error=reason) for name, n in pairs]
 

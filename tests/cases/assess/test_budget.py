@@ -58,7 +58,7 @@ degrees_of_freedom = 9
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data, folder = tmp_path_factory.mktemp("data"), tmp_path_factory.mktemp("built")
     simulate("paper", seed=5, out=data / "paper", format="parquet")
-    build_into(folder, load(data / "paper"), FitOptions(), compiled=False)
+    build_into(folder, load(data / "paper"), FitOptions())
     write_report(folder)
     return folder
 

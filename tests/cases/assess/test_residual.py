@@ -148,7 +148,7 @@ def test_spikes_of_an_exam_are_in_the_plain_figure_and_not_in_the_robust_one(tmp
     runs = ['file = "a.csv"', 'file = "b.csv"', 'file = "c.csv"\nrole = "exam"']
     (tmp_path / "RLG-1" / "dataset.toml").write_text(toml(*runs, head=head))
     (tmp_path / "out").mkdir()
-    built = build_into(tmp_path / "out", load(tmp_path / "RLG-1"), FitOptions(), numerics=["f32"], compiled=False)
+    built = build_into(tmp_path / "out", load(tmp_path / "RLG-1"), FitOptions(), numerics=["f32"])
     clean, exam = built.evaluation.runs[0], built.evaluation.runs[2]
     assert exam.outlier_rows == len(spikes) and clean.outlier_rows == 0 and clean.without_outliers is None
     assert exam.without_outliers is not None and built.evaluation.without_outliers == exam.without_outliers

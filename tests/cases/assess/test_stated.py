@@ -63,7 +63,7 @@ def _built(folder: Path, limits: str) -> Path:
     with result_folder(out, "build") as stage:
         stage.of("RLG-1")
         known = load_limits(folder / "limits.toml")
-        build_into(stage.folder, load(data), FitOptions(method="linear"), limits=known, compiled=False)
+        build_into(stage.folder, load(data), FitOptions(method="linear"), limits=known)
     return out
 
 

@@ -30,7 +30,7 @@ from gyrotc.results import cache as kept
 from gyrotc.simulate import read, simulate, simulated_floor
 from gyrotc.train import run_blocks
 from gyrotc.verify import log_parts
-from recordings import columns, csv_text, described, write_csv
+from recordings import columns, csv_text, described, state, write_csv
 
 READERS: dict[str, Callable[[Path], Any]] = {
     "model": load_model,
@@ -145,7 +145,7 @@ def test_times_on_a_wrong_scale(tmp_path: Path) -> None:
 def test_a_block_longer_than_the_recording_takes_no_more_memory_than_it(tmp_path: Path) -> None:
     table = columns()
     write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": 2e-6 * table["time_s"]})
-    [run] = load(tmp_path / "RLG-1", trust_units=True).runs
+    [run] = load(state(tmp_path / "RLG-1", "trust_units = true")).runs
     settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
     assert len(run_blocks(run.rows(), run, block_s=3600.0, **settings).valid) == 1
 
@@ -154,7 +154,7 @@ def test_gaps_that_make_more_samples_than_memory_is_granted_for(tmp_path: Path) 
     table = columns(2000)
     time = 1e-5 * np.arange(2000) + 1e4 * (np.arange(2000) // 3)
     write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": np.round(time, 6)})
-    [run] = load(tmp_path / "RLG-1", trust_units=True).runs
+    [run] = load(state(tmp_path / "RLG-1", "trust_units = true")).runs
     settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
     reported = refused(lambda: run_blocks(run.rows(), run, block_s=10.0, **settings))
     assert reported.startswith("a.csv: ") and "GiB of memory" in reported

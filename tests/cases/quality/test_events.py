@@ -30,7 +30,7 @@ from gyrotc.results import Finding
 from gyrotc.simulate import simulate
 from gyrotc.train import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
-from recordings import Columns, toml, write_csv
+from recordings import Columns, state, toml, write_csv
 
 from bench.rows.events import scores
 from tests.blind.other.record import draw_recording, write
@@ -568,7 +568,7 @@ def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: flo
     def in_unit(columns: EventColumns) -> None:
         columns["rate_dph"] = factor * columns["rate_dph"]
 
-    dataset = load(ramps(tmp_path, in_unit), trust_units=True)
+    dataset = load(state(ramps(tmp_path, in_unit), "trust_units = true"))
     assert [(e.id, e.file) for e in of_curves(dataset)] == [("unit_changed", "2.csv")]
 
 
@@ -577,7 +577,7 @@ def test_a_run_with_a_spike_is_in_memory_once(tmp_path: Path) -> None:
     n = 2**19
     write_csv(tmp_path / "1.csv", {name: np.arange(60.0) for name in ("time_s", "temperature_c", "rate_dph")})
     (tmp_path / "dataset.toml").write_text(toml('file = "1.csv"'))
-    (run,) = load(tmp_path, trust_units=True).runs
+    (run,) = load(state(tmp_path, "trust_units = true")).runs
     long = replace(run, reader=lambda: Rows(np.arange(float(n)), np.zeros(n), np.zeros(n), {}))
     tracemalloc.start()
     judged = _Judged([long], [np.array([100])], ())[0]

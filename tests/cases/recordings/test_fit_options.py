@@ -18,14 +18,6 @@ def test_options_of_a_description_reach_the_model(tmp_path: Path, gyrotc: Comman
     assert (model["block_s"], model["average_s"], model["seed"]) == (50.0, 200.0, 7)
 
 
-def test_the_command_line_comes_before_the_description(tmp_path: Path, gyrotc: Command) -> None:
-    described(tmp_path / "RLG-1", tail='[fit]\nmethod = "linear"')
-    for typed, method in (((), "linear"), (("--method", "cubic"), "cubic")):
-        done = gyrotc("fit", tmp_path / "RLG-1", *typed, "--out", tmp_path / method)
-        assert done.returncode == 0, done.stderr
-        assert json.loads((tmp_path / method / "model.json").read_text())["method"] == method
-
-
 @pytest.mark.parametrize(
     ("line", "field"),
     [

@@ -14,7 +14,7 @@ from gyrotc.common import InputError
 from gyrotc.quality import check
 from gyrotc.recordings import EARTH_RATE_DPH, UnitError, channel_unit, conversion, earth_rate, load, quantity_of
 from gyrotc.train import FitOptions, fit_dataset
-from recordings import Columns, columns, toml, write_csv
+from recordings import Columns, columns, state, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "RLG-1"\nearth_rate = "removed"\n'
 
@@ -154,10 +154,10 @@ def test_values_that_contradict_their_unit_are_refused_unless_trusted(
     with pytest.raises(InputError) as refused:
         load(folder)
     assert all(word in str(refused.value) for word in words), refused.value
-    assert "--trust-units" in str(refused.value)
-    dataset = load(folder, trust_units=True)
+    assert "trust_units = true" in str(refused.value)
+    dataset = load(state(folder, "trust_units = true"))
     assert any(words[0] in text for text in dataset.trusted)
-    reported = check(folder, trust_units=True)
+    reported = check(folder)
     assert not reported.problems and any("units are trusted" in str(warning) for warning in reported.warnings)
 
 
@@ -253,7 +253,7 @@ def test_the_command_refuses_and_takes_the_users_word(tmp_path: Path, gyrotc: Co
     refused = gyrotc("fit", folder, "--out", tmp_path / "out")
     assert refused.returncode == 2 and '[units] rate = "deg/s"' in refused.stderr
     assert not (tmp_path / "out").exists()
-    taken = gyrotc("fit", folder, "--out", tmp_path / "out", "--trust-units")
+    taken = gyrotc("fit", state(folder, "trust_units = true"), "--out", tmp_path / "out")
     assert taken.returncode == 0, taken.stderr
     training = json.loads((tmp_path / "out" / "training.json").read_text())
     assert "white noise" in training["units"]["trusted"][0]

@@ -64,16 +64,16 @@ def status(*arguments: str) -> int:
 
 COMMANDS = {
     "check": ("check", "data/RLG-1", "--json", "c.json"),
-    "fit": ("fit", "data/RLG-1", "--method", "constant", "--out", "R"),
+    "fit": ("fit", "data/RLG-1", "--out", "R"),
     "emit": ("emit", "fleet/RLG-1/model.json", "--out", "E", "--map", "map.csv"),
     "import": ("import", "data/RLG-1/run-01.csv", "--out", "I", "--serial", "A"),
-    "simulate": ("simulate", "paper-20C", "--row-s", "100", "--out", "S"),
+    "simulate": ("simulate", "paper-20C", "--raw-hz", "0.01", "--out", "S"),
     "report": ("report", "fleet/RLG-1"),
     "certificate": ("certificate", "fleet/RLG-1", "--draft", "--out", "C"),
     "fleet": ("fleet", "data", "--out", "fleet"),  # whose gyro is done before: no process is needed for it
     "verify": ("verify", "fleet/RLG-1", "--target", "host-gcc-O2", "--json", "v.json"),
     "evaluate": ("evaluate", "fleet/RLG-1", "data/RLG-1", "--trace", "T"),
-    "build": ("build", "data/RLG-1", "--method", "constant", "--target", "host-gcc-O2", "--out", "B"),
+    "build": ("build", "data/RLG-1", "--target", "host-gcc-O2", "--out", "B"),
     "compare": ("compare", "data/RLG-1", "--out", "M"),
     "diagnose": ("diagnose", "data/RLG-1", "--out", "D"),
 }

@@ -33,6 +33,7 @@ from gyrotc.train import (
     shape_of,
 )
 from numpy.typing import NDArray
+from recordings import state_fit
 
 from bench.signals import rms_of, without
 
@@ -316,7 +317,7 @@ def test_without_the_option_recordings_with_channels_give_the_model_that_they_ga
 def test_a_manifest_can_ask_for_channels(recordings: Path, fitted: Fitted, tmp_path: Path) -> None:
     fleet = load_manifest(_with_channels(recordings))
     [unit] = fleet.units
-    built = build_into(tmp_path, load(unit.dataset), fleet.options, numerics=fleet.numerics, compiled=False)
+    built = build_into(tmp_path, load(unit.dataset), fleet.options, numerics=fleet.numerics)
     assert built.model == fitted.model and built.model.terms
 
 
@@ -334,7 +335,7 @@ def test_a_fleet_with_channels_makes_what_a_build_with_channels_makes(
 ) -> None:
     for arguments in (
         ("fleet", _with_channels(recordings), "--out", tmp_path / "fleet", "--jobs", "1"),
-        ("build", recordings, "--channels", *HOST, "--out", tmp_path / "build"),
+        ("build", state_fit(recordings, channels=True), *HOST, "--out", tmp_path / "build"),
     ):
         done = gyrotc(*arguments)
         assert done.returncode == 0, done.stderr
@@ -390,7 +391,7 @@ def built(shaped_recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     """The steps of a build, as a user types them; one compiler, for time."""
     out = tmp_path_factory.mktemp("built")
     steps: list[list[str | Path]] = [
-        ["fit", shaped_recordings, "--channels", "--out", out],
+        ["fit", state_fit(shaped_recordings, channels=True), "--out", out],
         ["emit", out / "model.json", "--out", out],
         ["verify", out, "--target", "host-gcc-O2"],
         ["evaluate", out, shaped_recordings],

@@ -22,7 +22,7 @@ from conftest import Command, invoked, on_terminal, quick_and_slow
 from emitted import emitted
 from gyrotc.cli import base
 from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, NoiseLevel, StageLine, folded
+from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, StageLine, folded
 from gyrotc.cli.main import _hoisted, application, run
 from gyrotc.cli.recordings import RunFormat
 from gyrotc.model import Model
@@ -256,9 +256,6 @@ def test_bash_completes_commands_and_options(tmp_path: Path) -> None:
     ("typed", "offered"),
     [
         ("simulate paper --format", ["csv", "parquet"]),
-        ("simulate paper --noise cl", ["class"]),
-        ("simulate paper --noise", ["paper", "class"]),
-        ("build data --method cu", ["cubic", "cubic_slope"]),
         ("build data --numeric f32,", ["f32,q31"]),
         ("build data --axis a", ["all"]),
         ("verify result --target cortex-m4", ["cortex-m4f"]),
@@ -277,8 +274,8 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [(RunFormat, (campaign.FileFormat, rows.FileFormat)), (NoiseLevel, (campaign.NoiseName,))],
-    ids=["runs", "noise"],
+    [(RunFormat, (campaign.FileFormat, rows.FileFormat))],
+    ids=["runs"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:
     for of_job in types:
@@ -286,10 +283,7 @@ def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types
 
 
 def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
-    for command, right in (
-        (("simulate", "paper", "--out", "R", "--noise", "none"), NoiseLevel),
-        (("simulate", "paper", "--out", "R", "--format", "xml"), RunFormat),
-    ):
+    for command, right in ((("simulate", "paper", "--out", "R", "--format", "xml"), RunFormat),):
         done = invoked(*command)
         assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command
 

@@ -65,7 +65,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with result_folder(out, "build") as stage:
         stage.of("RLG-1")
         limits = load_limits(folder / "limits.toml")
-        build_into(stage.folder, load(data), FitOptions(), limits=limits, compiled=False)
+        build_into(stage.folder, load(data), FitOptions(), limits=limits)
     return out
 
 

@@ -22,7 +22,7 @@ from gyrotc.model import load_model
 from gyrotc.pages import failed_checks, write_report
 from gyrotc.recordings import load
 from gyrotc.results import MapError
-from recordings import columns, write_csv
+from recordings import columns, state, write_csv
 
 REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[4] / "shared/data/real"))
 
@@ -214,8 +214,8 @@ def test_a_correction_applied_while_recording_is_added_back_or_refused(
         np.savetxt(corrected / path.name, rows, fmt="%.12g", delimiter=",", header=header, comments="")
     refused = gyrotc("fit", corrected, "--out", tmp_path / "no")
     assert refused.returncode == 2 and "applied" in refused.stderr and not (tmp_path / "no").exists()
-    applied = demo / "result" / "model.json"
-    done = gyrotc("fit", corrected, "--applied", applied, "--out", tmp_path / "again")
+    state(corrected, f"applied_model = '{demo / 'result' / 'model.json'}'")
+    done = gyrotc("fit", corrected, "--out", tmp_path / "again")
     assert done.returncode == 0, done.stderr
     again = load_model(tmp_path / "again" / "model.json")
     t = np.linspace(-30, 60, 40)
@@ -294,15 +294,16 @@ def test_every_other_command_that_reads_a_model_refuses(demo: Path, tmp_path: Pa
     content["networks"][0]["weights"] = content["networks"][0]["weights"][:-1]
     (result / "model.json").write_text(json.dumps(content))
     before = {p: p.read_bytes() for p in result.rglob("*") if p.is_file()}
-    data = demo / "data"
+    data, corrected = demo / "data", Path(shutil.copytree(demo / "data", tmp_path / "corrected"))
+    state(corrected, f"applied_model = '{result / 'model.json'}'")
     for command in (
         ("verify", result),
         ("evaluate", result, data),
         ("report", result),
-        ("fit", data, "--applied", result / "model.json", "--out", tmp_path / "o"),
-        ("build", data, "--applied", result / "model.json", "--out", tmp_path / "o"),
-        ("check", data, "--applied", result / "model.json"),
-        ("compare", data, "--applied", result / "model.json"),
+        ("fit", corrected, "--out", tmp_path / "o"),
+        ("build", corrected, "--out", tmp_path / "o"),
+        ("check", corrected),
+        ("compare", corrected),
     ):
         done = gyrotc(*command)
         assert done.returncode == 2, (command, done.stdout, done.stderr)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from gyrotc.recordings import load
 from gyrotc.results import json_text
 from gyrotc.train import FitOptions, joined, predict
 from gyrotc.train.prior import prior_of
+from recordings import state_fit
 
 RUNS = """
 title = "Two short cycles"
@@ -64,7 +66,8 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
 
 def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
     reported = run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
-    run_here("fit", world / "short" / "LOT-0005-006", "--method", "mrbf", "--out", world / "alone")
+    apart = Path(shutil.copytree(world / "short" / "LOT-0005-006", world / "apart" / "LOT-0005-006"))
+    run_here("fit", state_fit(apart, method="mrbf"), "--out", world / "alone")
     lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
     use = json.loads((world / "with" / "training.json").read_text())["lot"]
     assert use["checksum"] == lot.checksum and use["accepted"] and not use["member"]

@@ -154,7 +154,7 @@ def test_any_name_of_a_file_ends_by_a_known_status(count: int, place: Path) -> N
         _right(["check", str(folder)])
         _right(["import", shown, "--out", str(folder / "I")])
         (folder / "dataset.toml").write_text(toml(f"file = {_toml_text(Path(shown).name)}"), "utf-8", "replace")
-        _right(["fit", str(folder), "--method", "constant", "--out", str(folder / "R")])
+        _right(["fit", str(folder), "--out", str(folder / "R")])
 
 
 def _toml_text(name: str) -> str:

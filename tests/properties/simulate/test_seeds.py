@@ -27,7 +27,7 @@ def _simulated(folder: Path, *options: str) -> dict[str, bytes]:
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_gyro(
     scenario: str, seed: int, kind: tuple[str, ...]
 ) -> None:
-    options = (scenario, "--row-s", "100", *kind)
+    options = (scenario, "--raw-hz", "0.01", *kind)
     with TemporaryDirectory() as place:
         one, again, other = (
             _simulated(Path(place) / name, *options, "--seed", str(number))

@@ -16,7 +16,7 @@ from gyrotc.model import Model, load_model
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from recordings import Columns
+from recordings import Columns, state_fit
 from small_gyro import HEAD, small_gyro, write_gyro
 
 METHODS = ["auto", "constant", "cubic", "cubic_slope", "mrbf"]
@@ -37,7 +37,7 @@ class Calibration:
 
 
 def fitted(folder: Path, out: Path, method: str = "auto") -> Calibration:
-    done = run_gyrotc("fit", folder, "--method", method, "--out", out)
+    done = run_gyrotc("fit", state_fit(folder, method=method) if method != "auto" else folder, "--out", out)
     assert done.returncode == 0, done.stderr
     return Calibration(load_model(out / "model.json"), json.loads((out / "training.json").read_text()))
 
@@ -87,7 +87,7 @@ def test_a_constant_added_to_the_rate_leaves_what_is_measured_after_correction(s
         for k, by in enumerate((0.0, constant_dph)):
             data = write_gyro(Path(place) / f"d{k}", shifted(runs, "rate_dph", by), "", "", 'role = "exam"')
             out = Path(place) / f"r{k}"
-            done = run_gyrotc("build", data, "--method", "cubic_slope", "--out", out, *HOST)
+            done = run_gyrotc("build", state_fit(data, method="cubic_slope"), "--out", out, *HOST)
             assert done.returncode == 0, done.stderr
             figures.append(json.loads((out / "evaluate.json").read_text()))
     for role in ("train", "exam"):
