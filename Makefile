@@ -125,10 +125,9 @@ lock:
 	@tools/lock.sh
 
 ## all pages as a site, with search and the reference made from the code, in build/site
-site: setup
-	@[ -x build/site-tools/bin/mkdocs ] || { python3 -m venv build/site-tools && \
-	  build/site-tools/bin/python -m pip install -q --disable-pip-version-check "mkdocs-material>=9.5,<10"; }
-	@build/site-tools/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
+site:
+	@tools/setup.sh test
+	@.venv/bin/mkdocs build -q --strict -f docs/mkdocs.yml -d ../build/site && echo "build/site/index.html (opens from the disk, search included)"
 
 ## remove what was built (not .venv)
 clean:

@@ -31,10 +31,33 @@ os.environ["COLUMNS"] = "200"  # rich asks once, when the command line is import
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = Path(__file__).resolve().parent / "cases" / "golden"
 EXAMPLE = ROOT / "examples" / "minimal"
+#: Measured recordings, a folder each; they are no part of the sources.
+MEASURED = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 #: Options of a build whose targets are not the point: one arithmetic, one compiler.
 HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests of measured recordings that this machine does not have."""
+    needed = {item: mark.args[0] for item in items if (mark := item.get_closest_marker("measured"))}
+    absent = [item for item, name in needed.items() if not (MEASURED / name).is_dir()]
+    config.hook.pytest_deselected(items=absent)
+    items[:] = [item for item in items if item not in set(absent)]
+
+
+def require(missing: str | None) -> None:
+    """Fail where something is missing that `make test` installs."""
+    if missing is not None:
+        pytest.fail(f"{missing} is not installed: tools/setup.sh test installs it", pytrace=False)
+
+
+def program(name: str) -> str:
+    """Return the path of a program of this machine."""
+    path = shutil.which(name)
+    require(None if path else name)
+    return str(path)
 
 
 def pytest_collection_finish() -> None:

@@ -24,7 +24,7 @@ prepare() {
   if [ "$python" != python3 ] && command -v chromium >/dev/null; then
     "$python" tools/pictures.py
   else
-    echo "release: pictures of pages stay as they are; tools/setup.sh picture brings what makes them" >&2
+    echo "release: pictures of pages stay as they are; tools/setup.sh test brings what makes them" >&2
   fi
   git --no-pager diff --stat
   echo "release: look at it, run the tests, then: git commit -am 'Release $1' && git tag -a v$1 -m 'gyrotc $1' && make release TAG=v$1"

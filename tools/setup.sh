@@ -2,16 +2,15 @@
 # Installs what gyrotc needs: system packages (Debian, Ubuntu) that are missing, then the virtual environment .venv.
 #
 #   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt; the ARM compiler and its emulator
-#   tools/setup.sh test       besides, what `make test` uses
+#   tools/setup.sh test       besides, what `make test` uses, Chromium for the pages among it
 #   tools/setup.sh check      besides, the cross compilers of `make check`
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
 #   tools/setup.sh prove      besides, the proof tools of `make prove`
-#   tools/setup.sh picture    besides, the browser of tools/pictures.py
 #
 # `locked` behind a level takes the versions of gen/requirements.lock, each file held against its SHA-256.
 #
 # No release's number stands in a package's name here: what belongs to one version of a compiler is asked of that compiler.
-# Without the packages of `base` nothing works; any other that this release does not have is named, and what needs it is skipped.
+# Without the packages of `base` nothing works; any other that this release does not have is named, and what needs it does not run.
 # A second call finds everything in place and does nothing. On a terminal it asks before it uses sudo.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -22,7 +21,7 @@ locked=${2:-}
 base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
 arm=(gcc-arm-none-eabi qemu-system-arm)
 test=(clang cmake cppcheck gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
-      clang-tidy pkg-config strace)
+      clang-tidy pkg-config strace git chromium)
 check=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-avr avr-libc)
 targets=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
          gcc-powerpc-linux-gnu libc6-dev-powerpc-cross gcc-m68k-linux-gnu libc6-dev-m68k-cross libc6-dev-i386
@@ -35,8 +34,7 @@ case $level in
   check) packages=("${test[@]}" "${check[@]}") ;;
   targets) packages=("${test[@]}" "${targets[@]}") ;;
   prove) packages=("${test[@]}" "${prove[@]}") ;;
-  picture) packages=(chromium) ;;
-  *) echo "setup: unknown level '$level' (demo, test, check, targets, prove, picture)" >&2; exit 2 ;;
+  *) echo "setup: unknown level '$level' (demo, test, check, targets, prove)" >&2; exit 2 ;;
 esac
 packages=("${base[@]}" "${arm[@]}" "${packages[@]}")
 
@@ -45,7 +43,7 @@ installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'install o
 # Names of the packages that belong to the compilers installed by now: the sanitizers of clang, the 32-bit part of gcc
 # (gcc-multilib would bring it too, but is in conflict with the cross compilers).
 belonging() {
-  case $level in demo | picture) return 0 ;; esac
+  case $level in demo) return 0 ;; esac
   if command -v clang >/dev/null; then echo "libclang-rt-$(clang -dumpversion | cut -d. -f1)-dev"; fi
   if [ "$level" = targets ]; then echo "lib32gcc-$(gcc -dumpversion | cut -d. -f1)-dev"; fi
 }
@@ -76,7 +74,7 @@ install_missing() {
     if [[ " ${base[*]} " == *" $p "* ]] || apt-cache show "$p" >/dev/null 2>&1; then
       known+=("$p")
     else
-      echo "setup: this release has no package $p: what needs it is skipped" >&2
+      echo "setup: this release has no package $p: what needs it does not run" >&2
     fi
   done
   [ ${#known[@]} -eq 0 ] && return 0
@@ -94,7 +92,7 @@ fi
 
 # The environment is made again when what it is made of has changed.
 extras=""
-case $level in demo | picture) ;; *) extras="[test]" ;; esac
+case $level in demo) ;; *) extras="[test]" ;; esac
 stamp=.venv/.gyrotc$extras
 fingerprint=$({ echo "$locked"; cat gen/pyproject.toml gen/CMakeLists.txt gen/core/* tools/setup.sh; find gen/gyrotc -name "*.py" | sort; } | sha256sum | cut -d" " -f1)
 if [ "$(cat "$stamp" 2>/dev/null || true)" != "$fingerprint" ]; then

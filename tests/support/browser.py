@@ -108,7 +108,7 @@ class Browser:
 @contextmanager
 def browser(folder: Path, *, trusting: bool = True) -> Iterator[Browser]:
     """A browser with its profile in `folder`, ended afterwards; `trusting`: a page of the disk may read other files."""
-    assert CHROMIUM is not None
+    assert CHROMIUM is not None, "chromium is not installed: tools/setup.sh test installs it"
     to_browser, writing = os.pipe()
     reading, from_browser = os.pipe()
 

@@ -61,11 +61,11 @@ def netcdf_3(path: Path, t: Truth) -> None:
 
 
 ANALYSIS_CASES = [
-    Case("Excel, a sheet of stamps behind one of notes", "book.xlsx", excel, needs="openpyxl", time_tolerance=1e-3),
+    Case("Excel, a sheet of stamps behind one of notes", "book.xlsx", excel, time_tolerance=1e-3),
     Case("CSV packed by gzip, decimal commas", "log.csv.gz", csv_gz),
     Case(
-        "NetCDF 4, times and packing of CF", "run.nc", netcdf, axes=True, needs="h5netcdf", started=True,
+        "NetCDF 4, times and packing of CF", "run.nc", netcdf, axes=True, started=True,
         temperature_tolerance=1e-6,
     ),
-    Case("NetCDF 3, milliseconds of CF", "old.nc", netcdf_3, needs="xarray", started=True),
+    Case("NetCDF 3, milliseconds of CF", "old.nc", netcdf_3, started=True),
 ]  # fmt: skip

@@ -50,7 +50,6 @@ class Case:
         options: What the command needs besides file and --out.
         axes: Whether it holds three axes.
         tolerance: Of rates, deg/h, from the digits that the logger writes.
-        needs: Library without which the case is skipped.
         starts_at: First time in the data set, s.
         time_tolerance: Of times, s.
         temperature_tolerance: Of temperatures, C.
@@ -63,7 +62,6 @@ class Case:
     options: Sequence[str] = ()
     axes: bool = False
     tolerance: float = 1e-6
-    needs: str = ""
     starts_at: float = 0.0
     time_tolerance: float = 1e-6
     temperature_tolerance: float = 1e-6

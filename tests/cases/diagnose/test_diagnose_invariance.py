@@ -1,31 +1,26 @@
 """What must not change a diagnosis, and what must: units, sign, order of runs, blocks, cuts, truth beside the data.
 
 Simulated recordings come from the independent generator of tests/blind with a fixed seed; every claim holds for any.
-Tests on measured recordings are skipped, and reported, where these are absent.
+Tests on measured recordings are left out where these are absent.
 """
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, Command
+from conftest import MEASURED, Command
 from gyrotc.diagnose import (
     Analysis,
     Declared,
-    Effect,
     Records,
-    Refitting,
     RunRecord,
     analyse,
-    cycle_of,
     declared_noise,
     diagnose,
     floor_of,
@@ -38,7 +33,6 @@ from gyrotc.diagnose import (
 from gyrotc.diagnose.joined import _root
 from gyrotc.recordings import Dataset, joined_runs, load
 from gyrotc.train import FitOptions
-from recordings import write_csv
 
 from bench.invariance import VARIATIONS, averaged
 from bench.splits import splits
@@ -269,57 +263,14 @@ def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
     assert np.isfinite(root).all()
 
 
-SOURCE = (
-    Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
-    / "mpu6000-chamber-cycle"
-    / "data.csv"
-)
-CUT_S = 3130.0
-AVERAGE_S = 100.0
-Table = dict[str, np.ndarray]
-
-
-def recording(axis: str) -> Table:
-    if not SOURCE.is_file():
-        pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
-    names = SOURCE.read_text("utf-8").split("\n", 1)[0].split(",")
-    table = dict(zip(names, np.loadtxt(SOURCE, delimiter=",", skiprows=1).T, strict=True))
-    return {name: table[name] for name in ("time_s", "temperature_c")} | {"rate_dph": table[f"rate_{axis}_dph"]}
-
-
-def handed_over(folder: Path, table: Table, cuts: list[float], later_s: float = 0.0) -> Dataset:
-    """Training spans that touch at the cuts, named last first, and the exam after them."""
-    write_csv(folder / "a.csv", table)
-    edges = [None, *(cut + later_s for cut in [*cuts, CUT_S])]
-    spans = []
-    for low, high in pairwise(edges):
-        start = "" if low is None else f"from_s = {low}\n"
-        spans.append(f'[[run]]\nfile = "a.csv"\npower_on_s = "unknown"\n{start}to_s = {high}\n')
-    exam = f'[[run]]\nfile = "a.csv"\npower_on_s = "unknown"\nfrom_s = {CUT_S + later_s}\nrole = "exam"\n'
-    (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{"".join(spans[::-1])}{exam}', "utf-8")
-    dataset = load(folder)
-    return replace(dataset, runs=joined_runs(dataset.runs))  # as every job does it
-
-
-def left(dataset: Dataset, block_s: float = 10.0) -> float:
-    """RMS on the exam of states and a map of T, both from the training part, deg/h."""
-    records = records_of(dataset, "train", block_s=block_s, average_s=AVERAGE_S)
-    options = FitOptions(method="mrbf", block_s=block_s, average_s=AVERAGE_S)
-    refitting = Refitting(dataset, records, options, single_cycle=True)
-    [runs] = refitting.on_exam([[Effect.of(state) for state in cycle_of(records).states]])
-    return float(np.sqrt(np.mean(np.concatenate([run.after_dph for run in runs]) ** 2)))
-
-
-REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
+SOURCE = MEASURED / "mpu6000-chamber-cycle" / "data.csv"
 
 
 def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command) -> dict[str, Any]:
     """Everything after the cut is scored once."""
-    if not (REAL / name).is_dir():
-        pytest.skip(f"{name} is absent: see GYROTC_REAL_DATA")
     data = folder / "data"
     data.mkdir()
-    (data / "data.csv").write_bytes((REAL / name / "data.csv").read_bytes())
+    (data / "data.csv").write_bytes((MEASURED / name / "data.csv").read_bytes())
     run = '[[run]]\nfile = "data.csv"\npower_on_s = "unknown"\n'
     (data / "dataset.toml").write_text(
         f'schema = 1\nserial = "R1"\n{run}to_s = {cut_s}\n{run}from_s = {cut_s}\nrole = "exam"\n'
@@ -331,6 +282,7 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
 
 
 @pytest.mark.slow
+@pytest.mark.measured("mpu6000-chamber-cycle")
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_no_name_of_a_measured_cycle_does_harm_on_the_branch_it_has_not_seen(
     axis: str, tmp_path: Path, gyrotc: Command
@@ -349,13 +301,12 @@ def test_no_name_of_a_measured_cycle_does_harm_on_the_branch_it_has_not_seen(
 
 def without(part: str, folder: Path, axis: str, means_s: float) -> Dataset:
     """The measured chamber cycle, of which a part is the exam, as means."""
-    if not SOURCE.is_file():
-        pytest.skip(f"{SOURCE.parent.name} is absent: see GYROTC_REAL_DATA")
-    [split] = [s for s in splits(REAL, folder) if (s.name, s.left_out) == (SOURCE.parent.name, part)]
+    [split] = [s for s in splits(MEASURED, folder) if (s.name, s.left_out) == (SOURCE.parent.name, part)]
     dataset = load(split.folder, axis=axis)
     return averaged(means_s)(dataset) if means_s else dataset
 
 
+@pytest.mark.measured("mpu6000-chamber-cycle")
 @pytest.mark.parametrize("part", ["the cold end", "branch 3"])
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_nothing_is_shipped_from_a_single_cycle(part: str, axis: str, tmp_path: Path) -> None:
@@ -367,21 +318,21 @@ def test_nothing_is_shipped_from_a_single_cycle(part: str, axis: str, tmp_path: 
 
 def cut_out(folder: Path, source: Path, spans: list[tuple[float, float]]) -> Dataset:
     """A data set of some spans of a measured recording."""
-    if not source.is_file():
-        pytest.skip(f"{source.parent.name} is absent: see GYROTC_REAL_DATA")
     (folder / source.name).write_bytes(source.read_bytes())
     runs = [f'[[run]]\nfile = "{source.name}"\npower_on_s = "unknown"\nfrom_s = {a}\nto_s = {b}\n' for a, b in spans]
     (folder / "dataset.toml").write_text(f'schema = 1\nserial = "R1"\n{"".join(runs)}', "utf-8")
     return load(folder, axis="x")
 
 
+@pytest.mark.measured("pan-lsm6dsm-cold")
 def test_more_functions_than_means_are_no_fault(tmp_path: Path) -> None:
     """A ramp of 17 means: a wave beside the map has as many columns, and is not tested."""
-    dataset = cut_out(tmp_path, REAL / "pan-lsm6dsm-cold" / "burst-means.csv", [(0.0, 5000.0)])
+    dataset = cut_out(tmp_path, MEASURED / "pan-lsm6dsm-cold" / "burst-means.csv", [(0.0, 5000.0)])
     result = diagnose(dataset, options=FitOptions(average_s=60.0)).result
     assert all(c.p_value is None or np.isfinite(c.p_value) for c in result.considered)
 
 
+@pytest.mark.measured("mpu6000-chamber-cycle")
 def test_causes_with_a_column_for_every_block_are_no_fault(tmp_path: Path) -> None:
     """144 blocks: a late record hides some of them, and beside a finer map no degree of freedom is left."""
     dataset = without("branch 1", tmp_path, "y", 0.0)
@@ -389,6 +340,7 @@ def test_causes_with_a_column_for_every_block_are_no_fault(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.measured("mpu6000-chamber-cycle")
 def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
     """Every second five minutes: a record that is late by more leaves no sample whose input is known."""
     spans = [(start, start + 300.0) for start in np.arange(1.0, 4246.0, 600.0).tolist()]
@@ -396,6 +348,7 @@ def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.measured("mpu6050-isothermal")
 def test_nothing_is_said_of_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
     result = diagnosed("mpu6050-isothermal", 524.0, "x", tmp_path, gyrotc)
     assert (result["verdict"], result["causes"], result["extended"]) == ("not_testable", [], None)

@@ -16,6 +16,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -41,8 +42,6 @@ def run_alone(*arguments: str | Path) -> tuple[int, str, str]:
 
 @pytest.mark.parametrize("case", [*CSV_CASES, *FOREIGN, *BINARY_CASES, *ANALYSIS_CASES], ids=lambda c: c.id)
 def test_a_file_comes_in_by_one_command(case: Case, tmp_path: Path) -> None:
-    if case.needs and importlib.util.find_spec(case.needs) is None:
-        pytest.skip(f"{case.needs} is not installed")
     seen = truth()
     case.write(tmp_path / case.file, seen)
     out = tmp_path / "RLG-1"
@@ -458,7 +457,6 @@ def test_a_binary_file_of_another_format_is_refused_with_what_to_do(content: byt
 
 @pytest.mark.parametrize("way", ["external", "virtual"])
 def test_values_in_other_files_are_not_read(way: str, tmp_path: Path, run: Run) -> None:
-    h5py = pytest.importorskip("h5py")
     secret = tmp_path / "secret"
     np.arange(500.0).tofile(secret)
     with h5py.File(tmp_path / "other.h5", "w") as other:
@@ -476,7 +474,6 @@ def test_values_in_other_files_are_not_read(way: str, tmp_path: Path, run: Run) 
 
 
 def test_links_to_other_files_are_not_followed(tmp_path: Path, run: Run) -> None:
-    h5py = pytest.importorskip("h5py")
     os.mkfifo(tmp_path / "pipe")  # opened, it would wait for ever
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file["time_s"], file["temperature_c"] = np.arange(500.0), np.linspace(20.0, 40.0, 500)
@@ -488,7 +485,6 @@ def test_links_to_other_files_are_not_followed(tmp_path: Path, run: Run) -> None
 
 
 def test_rows_that_a_logger_file_only_declares_are_refused(tmp_path: Path, run: Run) -> None:
-    h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "log.h5", "w") as file:
         for name in ("time_s", "temperature_c", "rate_dph"):
             file.create_dataset(name, (10**15,), "f8", chunks=(1024,))

@@ -119,8 +119,6 @@ def test_a_process_hands_back_what_the_library_reads(
     case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Tables, columns and every value, as the same code gives them in this process."""
-    if case.needs and importlib.util.find_spec(case.needs) is None:
-        pytest.skip(f"{case.needs} is not installed")
     path = tmp_path / case.file
     case.write(path, truth())
     parsers: list[Parser] = []

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import require
 from gyrotc.verify import all_targets
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -18,8 +19,7 @@ import documents  # noqa: E402
 
 def test_the_readme_shows_what_make_demo_prints(demo: Path) -> None:
     target = all_targets()["cortex-m4f"]
-    if target.missing():
-        pytest.skip(f"{target.missing()} is not installed")
+    require(target.missing())
     printed = (demo / "printed.txt").read_text("utf-8")
     for own, shown in (("data", "build/demo-data"), ("result", "build/demo")):
         printed = printed.replace(str(demo / own), shown)

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import require
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "proof.md").read_text("utf-8")
@@ -63,8 +64,7 @@ def test_without_the_tests_of_a_file_its_lines_are_reported(tmp_path: Path) -> N
     (tmp_path / "tools").mkdir()
     shutil.copy(ROOT / "tools" / "coverage.sh", tmp_path / "tools")
     gcovr = Path(sys.executable).with_name("gcovr")
-    if not gcovr.is_file():
-        pytest.skip("gcovr is not installed: tools/setup.sh test")
+    require(None if gcovr.is_file() else "gcovr")
     done = subprocess.run(
         [tmp_path / "tools" / "coverage.sh"],
         env=os.environ | {"GCOVR": str(gcovr)},

@@ -1,28 +1,22 @@
-"""Measured recordings: every axis, built from end to end; skipped, and reported, where they are absent."""
+"""Measured recordings: every axis, built from end to end."""
 
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import HOST, ROOT, Command
+from conftest import HOST, MEASURED, Command
 
 pytestmark = pytest.mark.slow
 
-REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")
-ABSENT = [name for name in SETS if not (REAL / name).is_dir()]
-SKIPPED = f"{len(ABSENT)} of {len(SETS)} measured recordings are absent: see GYROTC_REAL_DATA"
 
 
 def built(name: str, out: Path, gyrotc: Command) -> dict[str, dict[str, Any]]:
     """Evaluation and model of every axis."""
-    if name in ABSENT:
-        pytest.skip(SKIPPED)
-    done = gyrotc("build", REAL / name, "--axis", "all", "--out", out, *HOST)
+    done = gyrotc("build", MEASURED / name, "--axis", "all", "--out", out, *HOST)
     assert done.returncode == 0, done.stderr
     return {
         axis: {
@@ -36,6 +30,7 @@ def found(result: dict[str, Any]) -> set[str]:
     return {finding["id"] for finding in result["evaluate"]["findings"]}
 
 
+@pytest.mark.measured("mpu6000-chamber-cycle")
 def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(tmp_path: Path, gyrotc: Command) -> None:
     """Whatever is emitted is, on branches left out, no worse than a constant; and it is said."""
     for result in built("mpu6000-chamber-cycle", tmp_path / "out", gyrotc).values():
@@ -50,6 +45,7 @@ def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(tmp_pat
         assert [span["kind"] for span in result["training"]["spans"]] == ["branch"] * 3
 
 
+@pytest.mark.measured("mpu6050-isothermal")
 def test_nothing_can_be_learnt_from_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
     """What the bias does at this temperature may be more than noise; that is all that is found besides."""
     for result in built("mpu6050-isothermal", tmp_path / "out", gyrotc).values():
@@ -61,12 +57,11 @@ def test_nothing_can_be_learnt_from_a_constant_temperature(tmp_path: Path, gyrot
         assert network["w0"] == pytest.approx(mean, abs=10.0)
 
 
+@pytest.mark.measured("mpu6000-chamber-cycle")
 def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Command) -> None:
     """A thousandth of every rate in a folder of another name: the same findings, and now a mean like Earth's rate."""
     name = SETS[0]
-    if name in ABSENT:
-        pytest.skip(SKIPPED)
-    rows = (REAL / name / "data.csv").read_text().splitlines()
+    rows = (MEASURED / name / "data.csv").read_text().splitlines()
     results = []
     for folder, scale in ((tmp_path / name, 1.0), (tmp_path / SETS[1], 1e-3)):
         scaled = [",".join([*line.split(",")[:2], f"{float(line.split(',')[2]) * scale!r}"]) for line in rows[1:]]

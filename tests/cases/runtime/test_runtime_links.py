@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import quick_and_slow
+from conftest import quick_and_slow, require
 from gyrotc.common import runtime_folders
 from gyrotc.mirror import E_ID, E_IMAGE, E_LAYOUT, SERIAL_WORDS, Table, Words
 from gyrotc.model import Model, Term
@@ -204,8 +204,7 @@ C_FLAGS = ("-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", 
 @pytest.mark.parametrize("name", ["host-gcc-O2", "cortex-m4f"])
 def test_the_snippet_of_the_readme_compiles_links_and_corrects(name: str, tmp_path: Path) -> None:
     target = all_targets()[name]
-    if missing := target.missing():
-        pytest.skip(f"{missing} is not installed")
+    require(target.missing())
     snippet = re.findall(r"```c [^\n]*\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     model = random_model(1, serial="SIM-0001")
     emit(model, tmp_path)
@@ -269,8 +268,7 @@ def test_macros_of_an_emitted_header_are_those_of_the_model(tmp_path: Path) -> N
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 def test_read_only_bytes_of_the_header_are_those_of_a_compiled_table(numeric: str, tmp_path: Path) -> None:
     target = all_targets()["cortex-m4f"]
-    if target.missing():
-        pytest.skip(f"{target.missing()} is not installed")
+    require(target.missing())
     model = random_model(3, serial="SIM-0003")
     emit(model, tmp_path, numerics=[numeric])
     c = tmp_path / "c"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import MEASURED
 from gyrotc.common import InputError
 from gyrotc.recordings import SIMPLE, Dataset, Run, load
 from gyrotc.train import (
@@ -48,7 +48,6 @@ from gyrotc.train import (
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
 
-REAL = Path(os.environ.get("GYROTC_REAL_DATA", ROOT / ".." / "shared" / "data" / "real"))
 Change = Callable[[TrainingData], TrainingData]
 
 
@@ -303,11 +302,10 @@ def close(whole: Fitted, parts: Fitted) -> None:
     assert np.abs(two - one).max() <= 0.02 * max(float(np.ptp(one)), whole.model.noise_floor_dph or 0.0)
 
 
+@pytest.mark.measured("mpu6000-chamber-cycle")
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path: Path, axis: str) -> None:
-    source = REAL / "mpu6000-chamber-cycle" / "data.csv"
-    if not source.is_file():
-        pytest.skip("1 of 1 measured recordings is absent: see GYROTC_REAL_DATA")
+    source = MEASURED / "mpu6000-chamber-cycle" / "data.csv"
     names = source.read_text("utf-8").split("\n", 1)[0].split(",")
     table = dict(zip(names, np.loadtxt(source, delimiter=",", skiprows=1).T, strict=True))
     table = {"time_s": table["time_s"], "temperature_c": table["temperature_c"], "rate_dph": table[f"rate_{axis}_dph"]}

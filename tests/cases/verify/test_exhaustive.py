@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, Command
+from conftest import ROOT, Command, require
 from emitted import emitted, measured, spoil
 from gyrotc.common import CheckFailed, InputError
 from gyrotc.mirror import evaluate_map
@@ -169,8 +169,7 @@ def test_a_stack_without_a_bound_is_refused() -> None:
 
 def test_every_public_function_of_the_emitted_runtime_has_its_costs(tmp_path: Path) -> None:
     target = all_targets()["cortex-m4f"]
-    if target.missing():
-        pytest.skip(f"{target.missing()} is not installed")
+    require(target.missing())
     folder = emitted(tmp_path / "model")
     (folder / "c" / "gtc_config.h").write_text("")  # the defaults, which the header states
     costs = function_costs(runtime_object(target, folder / "c", tmp_path))

@@ -194,7 +194,6 @@ def test_works_in_its_folder_without_input_and_without_core_dumps(tmp_path: Path
     assert _python(code, tmp_path) == (0, f"{tmp_path} True (0, 0)\n")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not have every limit")
 def test_memory_and_files_are_limited(tmp_path: Path) -> None:
     status, said = _python("x = bytearray(3 * 2**30)", tmp_path)
     assert status == 1 and "MemoryError" in said

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import packed
+from conftest import packed, require
 from emitted import emitted
 from gyrotc.common import CheckFailed, InputError
 from gyrotc.results import cache
@@ -227,8 +227,7 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
 @pytest.mark.parametrize("name", ["host-gcc-O2", pytest.param("cortex-m4f", marks=pytest.mark.slow)])
 def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, compiled: _Compiled) -> None:
     target = all_targets()[name]
-    if target.missing():
-        pytest.skip(f"{target.missing()} is not installed")
+    require(target.missing())
     job = replace(job_of(emitted(tmp_path / "a")), trusted=False)
     first = [entry.content() for entry in board_entries(job, target)]
     assert all(entry["status"] == "pass" for entry in first)

@@ -139,7 +139,6 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="there is no /proc")
 @pytest.mark.parametrize("name", quick_and_slow(_QUICK, [name for name in COMMANDS if name not in _QUICK]))
 def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
     """At a moment drawn within the first second and a half: imports, work, or its end."""

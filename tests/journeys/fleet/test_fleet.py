@@ -307,15 +307,11 @@ def test_alike_gyros_do_not_stand_apart_by_a_hair() -> None:
     assert [o.name for o in outlying_units(entries)] == ["3"]
 
 
-def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command) -> None:
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
-        gyro(tmp_path / "d" / "RLG-1", "RLG-1")
-        done = gyrotc("fleet", tmp_path / "d", "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:8786")
-        assert done.returncode == 2 and "Dask is not installed" in done.stderr
-    else:
-        pytest.skip("Dask is installed")
+def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)  # as where it is not installed
+    gyro(tmp_path / "d" / "RLG-1", "RLG-1")
+    done = gyrotc("fleet", tmp_path / "d", "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:8786")
+    assert done.returncode == 2 and "Dask is not installed" in done.stderr
 
 
 @pytest.mark.slow

@@ -16,14 +16,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import distributed
 import pytest
 from conftest import ROOT, Command, on_terminal
 from gyrotc.fleet import Cluster, load_manifest, run_fleet
 from gyrotc.fleet import run as running
 from gyrotc.results import MARKER, FleetEntry
 from recordings import columns, toml, write_csv
-
-distributed = pytest.importorskip("distributed", reason="Dask is not installed")
 
 SERIALS = ("RLG-1", "RLG-2", "RLG-3")
 WORKERS = ("anna", "bert")

@@ -51,7 +51,8 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    import distributed
+
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
         cluster = Cluster(local.scheduler_address, 60.0)
         entries = run_fleet(load_manifest(lot / "d"), lot / "dask", cluster=cluster)

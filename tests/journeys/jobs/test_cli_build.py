@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -14,8 +13,9 @@ from types import SimpleNamespace
 
 import gyrotc
 import numpy as np
+import pandas as pd
 import pytest
-from conftest import EXAMPLE, HOST, Command, run_gyrotc
+from conftest import EXAMPLE, HOST, MEASURED, Command, run_gyrotc
 from gyrotc.assess import evaluate
 from gyrotc.common import InputError
 from gyrotc.model import load_model
@@ -23,8 +23,6 @@ from gyrotc.pages import failed_checks, write_report
 from gyrotc.recordings import load
 from gyrotc.results import MapError
 from recordings import columns, state, write_csv
-
-REAL = Path(os.environ.get("GYROTC_REAL_DATA", Path(__file__).resolve().parents[4] / "shared/data/real"))
 
 
 def _json(path: Path) -> dict:
@@ -136,10 +134,10 @@ def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:
     assert (demo / "result" / "report.html").read_bytes() == before
 
 
-@pytest.mark.skipif(not (REAL / "mpu6000-chamber-cycle").is_dir(), reason="no real recordings here")
+@pytest.mark.measured("mpu6000-chamber-cycle")
 @pytest.mark.slow
 def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyrotc: Command) -> None:
-    done = gyrotc("build", REAL / "mpu6000-chamber-cycle", "--axis", "z", *HOST, "--out", tmp_path / "r")
+    done = gyrotc("build", MEASURED / "mpu6000-chamber-cycle", "--axis", "z", *HOST, "--out", tmp_path / "r")
     assert done.returncode == 0, done.stderr
     evaluation = _json(tmp_path / "r" / "evaluate.json")
     assert evaluation["exam"] is None
@@ -310,9 +308,6 @@ def test_every_other_command_that_reads_a_model_refuses(demo: Path, tmp_path: Pa
         assert "networks" in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "o").exists()
     assert before == {p: p.read_bytes() for p in result.rglob("*") if p.is_file()}
-
-
-pd = pytest.importorskip("pandas")
 
 
 def frame(seed: int) -> pd.DataFrame:

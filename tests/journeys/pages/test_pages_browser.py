@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import CHROMIUM, Browser, browser
+from browser import Browser, browser
 from conftest import HOST, Command
 from recordings import columns, toml, write_csv
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: tools/setup.sh picture")
 
 PAGES = ("unit", "axes", "fleet", "diagnosis")
 

@@ -77,14 +77,6 @@ def _run(*command: str | Path, cwd: Path | None = None, **environment: str) -> s
     return done.stdout
 
 
-def _need(program: str) -> str:
-    """Path of a program of this machine; without it the test is skipped by its name."""
-    path = shutil.which(program)
-    if path is None:
-        pytest.skip(f"{program} is not installed")
-    return path
-
-
 @pytest.fixture(scope="module")
 def ramp(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What the C functions give."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -56,8 +55,6 @@ def test_the_commands_of_a_page_run_and_leave_nothing_to_be_tracked(
     name: str, gyros: dict[str, Path], tmp_path: Path
 ) -> None:
     """What stands in blocks, else `make`; what they write is ignored by git."""
-    if shutil.which("git") is None:
-        pytest.skip("git is not installed")
     for part in ("examples", "include", "libc"):
         shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("build", "__pycache__"))
     shutil.copy(ROOT / ".gitignore", tmp_path)
@@ -134,14 +131,6 @@ def test_a_damaged_image_is_not_used_nor_passed_over(gyros: dict[str, Path], fir
 def test_interrupt_and_task_on_the_host(tmp_path: Path) -> None:
     reported = _run("make", "-s", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
     assert re.search(r"\d+ increments, 5 readings, 0\.\d+ arcsec taken away", reported)
-
-
-def test_interrupt_and_task_with_freertos(tmp_path: Path) -> None:
-    kernel = os.environ.get("FREERTOS")
-    if kernel is None:
-        pytest.skip("FREERTOS names no folder of the FreeRTOS kernel")
-    reported = _run("make", "-s", f"FREERTOS={kernel}", f"OUT={tmp_path}", cwd=EXAMPLES / "rtos")
-    assert "320 increments, 5 readings" in reported
 
 
 def test_a_filter_in_cpp_integrates_the_corrected_rate(tmp_path: Path) -> None:

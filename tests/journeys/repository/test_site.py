@@ -1,10 +1,11 @@
-"""The site of the documents: what its pages are made of and, where `make site` was run, the pages in a browser."""
+"""The site of the documents: what its pages are made of, and the pages in a browser."""
 
 from __future__ import annotations
 
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,11 +14,11 @@ from urllib.parse import unquote, urlsplit
 import pytest
 import reference
 import site_pages
-from browser import CHROMIUM, Browser, browser
-from conftest import ROOT
+from browser import Browser, browser
+from conftest import ROOT, require
 
 PAGES = sorted((ROOT / "docs").rglob("*.md")) + sorted(p for p in site_pages.beside() if p.suffix == ".md")
-MKDOCS = ROOT / "build" / "site-tools" / "bin" / "mkdocs"
+MKDOCS = Path(sys.executable).with_name("mkdocs")
 _SEARCH = """(async () => {
   const field = document.querySelector('.md-search__input');
   field.focus();
@@ -79,8 +80,7 @@ class _References(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, made anew."""
-    if not MKDOCS.is_file():
-        pytest.skip("mkdocs is not installed: make site")
+    require(None if MKDOCS.is_file() else "mkdocs")
     folder = tmp_path_factory.mktemp("site")
     command = [MKDOCS, "build", "-q", "--strict", "-f", "docs/mkdocs.yml", "-d", folder]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -111,8 +111,6 @@ def test_the_site_has_the_pages_that_are_made(site: Path) -> None:
 
 @pytest.fixture(scope="module")
 def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed: tools/setup.sh picture")
     with browser(tmp_path_factory.mktemp("browser"), trusting=False) as opened:
         yield opened
 

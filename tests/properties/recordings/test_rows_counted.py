@@ -347,7 +347,8 @@ def test_a_packed_file_is_counted_too(tmp_path: Path, gyrotc: Command) -> None:
 
 
 def workbook(path: Path, *sheets: Sequence[str]) -> None:
-    openpyxl = pytest.importorskip("openpyxl")
+    import openpyxl
+
     book = openpyxl.Workbook()
     book.remove(book.active)
     for lines in sheets:
