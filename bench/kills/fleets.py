@@ -107,11 +107,11 @@ def _of_csv(path: Path) -> Iterator[tuple[str, Row]]:
 
 
 def _figures(row: Mapping[str, Any]) -> dict[str, str]:
-    figures = {k: f"{float(row[k]):.4g}" for k in ("before_rms_dph", "after_rms_dph", "bias_dph") if k in row}
+    figures = {k: f"{float(row[k]):.4g}" for k in ("constant_rms_dph", "after_rms_dph", "bias_dph") if k in row}
     return figures | ({"model_hash": row["model_hash"]} if "model_hash" in row else {})
 
 
 def _of_page(path: Path) -> Iterator[tuple[str, Row]]:
     for status, name, rest in _ROW.findall(path.read_text()):
         values = [f"{float(value):.4g}" for value in _VALUE.findall(rest)]
-        yield name, (status, dict(zip(("before_rms_dph", "after_rms_dph"), values, strict=False)))
+        yield name, (status, dict(zip(("constant_rms_dph", "after_rms_dph"), values, strict=False)))

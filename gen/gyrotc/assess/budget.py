@@ -21,6 +21,7 @@ from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from .. import __version__
 from ..common.arrays import FloatArray
@@ -193,7 +194,6 @@ _MEASURAND = (
     "clamped, noise of the rate not included"
 )
 _FIT_FREEDOM = 22.0  # 2/0.3²: training knows the logarithm of this variance to 0.3 (JCGM 100:2008, G.4.2)
-_SHOWN = 2.0  # standard errors beyond which spans left out say more than the map's own uncertainty does
 _PLANE = 3  # coefficients beside those of the centers
 
 
@@ -298,28 +298,59 @@ def _of_map(total: float, of_noise: float, between: float, runs: int) -> Iterato
 
 
 def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Contribution | str:
-    """What recordings that were left out show beyond floor and map; 0 where it is within two standard errors."""
+    """Return what recordings that were left out show beyond noise floor and map.
+
+    The excess of their mean square is known with an error, and it cannot be negative. Its expectation under both is
+    what counts: it falls to nothing only where many means show that nothing is there.
+    """
     judged = evaluation.judged()
-    known = (evaluation.uncertainty or {}).get("rms_dph")
-    floor = evaluation.noise_floor_dph
     rms = judged[1].after.rms_dph if judged and judged[0] != "train" else None
-    if judged is None or rms is None or known is None or not floor:
-        return "thermal history that was not trained: no recordings were left out to tell it"
+    if judged is None or rms is None:
+        constant = evaluation.train.constant.rms_dph if evaluation.train else None
+        if constant is None:
+            return "thermal history that was not trained: no recordings were left out to tell it"
+        return part(
+            "unseen",
+            "thermal history and rates that were not trained",
+            constant,
+            "no recordings were left out, so the map is not shown to be better than a constant: what that leaves",
+        )
+    known = (evaluation.uncertainty or {}).get("rms_dph")
+    floor = evaluation.noise_floor_dph or 0.0
     means = training.samples * training.block_s / training.average_s
     # Relative standard error of a floor from successive differences (von Neumann): sqrt(3/4n)
     of_floor = 0.0 if evaluation.noise_floor_source == "simulated" else math.sqrt(0.75 / max(means, 1.0))
-    excess = rms**2 - floor**2 - explained**2
-    error = 2.0 * math.hypot(rms * known.standard, floor**2 * of_floor)
-    shown = excess > _SHOWN * error
+    expected = floor**2 + explained**2
+    # Few means can agree by chance: not less than as many independent ones of at least the expected size allow.
+    of_square = max(
+        2.0 * rms * known.standard if known else 0.0, max(rms**2, expected) * math.sqrt(2.0 / judged[1].samples)
+    )
+    error = math.hypot(of_square, 2.0 * floor**2 * of_floor)
     return part(
         "unseen",
         "thermal history and rates that were not trained",
-        math.sqrt(excess) if shown else 0.0,
-        f"{PARTS[judged[0]]}, beyond noise floor and map" + ("" if shown else ": nothing is shown"),
-        freedom=known.freedom,
+        math.sqrt(positive_mean(rms**2 - expected, error)),
+        f"{judged[1].samples} means of {PARTS[judged[0]]}, beyond noise floor and map",
+        freedom=known.freedom if known else float(judged[1].samples),
         statistical=True,
     )
 
+
+def positive_mean(value: float, sigma: float) -> float:
+    """Return the mean of a normal distribution about `value` of which only the positive half is possible.
+
+    It rises with `value` and with `sigma`: what is known less well counts more.
+    """
+    if sigma <= 0.0:
+        return max(value, 0.0)
+    z = value / sigma
+    if z < _FAR_BELOW:  # by its asymptotic series, where the difference below would cancel
+        return -sigma / z
+    return value + sigma * math.exp(-0.5 * z * z - float(log_ndtr(z))) / math.sqrt(2.0 * math.pi)
+
+
+# Standard deviations below zero from which the asymptotic series of a truncated mean is right to 1 %.
+_FAR_BELOW = -14.0
 
 _BLOCK_S = 7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
 _LEAST_BLOCKS = 8  # shorter ones where an hour would give fewer: fewer squares hardly tell a variance
@@ -331,6 +362,7 @@ def figure_uncertainties(
     runs: Sequence[EvaluatedRun],
     average_s: float,
     *,
+    constant_dph: float = 0.0,
     scale: float = 1.0,
     floor: tuple[float, int | None] | None = None,
 ) -> dict[str, FigureUncertainty]:
@@ -340,12 +372,13 @@ def figure_uncertainties(
         judged: Means over `average_s` of the runs that the model is judged by.
         runs: These runs as they were evaluated.
         average_s: Averaging, s.
+        constant_dph: The constant that `improvement` compares the correction with.
         scale: 1, or the RMS of spans left out over that of `judged`, where these are training runs that stand in for
             them.
         floor: The noise floor (deg/h), and the number of means that it was estimated from (None: of a simulation).
     """
     blocks = _blocks(judged, average_s)
-    found = _jackknife(blocks) if len(blocks) >= 2 else {}
+    found = _jackknife(blocks, constant_dph) if len(blocks) >= 2 else {}
     after = np.concatenate([a.after_dph for a in judged]) if judged else np.zeros(0)
     if after.size > 1:
         # Of the largest magnitude of n normal numbers: pi/sqrt(6) times Gumbel's scale sigma/sqrt(2 ln 2n)
@@ -391,22 +424,34 @@ def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[FloatArr
     return parts
 
 
-def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> dict[str, FigureUncertainty]:
-    sums = np.array([(a.size, a.sum(), (a**2).sum(), (b**2).sum()) for b, a in blocks])
-    n, first, second, before = (sums.sum(axis=0) - sums).T
+def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]], constant_dph: float) -> dict[str, FigureUncertainty]:
+    """Return what deleting one block at a time says of each figure; not less than for independent means.
+
+    Few blocks can agree by chance. Noise of a gyro is white at best, so as many independent normal numbers are the
+    least that a figure can be unknown by.
+    """
+    sums = np.array([(a.size, a.sum(), (a**2).sum(), ((b - constant_dph) ** 2).sum()) for b, a in blocks])
+    total = sums.sum(axis=0)
+    n, first, second, constant = (total - sums).T
     mean = first / n
     figures = {
         "rms_dph": np.sqrt(second / n),
         "std_dph": np.sqrt(np.maximum(second / n - mean**2, 0.0)),
         "mean_dph": mean,
     }
+    rms = math.sqrt(total[2] / total[0])
+    least = {"rms_dph": rms / math.sqrt(2.0 * total[0]), "mean_dph": rms / math.sqrt(total[0])}
+    least["std_dph"] = least["rms_dph"]
     if second.all():
-        figures["improvement"] = np.sqrt(before / second)
+        figures["improvement"] = np.sqrt(constant / second)
+        least["improvement"] = math.sqrt(total[3] / total[2]) / math.sqrt(2.0 * total[0])
     count = len(blocks)
     method = f"jackknife over {count} blocks of the recordings"
     return {
         name: FigureUncertainty(
-            standard=float(np.sqrt((count - 1) * np.var(values))), freedom=float(count - 1), method=method
+            standard=max(float(np.sqrt((count - 1) * np.var(values))), least[name]),
+            freedom=float(count - 1),
+            method=method,
         )
         for name, values in figures.items()
     }

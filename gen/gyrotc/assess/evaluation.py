@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,7 @@ from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
 from .findings import beyond_noise, findings_of, residual_test
+from .requirements import requirements_of
 
 __all__ = ["AnsweredRows", "Watch", "evaluate"]
 
@@ -189,7 +190,12 @@ def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, Figu
         samples = max(result.train.samples, 1) if result.train else 1
         floor = (result.noise_floor_dph, None if result.noise_floor_source == "simulated" else samples)
     found = figure_uncertainties(
-        [a for a, _ in own], [run for _, run in own], result.average_s, scale=scale, floor=floor
+        [a for a, _ in own],
+        [run for _, run in own],
+        result.average_s,
+        constant_dph=result.constant_dph,
+        scale=scale,
+        floor=floor,
     )
     return found or None
 
@@ -309,7 +315,11 @@ def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:
     return Statistics(**statistics_of(np.concatenate([part.robust.after_dph for part in parts])))
 
 
-def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
+def _run_statistics(a: Averages, average_s: float) -> RunStatistics:
+    return RunStatistics(**statistics_of(a.after_dph), **time_statistics(a, average_s))
+
+
+def _evaluated(part: _Part, average_s: float, constant_dph: float) -> EvaluatedRun:
     run, a = part.run, part.averages
     entry = EvaluatedRun(
         file=run.file,
@@ -317,7 +327,8 @@ def _evaluated(part: _Part, average_s: float) -> EvaluatedRun:
         environment=run.environment,
         samples=int(a.after_dph.size),
         before=Statistics(**statistics_of(a.before_dph)),
-        after=RunStatistics(**statistics_of(a.after_dph), **time_statistics(a, average_s)),
+        constant=_run_statistics(replace(a, after_dph=a.before_dph - constant_dph), average_s),
+        after=_run_statistics(a, average_s),
     )
     if part.outlier_rows:
         robust = {"outlier_rows": part.outlier_rows, "without_outliers": _without_outliers([part])}
@@ -335,6 +346,7 @@ def _result(
     floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
     source = "simulated" if floor is not None else model.noise_floor_source
     compared = [p.mismatches for p in parts if p.mismatches is not None]
+    constant_dph = model.fallback_dph
     return Evaluation(
         gyrotc_version=__version__,
         serial=model.serial,
@@ -344,10 +356,12 @@ def _result(
         average_s=average_s,
         noise_floor_dph=floor if floor is not None else model.noise_floor_dph,
         noise_floor_source=source,
+        constant_dph=constant_dph,
+        requirements=requirements_of(model, [p.run for p in parts], [p.facts for p in parts], exam),
         mismatches=sum(compared) if len(compared) == len(parts) else None,
-        runs=tuple(_evaluated(p, average_s) for p in parts),
-        train=Pooled.of(train) if train else None,
-        exam=Pooled.of(exam) if exam else None,
+        runs=tuple(_evaluated(p, average_s, constant_dph) for p in parts),
+        train=Pooled.of(train, constant_dph) if train else None,
+        exam=Pooled.of(exam, constant_dph) if exam else None,
         without_outliers=_without_outliers([p for p in parts if p.run.role == ("exam" if exam else "train")]),
         findings=(),
         model=ModelSizes(

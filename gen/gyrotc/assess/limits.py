@@ -5,7 +5,8 @@ limit, fail beyond. `guard_band_binary` (4.2.2): pass up to AL, fail beyond. `si
 the limit, w = 0. The guard band is w = U: of what passes at most 2.3 % is beyond its limit.
 
 Where `evaluate` and `verify` say what is, this says whether it is enough. A figure that was not measured does not
-keep a limit.
+keep a limit. What the recordings lack (`requirements`) bounds the verdict, whatever the figures are; and of each limit
+it is said whether a constant for a correction would keep it, too.
 """
 
 from __future__ import annotations
@@ -24,15 +25,24 @@ from .. import __version__
 from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
 from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
-from ..results.evaluation import Evaluation, FigureUncertainty
-from ..results.release import DecisionRule, HeldLimits, Instrument, JudgedOn, Limit, Value, Verdict, Verification
+from ..results.decision import worst_of
+from ..results.evaluation import Evaluation, FigureUncertainty, RunStatistics, Statistics
+from ..results.release import (
+    DecisionRule,
+    HeldLimits,
+    Instrument,
+    JudgedOn,
+    Limit,
+    Value,
+    Verdict,
+    Verification,
+)
 from ..verify.toolchain import all_targets
 from .product_guards import ProductGuard
+from .requirements import LEAST_FREEDOM
 
 _NORMAL = NormalDist()
 _UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
-_ORDER: tuple[Verdict, ...] = ("PASS", "CONDITIONAL PASS", "FAIL")
-_LEAST_FREEDOM = 5.0  # with fewer, U is unknown by a third: 1/sqrt(2 freedom), JCGM 100:2008, E.4.3
 _ON_TRAINING = (
     "judged on the training runs themselves, which a fit follows too well: record a run for the exam and give it "
     'role = "exam"'
@@ -52,6 +62,9 @@ def decided(
     rule: DecisionRule,
     known: FigureUncertainty | str | None,
     part: JudgedOn | None = None,
+    *,
+    constant: float | None = None,
+    allowed: Sequence[tuple[Verdict, str]] = (),
 ) -> Limit:
     """Holds an amount with its uncertainty against a limit, by a decision rule.
 
@@ -65,18 +78,28 @@ def decided(
             be kept.
         part: What the figure was measured on; None: not on recordings. Of training runs, and with fewer than 5
             degrees of freedom where the uncertainty counts, a pass is a conditional one, by any rule.
+        constant: What a constant for a correction would give; None: the figure is not one of a correction.
+        allowed: Verdicts that the recordings allow at most, with the reasons.
     """
     one = _by_rule(name, measured, bound, sign, rule, known)
-    few = one.degrees_of_freedom is not None and one.degrees_of_freedom < _LEAST_FREEDOM
-    reasons = []
+    few = one.degrees_of_freedom is not None and one.degrees_of_freedom < LEAST_FREEDOM
+    reasons: list[tuple[Verdict, str]] = list(allowed) if part is not None else []
     if part == "train" and measured is not None:
-        reasons.append(_ON_TRAINING)
+        reasons.append(("CONDITIONAL PASS", _ON_TRAINING))
     if few and rule != "simple_acceptance":
-        reasons.append(
-            f"its uncertainty has fewer than {_LEAST_FREEDOM:g} degrees of freedom: record longer or more runs"
-        )
-    verdict = worst_of((one.verdict, "CONDITIONAL PASS" if reasons else None))
-    return one.model_copy(update={"part": part, "capped": "; ".join(reasons), "verdict": verdict})
+        why = f"its uncertainty has fewer than {LEAST_FREEDOM:g} degrees of freedom: record longer or more runs"
+        reasons.append(("CONDITIONAL PASS", why))
+    verdict = worst_of((one.verdict, *(most for most, _ in reasons))) or one.verdict
+    return one.model_copy(
+        update={
+            "part": part,
+            "capped": tuple(why for _, why in reasons),
+            "verdict": verdict,
+            "met": verdict in ("PASS", "CONDITIONAL PASS"),
+            "constant": constant,
+            "constant_passes": constant is not None and sign * (bound - constant) >= 0.0,
+        }
+    )
 
 
 def _by_rule(
@@ -125,11 +148,6 @@ def _bare(name: str, measured: float | None, bound: float, sign: float, why: str
     return Limit(
         limit=name, measured=measured, bound=bound, met=met, verdict="PASS" if met else "FAIL", uncertainty_from=why
     )
-
-
-def worst_of(verdicts: Iterable[Verdict | None]) -> Verdict | None:
-    """The gravest of several verdicts; None where there is none: nothing was judged."""
-    return max((v for v in verdicts if v), key=_ORDER.index, default=None)
 
 
 class StatedInstrument(Instrument):
@@ -315,23 +333,27 @@ def held_against(limits: Limits, model: Model, evaluation: Evaluation, verificat
     """Every limit with what was measured, and whether all are met."""
     covers = limits.covers.model_dump(exclude_none=True)
     has = {name: getattr(model.envelope, name) for name in covers}
+    allowed = [(one.verdict, f"{one.text}. {one.next}") for one in evaluation.requirements if not one.met]
     checks = (
-        *_amounts(limits, _measured(model, evaluation, verification), evaluation),
+        *_amounts(limits, _measured(model, evaluation, verification), evaluation, allowed),
         *(
             _limit(f"covers.{name}", a, (low, high), a[0] <= low and high <= a[1], "range of the recordings")
             for (name, (low, high)), a in zip(covers.items(), has.values(), strict=True)
         ),
         *_needs(limits.needs, evaluation, verification),
     )
+    reasons = (*(why for _, why in allowed), *(why for one in checks for why in one.capped))
+    verdict = worst_of((*(check.verdict for check in checks), *(most for most, _ in allowed))) if checks else None
     return HeldLimits(
         gyrotc_version=__version__,
         serial=model.serial,
         axis=model.axis,
         product=limits.product,
         sha256=limits.sha256,
-        met=bool(checks) and all(check.met for check in checks),
+        met=verdict in ("PASS", "CONDITIONAL PASS"),
         limits=checks,
-        verdict=worst_of(check.verdict for check in checks),
+        verdict=verdict,
+        capped=tuple(dict.fromkeys(reasons)) if checks else (),
         decision_rule=limits.decision_rule,
     )
 
@@ -340,25 +362,9 @@ def _measured(model: Model, evaluation: Evaluation, verification: Verification |
     """Figures by the names of limits; None: not measured."""
     found = evaluation.judged()
     judged = found[1] if found else None
-    role = "exam" if evaluation.exam else "train"
-    runs = [run.after for run in evaluation.runs if run.role == role]
-    after = judged.after if judged else None
-    floor, rms = evaluation.noise_floor_dph, after.rms_dph if after else None
     cells = "".join(model.coverage.rows) if model.coverage else ""
     sigma = model.uncertainty_dph
-
-    def worst(values: Iterable[float | None]) -> float | None:
-        return max((value for value in values if value is not None), default=None)
-
-    return {
-        "rms_dph": rms,
-        "std_dph": after.std_dph if after else None,
-        "max_abs_dph": after.max_abs_dph if after else None,
-        "mean_dph": abs(after.mean_dph) if after and after.mean_dph is not None else None,
-        "rms_over_floor": rms / floor if floor and rms is not None else None,
-        "rms_30min_dph": worst(run.rms_30min_dph for run in runs),
-        "angle_1h_arcsec": worst(run.angle_1h_arcsec for run in runs),
-        "first_10min_rms_dph": worst(run.first_10min_rms_dph for run in runs),
+    return _of_correction(evaluation, "after") | {
         "uncertainty_dph": max(max(row) for row in sigma.rows) if sigma else None,
         "error_bound_dph": verification.error_bound_dph if verification else None,
         "centers": evaluation.model.centers,
@@ -368,6 +374,34 @@ def _measured(model: Model, evaluation: Evaluation, verification: Verification |
         "rows_left_out": evaluation.rows_left_out,
         "improvement": judged.improvement if judged else None,
         "covered": cells.count("1") / len(cells) if cells else None,
+    }
+
+
+def _of_constant(evaluation: Evaluation) -> dict[str, Any]:
+    """Return the figures that a constant for a correction would have, by the names of limits."""
+    return _of_correction(evaluation, "constant") | {"improvement": 1.0}
+
+
+def _of_correction(evaluation: Evaluation, name: Literal["after", "constant"]) -> dict[str, Any]:
+    """Return figures of what a correction leaves of the recordings, by the names of limits; None: not measured."""
+    found = evaluation.judged()
+    role = "exam" if evaluation.exam else "train"
+    runs: list[RunStatistics] = [getattr(run, name) for run in evaluation.runs if run.role == role]
+    pooled: Statistics | None = getattr(found[1], name) if found else None
+    floor, rms = evaluation.noise_floor_dph, pooled.rms_dph if pooled else None
+
+    def worst(values: Iterable[float | None]) -> float | None:
+        return max((value for value in values if value is not None), default=None)
+
+    return {
+        "rms_dph": rms,
+        "std_dph": pooled.std_dph if pooled else None,
+        "max_abs_dph": pooled.max_abs_dph if pooled else None,
+        "mean_dph": abs(pooled.mean_dph) if pooled and pooled.mean_dph is not None else None,
+        "rms_over_floor": rms / floor if floor and rms is not None else None,
+        "rms_30min_dph": worst(run.rms_30min_dph for run in runs),
+        "angle_1h_arcsec": worst(run.angle_1h_arcsec for run in runs),
+        "first_10min_rms_dph": worst(run.first_10min_rms_dph for run in runs),
     }
 
 
@@ -388,8 +422,10 @@ def _limit(name: str, measured: Value, bound: Value, met: bool, why: str) -> Lim
     return Limit(limit=name, measured=measured, bound=bound, met=met, verdict=verdict, uncertainty_from=why)
 
 
-def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -> Iterator[Limit]:
-    known, judged = evaluation.uncertainty or {}, evaluation.judged()
+def _amounts(
+    limits: Limits, measured: dict[str, Any], evaluation: Evaluation, allowed: Sequence[tuple[Verdict, str]]
+) -> Iterator[Limit]:
+    known, judged, constant = evaluation.uncertainty or {}, evaluation.judged(), _of_constant(evaluation)
     role: JudgedOn | None = judged[0] if judged else None
 
     def measured_on(name: str) -> JudgedOn | None:
@@ -407,6 +443,8 @@ def _amounts(limits: Limits, measured: dict[str, Any], evaluation: Evaluation) -
                 limits.decision_rule,
                 _NOT_RANDOM.get(name) or known.get(name),
                 measured_on(name),
+                constant=constant.get(name),
+                allowed=allowed,
             )
 
 

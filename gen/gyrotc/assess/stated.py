@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from ..common.errors import InputError
 from ..model import Model
-from ..results.evaluation import Changes, Evaluation, Pooled
+from ..results.evaluation import Changes, Evaluation, Pooled, ratio_of
 from ..results.release import Budget, HeldLimits, Verification, VerifiedTarget
 from ..results.training import Training
 from .budget import AGEING, budget_of
@@ -44,7 +44,9 @@ def check_stated(
     Raises:
         InputError: A figure, a decision or an uncertainty is not what the other results give.
     """
-    _check_figures(evaluation, str(folder / "evaluate.json"))
+    where = str(folder / "evaluate.json")
+    _same(evaluation.constant_dph, model.fallback_dph, f"{where}, field constant_dph")
+    _check_figures(evaluation, where)
     if limits is not None:
         _check_limits(limits, model, evaluation, verification, str(folder / "limits.json"))
     if budget is not None:
@@ -63,7 +65,7 @@ def _check_figures(evaluation: Evaluation, where: str) -> None:
         n = sum(run.samples for run in runs)
         if (pooled.samples if pooled else 0) != n:
             raise InputError(f"{where}, field {role}.samples", "is not that of the runs", _EXPECTED)
-        for side in ("before", "after") if pooled and n else ():
+        for side in ("before", "constant", "after") if pooled and n else ():
             stated = getattr(pooled, side)
             parts = [(run.samples, getattr(run, side)) for run in runs if run.samples]
             mean = math.fsum(k * (s.mean_dph or 0.0) for k, s in parts) / n
@@ -72,18 +74,23 @@ def _check_figures(evaluation: Evaluation, where: str) -> None:
             _same(stated.mean_dph, mean, f"{where}, field {role}.{side}.mean_dph", math.sqrt(square))
             _same(stated.rms_dph, math.sqrt(square), f"{where}, field {role}.{side}.rms_dph")
             _same(stated.max_abs_dph, largest, f"{where}, field {role}.{side}.max_abs_dph")
+        if pooled and n:
+            expected = (pooled.before.mean_dph or 0.0) - evaluation.constant_dph
+            scale = abs(evaluation.constant_dph)
+            _same(pooled.constant.mean_dph, expected, f"{where}, field {role}.constant.mean_dph", scale)
     for role, pooled in (("train", evaluation.train), ("exam", evaluation.exam), ("left_out", evaluation.left_out)):
         if pooled is not None:
             _check_pooled(pooled, f"{where}, field {role}")
 
 
 def _check_pooled(pooled: Pooled, where: str) -> None:
-    for side in ("before", "after"):
+    for side in ("before", "constant", "after"):
         s = getattr(pooled, side)
         if None not in (s.rms_dph, s.mean_dph, s.std_dph):
             _same(s.rms_dph, math.hypot(s.mean_dph, s.std_dph), f"{where}.{side}.std_dph")
-    was, remains = pooled.before.rms_dph, pooled.after.rms_dph
-    _same(pooled.improvement, was / remains if was is not None and remains else None, f"{where}.improvement")
+    left = pooled.after.rms_dph
+    _same(pooled.improvement, ratio_of(pooled.constant.rms_dph, left), f"{where}.improvement")
+    _same(pooled.improvement_about_zero, ratio_of(pooled.before.rms_dph, left), f"{where}.improvement_about_zero")
 
 
 def _same(stated: float | None, found: float | None, where: str, scale: float = 0.0) -> None:
@@ -110,7 +117,7 @@ def _check_limits(
         part, _, name = one.limit.partition(".")
         several = part == "needs" and name != "generalises"
         parts[part][name] = (*parts[part].get(name, ()), one.bound) if several else one.bound
-    rule = {"decision_rule": held.decision_rule} if held.decision_rule else {}
+    rule = {"decision_rule": held.decision_rule}
     limits = _limits({"product": held.product, "sha256": held.sha256} | rule | parts, where)
     targets = tuple(
         VerifiedTarget(name=str(one.bound), status=status, numeric="")  # type: ignore[arg-type]

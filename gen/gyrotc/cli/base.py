@@ -259,9 +259,7 @@ AgeingOption = Annotated[
 ]
 AcceptOption = Annotated[
     str | None,
-    typer.Option(
-        "--accept-fail", metavar="REASON", help="Release a unit whose verdict is FAIL or CONDITIONAL PASS; says why."
-    ),
+    typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is not PASS; says why."),
 ]
 DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
 

@@ -111,7 +111,7 @@ def _tell_entry(entry: FleetEntry) -> None:
     if entry.after_rms_dph is not None:
         floor = "" if entry.rms_over_floor is None else f" = {entry.rms_over_floor:.3f} x noise floor"
         text += (
-            f"; RMS {sci(entry.before_rms_dph or 0.0, 3)} -> {sci(entry.after_rms_dph, 3)} deg/h{floor}, "
+            f"; RMS {sci(entry.after_rms_dph, 3)} deg/h{floor}, improvement {sci(entry.improvement)}, "
             f"{entry.centers} centers, {entry.table_bytes} bytes"
         )
     if entry.status != "done":

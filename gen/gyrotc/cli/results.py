@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -10,9 +9,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
 from ..pages.display import (
+    CONSTANT_PASSES,
     COVERAGE,
     bound_words,
+    limit_words,
     measured_words,
+    plain,
     rounded,
     sci,
     with_uncertainty,
@@ -188,34 +190,27 @@ def _difference_text(file: VerifiedFile) -> str:
 
 
 def summary_line(result: Evaluation) -> str:
-    """One line that says what was gained: about zero, what of it a constant alone gives, and about the mean.
+    """Return one line with what was gained against a constant, and what remains against the noise floor.
 
-    The paper's own figure stands beside it for the paper's scenario.
+    The improvement about zero stands behind it, and the paper's own figure beside that for the paper's scenario.
     """
     from ..pages.comparison import ENVIRONMENTS
 
     found = result.judged()
     if found is None or not found[1].improvement:
         return "no sample to judge by"
-    part = found[1]
-    if result.exam:
-        simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
-        published = simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
-        text = f"improvement about zero {part.improvement:.2f}"
-        beside = ["paper: 9.8-10.4"] if published else []
-    else:
-        where = "on spans left out" if found[0] == "left_out" else "on the training runs themselves"
-        text, beside = f"improvement about zero {where} {part.improvement:.2f}", []
-    alone = _of_a_constant(result, part)
-    beside += [f"a constant alone: {alone:.2f}"] if alone else []
-    text += f" ({'; '.join(beside)})" if beside else ""
-    if part.before.std_dph is not None and part.after.std_dph:
-        text += f", about the mean {part.before.std_dph / part.after.std_dph:.2f}"
-    floor, rms, known = result.noise_floor_dph, part.after.rms_dph, (result.uncertainty or {}).get("rms_dph")
-    spread = COVERAGE * known.standard if known else None
+    part, known = found[1], result.uncertainty or {}
+    spread = {name: COVERAGE * one.standard for name, one in known.items()}
+    simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
+    published = result.exam and simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
+    text = (
+        f"improvement {with_uncertainty(part.improvement, spread.get('improvement'))} against a constant on "
+        f"{_JUDGED_ON[found[0]]} (about zero {sci(part.improvement_about_zero)}{'; paper: 9.8-10.4' * bool(published)})"
+    )
+    floor, rms = result.noise_floor_dph, part.after.rms_dph
     if floor and rms is not None:
         text += (
-            f"; RMS {with_uncertainty(rms, spread)} deg/h = {rms / floor:.4f} x noise floor "
+            f"; RMS {with_uncertainty(rms, spread.get('rms_dph'))} deg/h = {rms / floor:.4f} x noise floor "
             f"({result.noise_floor_source})"
         )
     if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
@@ -225,15 +220,7 @@ def summary_line(result: Evaluation) -> str:
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 
-def _of_a_constant(result: Evaluation, judged: Pooled) -> float | None:
-    """Improvement about zero that the mean of the training runs alone gives; None without such runs."""
-    b, constant = judged.before, result.train.before.mean_dph if result.train else None
-    if constant is None or b.mean_dph is None or b.std_dph is None or b.rms_dph is None:
-        return None
-    left = math.hypot(b.std_dph, b.mean_dph - constant)
-    return b.rms_dph / left if left > 0.0 else None
-
-
+_JUDGED_ON = {"exam": "exam runs", "left_out": "spans left out", "train": "the training runs themselves"}
 _RULES = {
     "guard_band": "guard band w = U",
     "guard_band_binary": "guard band w = U, binary",
@@ -244,17 +231,18 @@ _RULES = {
 def limit_lines(limits: HeldLimits) -> Iterator[str]:
     """Return the verdict, and every limit that did not pass with what was measured."""
     product = f" of {limits.product}" if limits.product else ""
-    if limits.decision is None:
+    if limits.verdict is None:
         yield f"limits{product}: the file gives none, so nothing was judged"
         return
-    rule = f" ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)" if limits.decision_rule else ""
-    yield f"limits{product}: {limits.decision}{rule}"
-    yield from (f"  CONDITIONAL PASS at most: {why}" for why in limits.capped)
+    yield f"limits{product}: {limits.verdict} ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)"
+    yield from (f"  no PASS: {why}" for why in limits.capped)
     for check in limits.limits:
-        if check.decision != "PASS":
+        if check.constant_passes:
+            yield f"  {limit_words(check.limit)} {bound_words(check)}: {CONSTANT_PASSES} ({plain(check.constant)})"
+        if check.verdict != "PASS":
             kind, _, figure = check.limit.partition(".")
             name = figure if kind in ("at_most", "at_least") else check.limit
-            yield f"  {name} {bound_words(check)}: {measured_words(check)}, {check.decision}"
+            yield f"  {name} {bound_words(check)}: {measured_words(check)}, {check.verdict}"
 
 
 def change_lines(changes: Changes) -> Iterator[str]:

@@ -135,7 +135,7 @@ def step_in(residual: FloatArray) -> tuple[int, float, float]:
 
 #: Figures that are looked at, and whether they are compared by their ratio (logarithm).
 FIGURES = {
-    "before_rms_dph": True,
+    "constant_rms_dph": True,
     "after_rms_dph": True,
     "rms_over_floor": True,
     "noise_floor_dph": True,

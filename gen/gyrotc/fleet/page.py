@@ -51,7 +51,7 @@ _MOST_CURVES = 400  # of an axis: more make one dark area, which the band shows 
 
 
 def rms_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup | None:
-    """RMS of every gyro before and after, those that are outliers ringed; None for fewer than two."""
+    """RMS of every gyro with a constant and with its map, those that are outliers ringed; None for fewer than two."""
     if len(entries) < 2:
         return None
     ordered = sorted(entries, key=lambda e: e.after_rms_dph or 0.0)
@@ -59,7 +59,7 @@ def rms_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup | 
     ringed = [k for k, entry in enumerate(ordered) if entry.name in outliers]
     size = 5.0 if len(ordered) < _SMALL_FLEET else 2.5
     panel = Panel(x="gyros, in the order of what remains", y="RMS, deg/h", y_log=True, whole_x=True)
-    for label, color in (("before", BEFORE), ("after", AFTER)):
+    for label, color in (("constant", BEFORE), ("after", AFTER)):
         values = np.array([getattr(entry, f"{label}_rms_dph") for entry in ordered], dtype=np.float64)
         panel.dots(place, values, color, label, size=size)
         if ringed:
@@ -130,8 +130,8 @@ def _curve(entry: FleetEntry) -> FloatArray:
 
 _COLUMNS = (
     "name", "serial", "axis", "status", "verdict", "limits_met", "limits_held", "date", "outlier_reason", "judged_on",
-    "before_rms_dph", "after_rms_dph", "expanded_uncertainty_dph", "rms_over_floor", "noise_floor_dph", "bias_dph",
-    "centers", "table_bytes", "error_bound_dph", "findings", "model_hash", "reason",
+    "constant_rms_dph", "improvement", "after_rms_dph", "expanded_uncertainty_dph", "rms_over_floor",
+    "noise_floor_dph", "bias_dph", "centers", "table_bytes", "error_bound_dph", "findings", "model_hash", "reason",
 )  # fmt: skip
 
 _PICTURES = 60  # of outliers; of more, the words say enough

@@ -414,7 +414,8 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
             from_s=part.from_s,
         )
         judged.setdefault(part.environment, []).append(means)
-    total = Pooled.of([means for parts in judged.values() for means in parts])
+    constant_dph = whole.fallback_dph
+    total = Pooled.of([means for parts in judged.values() for means in parts], constant_dph)
     return Method(
         id=method,
         groups=tuple(
@@ -426,13 +427,15 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
                 after_rms_dph=part.after.rms_dph,
                 after_std_dph=part.after.std_dph,
                 improvement=part.improvement,
+                improvement_about_zero=part.improvement_about_zero,
             )
-            for name, part in ((name, Pooled.of(parts)) for name, parts in judged.items())
+            for name, part in ((name, Pooled.of(parts, constant_dph)) for name, parts in judged.items())
         ),
         exam_rms_dph=total.after.rms_dph,
         exam_std_dph=total.after.std_dph,
         before_rms_dph=total.before.rms_dph,
         improvement=total.improvement,
+        improvement_about_zero=total.improvement_about_zero,
         centers=whole.n_centers,
         table_bytes=whole.table_bytes,
         sum_abs_weights_dph=whole.sum_abs_weights,

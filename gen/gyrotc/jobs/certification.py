@@ -14,13 +14,13 @@ from typing import Annotated, Any, Literal
 from markupsafe import Markup
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..assess.limits import worst_of
 from ..assess.stated import check_stated
 from ..common.errors import InputError
 from ..common.inputs import checked, read_toml
 from ..pages.certificate import certificate_page, dcc_text, print_to_pdf
 from ..pages.report import thermal_picture
 from ..pages.unit import UnitResults, unit_in
+from ..results.decision import worst_of
 from ..results.files import write_atomically
 from ..results.folder import result_folder
 from ..results.marker import check_intact, sha256
@@ -131,11 +131,11 @@ def certificate(
         facts: A facts file of the laboratory.
         number: Number of the certificate.
         draft: Take what is missing as not stated: the page is marked as a draft, and there is no DCC.
-        accept_fail: Why a unit gets one whose verdict is FAIL or CONDITIONAL PASS; both say it.
+        accept_fail: Why a unit gets one whose verdict is not PASS; both say it.
 
     Raises:
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
-            built, the verdict is FAIL or CONDITIONAL PASS and not accepted, or `out` cannot be replaced.
+            built, the verdict is not PASS and not accepted, or `out` cannot be replaced.
     """
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     units = [unit_of(place) for place in places]
@@ -189,7 +189,7 @@ def unit_of(folder: Path) -> UnitResults:
 
 
 def reason_of_release(folder: Path, units: Sequence[UnitResults], reason: str | None) -> str | None:
-    """The reason for which a unit is released whose verdict is FAIL or CONDITIONAL PASS; None where it is neither.
+    """The reason for which a unit is released whose verdict is not PASS; None where it is neither.
 
     Raises:
         InputError: The verdict is one of these and there is no reason, or it is neither and there is one.

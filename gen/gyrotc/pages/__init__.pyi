@@ -16,6 +16,7 @@ from .comparison import comparison_picture as comparison_picture
 from .comparison import comparison_tables as comparison_tables
 from .comparison import with_published as with_published
 from .diagnosis import write_diagnosis_page as write_diagnosis_page
+from .display import CONSTANT_PASSES as CONSTANT_PASSES
 from .display import digits_of as digits_of
 from .display import rounded as rounded
 from .display import sci as sci
@@ -27,5 +28,4 @@ from .report import calibrations_over_time as calibrations_over_time
 from .report import page_environment as page_environment
 from .report import write_report as write_report
 from .unit import UnitResults as UnitResults
-from .unit import failed_checks as failed_checks
 from .unit import unit_in as unit_in

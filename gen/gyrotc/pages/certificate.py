@@ -18,6 +18,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ..common.texts import html_environment
+from ..results.decision import worst_of
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import Limit
@@ -25,7 +26,7 @@ from .display import bound_words, digits_of, limit_words, measured_words, rounde
 from .report import page_environment
 from .unit import UnitResults
 
-_CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "FAIL": "fail"}
+_CONFORMITY = {"PASS": "pass", "CONDITIONAL PASS": "conditionalPass", "NOT TESTABLE": "noPass", "FAIL": "fail"}
 _UNITS = (
     ("_dph", r"\degree\hour\tothe{-1}"),
     ("_arcsec", r"\arcsecond"),
@@ -73,7 +74,7 @@ def rows_of(unit: UnitResults) -> list[CertifiedRow]:
 
 def _row(limit: Limit) -> CertifiedRow:
     text, page, bound = limit_words(limit.limit), measured_words(limit), bound_words(limit)
-    plain = CertifiedRow(text, page, bound=bound, verdict=limit.decision)
+    plain = CertifiedRow(text, page, bound=bound, verdict=limit.verdict)
     unit = next((unit for end, unit in _UNITS if limit.limit.endswith(end)), "")
     known = limit.expanded_uncertainty
     if not unit or not known or not math.isfinite(known) or not isinstance(limit.measured, float):
@@ -101,7 +102,7 @@ def certificate_page(
         pictures: By axis: bias against temperature; None: it has no traces.
         facts: What the laboratory states.
         missing: What is missing makes it a draft.
-        accepted: Why the unit is released although a verdict is FAIL or CONDITIONAL PASS.
+        accepted: Why the unit is released although a verdict is not PASS.
     """
     template = page_environment().get_template("certificate.html.j2")
     rows = [rows_of(unit) for unit in units]
@@ -115,7 +116,11 @@ def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = No
         line=lambda value: " ".join(str(value).split()) or "-", day=lambda text: text[:10], rounded=rounded
     )
     text = environment.get_template("dcc.xml.j2").render(
-        units=units, rows=[rows_of(unit) for unit in units], facts=facts, accepted=accepted
+        units=units,
+        rows=[rows_of(unit) for unit in units],
+        facts=facts,
+        accepted=accepted,
+        verdict=worst_of(unit.decision for unit in units) or "",
     )
     return re.sub(r"\n\s*\n+", "\n", text)
 

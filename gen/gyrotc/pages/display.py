@@ -37,6 +37,9 @@ def significant(value: float, digits: int) -> str:
     return f"{mantissa}·{power(int(exact))}".replace("-", "−")
 
 
+CONSTANT_PASSES = "a constant keeps it, too, so it asks nothing of the map"
+"""What is said of a limit that a constant for a correction passes."""
+
 COVERAGE = 2.0
 """k of about 95 % of a normal distribution (JCGM 100:2008, G.1)."""
 
@@ -76,9 +79,10 @@ _STEMS = {
     "ram": "memory",
     "rows_left_out": "rows of training left out as outliers",
     "centers": "centers",
-    "improvement": "RMS before ÷ after, mean included",
+    "improvement": "improvement: RMS that a constant leaves ÷ RMS after",
+    "improvement_about_zero": "RMS before ÷ after, mean included",
     "covered": "share of the envelope with training data",
-    "before_rms": "RMS before, mean included",
+    "constant_rms": "RMS that a constant leaves",
     "after_rms": "RMS after",
     "after_mean": "mean after",
     "bias": "mean bias",
@@ -107,7 +111,7 @@ _CANDIDATES = {
 
 
 def words(key: str) -> str:
-    """A key such as `before_rms_dph` as words with its unit: "RMS before, mean included, deg/h"."""
+    """A key such as `constant_rms_dph` as words with its unit: "RMS that a constant leaves, deg/h"."""
     for end, unit in _UNITS:
         stem = key.removesuffix(end)
         if stem != key and stem:

@@ -28,12 +28,15 @@ from ..common.metrics import Averages, average_rows
 from ..common.texts import file_stem, html_environment
 from ..model import Model
 from ..recordings.description import exclude_line
+from ..results.decision import worst_of
 from ..results.evaluation import Calibration, EvaluatedRun
 from ..results.files import write_atomically
 from ..results.folder import result_folder
+from ..results.release import VERDICTS
 from ..results.training import LeftOutRows, NoiseTerms, Training
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import (
+    CONSTANT_PASSES,
     COVERAGE,
     bound_words,
     limit_words,
@@ -209,7 +212,6 @@ def prior_and_posterior(training: Training) -> Markup | None:
     return drawing([panel], width=HALF)
 
 
-_ORDER = ("FAIL", "CONDITIONAL PASS", "", "PASS")  # of axes on their common page
 _TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
@@ -242,9 +244,9 @@ def axes_page(folder: Path, axes: Sequence[str]) -> str:
     """
     units = [unit_in(folder / axis) for axis in axes]
     with page_from(folder):
-        ordered = sorted(units, key=lambda unit: (_ORDER.index(unit.verdict), -unit.counts["FAIL"]))
+        ordered = sorted(units, key=lambda unit: (-VERDICTS.index(unit.decision or "PASS"), -unit.counts["FAIL"]))
         pictures = {u.model.axis: thermal_picture(folder / str(u.model.axis), u) for u in units}
-        worst = ordered[0].verdict
+        worst = worst_of(unit.decision for unit in units) or ""
         template = page_environment().get_template("axes.html.j2")
         trends = {unit.model.axis: _trend(unit) for unit in units}
         return template.render(units=ordered, pictures=pictures, trends=trends, verdict=worst)
@@ -272,6 +274,8 @@ def page_environment() -> jinja2.Environment:
         words=words, candidate=words_of_candidate, limit_words=limit_words, bound_words=bound_words,
         measured_words=measured_words,
     )  # fmt: skip
+    environment.globals["all_verdicts"] = VERDICTS
+    environment.globals["constant_passes"] = CONSTANT_PASSES
     environment.filters["number"] = lambda value, digits=2: "–" if value is None else f"{value:.{digits}f}"
     environment.filters["chance"] = lambda value: "< 0.1 %" if value < 1e-3 else f"{100.0 * value:.2g} %"
     environment.tests["moved_input"] = lambda id: id in CATALOGUE and CATALOGUE[id].kind == "input"

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
+from ..results.decision import decision_of, failed_checks
 from ..results.diagnosed import Diagnosed
-from ..results.evaluation import PARTS, Changes, Evaluation, Pooled
-from ..results.release import Budget, HeldLimits, Limit, Verdict, Verification
+from ..results.evaluation import PARTS, Changes, Evaluation
+from ..results.release import VERDICTS, Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.training import CandidateModel, LeftOutRows, Manifest, Training
 from .display import COVERAGE, limit_words, plain, words
 
@@ -22,7 +23,6 @@ _RULES = {
     "simple_acceptance": "simple acceptance, w = 0 (ILAC-G8:09/2019, binary)",
 }
 _SHOWN_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # entries of `[meta]`
-_GRAVEST = ("FAIL", "CONDITIONAL PASS", "PASS")
 
 
 def unit_in(folder: Path) -> UnitResults:
@@ -69,9 +69,7 @@ class UnitResults:
     @property
     def decision(self) -> Verdict | None:
         """Of the limits and of what was proven; None without limits where nothing failed."""
-        if self.failures:
-            return "FAIL"
-        return self.limits.decision if self.limits else None
+        return decision_of(self.limits, self.verification, self.evaluation)
 
     @property
     def verdict(self) -> str:
@@ -87,16 +85,16 @@ class UnitResults:
     def held(self) -> list[Limit]:
         """The limits, those that are not met first."""
         limits = self.limits.limits if self.limits else ()
-        return sorted(limits, key=lambda one: _GRAVEST.index(one.decision))
+        return sorted(limits, key=lambda one: -VERDICTS.index(one.verdict))
 
     @property
     def counts(self) -> Counter[str]:
         """How many limits have each verdict."""
-        return Counter(one.decision for one in self.held)
+        return Counter(one.verdict for one in self.held)
 
     def named(self, verdict: str) -> str:
         """The limits of a verdict, in words."""
-        return "; ".join(limit_words(one.limit) for one in self.held if one.decision == verdict)
+        return "; ".join(limit_words(one.limit) for one in self.held if one.verdict == verdict)
 
     @property
     def left_out(self) -> tuple[LeftOutRows, ...]:
@@ -106,24 +104,18 @@ class UnitResults:
 
     @property
     def capped(self) -> tuple[str, ...]:
-        """Why a pass is a conditional one, and what to record."""
+        """Why it is no PASS although it may be within its bounds, and what to record."""
         return self.limits.capped if self.limits else ()
 
     @property
     def rule(self) -> str:
         """The decision rule in words."""
-        rule = self.limits.decision_rule if self.limits else None
-        return _RULES[rule] if rule else "simple acceptance (a result of an earlier gyrotc)"
+        return _RULES[self.limits.decision_rule] if self.limits else ""
 
     def spread(self, figure: str) -> float | None:
         """Expanded uncertainty (k = 2) of a figure."""
         known = (self.evaluation.uncertainty or {}).get(figure)
         return COVERAGE * known.standard if known else None
-
-    @property
-    def about_the_mean(self) -> float | None:
-        """How many times smaller the standard deviation has become."""
-        return _ratio(self.judged, "std_dph")
 
     @property
     def over_floor(self) -> float | None:
@@ -159,33 +151,6 @@ class UnitResults:
     def other_changes(self) -> list[tuple[str, str, str | None]]:
         """Figures, versions and files that are not as in the earlier result: before and now, or one text."""
         return list(_changes(self.changes)) if self.changes else []
-
-
-def _ratio(judged: Pooled | None, figure: str) -> float | None:
-    if judged is None:
-        return None
-    before, after = getattr(judged.before, figure), getattr(judged.after, figure)
-    return before / after if before is not None and after else None
-
-
-def failed_checks(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:
-    """What failed of the proof, in words."""
-    if verification:
-        for target in verification.targets:
-            if target.status == "fail":
-                reason = target.error or f"{target.mismatches} of {target.vectors} vectors differ"
-                yield f"{target.name}, {target.numeric}: {reason}"
-        for file in verification.emitted:
-            if file.status == "fail":
-                yield f"{file.file}: {file.verdict}"
-        for error in verification.errors:
-            if error.status == "fail":
-                yield (
-                    f"{error.numeric}: {error.worst_dph:.3g} deg/h from the model, above the proven bound of "
-                    f"{error.bound_dph:.3g}"
-                )
-    if evaluation.mismatches:
-        yield f"{evaluation.mismatches} steps of the recordings differ from the reference"
 
 
 def _changes(changes: Changes) -> Iterator[tuple[str, str, str | None]]:

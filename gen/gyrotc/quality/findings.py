@@ -242,6 +242,11 @@ def coarse_rate_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     yield finding("coarse_rate", text, run)
 
 
+# Fewer rows at an end of the range may be there by chance.
+_SATURATED_ROWS = 10
+# Rows elsewhere must repeat less often than this share of those at the end, else the rate is coarse or held everywhere.
+_SATURATED_RATIO = 0.2
+
 _GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
 _CELL_ROWS = 5  # fewer do not average the resolution of a thermometer
@@ -280,6 +285,7 @@ class RunFacts:
         largest_dph: Largest magnitude of a rate.
         noise_dph: Scatter from row to row, robust.
         wrapped: Where a counter of pulses passed its end: time of the first place, bits of the counter, places.
+        saturated_rows: Rows that repeat the largest or the smallest rate where others hardly ever repeat; 0: none.
         stuck_s: Longest stretch of one identical rate.
         held_rows: For how many rows each rate is held; 1: every row has its own.
         constant: Columns that hold one value only.
@@ -308,6 +314,7 @@ class RunFacts:
     largest_dph: float
     noise_dph: float
     wrapped: tuple[float, int, int] | None
+    saturated_rows: int
     stuck_s: float
     held_rows: int
     constant: tuple[str, ...]
@@ -353,6 +360,7 @@ def run_facts(run: Run, rows: Rows) -> RunFacts:
         largest_dph=float(max(rate.max(), -rate.min())) if len(rate) else 0.0,
         noise_dph=float(noise),
         wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
+        saturated_rows=saturated_rows(rate),
         stuck_s=longest_stretch(rate)[1] * run.row_period_s,
         held_rows=_held(rate),
         constant=_constant(rows, inside, rate),
@@ -447,6 +455,23 @@ def longest_stretch(values: FloatArray) -> tuple[int, int]:
             first, rows = int(ends[k] - lengths[k]), int(lengths[k])
         begun = int(ends[-1]) if len(ends) else begun
     return first, rows
+
+
+def saturated_rows(rate: FloatArray) -> int:
+    """Return how many rows are at an end of the range of the rate because they were cut there.
+
+    Noise makes neighbouring rows differ. Rows beyond the end of a range do not: they repeat it, and no other value.
+    """
+    found = 0
+    for end in (rate.max(initial=-np.inf), rate.min(initial=np.inf)):
+        at = rate == end
+        rows = int(np.count_nonzero(at))
+        if _SATURATED_ROWS <= rows < rate.size:
+            repeats = rate[1:] == rate[:-1]
+            there = float(np.mean(repeats[at[:-1]]))
+            elsewhere = float(np.mean(repeats[~at[:-1]]))
+            found += rows if there > _REPEATS and elsewhere < _SATURATED_RATIO * there else 0
+    return found
 
 
 def _held(rate: FloatArray) -> int:

@@ -7,6 +7,9 @@ from .base import read_optional as read_optional
 from .base import read_result as read_result
 from .cache import input_hashes as input_hashes
 from .cache import program_of as program_of
+from .decision import decision_of as decision_of
+from .decision import failed_checks as failed_checks
+from .decision import worst_of as worst_of
 from .diagnosed import NOTHING as NOTHING
 from .diagnosed import SURE as SURE
 from .diagnosed import UNNAMED as UNNAMED
@@ -33,6 +36,7 @@ from .evaluation import MapDifference as MapDifference
 from .evaluation import Method as Method
 from .evaluation import ModelSizes as ModelSizes
 from .evaluation import Pooled as Pooled
+from .evaluation import Requirement as Requirement
 from .evaluation import ResidualTest as ResidualTest
 from .evaluation import RunStatistics as RunStatistics
 from .evaluation import Statistics as Statistics

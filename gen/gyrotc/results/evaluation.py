@@ -11,7 +11,7 @@ from pydantic import Field
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
 from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
-from .release import HeldLimits
+from .release import HeldLimits, Verdict
 
 
 class Published(Part):
@@ -19,7 +19,7 @@ class Published(Part):
 
     before_rms_dph: float = Field(description="deg/h")
     after_rms_dph: float = Field(description="deg/h")
-    improvement: float = Field(description="RMS before over RMS after")
+    improvement_about_zero: float = Field(description="RMS before over RMS after")
 
 
 class Group(Part):
@@ -31,7 +31,8 @@ class Group(Part):
     before_std_dph: Figure = Field(description="about the mean, deg/h")
     after_rms_dph: Figure = Field(description="deg/h")
     after_std_dph: Figure = Field(description="about the mean, deg/h")
-    improvement: Figure = Field(description="RMS before over RMS after")
+    improvement: Figure = Field(description="RMS that a constant leaves over RMS after")
+    improvement_about_zero: Figure = Field(description="RMS before over RMS after")
     published: Published | None = Field(
         default=None, description="the paper's figures, where the recordings are of its environments"
     )
@@ -45,7 +46,8 @@ class Method(Part):
     exam_rms_dph: Figure = Field(description="RMS over all environments, deg/h")
     exam_std_dph: Figure = Field(description="about the mean, deg/h")
     before_rms_dph: Figure = Field(description="deg/h")
-    improvement: Figure = Field(description="RMS before over RMS after")
+    improvement: Figure = Field(description="RMS that a constant leaves over RMS after")
+    improvement_about_zero: Figure = Field(description="RMS before over RMS after")
     centers: Count = Field(description="centers of the networks")
     table_bytes: Count = Field(description="size of its table, bytes")
     sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
@@ -84,22 +86,46 @@ class RunStatistics(Statistics):
     first_10min_rms_dph: Figure = Field(description="RMS of the first 10 minutes, deg/h")
 
 
+def ratio_of(numerator: float | None, denominator: float | None) -> float | None:
+    """Return the ratio of two figures; None where one is not known or the second is 0."""
+    return numerator / denominator if numerator is not None and denominator else None
+
+
 class Pooled(Part):
     """Several runs, every sample with the same weight."""
 
     before: Statistics = Field(description="before compensation")
+    constant: Statistics = Field(description="after subtraction of a constant, see `constant_dph` of the result")
     after: Statistics = Field(description="after compensation")
-    improvement: Figure = Field(description="RMS before over RMS after")
+    improvement: Figure = Field(
+        description="RMS that a constant leaves over RMS after compensation: what the map gains, whatever constant is "
+        "in the rate"
+    )
+    improvement_about_zero: Figure = Field(
+        description="RMS before over RMS after compensation: it grows with any constant in the rate"
+    )
     samples: Count = Field(description="means over `average_s`")
 
     @classmethod
-    def of(cls, runs: Sequence[Averages]) -> Pooled:
-        """Figures over all samples of several runs."""
+    def of(cls, runs: Sequence[Averages], constant_dph: float | None = None) -> Pooled:
+        """Return figures over all samples of several runs.
+
+        Args:
+            constant_dph: The constant that the correction is compared with; None: the mean of these samples.
+        """
         before = np.concatenate([r.before_dph for r in runs]) if runs else np.zeros(0)
         after = np.concatenate([r.after_dph for r in runs]) if runs else np.zeros(0)
-        was, remains = Statistics(**statistics_of(before)), Statistics(**statistics_of(after))
-        ratio = was.rms_dph / remains.rms_dph if was.rms_dph is not None and remains.rms_dph else None
-        return cls(before=was, after=remains, improvement=ratio, samples=int(after.size))
+        if constant_dph is None:
+            constant_dph = float(before.mean()) if before.size else 0.0
+        was, flat, remains = (Statistics(**statistics_of(x)) for x in (before, before - constant_dph, after))
+        return cls(
+            before=was,
+            constant=flat,
+            after=remains,
+            improvement=ratio_of(flat.rms_dph, remains.rms_dph),
+            improvement_about_zero=ratio_of(was.rms_dph, remains.rms_dph),
+            samples=int(after.size),
+        )
 
 
 class EvaluatedRun(Part):
@@ -112,6 +138,7 @@ class EvaluatedRun(Part):
     to_s: Figure = Field(default=None, description="end of the span, s; only of spans")
     samples: Count = Field(description="means over `average_s`")
     before: Statistics = Field(description="before compensation")
+    constant: RunStatistics = Field(description="after subtraction of `constant_dph` of the result")
     after: RunStatistics = Field(description="after compensation")
     outlier_rows: Count = Field(default=0, description="rows that are spikes or parts of bursts")
     without_outliers: Statistics | None = Field(
@@ -137,6 +164,20 @@ class ModelSizes(Part):
     ram_bytes: Count | None = Field(description="the caller's state; null where nothing was compiled")
     sizes_on: str | None = Field(description="target of these sizes")
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
+
+
+class Requirement(Part):
+    """Something that recordings must have before a limit can be passed on them."""
+
+    id: str = Field(description="its stable name: `exam_covers_envelope`, `rows` or `power_ons`")
+    verdict: Verdict = Field(description="best verdict that it allows: `PASS` where the recordings have it")
+    text: str = Field(description="what the recordings have, and what a PASS needs")
+    next: str = Field(default="", description="what to record; empty where the recordings have it")
+
+    @property
+    def met(self) -> bool:
+        """Test whether the recordings have it."""
+        return self.verdict == "PASS"
 
 
 RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, sqrt(1.3^2 - 1)
@@ -188,7 +229,14 @@ class Evaluation(UnitResult):
     average_s: AverageLength = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Amount | None = Field(description="of means over `average_s`, deg/h")
     noise_floor_source: str | None = Field(description="`simulated`, or `estimated`")
+    constant_dph: float = Field(
+        description="weighted mean of the training bias, which the table falls back to without a temperature: the "
+        "constant that the map is compared with, deg/h"
+    )
     mismatches: Count | None = Field(description="steps that differ from the reference; null: not compared")
+    requirements: tuple[Requirement, ...] = Field(
+        description="what a PASS needs of the recordings, and whether they have it"
+    )
     runs: tuple[EvaluatedRun, ...] = Field(description="every run")
     train: Pooled | None = Field(description="all training runs; null where there are none")
     exam: Pooled | None = Field(description="all exam runs; null where there are none")

@@ -45,8 +45,9 @@ class FleetUnit(Part):
     judged_on: Literal["exam", "left_out", "train"] | None = Field(
         default=None, description="runs that the figures are of"
     )
-    before_rms_dph: Figure = Field(default=None, description="RMS before compensation, deg/h")
+    constant_rms_dph: Figure = Field(default=None, description="RMS that a constant leaves, deg/h")
     after_rms_dph: Figure = Field(default=None, description="RMS after compensation, deg/h")
+    improvement: Figure = Field(default=None, description="`constant_rms_dph` over `after_rms_dph`")
     after_mean_dph: Figure = Field(default=None, description="mean after compensation, deg/h")
     rms_over_floor: Figure = Field(default=None, description="`after_rms_dph` over the noise floor")
     noise_floor_dph: Figure = Field(default=None, description="noise floor of the model, deg/h")
@@ -62,7 +63,9 @@ class FleetUnit(Part):
     )
     model_hash: str | None = Field(default=None, description="hash of the model")
     verdict: Verdict | None = Field(
-        default=None, description="the worst of all limits, `FAIL` where another check failed; null without limits"
+        default=None,
+        description="the worst of all limits and of what the recordings allow, `FAIL` where another check failed; null "
+        "without limits",
     )
     limits_met: Count | None = Field(default=None, description="limits that are met; null without limits")
     limits_held: Count | None = Field(default=None, description="limits in all; null without limits")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -61,10 +61,16 @@ class Budget(UnitResult):
     valid_until: str | None = Field(description="last day of the interval; null: no date or no interval")
 
 
-Verdict = Literal["PASS", "CONDITIONAL PASS", "FAIL"]
-"""Statement of conformity; a conditional pass is within its limit, but closer to it than the guard band."""
+Verdict = Literal["PASS", "CONDITIONAL PASS", "NOT TESTABLE", "FAIL"]
+"""Statement of conformity, from best to worst.
 
-NEED_REASON: tuple[Verdict, ...] = ("CONDITIONAL PASS", "FAIL")
+A conditional pass is within its limit, but closer to it than the guard band, or shown on recordings that a PASS must
+not rest on alone. What is not testable may be within its limit: the recordings cannot show it.
+"""
+
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+
+NEED_REASON: tuple[Verdict, ...] = ("CONDITIONAL PASS", "NOT TESTABLE", "FAIL")
 """Verdicts of units that are certified only for a stated reason."""
 
 JudgedOn = Literal["exam", "left_out", "train"]
@@ -94,7 +100,7 @@ class Limit(Part):
         description="whether the decision rule accepts it, a conditional pass included; a limit whose figure was not "
         "measured is not met"
     )
-    verdict: Verdict | None = Field(default=None, description="null: of a gyrotc that did not state it")
+    verdict: Verdict = Field(description="statement of conformity")
     standard_uncertainty: Figure = Field(
         default=None, description="1 sigma, in the unit of the figure; null where there is none or it is not known"
     )
@@ -118,20 +124,21 @@ class Limit(Part):
         description="what the figure was measured on: `exam` runs, `left_out` spans of training, or the training runs "
         "themselves; null: not on recordings",
     )
-    capped: str = Field(
-        default="", description="why it is CONDITIONAL PASS at most, and what to record; empty: it is not"
+    capped: tuple[str, ...] = Field(default=(), description="why it is no PASS although it may be within its bound")
+    constant: Figure = Field(
+        default=None, description="the same figure with a constant for a correction; null: there is none"
     )
-
-    @property
-    def decision(self) -> Verdict:
-        """The verdict; files of an early gyrotc state only whether the limit is met."""
-        return self.verdict or ("PASS" if self.met else "FAIL")
+    constant_passes: bool = Field(
+        default=False, description="whether that is within the bound, so that the limit asks nothing of the map"
+    )
 
     def failure(self) -> str:
         """What is reported of a limit that is not met."""
         bound, measured = (_in_words(v) for v in (self.bound, self.measured))
         if self.verdict == "CONDITIONAL PASS":
             return f"{self.limit} = {bound} is met by less than the guard band: {measured}"
+        if self.verdict == "NOT TESTABLE":
+            return f"{self.limit} = {bound} is not testable: {'; '.join(self.capped)}"
         return f"{self.limit} = {bound} is not met: {measured}"
 
 
@@ -141,20 +148,17 @@ class HeldLimits(UnitResult):
     schema_: Annotated[Literal["gyrotc.limits/1"], Field(alias="schema")] = "gyrotc.limits/1"
     product: str = Field(description="name of the product, empty where the limits file gives none")
     sha256: str = Field(description="of the limits file")
-    met: bool = Field(description="whether all are met; false where the file gives no limits")
+    met: bool = Field(
+        description="whether all are met and the recordings can show it; false where the file gives no limits"
+    )
     limits: tuple[Limit, ...] = Field(description="every limit of the file")
-    verdict: Verdict | None = Field(default=None, description="the worst of all limits; null: there are none")
-    decision_rule: DecisionRule | None = Field(default=None, description="of the limits file")
-
-    @property
-    def decision(self) -> Verdict | None:
-        """The verdict; None where there is nothing that it could be of. Files of an early gyrotc do not state it."""
-        return (self.verdict or ("PASS" if self.met else "FAIL")) if self.limits else None
-
-    @property
-    def capped(self) -> tuple[str, ...]:
-        """Why limits are CONDITIONAL PASS at most, each reason once."""
-        return tuple(dict.fromkeys(one.capped for one in self.limits if one.capped))
+    verdict: Verdict | None = Field(
+        default=None,
+        description="the worst of all limits and of what the recordings allow (`requirements` of `evaluate.json`); "
+        "null: there are no limits",
+    )
+    capped: tuple[str, ...] = Field(default=(), description="why it is no PASS although all may be within their bounds")
+    decision_rule: DecisionRule = Field(description="of the limits file")
 
 
 STATED = (

@@ -18,7 +18,6 @@ from gyrotc.assess import (
     instruments_in,
     last_day,
     load_limits,
-    worst_of,
 )
 from gyrotc.common import Averages, InputError, statistics_of, time_statistics
 from gyrotc.jobs import build_into
@@ -37,6 +36,7 @@ from gyrotc.results import (
     Verification,
     read_optional,
     read_result,
+    worst_of,
 )
 from gyrotc.simulate import simulate
 from gyrotc.train import FitOptions
@@ -243,6 +243,7 @@ def reported_of(runs: list[Averages]) -> list[EvaluatedRun]:
         EvaluatedRun(
             file="a.csv", role="exam", environment=None, samples=a.after_dph.size,
             before=Statistics(**statistics_of(a.before_dph)),
+            constant=RunStatistics(**statistics_of(a.before_dph), **time_statistics(a, 100.0)),
             after=RunStatistics(**statistics_of(a.after_dph), **time_statistics(a, 100.0)),
         )
         for a in runs

@@ -21,7 +21,6 @@ from gyrotc.assess import (
     figure_uncertainties,
     findings_of,
     held_against,
-    worst_of,
 )
 from gyrotc.common import Averages, InputError, statistics_of, time_statistics
 from gyrotc.jobs import reason_of_release
@@ -35,6 +34,7 @@ from gyrotc.results import (
     Pooled,
     RunStatistics,
     Statistics,
+    worst_of,
 )
 from recordings import columns, toml, write_csv
 from scipy import stats
@@ -111,20 +111,27 @@ OF_RUNS = ("rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph")
 
 def evaluated(role: Literal["train", "exam"], **figures: float | None) -> EvaluatedRun:
     after = RunStatistics(**NOTHING, **(dict.fromkeys(OF_RUNS, 1.0) | figures))
-    return EvaluatedRun(file="a.csv", role=role, environment=None, samples=9, before=Statistics(**NOTHING), after=after)
+    constant = RunStatistics(**NOTHING, **dict.fromkeys(OF_RUNS, 1.0))
+    return EvaluatedRun(
+        file="a.csv", role=role, environment=None, samples=9, before=Statistics(**NOTHING), constant=constant,
+        after=after,
+    )  # fmt: skip
 
 
 def evaluation_of(runs: list[EvaluatedRun], **changes: Any) -> Evaluation:
     pooled = Pooled(
         before=Statistics(mean_dph=0.0, std_dph=0.01, rms_dph=0.01, max_abs_dph=0.03),
+        constant=Statistics(mean_dph=0.0, std_dph=0.01, rms_dph=0.01, max_abs_dph=0.03),
         after=Statistics(mean_dph=0.0, std_dph=0.001, rms_dph=0.001, max_abs_dph=0.003),
         improvement=10.0,
+        improvement_about_zero=10.0,
         samples=1000,
     )
     role = "exam" if any(run.role == "exam" for run in runs) else "train"
     content: dict[str, Any] = {
         "gyrotc_version": "0", "serial": "RLG-0042", "axis": None, "numeric": "f32", "block_s": 10.0,
         "average_s": 100.0, "noise_floor_dph": 0.001, "noise_floor_source": "estimated", "mismatches": 0,
+        "constant_dph": 0.0, "requirements": (),
         "runs": tuple(runs), "train": None, "exam": None, "findings": (),
         "model": ModelSizes(
             method="mrbf", centers=4, table_bytes=104, rom_bytes=None, ram_bytes=None, sizes_on=None,
@@ -238,31 +245,52 @@ def training_like(samples: int) -> Any:
     return SimpleNamespace(noise_floor_dph=FLOOR, samples=samples, block_s=10.0, average_s=100.0)
 
 
-@pytest.mark.parametrize(("factor", "shown"), [(1.05, True), (0.95, False)])
 @pytest.mark.parametrize("source", ["estimated", "simulated"])
-def test_unseen_history_is_in_the_budget_only_beyond_two_standard_errors(
-    source: Literal["estimated", "simulated"], factor: float, shown: bool, model_dict: dict[str, Any]
+@pytest.mark.parametrize("excess", [-20.0, -3.0, -1.0, 0.0, 1.0, 3.0, 20.0])
+def test_unseen_history_counts_with_the_mean_excess_that_its_error_allows(
+    excess: float, source: str, model_dict: dict[str, Any]
 ) -> None:
-    """RMS² of what was left out less floor² and the table's sigma², against its standard error by hand."""
-    samples, sigma, standard = 3000, 3e-4, 4e-5
+    """RMS² of what was left out less floor² and the table's sigma², with its standard error, cut at 0 by scipy."""
+    samples, standard, rms = 3000, 4e-6, 2e-3
     of_floor = 0.0 if source == "simulated" else np.sqrt(0.75 / (samples * 10.0 / 100.0))
-    known, low, high = FLOOR**2 + sigma**2, 1e-3, 5e-3
-    for _ in range(60):  # the RMS whose excess is `factor` times two standard errors, by bisection
-        rms = 0.5 * (low + high)
-        error = np.hypot(2.0 * rms * standard, 2.0 * FLOOR**2 * of_floor)
-        low, high = (low, rms) if rms**2 - known > factor * 2.0 * error else (rms, high)
+    error = np.hypot(2.0 * rms * standard, 2.0 * FLOOR**2 * of_floor)
+    sigma = np.sqrt(rms**2 - FLOOR**2 - excess * error)
+    unseen = unseen_of(model_dict, rms, sigma, source, samples, standard=standard, means=10**9)
+    expected = stats.truncnorm.mean(-excess, np.inf, loc=excess * error, scale=error)
+    assert unseen == pytest.approx(np.sqrt(expected), rel=0.01)
+
+
+def test_less_knowledge_never_states_less_unseen_history(model_dict: dict[str, Any]) -> None:
+    """Of fewer means, of an RMS that is known less well, and of no exam at all."""
+    stated = [unseen_of(model_dict, 1e-3, 3e-4, "estimated", 3000, standard=s) for s in (1e-5, 1e-4, 1e-3)]
+    assert stated == sorted(stated) and stated[0] > 0.0
+    means = [unseen_of(model_dict, 1e-3, 3e-4, "estimated", 3000, means=n) for n in (360, 100, 10, 1)]
+    assert means == sorted(means) and means[-1] < 1.1e-3
+    assert unseen_of(model_dict, None, 3e-4, "estimated", 3000) == pytest.approx(0.01), "what a constant leaves"
+
+
+def unseen_of(
+    model_dict: dict[str, Any],
+    rms: float | None,
+    sigma: float,
+    source: str,
+    samples: int,
+    *,
+    standard: float | None = None,
+    means: int = 100,
+) -> float:
+    """Return the contribution of unseen history, deg/h; `rms` None: no run was left out."""
     figures = Statistics(mean_dph=0.0, std_dph=rms, rms_dph=rms, max_abs_dph=5e-3)
-    exam = Pooled(before=figures, after=figures, improvement=1.0, samples=100)
-    made = evaluation_of(
-        [evaluated("exam"), evaluated("train")],
-        exam=exam,
-        noise_floor_source=source,
-        sigma_rms_dph=sigma,
-        uncertainty={"rms_dph": FigureUncertainty(standard=standard, freedom=20.0, method="by hand")},
+    exam = Pooled(
+        before=figures, constant=figures, after=figures, improvement=1.0, improvement_about_zero=1.0, samples=means
     )
+    known = {"rms_dph": FigureUncertainty(standard=standard, freedom=20.0, method="by hand")} if standard else None
+    runs = [evaluated("exam"), evaluated("train")] if rms is not None else [evaluated("train")]
+    made = evaluation_of(runs, noise_floor_source=source, sigma_rms_dph=sigma, uncertainty=known)
+    made = made.model_copy(update={"exam": exam if rms is not None else None})
     budget = budget_of(Model.from_dict(model_dict), training_like(samples), made, None)
     (unseen,) = (one for one in budget.contributions if one.id == "unseen")
-    assert unseen.contribution_dph == pytest.approx(np.sqrt(rms**2 - known) if shown else 0.0)
+    return unseen.contribution_dph
 
 
 def test_statistics_are_those_of_numpy() -> None:

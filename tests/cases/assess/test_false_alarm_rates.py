@@ -54,7 +54,7 @@ def test_of_a_thousand_clean_gyros_next_to_none_is_an_outlier_of_its_fleet(kind:
 @pytest.mark.parametrize("odd", ["x", "y", "z"])
 @pytest.mark.parametrize("place", [0, 5, 11])
 @pytest.mark.parametrize(
-    ("figure", "by_ratio"), [("before_rms_dph", True), ("noise_floor_dph", True), ("bias_dph", False)]
+    ("figure", "by_ratio"), [("constant_rms_dph", True), ("noise_floor_dph", True), ("bias_dph", False)]
 )
 def test_an_outlier_is_one_of_its_axis_beyond_five_scatters_wherever_it_is(
     figure: str, by_ratio: bool, place: int, odd: str

@@ -36,8 +36,9 @@ _NOTHING = dict.fromkeys(("mean_dph", "std_dph", "rms_dph", "max_abs_dph"))
 def run_of(role: Literal["train", "exam"], half_hour: float, angle: float | None, first: float) -> EvaluatedRun:
     after = RunStatistics(**_NOTHING, rms_30min_dph=half_hour, angle_1h_arcsec=angle, first_10min_rms_dph=first)
     return EvaluatedRun(
-        file="a.csv", role=role, environment=None, samples=1, before=Statistics(**_NOTHING), after=after
-    )
+        file="a.csv", role=role, environment=None, samples=1, before=Statistics(**_NOTHING), constant=after,
+        after=after,
+    )  # fmt: skip
 
 
 EVALUATION = Evaluation(
@@ -49,7 +50,9 @@ EVALUATION = Evaluation(
     average_s=100.0,
     noise_floor_dph=0.001,
     noise_floor_source="estimated",
+    constant_dph=0.007,
     mismatches=0,
+    requirements=(),
     rows_left_out=10,
     runs=(
         run_of("exam", 0.0002, 0.5, 0.001),
@@ -59,8 +62,10 @@ EVALUATION = Evaluation(
     train=None,
     exam=Pooled(
         before=Statistics(**_NOTHING),
+        constant=Statistics(rms_dph=0.011, std_dph=0.01, mean_dph=-0.004, max_abs_dph=0.04),
         after=Statistics(rms_dph=0.0011, std_dph=0.001, mean_dph=-0.0004, max_abs_dph=0.004),
         improvement=10.0,
+        improvement_about_zero=12.0,
         samples=2,
     ),
     findings=(Finding(id="run_outlier", text="", evidence={}),),

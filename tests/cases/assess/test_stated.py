@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 from conftest import quick_and_slow, run_gyrotc
-from gyrotc.assess import load_limits
+from gyrotc.assess import LEAST_POWER_ONS, load_limits
 from gyrotc.common import GyrotcError, InputError
 from gyrotc.jobs import build_into, certificate, unit_of
 from gyrotc.jobs.lot import _unit
@@ -54,11 +54,13 @@ PASSES = FAILS.replace("improvement = 1e6", "covered = 0.0").replace('"f32", "q3
 
 def _built(folder: Path, limits: str) -> Path:
     data, out = folder / "RLG-1", folder / "out"
-    table = columns(720, seed=1)
-    table["rate_dph"] = 20.0 + 2.0 * (table["rate_dph"] - 20.0)  # noise well above the rounding of float32
-    write_csv(data / "run-01.csv", table)
+    names = [f"run-{k:02d}.csv" for k in range(1, LEAST_POWER_ONS + 1)]
+    for seed, name in enumerate(names, 1):
+        table = columns(720, seed=seed)
+        table["rate_dph"] = 20.0 + 2.0 * (table["rate_dph"] - 20.0)  # noise well above the rounding of float32
+        write_csv(data / name, table)
     head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"\n[meta]\ncalibrated_on = "2026-03-07"'
-    (data / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
+    (data / "dataset.toml").write_text(toml(*(f'file = "{name}"' for name in names), head=head))
     (folder / "limits.toml").write_text(limits)
     with result_folder(out, "build") as stage:
         stage.of("RLG-1")

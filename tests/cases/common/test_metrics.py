@@ -59,7 +59,9 @@ def test_pooled_figures_weigh_every_sample_alike() -> None:
     result = Pooled.of(runs)
     assert result.samples == 400
     assert result.after.rms_dph == pytest.approx(np.sqrt((100 * 1 + 300 * 9) / 400))
-    assert result.improvement == pytest.approx(1.0)
+    assert result.improvement_about_zero == pytest.approx(1.0)
+    assert result.improvement == pytest.approx(np.sqrt(0.75 / 7.0)), "RMS about the mean of 2.5 over RMS"
+    assert Pooled.of(runs, 2.0).improvement == pytest.approx(np.sqrt(1.0 / 7.0))
 
 
 def test_statistics_of_nothing_are_null() -> None:

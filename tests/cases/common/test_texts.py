@@ -258,7 +258,10 @@ _LIMITS = _HEAD | {
     "product": "text",
     "sha256": "00",
     "met": False,
-    "limits": [{"limit": "text", "bound": "text", "measured": ["text"], "met": False}],
+    "decision_rule": "guard_band",
+    "verdict": "FAIL",
+    "capped": ["text"],
+    "limits": [{"limit": "text", "bound": "text", "measured": ["text"], "met": False, "verdict": "FAIL"}],
 }
 _MANIFEST = _HEAD | {
     "schema": "gyrotc.manifest/1",
@@ -441,7 +444,7 @@ def test_the_page_and_the_table_of_a_fleet(tmp_path: Path) -> None:
             "axis": None,
             "status": "done",
             "judged_on": "exam",
-            "before_rms_dph": 1.0,
+            "constant_rms_dph": 1.0,
             "after_rms_dph": None,
             "rms_over_floor": None,
             "noise_floor_dph": None,

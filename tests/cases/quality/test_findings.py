@@ -51,7 +51,8 @@ def result_of(*runs: tuple[float, float], train: float = 0.001, exam: float | No
 def _left_out(rms: float) -> SimpleNamespace:
     """What of a training says how it did on spans left out."""
     pooled = Pooled.model_validate(
-        {"before": statistics(rms), "after": statistics(rms), "improvement": 1.0, "samples": 100}
+        dict.fromkeys(("before", "constant", "after"), statistics(rms))
+        | {"improvement": 1.0, "improvement_about_zero": 1.0, "samples": 100}
     )
     return SimpleNamespace(findings=(), left_out=pooled, left_out_spans=())
 

@@ -35,7 +35,13 @@ from recordings import columns, described, write_csv
 HEAD = {"schema": "", "gyrotc_version": "", "serial": "", "axis": None}
 STATISTICS = {"mean_dph": 0.0, "std_dph": 0.0, "rms_dph": 0.0, "max_abs_dph": 0.0}
 AFTER = STATISTICS | {"rms_30min_dph": 0.0, "angle_1h_arcsec": 0.0, "first_10min_rms_dph": 0.0}
-POOLED = {"before": STATISTICS, "after": STATISTICS, "improvement": 0.0}
+POOLED = {
+    "before": STATISTICS,
+    "constant": STATISTICS,
+    "after": STATISTICS,
+    "improvement": 0.0,
+    "improvement_about_zero": 0.0,
+}
 FINDING = {"id": "", "text": "", "evidence": {}}
 
 MODEL = {
@@ -47,7 +53,8 @@ MODEL = {
 }  # fmt: skip
 EVALUATE = HEAD | {
     "numeric": "", "block_s": 0.0, "average_s": 0.0, "noise_floor_dph": 0.0, "noise_floor_source": "", "mismatches": 0,
-    "runs": [{"file": "", "role": "", "samples": 0, "before": STATISTICS, "after": AFTER}],
+    "constant_dph": 0.0, "requirements": [{"id": "", "verdict": "", "text": ""}],
+    "runs": [{"file": "", "role": "", "samples": 0, "before": STATISTICS, "constant": AFTER, "after": AFTER}],
     "train": POOLED, "exam": POOLED, "findings": [],
     "model": {
         "method": "", "centers": 0, "table_bytes": 0, "rom_bytes": 0, "ram_bytes": 0, "sum_abs_weights_dph": 0.0,
@@ -66,7 +73,7 @@ COMPARE = HEAD | {
         "id": "", "exam_rms_dph": 0.0, "centers": 0, "table_bytes": 0, "train_s": 0.0,
         "groups": [{
             "environment": "", "before_rms_dph": 0.0, "before_std_dph": 0.0, "after_rms_dph": 0.0,
-            "after_std_dph": 0.0, "improvement": 0.0,
+            "after_std_dph": 0.0, "improvement": 0.0, "improvement_about_zero": 0.0,
         }],
     }],
 }  # fmt: skip
@@ -177,11 +184,11 @@ def test_every_command_has_an_example_in_its_help() -> None:
 
 
 LIMITS = HeldLimits(
-    gyrotc_version="0.1.0", serial="A", axis=None, product="NAV", sha256="00", met=False,
+    gyrotc_version="0.1.0", serial="A", axis=None, product="NAV", sha256="00", met=False, decision_rule="guard_band",
     limits=(
-        Limit(limit="at_most.rom_bytes", measured=6292, bound=10.0, met=False),
-        Limit(limit="covers.temperature_c", measured=(-40.0, 60.0), bound=(-10.0, 30.0), met=True),
-        Limit(limit="at_most.rms_dph", measured=None, bound=1.0, met=False),
+        Limit(limit="at_most.rom_bytes", measured=6292, bound=10.0, met=False, verdict="FAIL"),
+        Limit(limit="covers.temperature_c", measured=(-40.0, 60.0), bound=(-10.0, 30.0), met=True, verdict="PASS"),
+        Limit(limit="at_most.rms_dph", measured=None, bound=1.0, met=False, verdict="FAIL"),
     ),
 )  # fmt: skip
 
@@ -214,7 +221,7 @@ def test_every_field_says_what_it_means(name: str) -> None:
 def test_a_result_is_read_back_as_it_was_written() -> None:
     content = json.loads(json.dumps(LIMITS.content()))
     assert list(content) == [
-        "schema", "gyrotc_version", "serial", "axis", "product", "sha256", "met", "limits",
+        "schema", "gyrotc_version", "serial", "axis", "product", "sha256", "met", "limits", "decision_rule",
     ]  # fmt: skip
     again = checked_result(content, HeldLimits, "limits.json")
     assert again == LIMITS and json.dumps(again.content()) == json.dumps(content)
@@ -266,6 +273,9 @@ def test_the_command_prints_a_schema_or_all(gyrotc: Command) -> None:
 def test_the_command_prints_tables_of_one_or_all(gyrotc: Command) -> None:
     done = gyrotc("schema", "limits", "--table")
     assert done.returncode == 0 and done.stdout == tables(HeldLimits)
-    assert "| `met` | true or false | whether all are met;" in done.stdout and "\n`Limit`: " in done.stdout
+    assert (
+        "| `met` | true or false | whether all are met and the recordings can show it;" in done.stdout
+        and "\n`Limit`: " in done.stdout
+    )
     whole = gyrotc("schema", "--table").stdout
     assert re.findall(r"^## (.+)$", whole, re.MULTILINE) == list(kinds()) and done.stdout in whole

@@ -267,7 +267,7 @@ def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(t
 
 def _entries(n: int, seed: int) -> list[FleetEntry]:
     draw = np.random.default_rng(seed)
-    names = ("before_rms_dph", "after_rms_dph", "noise_floor_dph", "rms_over_floor", "sum_abs_weights_dph")
+    names = ("constant_rms_dph", "after_rms_dph", "noise_floor_dph", "rms_over_floor", "sum_abs_weights_dph")
     return [
         _entry(
             f"RLG-{k}",

@@ -1,0 +1,247 @@
+"""Recordings that cannot carry a PASS, each made from recordings that do carry one, and constants of every size.
+
+A unit is made of eight short runs, each after its own power-on, four of them for the exam. Its limits are far from its
+figures, so that the figures alone would pass each case.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import HOST, run_gyrotc
+from gyrotc.assess import LEAST_POWER_ONS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from recordings import write_csv
+
+Rows = dict[str, np.ndarray]
+PERIOD_S = 10.0
+ROWS = 900
+SIGMA_DPH = 0.02
+LIMITS = """schema = 1
+[at_most]
+rms_dph = 1.0
+[at_least]
+improvement = 1.5
+"""
+
+
+def rows_of(seed: int) -> Rows:
+    """A triangle of temperature over 40 C in two and a half hours, a bias of 1 deg/h over it, and white noise."""
+    rng = np.random.default_rng(seed)
+    t = PERIOD_S * np.arange(ROWS)
+    phase = t / t[-1]
+    temperature = 40.0 * (1.0 - np.abs(2.0 * phase - 1.0)) + rng.normal(0.0, 0.005, ROWS)
+    bias = 0.6 * ((temperature - 20.0) / 20.0) ** 2 + 0.02 * temperature
+    return {"time_s": t, "temperature_c": temperature, "rate_dph": bias + rng.normal(0.0, SIGMA_DPH, ROWS)}
+
+
+Runs = dict[str, tuple[str, Rows]]
+"""Role and rows by name of the file."""
+
+
+def unit(train: int = 4, exam: int = 4) -> Runs:
+    roles = ["train"] * train + ["exam"] * exam
+    return {f"run-{k:02d}.csv": (role, rows_of(k)) for k, role in enumerate(roles)}
+
+
+def written(folder: Path, runs: Runs, *, serial: str = "RLG-1", more: str = "") -> Path:
+    text = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"\n{more}'
+    for k, (name, (role, rows)) in enumerate(runs.items()):
+        write_csv(folder / name, rows)
+        start = datetime(2026, 3, 1, tzinfo=timezone.utc) + timedelta(days=k)
+        text += f'[[run]]\nfile = "{name}"\nrole = "{role}"\nstarted = {start.isoformat()}\npower_on_s = 0.0\n'
+    (folder / "dataset.toml").write_text(text)
+    return folder
+
+
+def built(folder: Path, data: Path, limits: str = LIMITS, status: int | None = None) -> dict[str, Any]:
+    """Return the results of a build by name; the exit status is 0 for a PASS or CONDITIONAL PASS."""
+    (folder / "limits.toml").write_text(limits)
+    out = folder / f"result-{data.name}"
+    done = run_gyrotc("build", data, *HOST, "--limits", folder / "limits.toml", "--out", out)
+    held = json.loads((out / "limits.json").read_text())
+    expected = 0 if held["verdict"] in ("PASS", "CONDITIONAL PASS") else 1
+    assert done.returncode == (expected if status is None else status), done.stderr
+    names = ("limits", "evaluate", "budget", "training", "model")
+    return {name: json.loads((out / f"{name}.json").read_text()) for name in names} | {"out": out, "done": done}
+
+
+def exam_rows(change: Callable[[Rows], Rows]) -> Callable[[Runs], Runs]:
+    return lambda runs: {n: (role, change(rows) if role == "exam" else rows) for n, (role, rows) in runs.items()}
+
+
+def all_rows(change: Callable[[Rows], Rows]) -> Callable[[Runs], Runs]:
+    return lambda runs: {n: (role, change(rows)) for n, (role, rows) in runs.items()}
+
+
+def held_at(c: float, span_c: float) -> Callable[[Rows], Rows]:
+    """Return what keeps a chamber at a temperature, with a slow wave of a given span."""
+
+    def change(rows: Rows) -> Rows:
+        t = c + 0.5 * span_c * np.sin(np.linspace(0.0, 6.0 * np.pi, ROWS))
+        bias = 0.6 * ((t - 20.0) / 20.0) ** 2 + 0.02 * t
+        noise = np.random.default_rng(99).normal(0.0, SIGMA_DPH, ROWS)
+        return rows | {"temperature_c": t, "rate_dph": bias + noise}
+
+    return change
+
+
+def half(rows: Rows) -> Rows:
+    return {name: values[: ROWS // 3] for name, values in rows.items()}
+
+
+def constant(rows: Rows) -> Rows:
+    return rows | {"rate_dph": np.full(ROWS, 0.4), "temperature_c": np.full(ROWS, 20.0)}
+
+
+def saturated(rows: Rows) -> Rows:
+    return rows | {"rate_dph": np.clip(rows["rate_dph"], 0.0, 0.9)}
+
+
+def few(runs: Runs) -> Runs:
+    return {name: runs[name] for name in ("run-00.csv", "run-01.csv", "run-04.csv")}
+
+
+CASES = {
+    "as recorded": (lambda runs: runs, "PASS", None),
+    "exam at a hold of 0.6 C": (exam_rows(held_at(20.0, 0.6)), "NOT TESTABLE", "exam_covers_envelope"),
+    "exam over a third of the range": (exam_rows(half), "CONDITIONAL PASS", "exam_covers_envelope"),
+    "exam of a dead logger": (exam_rows(constant), "NOT TESTABLE", "rows"),
+    "gyro beyond its range": (all_rows(saturated), "NOT TESTABLE", "rows"),
+    "gyro beyond its range in the exam": (exam_rows(saturated), "NOT TESTABLE", "rows"),
+    "three power-ons": (few, "CONDITIONAL PASS", "power_ons"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_the_recordings_cannot_show_is_no_pass(name: str, tmp_path: Path) -> None:
+    change, verdict, lacking = CASES[name]
+    found = built(tmp_path, written(tmp_path / "RLG-1", change(unit())))
+    requirements = {one["id"]: one for one in found["evaluate"]["requirements"]}
+    assert found["limits"]["verdict"] == verdict, requirements
+    if lacking is not None:
+        assert requirements[lacking]["verdict"] != "PASS" and requirements[lacking]["next"]
+        assert all(one["verdict"] != "PASS" for one in found["limits"]["limits"] if one["part"])
+    assert f"a PASS needs {LEAST_POWER_ONS}" in (found["out"] / "report.html").read_text("utf-8")
+
+
+def test_spans_of_one_file_and_files_of_one_power_on_count_once(tmp_path: Path) -> None:
+    """Eight files whose clocks say that the gyro was switched on once."""
+    data = written(tmp_path / "RLG-1", unit())
+    text = (data / "dataset.toml").read_text()
+    for k in range(8):
+        text = text.replace("power_on_s = 0.0\n", f"power_on_s = {-86400.0 * k}\n", 1)
+    (data / "dataset.toml").write_text(text)
+    found = built(tmp_path, data)
+    assert found["limits"]["verdict"] == "CONDITIONAL PASS"
+    (one,) = (r for r in found["evaluate"]["requirements"] if r["id"] == "power_ons")
+    assert one["text"].startswith("1 power-on was recorded")
+
+
+def test_a_short_exam_states_no_less_than_a_long_one(tmp_path: Path) -> None:
+    """Each figure and U of an exam of ten means, against those of the same exam in full."""
+    short = unit()
+    for name, (role, rows) in short.items():
+        if role == "exam":
+            short[name] = (role, {k: v[: 30 if name != "run-07.csv" else 20] for k, v in rows.items()})
+    some = built(tmp_path, written(tmp_path / "some", short))
+    whole = built(tmp_path, written(tmp_path / "whole", unit()))
+    assert some["evaluate"]["exam"]["samples"] <= 12 and whole["evaluate"]["exam"]["samples"] > 300
+    assert some["budget"]["expanded_dph"] > whole["budget"]["expanded_dph"]
+    known = whole["evaluate"]["uncertainty"]
+    for name, one in (some["evaluate"]["uncertainty"] or {}).items():
+        if name in ("rms_dph", "std_dph", "mean_dph", "improvement"):
+            relative = [e["exam"]["after"]["rms_dph"] for e in (some["evaluate"], whole["evaluate"])]
+            assert one["standard"] / relative[0] > known[name]["standard"] / relative[1], name
+
+
+def test_no_exam_states_no_less_than_an_exam(tmp_path: Path) -> None:
+    """A method chosen by name and no test run: nothing shows that the map holds."""
+    runs = {name: of for name, of in unit().items() if of[0] == "train"}
+    whole = built(tmp_path, written(tmp_path / "whole", unit()))
+    none = built(tmp_path, written(tmp_path / "none", runs))
+    assert none["budget"]["expanded_dph"] > 0.8 * whole["budget"]["expanded_dph"]
+
+
+def test_neither_order_nor_names_of_files_change_a_verdict(tmp_path: Path) -> None:
+    runs = exam_rows(half)(unit())
+    first = built(tmp_path, written(tmp_path / "a", runs))
+    names = list(runs)
+    shuffled = {f"z{k}-{name}": runs[name] for k, name in enumerate(np.random.default_rng(5).permutation(names))}
+    data = written(tmp_path / "b", {new: (role, rows) for new, (role, rows) in shuffled.items()})
+    second = built(tmp_path, data)
+    for one, other in zip(first["limits"]["limits"], second["limits"]["limits"], strict=True):
+        assert one["verdict"] == other["verdict"] and one["measured"] == pytest.approx(other["measured"], rel=0.02)
+    assert first["limits"]["verdict"] == second["limits"]["verdict"]
+
+
+def test_the_unit_of_the_rate_changes_no_verdict(tmp_path: Path) -> None:
+    """The same recordings in deg/s."""
+    runs = unit()
+    first = built(tmp_path, written(tmp_path / "a", runs))
+    in_dps = all_rows(lambda rows: rows | {"rate_dph": rows["rate_dph"] / 3600.0})(runs)
+    data = written(tmp_path / "b", in_dps)
+    head, _, tail = (data / "dataset.toml").read_text().partition("[[run]]")
+    (data / "dataset.toml").write_text(head + '[units]\nrate = "deg/s"\n[[run]]' + tail)
+    second = built(tmp_path, data)
+    assert first["limits"]["verdict"] == second["limits"]["verdict"] == "PASS"
+    for one, other in zip(first["limits"]["limits"], second["limits"]["limits"], strict=True):
+        assert one["measured"] == pytest.approx(other["measured"], rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    folder = tmp_path_factory.mktemp("plain")
+    return built(folder, written(folder / "RLG-1", unit()))
+
+
+@settings(max_examples=6, deadline=None, derandomize=True)
+@given(
+    offset_dph=st.sampled_from([-1e4, -10.0, 9.7, 10.0, 1e4]),
+    scale=st.sampled_from([1.0, 10.0, 100.0]),
+)
+def test_a_constant_in_the_rate_changes_nothing_but_itself(
+    plain: dict[str, Any], tmp_path_factory: pytest.TempPathFactory, offset_dph: float, scale: float
+) -> None:
+    """Figures scale with the rate and do not see an offset, but for the proven rounding of the table."""
+    folder = tmp_path_factory.mktemp("moved")
+    scale = max(scale, 100.0) if abs(offset_dph) > 1e3 else scale  # else float32 has too few digits for the table
+
+    def moved(rows: Rows) -> Rows:
+        return rows | {"rate_dph": scale * rows["rate_dph"] + offset_dph}
+
+    limits = LIMITS.replace("rms_dph = 1.0", f"rms_dph = {scale}")
+    found = built(folder, written(folder / "RLG-1", all_rows(moved)(unit()), serial="RLG-1"), limits)
+    assert found["limits"]["verdict"] == plain["limits"]["verdict"] == "PASS"
+    one, other = found["evaluate"], plain["evaluate"]
+    assert one["exam"]["improvement"] == pytest.approx(other["exam"]["improvement"], rel=0.02)
+    for part in ("constant", "after"):
+        assert one["exam"][part]["rms_dph"] == pytest.approx(scale * other["exam"][part]["rms_dph"], rel=0.02)
+    assert one["noise_floor_dph"] == pytest.approx(scale * other["noise_floor_dph"], rel=0.02)
+    assert one["constant_dph"] == pytest.approx(scale * other["constant_dph"] + offset_dph, rel=1e-3)
+    assert [f["id"] for f in one["findings"]] == [f["id"] for f in other["findings"]]
+
+
+def test_a_limit_that_a_constant_keeps_is_named(tmp_path: Path) -> None:
+    """On a unit with a bias of 1 deg/h over temperature; an offset of 10 deg/h does not hide it."""
+    offset = all_rows(lambda rows: rows | {"rate_dph": rows["rate_dph"] + 10.0})(unit())
+    limits = (
+        "schema = 1\n[at_most]\nrms_dph = 1.0\nstd_dph = 0.1\nmax_abs_dph = 20.0\nrms_over_floor = 1e3\n"
+        "rms_30min_dph = 1.0\nangle_1h_arcsec = 1e4\nfirst_10min_rms_dph = 0.1\ncenters = 1e3\n"
+        "[at_least]\nimprovement = 0.9\n"
+    )
+    found = built(tmp_path, written(tmp_path / "RLG-1", offset), limits)
+    kept = {one["limit"].partition(".")[2]: one["constant_passes"] for one in found["limits"]["limits"]}
+    assert kept == {
+        "rms_dph": True, "std_dph": False, "max_abs_dph": True, "rms_over_floor": True, "rms_30min_dph": True,
+        "angle_1h_arcsec": True, "first_10min_rms_dph": False, "centers": False, "improvement": True,
+    }  # fmt: skip
+    page = (found["out"] / "report.html").read_text("utf-8")
+    assert page.count("a constant keeps it, too") == sum(kept.values())
