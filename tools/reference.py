@@ -93,7 +93,7 @@ def _cell(text: str) -> str:
 
 def schemas_page() -> str:
     """Every JSON Schema with its first fields; FORMAT.md has those within objects."""
-    from gyrotc.cli.shell import kinds
+    from gyrotc.cli.schema import kinds
 
     parts = [
         "# JSON reference\n",
@@ -138,7 +138,7 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
 
 def format_page() -> str:
     """docs/FORMAT.md with the tables of fields."""
-    from gyrotc.cli.shell import kinds, tables
+    from gyrotc.cli.schema import kinds, tables
 
     def table(place: re.Match[str]) -> str:
         other = REPORTED_BY.get(place[1])

@@ -1,4 +1,4 @@
-"""Commands for many serials (`fleet`, `lot`), and for what leaves the laboratory (`certificate`)."""
+"""Commands for many gyros: `fleet` and `lot`."""
 
 from __future__ import annotations
 
@@ -11,18 +11,10 @@ import typer
 from ..common.errors import CheckFailed
 from ..common.texts import toml_key
 from ..pages.display import sci, words
-from .base import (
-    LOT,
-    AcceptOption,
-    DirArg,
-    JsonOption,
-    OutOption,
-    app,
-    progress,
-    tell,
-    write_json,
-    written_place,
-)
+from .application import app
+from .options import JsonOption, OutOption, written_place
+from .output import tell, write_json
+from .progress import LOT, progress
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
@@ -34,18 +26,20 @@ def fleet(
         Path, typer.Argument(help="A manifest (TOML), or a folder with a data set in each of its folders.")
     ],
     out: OutOption,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, max=256, help="Processes on this machine.")] = 2,
+    jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, max=256, help="Processes on this machine.")] = 2,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
     ] = None,
     wait: Annotated[
-        int, typer.Option("--wait", min=1, help="Seconds for which a fleet without any worker of --scheduler waits.")
+        int,
+        typer.Option("--wait", metavar="S", min=1, help="How long a fleet waits for a worker of --scheduler, s."),
     ] = 60,
     json_file: JsonOption = None,
 ) -> None:
-    """Many serials: read, fit, emit and check each; one summary, and those that are outliers.
+    """Calibrate many gyros, and name those that are outliers.
 
-    What is done is not done again, and one that fails does not stop the others.
+    Each is read, fitted, emitted and checked. What is done is not done again, and one that fails does not stop the
+    others.
 
     Example: gyrotc fleet recordings --out fleet
     """
@@ -129,7 +123,9 @@ def lot(
         str | None, typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own.")
     ] = None,
 ) -> None:
-    """Learn what units of one type share, so that the next ones need fewer runs (build --lot).
+    """Learn what gyros of one type share.
+
+    The next ones then need fewer runs (build --lot).
 
     Example: gyrotc lot fleet --out lot.json
     """
@@ -146,32 +142,3 @@ def lot(
         f"a new unit, before any run: {sci(checked.left_rms_dph)} deg/h about the lot's map, "
         f"{sci(checked.constant_rms_dph)} about its own mean"
     )
-
-
-@app.command()
-def certificate(
-    folder: DirArg,
-    out: OutOption,
-    facts: Annotated[
-        Path | None, typer.Option("--facts", help="What the laboratory states (TOML, docs/delivery.md).")
-    ] = None,
-    number: Annotated[str | None, typer.Option("--number", help="Number of the certificate.")] = None,
-    draft: Annotated[
-        bool, typer.Option("--draft", help="Without what is missing: marked as a draft, and no DCC.")
-    ] = False,
-    accept_fail: AcceptOption = None,
-) -> None:
-    """Write a certificate: a page of A4, PDF where Chromium is there, and a digital calibration certificate (DCC XML).
-    What is missing for one is listed before anything is written.
-
-    Example: gyrotc certificate result --facts laboratory.toml --number 2026-0042 --out certificate
-    """
-    from ..jobs.certification import certificate as run
-
-    with progress() as say:
-        say("writing")
-        found = run(folder, out, facts=facts, number=number, draft=draft, accept_fail=accept_fail)
-    for path in found.files:
-        tell(str(path))
-    if not found.pdf:
-        tell("no PDF: Chromium is not installed or did not print; print certificate.html", wrong=True)

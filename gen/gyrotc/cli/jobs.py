@@ -1,4 +1,4 @@
-"""Whole jobs: build, compare, diagnose, with what they print."""
+"""Commands that are whole jobs: `build`, `compare` and `diagnose`, with what they print."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..common.errors import CheckFailed
-from .base import (
-    BUILD,
-    COMPARE,
-    DIAGNOSE,
+from .application import app
+from .options import (
     AgeingOption,
     AxisOption,
     DatasetArg,
@@ -24,14 +22,11 @@ from .base import (
     OutOption,
     PriorOption,
     TargetOption,
-    app,
     lot_in,
     numerics_of,
-    progress,
-    show,
-    tell,
-    write_json,
 )
+from .output import show, tell, write_json
+from .progress import BUILD, COMPARE, DIAGNOSE, progress
 from .results import (
     change_lines,
     limit_lines,
@@ -196,7 +191,7 @@ def compare(
     axis: AxisOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Train every method on this data and show them side by side, as in the paper's Table 1.
+    """Train every method on this data, as in the paper's Table 1.
 
     Example: gyrotc compare recordings --out comparison
     """
@@ -230,7 +225,9 @@ def diagnose(
     lot: LotOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Find what the simulation gets wrong about recordings: name the cause, extend the model, measure the gain.
+    """Name the cause of what a static map leaves in recordings.
+
+    The model is extended by the cause, and the gain is measured on runs that it was not fitted to.
 
     Example: gyrotc diagnose recordings --out diagnosis
     """

@@ -182,8 +182,8 @@ def _hoisted(arguments: list[str]) -> list[str]:
 
 def application() -> Typer:
     """The application with all its subcommands: importing a module of them registers its own."""
-    from . import fleet, jobs, recordings, shell, steps  # noqa: F401
-    from .base import app
+    from . import certificate, fleet, jobs, recordings, schema, steps  # noqa: F401
+    from .application import app
 
     return app
 

@@ -10,17 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from ..common.errors import InputError
-from .base import (
-    AxisOption,
-    DatasetArg,
-    JsonOption,
-    OutOption,
-    SeedOption,
-    app,
-    progress,
-    tell,
-    write_json,
-)
+from .application import app
+from .options import AxisOption, DatasetArg, JsonOption, OutOption, SeedOption
+from .output import tell, write_json
+from .progress import progress
 
 
 class RunFormat(str, Enum):
@@ -52,7 +45,11 @@ def import_(
     ] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option("--column", help="What a column is, e.g. rate=G1, temperature=T2, time=t; may be repeated."),
+        typer.Option(
+            "--column",
+            metavar="ROLE=NAME",
+            help="What a column is, e.g. rate=G1, time=t; may be repeated.",
+        ),
     ] = None,
     table: Annotated[
         str | None, typer.Option("--table", help="Which of several tables (sheets, groups) of a file.")
@@ -69,7 +66,9 @@ def import_(
     csv: Annotated[
         list[str] | None,
         typer.Option(
-            "--csv", help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated."
+            "--csv",
+            metavar="KEY=VALUE",
+            help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
         ),
     ] = None,
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the runs.")] = RunFormat.parquet,
@@ -89,7 +88,9 @@ def import_(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show how the files would be read.")] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Make a data set of files of loggers: CSV, Excel, Parquet, MATLAB, HDF5, NetCDF or TDMS.
+    """Make a data set of files of loggers.
+
+    The files are CSV, Excel, Parquet, MATLAB, HDF5, NetCDF or TDMS.
 
     Example: gyrotc import chamber.csv --out RLG-0042 --rate-unit deg/s
     """
@@ -181,10 +182,13 @@ def simulate(
         typer.Option("--unrelated", help="With --units: gyros that share nothing with the others; default 0."),
     ] = None,
 ) -> None:
-    """Make a data set from the physical simulation, and truth.json beside it; or a lot of gyros, a data set each.
+    """Make a data set from the physical simulation.
+
+    The truth is beside it, in truth.json. --units makes a lot of gyros, a data set each.
 
     Example: gyrotc simulate paper --seed 1 --out demo-data
-    Example: gyrotc simulate paper --units 60 --family 0.94 --seed 1 --out lot-data
+
+    Example: gyrotc simulate paper --units 60 --seed 1 --out lot
     """
     from ..simulate.campaign import simulate as run
 
@@ -243,7 +247,9 @@ def check(
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Report all errors and warnings of recordings at once, also while they still grow.
+    """Report all errors and warnings of recordings at once.
+
+    Files that still grow are read as far as they are.
 
     Example: gyrotc check recordings
     """

@@ -11,11 +11,8 @@ import typer
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from .base import (
-    EMIT,
-    ERR,
-    FIT,
-    VERIFY,
+from .application import app
+from .options import (
     AgeingOption,
     AxisOption,
     DatasetArg,
@@ -26,15 +23,12 @@ from .base import (
     OutOption,
     PriorOption,
     TargetOption,
-    app,
     lot_in,
     numerics_of,
-    progress,
-    show,
-    tell,
-    write_json,
     written_place,
 )
+from .output import ERR, show, tell, write_json
+from .progress import EMIT, FIT, VERIFY, progress
 from .results import (
     evaluation_table,
     file_notes,
@@ -93,7 +87,9 @@ def fit(
     ageing: AgeingOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Train a model: write DIR/model.json and DIR/training.json, and remove what was made of an earlier model there.
+    """Train a model: write DIR/model.json and DIR/training.json.
+
+    What was made of an earlier model in DIR is removed.
 
     Example: gyrotc fit recordings --out result
     """
@@ -135,7 +131,8 @@ def emit(
     out: OutOption,
     numeric: NumericOption = None,
     zero_at: Annotated[
-        float | None, typer.Option("--zero-at", min=-200, max=400, help="Shift the bias to 0 at this temperature, C.")
+        float | None,
+        typer.Option("--zero-at", metavar="C", min=-200, max=400, help="Shift the bias to 0 at this temperature."),
     ] = None,
     map_file: Annotated[
         Path | None,
@@ -206,8 +203,10 @@ def verify(
     ] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Is DIR/c what gyrotc makes of DIR/model.json? Every file is made again and compared byte for byte, then compiled
-    for each target and run, every bit compared with the reference. main.c is an example: edit it, and say so.
+    """Test whether DIR/c is what gyrotc makes of DIR/model.json.
+
+    Every file is made again and compared byte for byte, then compiled for each target and run, every bit compared with
+    the reference. main.c is an example that may be edited.
 
     Example: gyrotc verify result --target all
     """
@@ -259,7 +258,9 @@ def evaluate(
     trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Replay recordings through the compiled C code, compare every step, measure.
+    """Replay recordings through the compiled C code and measure.
+
+    Every step is compared with the reference.
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
@@ -282,7 +283,9 @@ def evaluate(
 
 @app.command()
 def report(folder: DirArg) -> None:
-    """Write DIR/report.html from what build or diagnose left in DIR.
+    """Draw DIR/report.html from the results in DIR.
+
+    DIR is what build or diagnose wrote, or the folder of a gyro of a fleet.
 
     Example: gyrotc report result
     """

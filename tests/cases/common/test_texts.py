@@ -18,7 +18,7 @@ import pytest
 from conftest import Command
 from emitted import recorded
 from gyrotc.assess import evaluate, load_limits
-from gyrotc.cli import base
+from gyrotc.cli import output, progress
 from gyrotc.cli.results import evaluation_table, verify_table
 from gyrotc.common import (
     C_COMMENT,
@@ -640,10 +640,10 @@ def test_names_of_files_stay_in_their_folder_and_differ(tmp_path: Path) -> None:
 
 def test_terminals_show_every_text_and_obey_none(result: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     stream = io.StringIO()
-    console = type(base.OUT)(file=stream, force_terminal=True, color_system=None, width=10**4)
-    monkeypatch.setattr(base, "OUT", console)
+    console = type(output.OUT)(file=stream, force_terminal=True, color_system=None, width=10**4)
+    monkeypatch.setattr(output, "OUT", console)
     for text in HOSTILE:
-        base.tell(text)
+        output.tell(text)
     assert stream.getvalue().count("\n") == len(HOSTILE), "each is reported in one line"
     evaluation = result["evaluation"]
     runs = tuple(evaluation.runs[0].model_copy(update={"environment": t, "file": t}) for t in HOSTILE[:400])
@@ -676,8 +676,8 @@ def test_a_refusal_is_one_line_whatever_the_name(tmp_path: Path, gyrotc: Command
 
 def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = io.StringIO()
-    monkeypatch.setattr(base, "ERR", type(base.ERR)(file=stream, force_terminal=True, width=200))
-    with base.progress() as say:
+    monkeypatch.setattr(progress, "ERR", type(output.ERR)(file=stream, force_terminal=True, width=200))
+    with progress.progress() as say:
         for text in HOSTILE:
             say(f"replaying {text}")
 

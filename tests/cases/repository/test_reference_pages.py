@@ -9,7 +9,7 @@ import pytest
 import reference
 from conftest import ROOT
 from gyrotc.cli.main import application
-from gyrotc.cli.shell import kinds, tables
+from gyrotc.cli.schema import kinds, tables
 from gyrotc.verify import PUBLIC
 from typer.main import get_command
 

@@ -14,7 +14,7 @@ import pytest
 from conftest import Command
 from gyrotc import results
 from gyrotc.cli.main import application
-from gyrotc.cli.shell import kinds, tables
+from gyrotc.cli.schema import kinds, tables
 from gyrotc.model import load_model
 from gyrotc.results import (
     At,

@@ -20,10 +20,12 @@ from typing import Any, get_args
 import pytest
 from conftest import Command, invoked, on_terminal, quick_and_slow
 from emitted import emitted
-from gyrotc.cli import base
-from gyrotc.cli import base as stage_module
-from gyrotc.cli.base import BUILD, DIAGNOSE, EMIT, FIT, GROUPS, StageLine, folded
+from gyrotc.cli import progress as stage_module
+from gyrotc.cli.application import GROUPS, INSTEAD
 from gyrotc.cli.main import _hoisted, application, run
+from gyrotc.cli.options import JsonOption
+from gyrotc.cli.output import folded
+from gyrotc.cli.progress import BUILD, DIAGNOSE, EMIT, FIT, StageLine
 from gyrotc.cli.recordings import RunFormat
 from gyrotc.model import Model
 from gyrotc.recordings.importers import rows
@@ -190,16 +192,29 @@ def test_warnings_of_libraries_are_kept_out_unless_asked_for() -> None:
         assert (done.returncode, "of a library" in done.stderr) == (0, shown)
 
 
-@pytest.mark.slow
-def test_help_keeps_to_80_columns(gyrotc: Command) -> None:
-    wide = []
-    for words in ([], *([name] for name in ("build", "emit", "fleet", "diagnose", "import"))):
-        command = [PROGRAM, *words, "--help"]
-        reported = subprocess.run(
-            command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"}
-        )
-        wide += [line for line in reported.stdout.splitlines() if len(line) > 80]
-    assert wide == []
+@pytest.mark.parametrize("name", ["", *(name for names in GROUPS.values() for name in names)])
+def test_help_keeps_to_80_columns_and_cuts_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERMINAL_WIDTH", "80")
+    lines = invoked(*([name] if name else []), "--help").stdout.splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    examples = [line for line in lines if line.startswith("  Example: ")]
+    assert all(lines[lines.index(line) + 1] == "" for line in examples), "an example is one line, to be copied"
+    assert bool(examples) == bool(name)
+    if not name:
+        commands = [line for line in lines if line.startswith("  ") and line.split()[0] in application_names()]
+        assert len(commands) == len(application_names())
+        assert all(line.endswith(".") and not line.endswith("...") for line in commands)
+
+
+def application_names() -> list[str]:
+    return [name for names in GROUPS.values() for name in names]
+
+
+@pytest.mark.parametrize("name", INSTEAD)
+def test_a_command_that_there_is_not_names_what_does_its_work(name: str) -> None:
+    done = invoked(name, "--out", "R")
+    assert done.exit_code == 2 and f"There is no command {name}: {INSTEAD[name]}." in done.stderr
 
 
 def test_long_lines_are_broken_between_words_and_stay_to_be_copied() -> None:
@@ -337,7 +352,7 @@ def test_every_command_writes_its_json_by_the_same_function() -> None:
     assert {"build", "check", "compare", "diagnose", "emit", "fit", "fleet", "verify"} <= found
     for command in commands:
         parameter = inspect.signature(command, eval_str=True).parameters.get("json_file")
-        assert parameter is None or parameter.annotation == base.JsonOption, command.__name__
+        assert parameter is None or parameter.annotation == JsonOption, command.__name__
 
 
 def test_help_of_the_package_begins_with_commands_that_there_are() -> None:

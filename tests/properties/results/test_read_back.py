@@ -13,7 +13,7 @@ import pytest
 from conftest import run_gyrotc
 from drawn import examples
 from emitted import emitted
-from gyrotc.cli.shell import kinds
+from gyrotc.cli.schema import kinds
 from gyrotc.common import InputError
 from gyrotc.results import checked_result
 from hypothesis import assume, given

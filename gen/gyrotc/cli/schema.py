@@ -1,4 +1,4 @@
-"""Forms of the results, as JSON Schema and as tables."""
+"""The command `schema`: forms of the results, as JSON Schema or as tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 import typer
 
 from ..common.errors import InputError
-from .base import app
+from .application import app
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
