@@ -23,7 +23,7 @@ class RunFormat(str, Enum):
     parquet = "parquet"
 
 
-_ROLES = ("time", "temperature", "rate", "rate_x", "rate_y", "rate_z", "pulses")
+_ROLES = ("time", "temperature", "device", "rate", "rate_x", "rate_y", "rate_z", "pulses")
 
 
 @app.command(name="import")
@@ -35,10 +35,11 @@ def import_(
     ] = None,
     serial: Annotated[str | None, typer.Option("--serial", help="Serial of the gyro.")] = None,
     rate_unit: Annotated[
-        str | None, typer.Option("--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, ...")
+        str | None, typer.Option("--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, deg/s/131, ...")
     ] = None,
     temperature_unit: Annotated[
-        str | None, typer.Option("--temperature-unit", help="Unit of temperatures: degC, K, degF, ...")
+        str | None,
+        typer.Option("--temperature-unit", help='Unit of temperatures: degC, K, "raw/340 + 36.53 degC", ...'),
     ] = None,
     time_unit: Annotated[
         str | None, typer.Option("--time-unit", help="Unit of times: s, ms, us, min, 0.01 s, ...")
@@ -48,11 +49,24 @@ def import_(
         typer.Option(
             "--column",
             metavar="ROLE=NAME",
-            help="What a column is, e.g. rate=G1, time=t; may be repeated.",
+            help="What a column is, e.g. rate=G1, time=t, device=SN; may be repeated.",
         ),
     ] = None,
     table: Annotated[
         str | None, typer.Option("--table", help="Which of several tables (sheets, groups) of a file.")
+    ] = None,
+    where: Annotated[
+        str | None, typer.Option("--where", help="The rows that are taken, e.g. 'id == 3': those of one sensor.")
+    ] = None,
+    hold: Annotated[
+        bool, typer.Option("--hold", help="Each reading of temperature and channels holds until the next one.")
+    ] = False,
+    join: Annotated[
+        list[Path] | None, typer.Option("--join", help="A file with the temperature at the same time; may be repeated.")
+    ] = None,
+    tolerance_s: Annotated[
+        float | None,
+        typer.Option("--tolerance-s", min=1e-6, help="For how long a reading of a joined file holds, s."),
     ] = None,
     rate_hz: Annotated[
         float | None, typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times.")
@@ -63,6 +77,9 @@ def import_(
     time_zone: Annotated[
         str | None, typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00.")
     ] = None,
+    leave_out_late: Annotated[
+        bool, typer.Option("--leave-out-late", help="Leave out rows whose time is not behind that of the row before.")
+    ] = False,
     csv: Annotated[
         list[str] | None,
         typer.Option(
@@ -85,7 +102,7 @@ def import_(
     trust_units: Annotated[
         bool, typer.Option("--trust-units", help="Take units that the values contradict; dataset.toml records it.")
     ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only show how the files would be read.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Read the files and show how, but write nothing.")] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Make a data set of files of loggers.
@@ -103,6 +120,10 @@ def import_(
     content = known.model_dump()
     content["csv"] |= _csv(csv or [], content["csv"])
     content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
+    content["hold"] |= hold
+    content["where"] = where or known.where
+    content["time"]["leave_out_late"] |= leave_out_late
+    content["join"] = _joins(join or [], tolerance_s) or content["join"]
     chosen = _stated(content, units, stated, _columns(column or []), table)
     options = ImportOptions(serial, format.value, trust_units, dry_run, exam)
     with progress() as say:
@@ -125,7 +146,7 @@ def _stated(
     content["units"] |= {kind: unit for kind, unit in units.items() if unit is not None}
     content["time"] |= {key: value for key, value in time_keys.items() if value is not None}
     if any(role.startswith(("rate", "pulses")) for role in columns):
-        for role in _ROLES[2:]:
+        for role in _ROLES[3:]:
             content["columns"][role] = None
     content["columns"] |= columns
     return content | ({"table": table} if table is not None else {})
@@ -140,6 +161,19 @@ def _columns(stated: list[str]) -> dict[str, Any]:
             raise InputError("--column", repr(one), f"ROLE=NAME with ROLE one of {', '.join(_ROLES)}")
         columns[role] = (*columns.get("time", ()), name) if role == "time" else name
     return columns
+
+
+def _joins(files: list[Path], tolerance_s: float | None) -> list[dict[str, Any]]:
+    """Options as `[[join]]` of a map.
+
+    Raises:
+        InputError: One of the two is missing.
+    """
+    if bool(files) != (tolerance_s is not None):
+        found = "without --tolerance-s" if files else "without --join"
+        expected = "--join FILE --tolerance-s S: for how long a reading of the file holds"
+        raise InputError("--join" if files else "--tolerance-s", found, expected)
+    return [{"file": str(file), "tolerance_s": tolerance_s} for file in files]
 
 
 def _csv(stated: list[str], known: dict[str, Any]) -> dict[str, Any]:

@@ -473,15 +473,20 @@ def _temperature(name: str, values: FloatArray) -> Iterator[Fault]:
     for fault in _within(name, values, _TEMPERATURE_C, "C"):
         likely = likely_temperature(values)
         word = {"K": "kelvin", "degF": "fahrenheit"}.get(likely or "", "")
-        hint = f'; {word}? [units] temperature = "{likely}" in dataset.toml' if likely else ""
+        hint = "; nan in place of a failed reading"
+        hint = f'; {word}? [units] temperature = "{likely}" in dataset.toml' if likely else hint
         yield Fault(fault.row, fault.column, fault.rows, fault.found, fault.expected + hint)
+
+
+# A unit is wrong in all rows: fewer implausible temperatures are failed readings.
+_MIN_SHARE = 0.02
 
 
 def likely_temperature(values: FloatArray) -> str | None:
     """The unit in which temperatures beyond the plausible would all be plausible: "K", "degF" or None."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-    if high <= _TEMPERATURE_C[1]:
+    if high <= _TEMPERATURE_C[1] or np.count_nonzero(finite > _TEMPERATURE_C[1]) < _MIN_SHARE * len(finite):
         return None
     if _KELVIN[0] <= low and high <= _KELVIN[1]:
         return "K"

@@ -432,6 +432,22 @@ def _header(name: str, head: bytes) -> tuple[str, ...]:
     return names
 
 
+def nuls_at_end(path: Path, size: int) -> int:
+    """Number of NUL bytes at the end of a file of text: what a logger that lost power had not written yet."""
+    file, _ = open_input(path, path.name, "a file of text")
+    count = 0
+    with file:
+        while count < size:
+            start = max(size - count - _BLOCK_BYTES, 0)
+            file.seek(start)
+            block = file.read(size - count - start)
+            held = len(block.rstrip(b"\x00"))
+            count += len(block) - held
+            if held:
+                break
+    return count
+
+
 def _bare(cell: str) -> str:
     """A cell without the spaces and quotes around it."""
     return cell.strip().strip('"').strip()
@@ -439,6 +455,8 @@ def _bare(cell: str) -> str:
 
 def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[int, str]:
     """Size without a torn last line (no line end, and cells missing or a number cut), and that line."""
+    nuls = nuls_at_end(path, size)
+    size -= nuls
     start = max(head, size - _LONGEST_LINE)
     file, _ = open_input(path, path.name, "a CSV file")
     with file:
@@ -451,5 +469,5 @@ def _without_torn_line(path: Path, size: int, head: int, columns: int) -> tuple[
     cut = number_in(f"{cells[-1]}0") is not None  # a digit more makes a number of what was torn off within one
     numbers = cut and all(number_in(cell) is not None for cell in cells[:-1])
     if not line or whole or not numbers or len(cells) > columns:
-        return size, ""
+        return size, f"{nuls} NUL bytes" if nuls else ""
     return start + at, line

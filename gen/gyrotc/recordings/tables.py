@@ -9,15 +9,17 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
+from ..common.arrays import IntArray
 from ..common.errors import InputError, install_command
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
@@ -51,6 +53,7 @@ class Chunk:
     Attributes:
         columns: Values by name: numbers (NaN where a cell is missing), datetime64[ns], or text (pyarrow).
         first: Number of the first row in the table, from 0.
+        rows: Numbers of the rows in the table; None: they follow one another.
         done: Share of the table that has been read with these rows, 0 to 1.
         left_out: Number of rows of the file that are not among them, by the reason.
     """
@@ -59,6 +62,19 @@ class Chunk:
     first: int
     done: float
     left_out: Mapping[str, int] = field(default_factory=dict)
+    rows: IntArray | None = None
+
+    def row(self, k: int) -> int:
+        """Number in the table of a row of the chunk."""
+        return self.first + k if self.rows is None else int(self.rows[k])
+
+    def only(self, chosen: NDArray[np.bool_]) -> Chunk:
+        """The chosen rows."""
+        columns = {
+            name: values.filter(pa.array(chosen)) if isinstance(values, pa.Array) else values[chosen]
+            for name, values in self.columns.items()
+        }
+        return replace(self, columns=columns, rows=self.first + np.flatnonzero(chosen))
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0
@@ -77,6 +93,7 @@ class LoggerTable(ABC):
         notes: What the file says, or shows, of rows that it lacks.
         rows: Number of rows where the format states it, else 0.
         above: Lines of text above the first row: names, units, and what else a logger writes there.
+        tolerance_s: For how long a reading of a joined file holds, s; None: a table of the file itself.
     """
 
     name: str
@@ -87,6 +104,7 @@ class LoggerTable(ABC):
     notes: tuple[str, ...] = field(default=())
     rows: int = 0
     above: int = 0
+    tolerance_s: float | None = None
 
     @abstractmethod
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
@@ -99,6 +117,14 @@ class LoggerTable(ABC):
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
         return f"row {row + 1}" if not self.name else f"{self.name}, row {row + 1}"
+
+    def cut_in_two(self, file: str, row: int) -> str:
+        """What makes two files of the rows before and from a row, in words or commands."""
+        return f"a file with the rows before {self.place(row)}, and one with the rows from there on"
+
+    def turned_round(self, file: str) -> str:
+        """What makes a file with the rows in reverse order, in words or commands."""
+        return "a file in which the rows are sorted by time"
 
     def column(self, name: str) -> Column | None:
         """The column of a name, None if there is none."""
@@ -116,6 +142,7 @@ class LoggerFile:
         facts: Facts about the recording that the file states, such as a serial.
         csv: How a CSV file is read, as keys of `[csv]` of a map; empty for other formats.
         close: Ends the reading: after it no chunk comes.
+        joined: Files whose tables stand behind its own.
     """
 
     path: Path
@@ -124,6 +151,7 @@ class LoggerFile:
     facts: dict[str, str] = field(default_factory=dict)
     csv: dict[str, Any] = field(default_factory=dict)
     close: Callable[[], object] = lambda: None
+    joined: tuple[Path, ...] = ()
 
 
 def optional_library(path: Path, module: str, extra: str, what: str) -> ModuleType:

@@ -2,10 +2,12 @@
 
 A unit is a product of powers of the names that stand here. Its size is a fraction of whole numbers times a power of pi,
 so a factor is rounded once. An angle has a dimension of its own: Hz is no rate of rotation.
+A register with an offset is written as in its data sheet: `raw/340 + 36.53 degC`.
 """
 
 from __future__ import annotations
 
+import ast
 import math
 import re
 from collections import Counter
@@ -62,7 +64,8 @@ _OTHER = {
     "% percent count LSB": "1",
     "psi": "0.45359237 kg g_0/(0.0254 m)^2",
 }
-_ZERO = {"C": Fraction("273.15"), "F": Fraction("459.67") * 5 / 9}
+_FAHRENHEIT = Fraction(5, 9)  # kelvins
+_ZERO = {"C": Fraction("273.15"), "F": Fraction("459.67") * _FAHRENHEIT}
 """Kelvins at zero, by the first name."""
 
 _PREFIXES = {
@@ -153,12 +156,15 @@ def conversion(text: str, kind: str) -> Conversion:
     """How values of a unit become gyrotc's own.
 
     Args:
-        text: A unit, or a number of one: "deg/s", "°/h", "K", "0.01 s", "deg/s / 131" (131 counts make 1 deg/s).
+        text: A unit, a number of one: "deg/s", "°/h", "K", "0.01 s", "deg/s / 131" (131 counts make 1 deg/s), or a
+            line through `raw`: "raw/340 + 36.53 degC".
         kind: "time", "temperature", "rate", or any other unit as text, as of a channel.
 
     Raises:
         UnitError: It is no such unit.
     """
+    if _RAW.search(text):
+        return _of_register(text, kind)
     given, wanted = _size(text), _size(NATIVE_UNITS.get(kind, kind))
     if not given.named:
         raise UnitError(f"{text!r} is a number without a unit")
@@ -171,7 +177,70 @@ def conversion(text: str, kind: str) -> Conversion:
         factor = math.inf
     if not 0.0 < factor < math.inf:
         raise UnitError(f"{text!r} is no unit: its size is {factor:g}")
+    if given.zero and not _is_decimal(given.size / (_FAHRENHEIT if given.zero == _ZERO["F"] else 1)):
+        raise UnitError(f"{text!r} scales counts and states no offset ('raw/128 + 0 degC' does)")
     return Conversion(text, factor, float((given.zero - wanted.zero) / wanted.size))
+
+
+def _is_decimal(size: Fraction) -> bool:
+    """Test whether a number is a power of ten: decimal places, not the scale of a register."""
+    digits = str(max(size.numerator, size.denominator))
+    return min(size.numerator, size.denominator) == 1 and digits.rstrip("0") == "1"
+
+
+_RAW = re.compile(r"\braw\b")
+_TERM = re.compile(r"\s*(?:raw\b|\d+(?:\.\d*)?(?:[eE][+-]?\d{1,2})?|[-+*/()])")
+
+
+def _of_register(text: str, kind: str) -> Conversion:
+    """The conversion of a line through `raw`, such as "(raw - 521) / 340 + 35 degC".
+
+    Raises:
+        UnitError: What precedes the unit is no line, or the unit is none.
+    """
+    unknown = UnitError(f"{text!r} is no line of raw and a unit, such as 'raw/340 + 36.53 degC'")
+    if len(text) > _MOST:
+        raise unknown
+    end = 0
+    while term := _TERM.match(text, end):
+        end = term.end()
+    if not (unit_text := text[end:].strip()):
+        raise unknown
+    unit = conversion(unit_text, kind)
+    try:
+        slope, level = _line(ast.parse(text[:end].strip(), mode="eval").body)
+        factor, offset = float(slope) * unit.factor, float(level) * unit.factor + unit.offset
+    except (SyntaxError, ArithmeticError, ValueError) as error:
+        raise unknown from error
+    if not 0.0 < abs(factor) < math.inf:
+        raise unknown
+    return Conversion(text, factor, offset)
+
+
+def _line(node: ast.expr) -> tuple[Fraction, Fraction]:
+    """Slope and level of an expression that is linear in `raw`.
+
+    Raises:
+        ValueError: It is not linear, or holds something else.
+    """
+    if isinstance(node, ast.Constant):
+        return Fraction(0), Fraction(str(node.value))
+    if isinstance(node, ast.Name) and node.id == "raw":
+        return Fraction(1), Fraction(0)
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        sign = -1 if isinstance(node.op, ast.USub) else 1
+        slope, level = _line(node.operand)
+        return sign * slope, sign * level
+    if isinstance(node, ast.BinOp):
+        (slope, level), (other_slope, other_level) = _line(node.left), _line(node.right)
+        if isinstance(node.op, ast.Add | ast.Sub):
+            sign = -1 if isinstance(node.op, ast.Sub) else 1
+            return slope + sign * other_slope, level + sign * other_level
+        if isinstance(node.op, ast.Mult) and not (slope and other_slope):
+            return slope * other_level + other_slope * level, level * other_level
+        if isinstance(node.op, ast.Div) and not other_slope:
+            return slope / other_level, level / other_level
+    raise ValueError("not linear in raw")
 
 
 def quantity_of(text: str) -> Quantity | None:
@@ -304,7 +373,11 @@ def declared(units: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> 
     return {name: one for name, one in found.items() if one.changes}
 
 
-_EXAMPLES = {"time": "s, ms, min", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
+_EXAMPLES = {
+    "time": "s, ms, min",
+    "temperature": "degC, K, degF, raw/340 + 36.53 degC",
+    "rate": "deg/h, deg/s, rad/s",
+}
 
 
 _LONGEST = 256  # characters of a name that is searched for a unit: the search takes the square of it or more

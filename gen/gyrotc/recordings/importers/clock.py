@@ -71,6 +71,17 @@ def text_of(column: Column, values: Any) -> Any:
     return pa.array(texts, pa.string())
 
 
+def _digits(values: Any, form: str) -> pa.Array:
+    """Whole numbers as the digits of a form without marks, such as %Y%m%d%H%M%S."""
+    width = sum(_WIDTHS.get(code, 2) for code in re.findall("%([A-Za-z])", form))
+    numbers = np.asarray(values)
+    whole = np.isfinite(numbers) & (numbers == np.floor(numbers)) & (numbers >= 0) & (numbers < _MAX_EXACT)
+    given = [f"{int(v):0{width}d}" if good else None for v, good in zip(numbers.tolist(), whole.tolist(), strict=True)]
+    return pa.array(given, pa.string())
+
+
+_WIDTHS = {"Y": 4, "j": 3, "f": 0}
+_MAX_EXACT = 2**63
 _EPOCH_S = 1e8  # a counter beyond three years counts from an epoch, not from power-on: it starts at its first row
 _NAT = np.iinfo(np.int64).min
 _WRAPS = (2**16, 2**24, 2**32)  # counters of 16, 24 and 32 bits
@@ -94,7 +105,6 @@ class Clock:
 
     Attributes:
         form: Form of the stamps; empty for other clocks.
-        wraps: How often a counter started again.
         origin: What counts as 0: nanoseconds since 1970 for stamps, else a value of the counter.
     """
 
@@ -108,14 +118,17 @@ class Clock:
         stated: TimeMap,
     ) -> None:
         self.form = ""
-        self.wraps = 0
         self.origin: int | float | None = None
         self._file, self._table, self._columns, self._rate_hz = file, table, columns, rate_hz
         self._unit: Conversion | None = conversion(unit, "time") if unit else None
         self._stamps: Stamps | None = None
         self._last: float | None = None
+        self._wrap: int | None = None
         self._added = 0
-        if columns and (columns[0].kind != "number" or len(columns) > 1) and columns[0].sample:
+        self._rows = 0
+        self._start_s = 0.0
+        compact = stated.format is not None and len(columns) == 1 and columns[0].kind == "number"
+        if columns and (compact or ((columns[0].kind != "number" or len(columns) > 1) and columns[0].sample)):
             self.form = stated.format or _form(file, columns)
             in_name = _ZONE.search(columns[0].name)
             self._stamps = Stamps(self.form, stated.zone or (in_name[1] if in_name else None))
@@ -145,6 +158,51 @@ class Clock:
         dated = self._stamps is not None and self._stamps.dated
         return bool(self._columns) and not self._known_zone and dated
 
+    @property
+    def zero_ns(self) -> int | None:
+        """Nanoseconds since 1970 at time 0; None: it counts from something else."""
+        if not self._columns:
+            return _nanoseconds(self._table.started) if self._table.started is not None else None
+        stamps = self._stamps is not None or self._columns[0].kind == "stamp"
+        return int(self.origin) if stamps and self.origin is not None else None
+
+    def follow(self, other: Clock) -> None:
+        """Counts from the same zero as another clock that has begun.
+
+        Raises:
+            InputError: Nothing says how one clock is ahead of the other.
+        """
+        stamps = bool(self._columns) and (self._stamps is not None or self._columns[0].kind == "stamp")
+        if stamps and other.zero_ns is not None and self._known_zone == other.known_zone:
+            self.origin = other.zero_ns
+        elif not self._columns and self.zero_ns is not None and other.zero_ns is not None and other.known_zone:
+            self._start_s = (self.zero_ns - other.zero_ns) / 1e9
+        elif self.zero_ns is None and not stamps and other.zero_ns is None and bool(self._columns) == other.counts:
+            self.origin = other.origin
+        else:
+            found = f"has {self.words}, and the rates have {other.words}: nothing says how far one clock is ahead"
+            expected = "times of one kind in both: stamps of known zones (--time-zone), or one counter"
+            raise InputError(self._file, found, expected)
+
+    @property
+    def known_zone(self) -> bool:
+        """Whether the times are those of UTC."""
+        return self._known_zone or (not self._columns and self._table.started is not None)
+
+    @property
+    def counts(self) -> bool:
+        """Whether a column counts the time."""
+        return bool(self._columns)
+
+    @property
+    def words(self) -> str:
+        """What the times are, in words."""
+        if not self._columns:
+            return "rows at a fixed rate" + (" from a stated start" if self._table.started else "")
+        zone = "a known zone" if self._known_zone else "no zone"
+        stamps = self._stamps is not None or self._columns[0].kind == "stamp"
+        return f"stamps of {zone}" if stamps else "a counter of time"
+
     def __call__(self, chunk: Chunk) -> FloatArray:
         """Times of the rows of a chunk, s; NaN where there is none.
 
@@ -153,7 +211,8 @@ class Clock:
         """
         if not self._columns:
             assert self._rate_hz is not None
-            return np.arange(chunk.first, chunk.first + len(chunk)) / self._rate_hz
+            self._rows += len(chunk)
+            return self._start_s + np.arange(self._rows - len(chunk), self._rows) / self._rate_hz
         values = chunk.columns[self._columns[0].name]
         if self._stamps is not None:
             return self._since(*self._parsed(chunk))
@@ -165,6 +224,8 @@ class Clock:
     def _parsed(self, chunk: Chunk) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         assert self._stamps is not None
         texts = chunk.columns[self._columns[0].name]
+        if len(self._columns) == 1 and not isinstance(texts, pa.Array | pa.ChunkedArray):
+            texts = _digits(texts, self.form)
         if len(self._columns) > 1:
             parts = [text_of(column, chunk.columns[column.name]) for column in self._columns]
             texts = pc.binary_join_element_wise(*parts, " ")
@@ -172,7 +233,7 @@ class Clock:
         held = np.asarray(pc.not_equal(pc.fill_null(texts, ""), "").to_numpy(zero_copy_only=False), dtype=bool)
         if np.any(held & ~good):
             row = int(np.argmax(held & ~good))
-            where = f"{self._file}, {self._table.place(chunk.first + row)}, column {self._columns[0].name}"
+            where = f"{self._file}, {self._table.place(chunk.row(row))}, column {self._columns[0].name}"
             hint = f"a stamp of the form {self.form}; --time-format names another"
             raise InputError(where, repr(texts[row].as_py()), hint)
         return ns, good
@@ -206,16 +267,30 @@ class Clock:
         step = np.diff(raw.astype(np.float64), prepend=np.nan if self._last is None else self._last)
         self._last = float(raw[-1])
         raw = raw + self._added
-        falls = np.flatnonzero(step < 0.0)
-        wraps = (*_WRAPS, *(round(s / self._unit.factor) for s in _PERIODS_S if self._unit))
-        usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
-        for at in falls[:1000]:
-            wrap = next((w for w in wraps if abs(step[at] + w) <= _NEAR_STEPS * usual), None)
-            if wrap is not None and step[at] < -0.5 * wrap:
-                raw[at:] += wrap
-                self._added += wrap
-                self.wraps += 1
-        return raw
+        near = _NEAR_STEPS * float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+        begins = 0
+        if self._wrap is None:
+            wraps = (*_WRAPS, *(round(s / self._unit.factor) for s in _PERIODS_S if self._unit))
+            found = [(at, wrap) for wrap in wraps for at in np.flatnonzero(_passes(step, wrap, near))[:1].tolist()]
+            if not found:
+                return raw
+            begins, self._wrap = min(found)
+        # A late sample falls back over the end of the counter, and the sample behind it passes that end again.
+        turns = _passes(step, self._wrap, near).astype(np.int64) - _passes(-step, self._wrap, near)
+        turns[:begins] = 0
+        total = np.cumsum(turns) * self._wrap
+        self._added += int(total[-1])
+        return raw + total
+
+
+def _passes(step: FloatArray, wrap: int, near: float) -> NDArray[np.bool_]:
+    """Test which differences pass the end of a counter of that size."""
+    return (np.abs(step + wrap) <= near) & (step < -0.5 * wrap)
+
+
+def _nanoseconds(moment: datetime) -> int:
+    since = moment - datetime(1970, 1, 1, tzinfo=timezone.utc)
+    return (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
 
 
 def _form(file: str, columns: Sequence[Column]) -> str:

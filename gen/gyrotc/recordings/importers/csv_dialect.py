@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import re
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -207,7 +208,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     Raises:
         InputError: No rows of numbers can be found.
     """
-    encoding = given.get("encoding") or _encoding(head)
+    encoding = given.get("encoding") or encoding_of(head)
     text = _text(name, head, encoding)
     lines = re.split(r"\r\n|\n|\r", text)[: None if whole else -1]
     comment = _comments(lines, given)
@@ -275,7 +276,13 @@ def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dic
     return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
 
 
-def _encoding(head: bytes) -> str:
+def without_nuls(name: str) -> str:
+    """The command that takes NUL bytes out of a file of text."""
+    return f"text: `tr -d '\\000' < {shlex.quote(name)} > {shlex.quote(name + '.csv')}` takes them out"
+
+
+def encoding_of(head: bytes) -> str:
+    """Name of the codec of a text, by its first bytes."""
     for mark, encoding in (
         (codecs.BOM_UTF8, "utf-8-sig"),
         (codecs.BOM_UTF16_LE, "utf-16"),
@@ -296,8 +303,12 @@ def _encoding(head: bytes) -> str:
 
 def _text(name: str, head: bytes, encoding: str) -> str:
     strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
-    if strange > 0.01 * len(head) or (b"\x00" in head and not encoding.startswith("utf-16")):
+    nuls = 0 if encoding.startswith("utf-16") else head.count(b"\x00")
+    if strange > 0.01 * len(head) or nuls > 0.5 * len(head):
         raise InputError(name, *_BINARY)
+    if nuls:
+        line = head[: head.index(b"\x00")].count(b"\n") + 1
+        raise InputError(f"{name}, line {line}", f"{nuls} NUL bytes from there on", without_nuls(name))
     try:
         text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
     except LookupError as error:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
+import shlex
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ import numpy as np
 import pyarrow as pa
 
 from ...common.errors import InputError
-from ..files import blocks_of_lines, lines_held, number_in, parsed
+from ..files import blocks_of_lines, lines_held, nuls_at_end, number_in, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable, optional_library
 from .cells import (
     HEXADECIMAL,
@@ -32,7 +33,7 @@ from .cells import (
     plain_number,
     split_line,
 )
-from .csv_dialect import Dialect, dialect_of
+from .csv_dialect import Dialect, dialect_of, encoding_of, without_nuls
 from .layout import SeveralLayouts, can_be_row, other_names, row_misfit
 
 
@@ -53,7 +54,11 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
     """
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
-        whole = not file.read(1)
+    size, nuls = path.stat().st_size, 0
+    if not (given.get("encoding") or encoding_of(head)).lower().startswith("utf-16"):
+        nuls = nuls_at_end(path, size)
+    size -= nuls
+    head, whole = head[:size], size <= len(head)
     if not head.strip():
         raise InputError(path.name, "is empty", "a header and rows")
     dialect = dialect_of(path.name, head, given, whole=whole)
@@ -67,8 +72,9 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
         columns=columns,
         path=path,
         dialect=dialect,
-        size=path.stat().st_size,
+        size=size,
         above=dialect.above,
+        notes=(f"{nuls} NUL bytes behind the last row are no rows: the logger lost power",) if nuls else (),
         **_stated_rate(dialect),
     )
     return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.to_map())
@@ -110,6 +116,24 @@ class CsvTable(LoggerTable):
                         return f"line {line}"
                     at += 1
         return f"row {row + 1}"
+
+    def cut_in_two(self, file: str, row: int) -> str:
+        """The commands that make two files, each with all that is above the rows."""
+        if self.dialect.encoding.startswith("utf-16"):
+            return super().cut_in_two(file, row)
+        line = int(self.place(row).rpartition(" ")[2])
+        return _commands(
+            file,
+            f"head -n {line - 1} {{name}} > {{name}}.1.csv",
+            f"(head -n {self.dialect.data_line - 1} {{name}}; tail -n +{line} {{name}}) > {{name}}.2.csv",
+        )
+
+    def turned_round(self, file: str) -> str:
+        """The command that reverses the rows."""
+        if self.dialect.encoding.startswith("utf-16"):
+            return super().turned_round(file)
+        first = self.dialect.data_line
+        return _commands(file, f"(head -n {first - 1} {{name}}; tail -n +{first} {{name}} | tac) > {{name}}.csv")
 
     def _blocks(self) -> Iterator[tuple[bytes, int, float]]:
         one = self.dialect
@@ -222,6 +246,8 @@ class CsvTable(LoggerTable):
         self, line: int, text: str, names: Sequence[str], index: dict[str, int], following: str | None
     ) -> dict[str, Any]:
         one = self.dialect
+        if "\x00" in text:
+            raise InputError(f"{self.path.name}, line {line}", "NUL bytes", without_nuls(self.path.name))
         row = split_line(text, one.delimiter)
         if len(row) != len(self.columns):
             layout = (len(self.columns), one.delimiter, one.decimal, one.data_line)
@@ -246,6 +272,14 @@ class CsvTable(LoggerTable):
             raise other_names(self.path.name, line, row)
         hint = f'--csv missing="{cell[:20]}" takes it as no reading'
         raise InputError(f"{self.path.name}, line {line}, column {name}", repr(cell[:40]), f"a number; {hint}")
+
+
+def _commands(file: str, *commands: str) -> str:
+    """Commands of a shell on a file of text, unpacked first where it is packed."""
+    packed = file.lower().endswith(".gz")
+    name = shlex.quote(file[: -len(".gz")] if packed else file)
+    unpacked = [f"gunzip -k {shlex.quote(file)}"] if packed else []
+    return ", ".join(f"`{command}`" for command in [*unpacked, *(command.format(name=name) for command in commands)])
 
 
 def _whole(values: Sequence[Any]) -> bool:

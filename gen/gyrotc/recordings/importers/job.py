@@ -8,10 +8,13 @@ from __future__ import annotations
 import gzip
 import hashlib
 import re
+import shlex
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from datetime import datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +26,18 @@ from ...common.errors import InputError
 from ...common.inputs import open_input, refuse_above
 from ...results.base import ADVICE, Finding
 from ...results.files import write_own
-from ...results.folder import result_folder, scratch_folder
+from ...results.folder import Stage, result_folder, scratch_folder
 from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
-from ..description import FILE, MIN_ROWS, check_serial, dataset_toml
+from ..description import FILE, MIN_ROWS, Problems, SourceEntry, check_serial, dataset_toml, parse_description
 from ..parser_process import Parser, open_confined
 from ..plausibility import TRUSTED, Suspicion, suspicions
-from ..tables import LoggerFile
+from ..reading import Evidence
+from ..tables import LoggerFile, LoggerTable
 from .csv_table import open_csv
-from .map_file import MAP_FILE, Choice, ImportPlan, Map, TimeMap, map_text
+from .map_file import MAP_FILE, Choice, ImportPlan, JoinMap, Map, map_text
 from .propose import Ask, propose
-from .rows import NAMES_OF_COLUMNS, FileFormat, ImportedRows, RunFile
+from .rows import NAMES_OF_COLUMNS, FileFormat, ImportedRows, RowsChunk, RunFile
+from .selection import NO_DEVICE
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
 
@@ -40,6 +45,7 @@ _BLOCK_BYTES = 2**22  # of a read: bounds memory
 def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Map:
     """The map with every choice that was made."""
     columns: dict[str, Any] = {choice.role: choice.source for choice in (*plan.values, plan.temperature)}
+    columns["device"] = plan.device.name if plan.device else chosen.columns.device
     if plan.time:
         columns["time"] = tuple(choice.column.name for choice in plan.time)
     units = dict(chosen.units)
@@ -49,7 +55,7 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
     if plan.values[0].unit:
         units["rate"] = plan.values[0].unit
     units |= {choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units}
-    time = TimeMap(format=rows.clock.form or None, zone=chosen.time.zone, rate_hz=plan.rate_hz)
+    time = chosen.time.model_copy(update={"format": rows.clock.form or None, "rate_hz": plan.rate_hz})
     csv = {
         k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal", "thousands")
     } | chosen.csv.given()
@@ -63,8 +69,14 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
     return Map.model_validate(chosen.model_dump() | update)
 
 
-def serial_of(stated: str | None, chosen: Map, file: LoggerFile, out: Path) -> str:
+def serial_of(stated: str | None, chosen: Map, file: LoggerFile, device: str, out: Path) -> str:
+    """Serial of the gyro: as stated, else of the map, the column of devices, the file, or the name of the folder.
+
+    Raises:
+        InputError: It is no legal serial.
+    """
     in_file = next((v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None)
+    in_file = device or in_file
     known = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
     serial = known or out.resolve().name
     try:
@@ -84,28 +96,79 @@ def run_name(path: Path, taken: set[str]) -> str:
     return name
 
 
-def description_of(serial: str, chosen: Map, entries: Sequence[Mapping[str, Any]]) -> str:
+@dataclass(frozen=True, slots=True)
+class ImportedRun:
+    """A run that was written, and the file that it is of.
+
+    Attributes:
+        file: Name of the run in the data set.
+        sources: The logger's file, and those that were joined to it.
+        started: Time of its first row where it is known.
+        device: Name of the gyro in the rows; empty: no column says it.
+        read: Rows of the file.
+        above: Lines of text above them.
+        rows: Rows that were written.
+        left_out: Rows that were not, by the reason.
+        notes: What the file says, or shows, of rows that it lacks.
+        trusted: What units were taken against.
+        pulses: Whether pulses were counted.
+        evidence: Ranges and means of the rows.
+        period_s: Shortest and longest step from row to row, s.
+        exam: The run judges the correction and is not trained on.
+    """
+
+    file: str
+    sources: tuple[SourceEntry, ...]
+    started: datetime | None
+    device: str
+    read: int
+    above: int
+    rows: int
+    left_out: Mapping[str, int]
+    notes: tuple[str, ...]
+    trusted: tuple[str, ...]
+    pulses: bool
+    evidence: Evidence
+    period_s: tuple[float, float]
+    exam: bool = False
+
+    def result(self) -> ImportedFile:
+        """What `gyrotc import` says of it."""
+        source = self.sources[0].model_dump()
+        return ImportedFile(
+            file=self.file,
+            read=self.read,
+            above=self.above,
+            rows=self.rows,
+            left_out=dict(self.left_out),
+            trusted=self.trusted,
+            source=OriginalFile(**source),
+        )
+
+
+def description_of(serial: str, chosen: Map, runs: Sequence[ImportedRun]) -> str:
+    """`dataset.toml` of imported runs."""
     head: dict[str, Any] = {"schema": 1, "serial": serial}
     for key in ("description", "earth_rate", "latitude_deg", "pulse_weight_arcsec"):
         if getattr(chosen, key) not in (None, ""):
             head[key] = getattr(chosen, key)
-    if any(entry["trusted"] for entry in entries):
+    if any(run.trusted for run in runs):
         head["trust_units"] = True
-    sources = [entry["source"] for entry in entries]
+    sources = [source.model_dump() for run in runs for source in run.sources]
     tables: dict[str, Any] = {"source": sources[0] if len(sources) == 1 else sources}
     if chosen.meta:
         tables["meta"] = chosen.meta
     if chosen.noise:
         tables["noise"] = chosen.noise
-    return dataset_toml(head, tables, [dict(_run_entry(entry)) for entry in entries])
+    return dataset_toml(head, tables, [dict(_run_entry(run)) for run in runs])
 
 
-def _run_entry(entry: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    yield "file", entry["file"]
-    if entry["exam"]:
+def _run_entry(run: ImportedRun) -> Iterator[tuple[str, Any]]:
+    yield "file", run.file
+    if run.exam:
         yield "role", "exam"
-    if entry["started"] is not None:
-        yield "started", entry["started"]
+    if run.started is not None:
+        yield "started", run.started
     yield "power_on_s", "unknown"
 
 
@@ -136,11 +199,13 @@ def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator
         yield _line(choice.role, choice.source, _unit_words(choice), _why(choice))
     if rows.clock.needs_zone:
         yield "  the stamps have no zone: when the run started is left out (--time-zone Europe/Berlin would say it)"
+    if plan.where:
+        yield _line("rows", str(plan.where), "", "as stated")
+    if plan.device:
+        yield _line("device", plan.device.name, "", "its name, or as stated: one gyro in all rows")
     if plan.left_out:
         more = f" and {len(plan.left_out) - _MOST_NAMES} more" if len(plan.left_out) > _MOST_NAMES else ""
         yield f"  left out: {', '.join(plan.left_out[:_MOST_NAMES])}{more} ([channels] of the map takes them)"
-    for note in plan.main.notes:
-        yield f"  {note}"
 
 
 def preview(rows: ImportedRows) -> Iterator[str]:
@@ -151,23 +216,27 @@ def preview(rows: ImportedRows) -> Iterator[str]:
         yield f"  row {k + 1}: {before or '-'}  ->  {after}"
 
 
-def import_summary(out: Path, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def import_summary(out: Path, runs: Sequence[ImportedRun]) -> Iterator[str]:
     """What was written."""
-    for entry in entries:
-        cells = entry["evidence"].cells
-        low, high = entry["evidence"].temperature_c
-        length = _period(*entry["period_s"])
-        means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(cells[:, 2:].mean(axis=0)))
-        left = "".join(f", {count} left out: {reason}" for reason, count in entry["left_out"].items())
-        above = f"; lines of text above them: {entry['above']}" if entry["above"] else ""
-        yield (
-            f"{out / entry['file']}: {entry['rows']} rows of {length} s, {low:.4g} ... {high:.4g} C, "
-            f"mean {means} {'pulses a row' if entry['pulses'] else 'deg/h'}; {entry['read']} read{left}{above}"
-        )
-        for text in entry["trusted"]:
+    for run in runs:
+        yield f"{out / run.file}: {_counted(run)}"
+        for text in run.trusted:
             yield f"  {TRUSTED}{text}"
+        yield from (f"  {note}" for note in run.notes)
     kept = out / "map.toml"
     yield f"{kept}: reads the next file of this logger: gyrotc import FILE --map {kept} --out ..."
+
+
+def _counted(run: ImportedRun) -> str:
+    """Rows, their period, temperatures and mean, and where each row of the file is."""
+    low, high = run.evidence.temperature_c
+    means = ", ".join(f"{mean:.4g}" for mean in np.atleast_1d(run.evidence.cells[:, 2:].mean(axis=0)))
+    left = "".join(f", {count} left out: {reason}" for reason, count in run.left_out.items())
+    above = f"; lines of text above them: {run.above}" if run.above else ""
+    return (
+        f"{run.rows} rows of {_period(*run.period_s)} s, {low:.4g} ... {high:.4g} C, "
+        f"mean {means} {'pulses a row' if run.pulses else 'deg/h'}; {run.read} read{left}{above}"
+    )
 
 
 _EXACT = 1e-6  # of a period: what stamps in microseconds leave of rows of a second
@@ -217,7 +286,7 @@ class ImportOptions:
         serial: Serial of the gyro; else that of the map, of the file, or the name of the folder.
         format: Format of the runs that are written.
         trust_units: Values that contradict their units are taken; it is recorded.
-        dry_run: Tell what would be read and how, and write nothing.
+        dry_run: Read the files and tell how, but write nothing.
         exam: The last file is the exam, which judges the correction and is not trained on; None: a person is asked.
     """
 
@@ -230,11 +299,11 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What was written: the serial, the kept map, and an entry for each run (`file`, `rows`, `left_out`, `source`)."""
+    """What was written: the serial, the kept map, and the runs."""
 
     serial: str
     map: Map
-    runs: tuple[dict[str, Any], ...]
+    runs: tuple[ImportedRun, ...]
 
     def result(self) -> ImportedFiles:
         """What `gyrotc import` says of it."""
@@ -242,31 +311,20 @@ class Imported:
             gyrotc_version=__version__,
             serial=self.serial,
             axis=None,
-            map={k: v for k, v in self.map.model_dump(mode="json").items() if v not in (None, "", {})},
-            runs=tuple(
-                ImportedFile(
-                    file=entry["file"],
-                    read=entry["read"],
-                    above=entry["above"],
-                    rows=entry["rows"],
-                    left_out=entry["left_out"],
-                    trusted=tuple(entry["trusted"]),
-                    source=OriginalFile(**entry["source"]),
-                )
-                for entry in self.runs
-            ),
+            map={k: v for k, v in self.map.model_dump(mode="json").items() if v not in (None, "", {}, [], False)},
+            runs=tuple(run.result() for run in self.runs),
             findings=self.findings(),
         )
 
     def findings(self) -> tuple[Finding, ...]:
         """Rows that were left out, and units that were taken against what the values say, as `check` tells them."""
         said = [
-            (id, entry["file"], text)
-            for entry in self.runs
+            (id, run.file, text)
+            for run in self.runs
             for id, texts in (
-                ("left_out", [f"{rows} rows are left out: {reason}" for reason, rows in entry["left_out"].items()]),
-                ("left_out", entry["notes"]),
-                ("units_trusted", [TRUSTED + text for text in entry["trusted"]]),
+                ("left_out", [f"{rows} rows are left out: {reason}" for reason, rows in run.left_out.items()]),
+                ("left_out", run.notes),
+                ("units_trusted", [TRUSTED + text for text in run.trusted]),
             )
             for text in texts
         ]
@@ -298,49 +356,155 @@ def import_files(
         InputError: Something that cannot be taken; nothing is written.
     """
     tell = say or (lambda _: None)
-    try:
-        return _imported(files, out, chosen, options, ask or (lambda _: None), tell, progress)
-    except _DryRun:
+    reading = _Import(files, out, options, ask or (lambda _: None), tell, progress)
+    if options.dry_run:
+        for run in reading.runs(chosen, None):
+            tell(f"{run.file}: {_counted(run)}")
         tell("dry run: nothing was written")
         return None
-
-
-def _imported(
-    files: Sequence[Path],
-    out: Path,
-    chosen: Map,
-    options: ImportOptions,
-    ask: Ask,
-    tell: Say,
-    progress: ImportProgress | None,
-) -> Imported:
-    entries: list[dict[str, Any]] = []
-    names: set[str] = set()
-    serial = ""
-    exam = _last_is_exam(files, options, ask)
+    exam = _last_is_exam(files, options, ask or (lambda _: None))
     with result_folder(out, "import", inputs=files) as stage:
-        folder = stage.folder
-        for path in files:
-            with closing(open_logger_file(path, chosen)) as file:
-                plan = propose(file, chosen, ask)
-                rows = ImportedRows(path.name, plan, chosen.time)
-                for line in proposal(file, plan, rows):
-                    tell(line)
-                chosen = kept_map(chosen, file, plan, rows)
-                if not serial:
-                    serial = serial_of(options.serial, chosen, file, out)
-                    stage.of(serial)
-                target = folder / f"{run_name(path, names)}.{options.format}"
-                entries.append(_run(file, rows, target, chosen, options, tell, progress))
-        chosen = chosen.model_copy(update={"serial": serial})
-        for entry in entries:
-            entry["exam"] = exam and entry is entries[-1]
-        write_own(folder / MAP_FILE, map_text(chosen))
-        write_own(folder / FILE, description_of(serial, chosen, entries))
-    for line in import_summary(out, entries):
+        runs = list(reading.runs(chosen, stage))
+        runs[-1] = replace(runs[-1], exam=exam)
+        kept = reading.kept.model_copy(update={"serial": reading.serial})
+        write_own(stage.folder / MAP_FILE, map_text(kept))
+        write_own(stage.folder / FILE, description_of(reading.serial, kept, runs))
+    for line in import_summary(out, runs):
         tell(line)
-    tell(_judged_by(entries))
-    return Imported(serial, chosen, tuple(entries))
+    tell(_judged_by(runs))
+    return Imported(reading.serial, kept, tuple(runs))
+
+
+class _Import:
+    """Reads files, each as a run of one gyro; the first one decides what the map leaves open.
+
+    Attributes:
+        serial: Serial of the gyro, known with the first file.
+        kept: The map with every choice that was made.
+    """
+
+    def __init__(
+        self,
+        files: Sequence[Path],
+        out: Path,
+        options: ImportOptions,
+        ask: Ask,
+        tell: Say,
+        progress: ImportProgress | None,
+    ) -> None:
+        self.serial = ""
+        self.kept = Map()
+        self._files, self._out, self._options = files, out, options
+        self._ask, self._tell, self._progress = ask, tell, progress
+
+    def runs(self, chosen: Map, stage: Stage | None) -> Iterator[ImportedRun]:
+        """The runs, one after the other.
+
+        Args:
+            stage: Where they are written; None: nowhere.
+
+        Raises:
+            InputError: A file that cannot be taken, or files of several gyros.
+        """
+        _refuse_loss(self._files, self._out)
+        names: set[str] = set()
+        devices: dict[str, str] = {}
+        self.kept = chosen
+        for path in self._files:
+            with ExitStack() as stack:
+                file = stack.enter_context(closing(open_logger_file(path, self.kept)))
+                file = with_joined(file, self.kept.join, stack)
+                plan = propose(file, self.kept, self._ask)
+                rows = ImportedRows(path.name, plan, self.kept)
+                for line in proposal(file, plan, rows):
+                    self._tell(line)
+                self.kept = kept_map(self.kept, file, plan, rows)
+                chunks = rows.chunks()
+                first = next(chunks, None)
+                if not self.serial:
+                    self.serial = serial_of(self._options.serial, self.kept, file, rows.device.name, self._out)
+                    if stage is not None:
+                        stage.of(self.serial)
+                name = f"{run_name(path, names)}.{self._options.format}"
+                target = stage.folder / name if stage is not None else None
+                run = self._run(file, rows, chain([first] if first else [], chunks), name, target)
+                devices.setdefault(run.device, path.name)
+                if len(devices) > 1:
+                    raise _of_several(devices)
+                yield run
+
+    def _run(
+        self, file: LoggerFile, rows: ImportedRows, chunks: Iterable[RowsChunk], name: str, target: Path | None
+    ) -> ImportedRun:
+        """Reads one file, and writes its run where there is a target."""
+        layout = rows.layout
+        columns_of = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]
+        with ExitStack() as stack:
+            sink = stack.enter_context(RunFile(target, self._options.format, columns_of)) if target else None
+            for k, (columns, done) in enumerate(chunks):
+                for line in preview(rows) if k == 0 else ():
+                    self._tell(line)
+                if sink is not None:
+                    sink.write(columns)
+                if self._progress is not None:
+                    self._progress(file.path.name, done)
+        if rows.count < MIN_ROWS:
+            left = ", ".join(f"{count} with {reason}" for reason, count in rows.left_out.items())
+            found = f"{rows.count} rows" + (f" ({left})" if left else "")
+            raise InputError(file.path.name, found, f"at least {MIN_ROWS}" + rows.hint())
+        return ImportedRun(
+            file=name,
+            sources=tuple(_source(path, name) for path in (file.path, *file.joined)),
+            started=rows.clock.started,
+            device=rows.device.name,
+            read=rows.read,
+            above=rows.plan.main.above,
+            rows=rows.count,
+            left_out=rows.left_out,
+            notes=(*rows.plan.main.notes, *rows.notes()),
+            trusted=tuple(_judged(file, rows, self.kept, self._options)),
+            pulses=layout.pulses,
+            evidence=rows.evidence,
+            period_s=rows.period_s,
+        )
+
+
+def _source(path: Path, run: str) -> SourceEntry:
+    return SourceEntry(
+        file=path.name,
+        sha256=sha256_of(path),
+        bytes=path.stat().st_size,
+        imported_by=f"gyrotc {__version__}",
+        map=MAP_FILE,
+        run=run,
+    )
+
+
+def _of_several(devices: Mapping[str, str]) -> InputError:
+    """The refusal of files of several gyros, by the file of each."""
+    (first, file), (second, other) = list(devices.items())[:2]
+    found = f"the rows are of {second or 'no named gyro'!r}, those of {file} of {first or 'no named gyro'!r}"
+    expected = f"a data set for each gyro, or --column device={NO_DEVICE} if they are of one"
+    return InputError(other, found, expected)
+
+
+def _refuse_loss(files: Sequence[Path], out: Path) -> None:
+    """Refuses to replace an imported data set by one that lacks some of its recordings.
+
+    Raises:
+        InputError: `out` holds recordings of other files.
+    """
+    if not (out / FILE).is_file():
+        return
+    description = parse_description(out / FILE, Problems(collect=True))
+    earlier = dict.fromkeys(source.file for source in (description.source if description else ()) if source.run)
+    names = {path.name for path in files}
+    lost = [name for name in earlier if name not in names]
+    if lost:
+        every = " ".join(shlex.quote(name) for name in [*lost, *(str(path) for path in files)])
+        found = f"holds the recordings of {', '.join(lost)}, which this import would remove"
+        expected = f"all files in one command, `gyrotc import {every} --out {out}`, or another --out"
+        raise InputError(str(out), found, expected)
 
 
 def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bool:
@@ -357,68 +521,12 @@ def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bo
     return (answer or "").lower() in ("y", "yes")
 
 
-def _judged_by(entries: Sequence[Mapping[str, Any]]) -> str:
+def _judged_by(runs: Sequence[ImportedRun]) -> str:
     """What will judge a correction made of these runs."""
-    if entries[-1]["exam"]:
-        return f"{entries[-1]['file']} is the exam; the other runs are trained on"
-    hint = "" if len(entries) < 2 else ": --exam makes the last run the exam"
+    if runs[-1].exam:
+        return f"{runs[-1].file} is the exam; the other runs are trained on"
+    hint = "" if len(runs) < 2 else ": --exam makes the last run the exam"
     return f"every run is trained on, so a correction is judged by parts left out in turn{hint}"
-
-
-class _DryRun(Exception):
-    """Ends a dry run."""
-
-
-def _run(
-    file: LoggerFile,
-    rows: ImportedRows,
-    target: Path,
-    chosen: Map,
-    options: ImportOptions,
-    tell: Say,
-    progress: ImportProgress | None,
-) -> dict[str, Any]:
-    """Writes one run; its entry."""
-    layout = rows.layout
-    names = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]
-    shown = False
-    with RunFile(target, options.format, names) as sink:
-        for columns, done in rows.chunks():
-            if not shown:
-                shown = True
-                for line in preview(rows):
-                    tell(line)
-                if options.dry_run:
-                    raise _DryRun
-            sink.write(columns)
-            if progress is not None:
-                progress(file.path.name, done)
-    if rows.count < MIN_ROWS:
-        left = ", ".join(f"{count} with {reason}" for reason, count in rows.left_out.items())
-        raise InputError(file.path.name, f"{rows.count} rows" + (f" ({left})" if left else ""), f"at least {MIN_ROWS}")
-    trusted = _judged(file, rows, chosen, options)
-    started = rows.clock.started
-    return {
-        "file": target.name,
-        "started": started,
-        "pulses": layout.pulses,
-        "rows": rows.count,
-        "read": rows.read,
-        "above": rows.plan.main.above,
-        "left_out": dict(rows.left_out),
-        "notes": rows.plan.main.notes,
-        "trusted": trusted,
-        "evidence": rows.evidence,
-        "period_s": rows.period_s,
-        "source": {
-            "file": file.path.name,
-            "sha256": sha256_of(file.path),
-            "bytes": file.path.stat().st_size,
-            "imported_by": f"gyrotc {__version__}",
-            "map": MAP_FILE,
-            "run": target.name,
-        },
-    }
 
 
 def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOptions) -> list[str]:
@@ -476,11 +584,32 @@ def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
     """
     if path.is_dir():
         raise InputError(str(path), "is a folder", "files of a logger")
+    head = _head(path)
+    return _unpacked(path, chosen) if head.startswith(_GZIP) else _opened(path, head, chosen)
+
+
+def with_joined(file: LoggerFile, joins: Sequence[JoinMap], stack: ExitStack) -> LoggerFile:
+    """A file with the tables of the files that are joined to it.
+
+    Args:
+        stack: Closes what is opened.
+    """
+    tables: list[LoggerTable] = []
+    for join in joins:
+        other = stack.enter_context(closing(open_logger_file(Path(join.file), Map())))
+        for table in other.tables:
+            name = f"{other.path.name}/{table.name}" if table.name else other.path.name
+            tables.append(replace(table, name=name, tolerance_s=join.tolerance_s))
+    return replace(file, tables=(*file.tables, *tables), joined=tuple(Path(join.file) for join in joins))
+
+
+def _head(path: Path) -> bytes:
     opened, _ = open_input(path, path.name, "a file of a logger")
     with opened as file:
-        head = file.read(1024)
-    if head.startswith(_GZIP):
-        return _unpacked(path, chosen)
+        return file.read(1024)
+
+
+def _opened(path: Path, head: bytes, chosen: Map) -> LoggerFile:
     kind = _kind(path, head)
     for magic, what, instead in _REFUSED if kind is None else ():
         if head.startswith(magic):
@@ -503,8 +632,6 @@ def _unpacked(path: Path, chosen: Map) -> LoggerFile:
     Raises:
         InputError: It is damaged, packed twice, or larger than is allowed once unpacked.
     """
-    if path.stem.lower().endswith(".gz"):
-        raise InputError(path.name, "packed twice", "the file, packed once at most")
     with ExitStack() as stack:
         place = stack.enter_context(scratch_folder()) / (path.stem or "unpacked")
         size = 0
@@ -517,5 +644,9 @@ def _unpacked(path: Path, chosen: Map) -> LoggerFile:
         except (OSError, EOFError, zlib.error) as error:
             what = " ".join(str(error).split())[:100]
             raise InputError(path.name, f"cannot be unpacked ({what})", "a whole .gz file") from error
-        file = stack.enter_context(closing(open_logger_file(place, chosen)))
+        head = _head(place)
+        if head.startswith(_GZIP):
+            name, once = shlex.quote(path.name), shlex.quote(f"once-{path.name}")
+            raise InputError(path.name, "is packed twice", f"one layer of gzip: `gunzip -c {name} > {once}`")
+        file = stack.enter_context(closing(_opened(place, head, chosen)))
         return replace(file, path=path, close=stack.pop_all().close)

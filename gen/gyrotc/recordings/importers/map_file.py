@@ -12,6 +12,7 @@ from ...common.errors import InputError
 from ...common.inputs import read_toml
 from ..description import dataset_toml
 from ..tables import Column, LoggerTable
+from .selection import Where
 
 MAP_FILE = "map.toml"
 
@@ -24,8 +25,12 @@ class _Part(BaseModel):
 
 
 class ColumnMap(_Part):
-    """`[columns]`: names in the logger's file; `time` may be two, a date and a time of day."""
+    """`[columns]`: names in the logger's file; `time` may be two, a date and a time of day.
 
+    `device` names the gyro of each row; "none": no column does.
+    """
+
+    device: Text | None = None
     time: Texts = ()
     temperature: Text | None = None
     rate: Text | None = None
@@ -58,11 +63,28 @@ class CsvMap(_Part):
 
 
 class TimeMap(_Part):
-    """`[time]`: form of date-time stamps, their zone, or rows per second where no column holds times."""
+    """`[time]`: form of date-time stamps, their zone, or rows per second where no column holds times.
+
+    `leave_out_late`: rows whose time is not behind that of the row before are left out.
+    """
 
     format: Text | None = None
     zone: Text | None = None
     rate_hz: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
+    leave_out_late: bool = False
+
+
+class JoinMap(_Part):
+    """`[[join]]`: another file with the temperature; a reading of it holds at most `tolerance_s`.
+
+    `time`, `format` and `zone` say what is not recognised of its times.
+    """
+
+    file: Text
+    tolerance_s: Annotated[float, Field(gt=0.0, le=1e6)]
+    time: Texts = ()
+    format: Text | None = None
+    zone: Text | None = None
 
 
 class Map(_Part):
@@ -74,6 +96,8 @@ class Map(_Part):
     latitude_deg: float | None = None
     pulse_weight_arcsec: float | None = None
     table: Text | None = None
+    where: Text | None = None
+    hold: bool = False
     columns: ColumnMap = ColumnMap()
     channels: dict[Text, Text] | None = None
     units: dict[Text, Text] = {}
@@ -81,6 +105,7 @@ class Map(_Part):
     noise: dict[str, float] | None = None
     csv: CsvMap = CsvMap()
     time: TimeMap = TimeMap()
+    join: tuple[JoinMap, ...] = ()
 
 
 def load_map(path: Path) -> Map:
@@ -112,14 +137,15 @@ def checked_map(content: Any, name: str) -> Map:
 def map_text(chosen: Map) -> str:
     """A map as TOML, without what is empty."""
     content = chosen.model_dump()
-    head = {k: v for k, v in content.items() if not isinstance(v, dict) and v not in (None, "")}
-    tables = {}
+    joined = [{k: v for k, v in one.items() if v not in (None, ())} for one in content.pop("join")]
+    head = {k: v for k, v in content.items() if not isinstance(v, dict) and v not in (None, "", False)}
+    tables: dict[str, Any] = {}
     for name, table in content.items():
         if isinstance(table, dict):
-            kept = {k: v for k, v in table.items() if v not in (None, ())}
+            kept = {k: v for k, v in table.items() if v not in (None, (), False)}
             if kept or (name == "channels" and content["channels"] is not None):
                 tables[name] = {k: v[0] if isinstance(v, tuple) and len(v) == 1 else v for k, v in kept.items()}
-    return dataset_toml(head, tables)
+    return dataset_toml(head, tables | {"join": joined})
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +183,8 @@ class ImportPlan:
         values: Rates by axis, one rate, or pulses.
         channels: Auxiliary channels of the main table.
         rate_hz: Rows per second where rows are counted, with the reason in `why_rate`.
+        where: The rows that are taken; None: all.
+        device: Column that names the gyro of each row.
         left_out: Numeric columns of the main table that are not taken.
     """
 
@@ -168,3 +196,5 @@ class ImportPlan:
     rate_hz: float | None
     why_rate: str
     left_out: tuple[str, ...]
+    where: Where | None = None
+    device: Column | None = None

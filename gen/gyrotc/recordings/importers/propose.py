@@ -15,19 +15,37 @@ from ..tables import Column, LoggerFile, LoggerTable
 from ..units import NATIVE_UNITS, Meaning, UnitError, channel_unit, conversion, meaning, split_unit, words_of_name
 from .clock import clock_columns, fraction_of
 from .map_file import Choice, ImportPlan, Map
+from .selection import NO_DEVICE, Where, device_column
+from .stamps import COMPACT, forms_of, pattern_of
 
 Ask = Callable[[str], str | None]
 """Asks a person on a terminal; None where there is none."""
 
 
 OPTIONS = {"time": "--time-unit", "temperature": "--temperature-unit", "rate": "--rate-unit"}
-_EXAMPLES = {"time": "s, ms, us, min, d", "temperature": "degC, K, degF", "rate": "deg/h, deg/s, rad/s"}
+_EXAMPLES = {
+    "time": "s, ms, us, min, d",
+    "temperature": "degC, K, degF, 'raw/340 + 36.53 degC'",
+    "rate": "deg/h, deg/s, rad/s",
+}
+
+
+_Missing = tuple[str, str, str]
+"""Kind and column of a unit that stands nowhere, and the option that states it."""
+
+
+def _is_compact(cell: str) -> bool:
+    """Test whether digits are a date and a time of day."""
+    return bool(forms_of([f"{cell[:8]} {cell[8:]}"])) and len(cell) == _COMPACT_DIGITS and cell[:2] in ("19", "20")
+
+
+_COMPACT_DIGITS = 14
 
 
 class Units:
     """Units of the three kinds: stated, in the file, or asked for."""
 
-    def __init__(self, file: str, stated: Mapping[str, str], ask: Ask, missing: list[str]) -> None:
+    def __init__(self, file: str, stated: Mapping[str, str], ask: Ask, missing: list[_Missing]) -> None:
         self._file, self._stated, self._ask, self._missing = file, stated, ask, missing
         self._asked: dict[str, str] = {}
 
@@ -52,7 +70,9 @@ class Units:
             if answer:
                 self._asked[kind] = self._checked(kind, answer, "the answer")
         if kind not in self._asked:
-            self._missing.append(f"{kind}\t{column.name}")
+            compact = kind == "time" and any(column.sample) and all(_is_compact(cell) for cell in column.sample if cell)
+            option = f'--time-format "{COMPACT}"' if compact else f'{OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
+            self._missing.append((kind, column.name, option))
             return ""
         return self._asked[kind]
 
@@ -64,19 +84,10 @@ class Units:
         return unit
 
 
-def said(missing: Sequence[str]) -> Iterator[str]:
-    seen = set()
-    for one in missing:
-        kind, column = one.split("\t")
-        if kind not in seen:
-            seen.add(kind)
-            yield f"no unit of the {kind} in column {column!r}"
-
-
-def asked(missing: Sequence[str]) -> Iterator[str]:
-    for one in missing:
-        kind = one.split("\t")[0]
-        yield f'{OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
+def said(missing: Sequence[_Missing]) -> Iterator[str]:
+    """What is missing, once for each kind."""
+    for kind, column in {kind: column for kind, column, _ in reversed(missing)}.items():
+        yield f"no unit of the {kind} in column {column!r}"
 
 
 _HEXADECIMAL = re.compile(r"(?=.*[A-Fa-f])[0-9A-Fa-f]+h?|[0-9A-Fa-f]+h")
@@ -151,9 +162,11 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
     values = _values(file, tables, chosen)
     _check_weight(file, values[0], chosen)
     main = values[0][1]
+    where = _where(file, main, chosen)
+    device = device_column(main, _stated_device(file, main, chosen), where)
     time, rate_hz, why_rate = _time(file, main, chosen)
     temperature = _temperature(file, tables, main, chosen)
-    missing: list[str] = []
+    missing: list[_Missing] = []
     unit = Units(file.path.name, chosen.units, ask, missing)
     picked_values = tuple(
         Choice(role, table, column, None if role == "pulses" else unit.of("rate", column, table), why)
@@ -166,29 +179,56 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
         unit.of("temperature", temperature[1], temperature[0]),
         temperature[2],
     )
-    picked_time = tuple(_times(time, main, unit))
+    picked_time = tuple(_times(time, main, unit, chosen.time.format))
     if missing:
-        raise InputError(file.path.name, "; ".join(said(missing)), " ".join(dict.fromkeys(asked(missing))))
+        options = dict.fromkeys(option for _, _, option in missing)
+        raise InputError(file.path.name, "; ".join(said(missing)), " ".join(options))
     taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
     channels = tuple(_channels(file, main, chosen, taken))
     taken |= {c.column.name for c in channels}
+    taken |= {name for name in (where and where.column, device and device.name) if name}
     left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
-    return ImportPlan(main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left)
+    return ImportPlan(
+        main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left, where, device
+    )
 
 
-def _times(time: Sequence[tuple[Column, str]], main: LoggerTable, unit: Units) -> Iterator[Choice]:
-    """The columns of time; a counter, which is one of numbers alone, has a unit."""
+def _where(file: LoggerFile, main: LoggerTable, chosen: Map) -> Where | None:
+    """The rows that are taken.
+
+    Raises:
+        InputError: The condition is none, or of a column that the table of the rates does not have.
+    """
+    if chosen.where is None:
+        return None
+    where = Where.of(chosen.where)
+    if main.column(where.column) is None:
+        names = ", ".join(column.name for column in main.columns)
+        found = f"no column {where.column!r} beside the rates"
+        raise InputError(file.path.name, found, f"--where with one of: {names}")
+    return where
+
+
+def _stated_device(file: LoggerFile, main: LoggerTable, chosen: Map) -> str | None:
+    """Name of the column of devices that the map states, as the table of the rates has it."""
+    stated = chosen.columns.device
+    return stated if stated in (None, NO_DEVICE) else _find(file, str(stated), main)[1].name
+
+
+def _times(time: Sequence[tuple[Column, str]], main: LoggerTable, unit: Units, form: str | None) -> Iterator[Choice]:
+    """The columns of time; a counter, which is one of numbers alone and of no stated form, has a unit."""
     for column, why in time:
-        counter = column.kind == "number" and len(time) == 1
+        counter = column.kind == "number" and len(time) == 1 and form is None
         yield Choice("time", main, column, unit.of("time", column, main) if counter else None, why)
 
 
 def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
+    own = [table for table in file.tables if table.tolerance_s is None]
     if chosen.table is None:
-        return list(file.tables)
-    found = [t for t in file.tables if t.name == chosen.table]
+        return own
+    found = [table for table in own if table.name == chosen.table]
     if not found:
-        names = ", ".join(t.name for t in file.tables)
+        names = ", ".join(table.name for table in own)
         raise InputError(file.path.name, f"no table {chosen.table!r}", f"--table with one of: {names}")
     return found
 
@@ -296,7 +336,9 @@ def _temperature(
         raise InputError(
             file.path.name,
             f"no column that gives a temperature among {listed(file)}",
-            name_it("temperature") + in_text(file, "temperature"),
+            name_it("temperature")
+            + in_text(file, "temperature")
+            + "; or --join FILE --tolerance-s S with another file",
         )
     if len(top) > 1:
         names = [f"{t.name}/{c.name}" if t.name else c.name for t, c in top]
@@ -324,6 +366,8 @@ def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[
         whole = _stamps(stamps)
         fraction = fraction_of(main.columns, whole[-1][0])
         return [*whole, *([(fraction, "its fraction of a second")] if fraction else [])], None, ""
+    if chosen.time.format is not None and (compact := _of_form(main, chosen.time.format)):
+        return [(compact, "it holds stamps of the stated form")], None, ""
     if parts := clock_columns(main.columns):
         return [(column, "parts of the time, by their names") for column in parts], None, ""
     stated = {*chosen.columns.values().values(), chosen.columns.temperature}
@@ -341,10 +385,18 @@ def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[
     raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 
 
+def _of_form(main: LoggerTable, form: str) -> Column | None:
+    """The first column of whole numbers that are stamps of a form without marks."""
+    pattern = re.compile(pattern_of(form))
+    for column in main.columns:
+        cells = [cell for cell in column.sample if cell]
+        if column.kind == "number" and cells and all(pattern.fullmatch(cell) for cell in cells):
+            return column
+    return None
+
+
 def _stamps(stamps: Sequence[Column]) -> list[tuple[Column, str]]:
     """One column of dates and times, or a date and a time of day."""
-    from .stamps import forms_of
-
     parts = [(c, forms_of([s for s in c.sample if s])) for c in stamps]
     if not any(c.sample for c in stamps):
         return [(stamps[0], "it holds dates and times")]

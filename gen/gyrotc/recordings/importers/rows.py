@@ -18,11 +18,14 @@ from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.files import create
 from ..description import Layout, column_faults, likely_temperature
+from ..files import number_in
 from ..reading import Evidence
 from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, UnitError, channel_unit, conversion, meaning
 from .clock import Clock
-from .map_file import Choice, ImportPlan, TimeMap
+from .map_file import Choice, ImportPlan, Map, TimeMap
+from .order import Times, out_of_order, refuse_skipped_hour
+from .selection import NO_DEVICE, Device
 
 NAMES_OF_COLUMNS = {
     "temperature": "temperature_c",
@@ -41,7 +44,7 @@ class ImportedRows:
     Attributes:
         file: Name for messages.
         plan: What is read.
-        stated: `[time]` of the map.
+        chosen: What is known of the logger.
         read: Rows of the file.
         count: Rows of these that were given.
         left_out: Rows of these that were not, by the reason.
@@ -53,7 +56,7 @@ class ImportedRows:
 
     file: str
     plan: ImportPlan
-    stated: TimeMap
+    chosen: Map
     read: int = 0
     count: int = 0
     left_out: Counter[str] = field(default_factory=Counter)
@@ -65,10 +68,14 @@ class ImportedRows:
         plan = self.plan
         unit = plan.time[0].unit if plan.time else None
         columns = [choice.column for choice in plan.time]
-        self.clock = Clock(self.file, plan.main, columns, unit, plan.rate_hz, self.stated)
+        self.clock = Clock(self.file, plan.main, columns, unit, plan.rate_hz, self.chosen.time)
+        stated = self.chosen.columns.device not in (None, NO_DEVICE)
+        self.device = Device(self.file, plan.main, plan.device, stated=stated)
+        self._missing = [number for word in self.chosen.csv.missing if (number := number_in(word)) is not None]
+        self._holds = dict.fromkeys([*(self.name_of(c) for c in plan.channels), "temperature_c"], np.nan)
         self.evidence = Evidence(len(plan.values))
         self.units = {name: one for name, one in self._conversions().items() if one is not None}
-        self._held: tuple[FloatArray, FloatArray] | None = None
+        self._readings_of_table: tuple[FloatArray, FloatArray] | None = None
         self._last: dict[str, float] | None = None
         self._time = np.zeros(0)
 
@@ -81,7 +88,7 @@ class ImportedRows:
         channels = tuple(choice.role for choice in self.plan.channels)
         return Layout("time_s", NAMES_OF_COLUMNS["temperature"], value, roles == ["pulses"], axes, channels)
 
-    def chunks(self) -> Iterator[tuple[dict[str, FloatArray], float]]:
+    def chunks(self) -> Iterator[RowsChunk]:
         """Rows by column name, and the share of the file that was read.
 
         Raises:
@@ -90,10 +97,13 @@ class ImportedRows:
         plan = self.plan
         choices = [*plan.values, *plan.channels]
         choices += [plan.temperature] * (plan.temperature.table is plan.main)
-        names = list(dict.fromkeys([*self.clock.names, *(choice.column.name for choice in choices)]))
-        for chunk in plan.main.chunks(names):
-            self.read += len(chunk) + sum(chunk.left_out.values())
-            self.left_out.update(chunk.left_out)
+        where = [plan.where.column] if plan.where else []
+        names = [*self.clock.names, *self.device.names, *where, *(choice.column.name for choice in choices)]
+        for whole in plan.main.chunks(list(dict.fromkeys(names))):
+            self.read += len(whole) + sum(whole.left_out.values())
+            self.left_out.update(whole.left_out)
+            chunk = self._picked(whole)
+            self.device.look(chunk)
             lengths = {len(values) for values in chunk.columns.values()}
             if len(lengths) > 1:
                 found = f"columns of {min(lengths)} to {max(lengths)} rows where they should be of one length"
@@ -107,7 +117,8 @@ class ImportedRows:
             self._keep_first(chunk, columns)
             kept, rows = self._whole(columns)
             if len(rows):
-                kept = self._in_order(kept, rows, chunk)
+                kept, rows = self._in_order(kept, rows, chunk)
+            if len(rows):
                 self._check(kept, rows, chunk)
                 self.count += len(kept["time_s"])
                 value_names = [NAMES_OF_COLUMNS[choice.role] for choice in plan.values]
@@ -127,6 +138,30 @@ class ImportedRows:
             raise InputError(self.file, found, "a whole file: what is missing may be in the original")
         assert self.read == self.count + self.left_out.total()
 
+    def _picked(self, chunk: Chunk) -> Chunk:
+        """The rows that the plan picks; the others are counted."""
+        if self.plan.where is None or not len(chunk):
+            return chunk
+        picked = self.plan.where.rows(chunk.columns[self.plan.where.column])
+        if picked.all():
+            return chunk
+        self.left_out[f"not {self.plan.where}"] += int(np.count_nonzero(~picked))
+        return chunk.only(picked)
+
+    def notes(self) -> Iterator[str]:
+        """What a person may want to state, by the rows that were left out."""
+        if hint := self.hint():
+            yield f"most rows are left out{hint}"
+
+    def hint(self) -> str:
+        """The option for a temperature that few rows have, as the end of a sentence; empty where most rows have it."""
+        without = sum(self.left_out[f"no number in {name}"] for name in self._holds)
+        if without <= 0.5 * self.read:
+            return ""
+        if self.plan.temperature.table is not self.plan.main:
+            return "; a larger tolerance of the joined file (--tolerance-s), or a file of the same time"
+        return "; --hold holds each reading of temperature and channels until the next one"
+
     def name_of(self, choice: Choice) -> str:
         """Name of the column that a choice becomes."""
         return NAMES_OF_COLUMNS.get(choice.role, choice.role)
@@ -140,18 +175,39 @@ class ImportedRows:
     def _native(self, choice: Choice, chunk: Chunk) -> FloatArray:
         if choice.table is not self.plan.main:
             return self._held_at(choice)
-        values = np.asarray(chunk.columns[choice.column.name]).astype(np.float64)
-        unit = self.units.get(self.name_of(choice))
-        return unit(values) if unit else values
+        values = self._numbers(chunk.columns[choice.column.name])
+        name = self.name_of(choice)
+        unit = self.units.get(name)
+        values = unit(values) if unit else values
+        return self._held(name, values) if self.chosen.hold and name in self._holds else values
+
+    def _numbers(self, column: Any) -> FloatArray:
+        """Values as the file has them, NaN where the map says that a number is no reading."""
+        values = np.asarray(column).astype(np.float64)
+        if self._missing:
+            values[np.isin(values, self._missing)] = np.nan
+        return values
+
+    def _held(self, name: str, values: FloatArray) -> FloatArray:
+        """Values in which each reading holds until the next one."""
+        at = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
+        held = np.where(at >= 0, values[np.maximum(at, 0)], self._holds[name])
+        self._holds[name] = float(held[-1]) if len(held) else self._holds[name]
+        return held
 
     def _held_at(self, choice: Choice) -> FloatArray:
-        """The last reading of another table at the time of each row; NaN before its first."""
-        if self._held is None:
-            self._held = self._readings(choice)
-        times, values = self._held
+        """The last reading of another table at the time of each row; NaN before its first, or where it is too old."""
+        if self._readings_of_table is None:
+            self._readings_of_table = self._readings(choice)
+        times, values = self._readings_of_table
+        if not len(times):
+            return np.full(len(self._time), np.nan)
         at = np.searchsorted(times, self._time, "right") - 1
+        known = at >= 0
+        if choice.table.tolerance_s is not None:
+            known &= self._time - times[np.maximum(at, 0)] <= choice.table.tolerance_s
         unit = self.units.get(self.name_of(choice))
-        found = np.where(at >= 0, values[np.maximum(at, 0)], np.nan) if len(values) else np.full(len(at), np.nan)
+        found = np.where(known, values[np.maximum(at, 0)], np.nan)
         return unit(found) if unit else found
 
     def _readings(self, choice: Choice) -> tuple[FloatArray, FloatArray]:
@@ -159,24 +215,45 @@ class ImportedRows:
         clock = self._clock_of(table)
         times, values = [np.zeros(0)], [np.zeros(0)]
         for chunk in table.chunks(list(dict.fromkeys([*clock.names, choice.column.name]))):
-            one = np.asarray(chunk.columns[choice.column.name]).astype(np.float64)
+            if not len(chunk):
+                continue
+            one = self._numbers(chunk.columns[choice.column.name])
             when = clock(chunk)
             good = np.isfinite(one) & np.isfinite(when)
             times.append(when[good])
             values.append(one[good])
-        return np.concatenate(times), np.concatenate(values)
+        time = np.concatenate(times)
+        if np.any(np.diff(time) < 0.0):
+            at = int(np.argmin(np.diff(time))) + 1
+            found = f"time goes back: {time[at]:.10g} s after {time[at - 1]:.10g} s"
+            raise InputError(self._file_of(table), found, "readings in order of time")
+        return time, np.concatenate(values)
+
+    def _file_of(self, table: LoggerTable) -> str:
+        """Name of the file of a table, for messages."""
+        return self.file if table.tolerance_s is None else table.name
 
     def _clock_of(self, table: LoggerTable) -> Clock:
-        """The clock of another table, set to that of the main one."""
-        columns = _same_time(self.plan, table)
+        """The clock of another table, set to that of the main one.
+
+        Raises:
+            InputError: It has no times, or none that can be compared with those of the rates.
+        """
+        joined = next((one for one in self.chosen.join if table.tolerance_s is not None), None)
+        columns = [c for n in joined.time if (c := table.column(n))] if joined else []
+        columns = columns or _same_time(self.plan, table)
+        where = self._file_of(table)
         if not columns and table.rate_hz is None:
             found = f"table {table.name!r} has no column of time like that of {self.plan.main.name!r}"
-            raise InputError(self.file, found, "--column temperature=... of the table with the rates")
+            raise InputError(where, found, "--column temperature=... of the table with the rates")
         unit = None
         if columns and columns[0].kind == "number":
-            unit = columns[0].unit or (self.plan.time[0].unit if self.plan.time else None)
-        clock = Clock(self.file, table, columns, unit, table.rate_hz, self.stated)
-        clock.origin = self.clock.origin
+            unit = _unit_of_time(columns[0], table) or (self.plan.time[0].unit if self.plan.time else None)
+        stated = (
+            TimeMap(format=joined.format, zone=joined.zone or self.chosen.time.zone) if joined else self.chosen.time
+        )
+        clock = Clock(where, table, columns, unit, table.rate_hz, stated)
+        clock.follow(self.clock)
         return clock
 
     def _keep_first(self, chunk: Chunk, columns: dict[str, FloatArray]) -> None:
@@ -195,7 +272,9 @@ class ImportedRows:
         rows = np.flatnonzero(good)
         return ({n: v if good.all() else v[good] for n, v in columns.items()}, rows)
 
-    def _in_order(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> dict[str, FloatArray]:
+    def _in_order(
+        self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk
+    ) -> tuple[dict[str, FloatArray], NDArray[np.int64]]:
         """Without rows that repeat the one before in every value; times must go on.
 
         Raises:
@@ -203,33 +282,35 @@ class ImportedRows:
         """
         last = self._last or dict.fromkeys(kept, np.nan)
         before = {name: np.r_[last[name], values[:-1]] for name, values in kept.items()}
-        copies = np.all([values == before[name] for name, values in kept.items()], axis=0)
-        if copies.any():
-            self.left_out["copies of the row before"] += int(copies.sum())
-        wrong = (kept["time_s"] <= before["time_s"]) & ~copies
-        if wrong.any():
-            at = int(np.argmax(wrong))
-            self._refuse_time(kept["time_s"][at], before["time_s"][at], chunk.first + int(rows[at]))
+        out = np.all([values == before[name] for name, values in kept.items()], axis=0)
+        self._leave_out("copies of the row before", out)
+        time = kept["time_s"]
+        reached = np.fmax.accumulate(np.r_[last["time_s"], time[:-1]])
+        late = (time <= reached) & ~out
+        if late.any() and not self.chosen.time.leave_out_late:
+            at = int(np.argmax(late))
+            raise out_of_order(self._times(chunk, rows, time, before["time_s"]), at)
+        self._leave_out("time not behind that of the row before", late)
+        taken = ~(out | late)
+        kept, rows = {name: values[taken] for name, values in kept.items()}, rows[taken]
+        if not len(rows):
+            return kept, rows
+        previous = np.r_[last["time_s"], kept["time_s"][:-1]]
+        refuse_skipped_hour(self._times(chunk, rows, kept["time_s"], previous))
+        steps = kept["time_s"] - previous
         self._last = {name: float(values[-1]) for name, values in kept.items()}
-        steps = (kept["time_s"] - before["time_s"])[~copies]
         steps = steps[np.isfinite(steps)]
         if steps.size:
             low, high = self.period_s
             self.period_s = (min(low, float(steps.min())), max(high, float(steps.max())))
-        return {name: values[~copies] for name, values in kept.items()} if copies.any() else kept
+        return kept, rows
 
-    def _refuse_time(self, time: float, before: float, row: int) -> None:
-        where = f"{self.file}, {self.plan.main.place(row)}"
-        if time == before:
-            found = f"the time of the row before, {time:.10g} s, with other values"
-            expected = "times that go on; --rate-hz R counts rows that come at a fixed rate instead"
-        elif 3000.0 < before - time < 4000.0 and self.clock.needs_zone:
-            found = f"time goes back by {before - time:.10g} s, as when summer time ends"
-            expected = "--time-zone with the zone of a fixed offset that the logger kept, or --rate-hz R"
-        else:
-            found = f"time goes back: {time:.10g} s after {before:.10g} s"
-            expected = "times that go on: cut the file there and import its parts, or --rate-hz R to count rows"
-        raise InputError(where, found, expected)
+    def _times(self, chunk: Chunk, rows: NDArray[np.int64], time_s: FloatArray, before_s: FloatArray) -> Times:
+        return Times(self.file, self.plan.main, self.clock, chunk, rows, time_s, before_s)
+
+    def _leave_out(self, reason: str, rows: NDArray[np.bool_]) -> None:
+        if count := int(np.count_nonzero(rows)):
+            self.left_out[reason] += count
 
     def _check(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> None:
         """Values that no gyro and no chamber gives.
@@ -238,15 +319,28 @@ class ImportedRows:
             InputError: There is one.
         """
         for fault in column_faults(kept, self.layout):
-            place = self.plan.main.place(chunk.first + int(rows[min(fault.row, len(rows) - 1)]))
+            place = self.plan.main.place(chunk.row(int(rows[fault.row])))
             kind = {"time_s": "time", "temperature_c": "temperature"}.get(fault.column, "rate")
             unit = self.units.get(fault.column)
             read = f" (read as {unit.unit})" if unit else ""
             guess = kind == "temperature" and not (unit and unit.changes)
             likely = likely_temperature(kept[fault.column]) if guess else None
             option = f"--{kind}-unit {likely}" if likely else f"another --{kind}-unit"
+            if kind != "time" and fault.rows < _MAX_SHARE * len(rows):
+                raw = self._raw(fault.column, chunk, int(rows[fault.row]))
+                option = f"--csv missing={raw} takes {'it' if fault.rows == 1 else 'these'} as no reading, or {option}"
             expected = f"{fault.expected.split(';')[0]}: {option}, or another --column {kind}=..."
             raise InputError(f"{self.file}, {place}, column {fault.column}", fault.found + read, expected)
+
+    def _raw(self, name: str, chunk: Chunk, row: int) -> str:
+        """A value as the file has it."""
+        choices = (self.plan.temperature, *self.plan.values, *self.plan.channels)
+        choice = next(choice for choice in choices if self.name_of(choice) == name)
+        return f"{chunk.columns[choice.column.name][row]:.10g}" if choice.table is self.plan.main else "..."
+
+
+# More implausible values than this share of the rows are no failed readings, but another unit.
+_MAX_SHARE = 0.2
 
 
 def conversion_of(choice: Choice) -> Conversion | None:
@@ -264,16 +358,24 @@ def conversion_of(choice: Choice) -> Conversion | None:
 
 
 def _same_time(plan: ImportPlan, table: LoggerTable) -> list[Column]:
-    """The column of time of another table: of the same name, or the likeliest."""
+    """The column of time of another table: of the same name, of stamps, or the first of time by name and unit."""
     if not plan.time:
         return []
-    found = [column for choice in plan.time if (column := table.column(choice.column.name))]
-    if len(found) == len(plan.time):
-        return found
-    likely = [c for c in table.columns if meaning(c.name, c.unit, table.name).kind == "time" and c.unit]
-    return likely[:1]
+    same = [column for choice in plan.time if (column := table.column(choice.column.name))]
+    if len(same) == len(plan.time):
+        return same
+    stamps = [column for column in table.columns if column.kind == "stamp"]
+    return (stamps or [column for column in table.columns if _unit_of_time(column, table)])[:1]
 
 
+def _unit_of_time(column: Column, table: LoggerTable) -> str | None:
+    """Unit of a column of times; None: it holds something else, or its unit stands nowhere."""
+    known = meaning(column.name, column.unit, table.name)
+    return known.unit if known.kind == "time" and column.kind == "number" else None
+
+
+RowsChunk = tuple[dict[str, FloatArray], float]
+"""Rows by column name, and the share of the file that was read."""
 FileFormat = Literal["csv", "parquet"]
 _GROUP_ROWS = 2**20  # of a row group: Arrow's own default
 

@@ -42,6 +42,8 @@ _DATES = (
     "%d %b %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y-%j", "%Y%m%d",
 )  # fmt: skip
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S:%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%H%M%S", "%H:%M")
+COMPACT = "%Y%m%d%H%M%S"
+"""A date and a time of day as digits alone."""
 _JOINTS = (" ", "T", "  ", "_", " - ", ", ")
 _MAYBE = re.compile(r"\d{1,4}[-/.: ]|\d{8}|\d{6}")
 _DIGITS_ONLY = re.compile(r"(%[A-Za-z])+")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -36,27 +38,43 @@ def open_tdms(path: Path) -> LoggerFile:
     return LoggerFile(path, "TDMS file", tables, facts, close=stream.close)
 
 
-def _tables(group: Any) -> list[LoggerTable]:
-    lengths: dict[int, list[Any]] = {}
+def _tables(group: Any) -> Iterator[LoggerTable]:
+    """A table for each rhythm of a group: channels of one length, one increment and one time of the first sample."""
+    rhythms: dict[_Rhythm, list[Any]] = {}
     for channel in group.channels():
-        if len(channel) > 1:
-            lengths.setdefault(len(channel), []).append(channel)
-    tables: list[LoggerTable] = []
-    for rows, channels in lengths.items():
-        columns, parts = [], {}
-        for channel in channels:
-            column = _column(channel)
-            if column is not None:
-                columns.append(column)
-                parts[column.name] = _part(channel)
-        step = channels[0].properties.get("wf_increment")
-        rate = 1.0 / float(step) if step and 0.0 < float(step) < np.inf else None
-        name = group.name if len(lengths) == 1 else f"{group.name} ({rows} rows)"
-        why = f"wf_increment = {step} s of {channels[0].name}" if rate else ""
-        started = _instant(channels[0].properties.get("wf_start_time")) if rate else None
-        if columns:
-            tables.append(ArrayTable(name, tuple(columns), rate, why, started, rows=rows, parts=parts))
-    return tables
+        if len(channel) > 1 and _column(channel) is not None:
+            rhythms.setdefault(_rhythm(channel), []).append(channel)
+    for rhythm, channels in rhythms.items():
+        step = rhythm.increment_s
+        rate = 1.0 / step if step and 0.0 < step < np.inf else None
+        names = [channel.name for channel in channels]
+        yield ArrayTable(
+            group.name if len(rhythms) == 1 else f"{group.name} ({', '.join(names)})",
+            tuple(column for channel in channels if (column := _column(channel)) is not None),
+            rate,
+            f"wf_increment = {step} s of {names[0]}" if rate else "",
+            rhythm.started if rate else None,
+            rows=rhythm.rows,
+            parts={channel.name: _part(channel) for channel in channels},
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Rhythm:
+    """When the samples of a channel were taken."""
+
+    rows: int
+    increment_s: float | None
+    started: datetime | None
+
+
+def _rhythm(channel: Any) -> _Rhythm:
+    step = channel.properties.get("wf_increment")
+    started = _instant(channel.properties.get("wf_start_time"))
+    offset_s = float(channel.properties.get("wf_start_offset") or 0.0)
+    if started is not None and np.isfinite(offset_s):
+        started += timedelta(seconds=offset_s)
+    return _Rhythm(len(channel), float(step) if step else None, started)
 
 
 def _column(channel: Any) -> Column | None:
