@@ -117,7 +117,6 @@ REFUSED: dict[str, Refused] = {
     "short row": Refused(line(7, "50.0,20.1"), ("a.csv, line 7", "2 cells", "3 as in the header")),
     "long row": Refused(line(7, "50.0,20.1,20.0,1"), ("a.csv, line 7", "4 cells", "3 as in the header")),
     "NUL byte": Refused(line(7, "50.0,20.1,20\x00.0"), ("a.csv, line 7", "NUL byte")),
-    "NUL tail": Refused(with_bytes(lambda data: data + bytes(4096)), ("a.csv, line 122", "NUL byte")),
     "repeated time": Refused(
         line(7, "40.0,20.1,20.0"), ("a.csv, line 7, column time_s", "repeated: 40 s after 40 s", "increase")
     ),

@@ -304,7 +304,8 @@ def encoding_of(head: bytes) -> str:
 def _text(name: str, head: bytes, encoding: str) -> str:
     strange = sum(head.count(bytes([code])) for code in (*range(1, 9), *range(14, 32)))
     nuls = 0 if encoding.startswith("utf-16") else head.count(b"\x00")
-    if strange > 0.01 * len(head) or nuls > 0.5 * len(head):
+    begins_with_text = not nuls or b"\x00" not in head.partition(b"\n")[0]
+    if strange > 0.01 * len(head) or not begins_with_text:
         raise InputError(name, *_BINARY)
     if nuls:
         line = head[: head.index(b"\x00")].count(b"\n") + 1
