@@ -196,7 +196,7 @@ def compare(
     Example: gyrotc compare recordings --out comparison
     """
     from ..jobs.applied import applied_in
-    from ..jobs.calibration import compare as run
+    from ..jobs.comparison import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.loading import load
     from ..results.files import json_text, write_atomically

@@ -5,13 +5,13 @@ from .axes import verify_axes as verify_axes
 from .calibration import Built as Built
 from .calibration import build as build
 from .calibration import build_into as build_into
-from .calibration import compare as compare
 from .certification import LaboratoryFacts as LaboratoryFacts
 from .certification import certificate as certificate
 from .certification import laboratory_facts as laboratory_facts
 from .certification import missing_facts as missing_facts
 from .certification import reason_of_release as reason_of_release
 from .certification import unit_of as unit_of
+from .comparison import compare as compare
 from .diagnosis import extended_scenario as extended_scenario
 from .lot import checksum_of as checksum_of
 from .lot import load_lot as load_lot

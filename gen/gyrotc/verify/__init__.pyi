@@ -6,9 +6,9 @@ from .emitted import Job as Job
 from .emitted import board_files as board_files
 from .emitted import checked_sources as checked_sources
 from .emitted import table_files as table_files
-from .job import Visited as Visited
+from .exhaustive import Visited as Visited
+from .exhaustive import visit_all as visit_all
 from .job import verify as verify
-from .job import visit_all as visit_all
 from .replay import replay_case_of as replay_case_of
 from .sizes import PUBLIC as PUBLIC
 from .sizes import function_costs as function_costs
