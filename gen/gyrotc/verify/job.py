@@ -45,6 +45,8 @@ from .exhaustive import visit_all
 from .replay import replay_dataset
 from .toolchain import Target, all_targets, end_all
 
+__all__ = ["chosen_targets", "verify"]
+
 # Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
 _NEXT_PROGRAM_S = 0.05
 
