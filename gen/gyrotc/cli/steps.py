@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from datetime import date
 from pathlib import Path
 from typing import Annotated
 
@@ -212,9 +213,10 @@ def verify(
     """
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
+    from ..results.base import read_optional
     from ..results.files import json_text, write_atomically
     from ..results.folder import result_folder
-    from ..results.release import JointVerification, Verification
+    from ..results.release import Budget, JointVerification, Verification
     from ..verify.job import verify as run
 
     axes = axes_in(folder)
@@ -248,6 +250,10 @@ def verify(
     if result.failed:
         n_targets = sum(len(one.targets) for one in results.values())
         raise CheckFailed(f"{result.failed} checks failed; {n_targets} targets")
+    for part in [folder / axis for axis in axes] or [folder]:
+        budget = read_optional(part / "budget.json", Budget)
+        if budget is not None and budget.expired(date.today()):
+            raise CheckFailed(f"{part}: the calibration was valid until {budget.valid_until}; calibrate again")
 
 
 @app.command()
@@ -289,7 +295,8 @@ def report(folder: DirArg) -> None:
 
     Example: gyrotc report result
     """
-    from ..jobs.axes import axes_in
+    from ..jobs.axes import axes_in, refuse_parts_of_two
+    from ..model import load_model
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.report import axes_page, write_page, write_report
 
@@ -298,6 +305,7 @@ def report(folder: DirArg) -> None:
         if is_diagnosis(folder):
             path = write_diagnosis_page(folder)
         elif axes := axes_in(folder):
+            refuse_parts_of_two(folder, {axis: load_model(folder / axis / "model.json") for axis in axes})
             path = write_page(folder, axes_page(folder, axes))
         else:
             path = write_report(folder)

@@ -83,6 +83,30 @@ def axes_in(folder: Path) -> tuple[str, ...]:
     return tuple(axis for axis in AXES if (folder / axis / "model.json").is_file())
 
 
+def refuse_parts_of_two(folder: Path, models: Mapping[str, Model]) -> None:
+    """Refuse a result whose axes were not built together from recordings of one gyro.
+
+    Args:
+        folder: The result; messages name it.
+        models: Models by the axis that their folder stands for; "": of one rate.
+
+    Raises:
+        InputError: An axis is not the one that its folder names, or serials, days or recordings differ.
+    """
+    first = next(iter(models.values()))
+    for axis, model in models.items():
+        if (model.axis or "") != axis:
+            raise InputError(str(folder / axis), f"holds axis {model.axis}", "each axis once, in its own folder")
+        for what, one, other in (
+            ("serial", first.serial, model.serial),
+            ("day of the calibration", first.meta.get("calibrated_on"), model.meta.get("calibrated_on")),
+            ("recordings", first.data, model.data),
+        ):
+            if one != other:
+                found = f"axes {first.axis} and {axis} differ in {what}: they are parts of two units"
+                raise InputError(str(folder), found, "axes that were built together from recordings of one gyro")
+
+
 def verify_axes(
     folder: Path,
     results: Mapping[str, Verification],
@@ -95,6 +119,7 @@ def verify_axes(
         InputError: There is no emitted folder, or a model cannot be read.
     """
     models = {axis: load_model(folder / axis / "model.json") for axis in results}
+    refuse_parts_of_two(folder, models)
     if not (folder / "c").is_dir():
         raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
     numeric = next(iter(results.values())).errors[0].numeric

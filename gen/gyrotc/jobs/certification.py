@@ -7,25 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date, time
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from markupsafe import Markup
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from ..assess.limits import last_day
 from ..assess.stated import check_stated
 from ..common.errors import InputError
 from ..common.inputs import checked, read_toml
 from ..pages.certificate import certificate_page, dcc_text, print_to_pdf
 from ..pages.report import thermal_picture
 from ..pages.unit import UnitResults, unit_in
+from ..recordings.description import in_order, json_value, stated_day
 from ..results.decision import worst_of
 from ..results.files import write_atomically
 from ..results.folder import result_folder
 from ..results.marker import check_intact, sha256
 from ..results.release import NEED_REASON, STATED
-from .axes import axes_in
+from .axes import axes_in, refuse_parts_of_two
 
 _LONGEST = 300  # characters of a reason: a line or two of a certificate
 _EXPECTED = "a facts file (docs/delivery.md)"
@@ -48,16 +50,7 @@ _NEEDED = {
 """What a certificate has to say (ISO/IEC 17025:2017, 7.8.2 and 7.8.4), and what it is."""
 
 
-def _day(value: object) -> object:
-    """Dates of TOML as JSON writes them, in tables and lists, too."""
-    if isinstance(value, Mapping):
-        return {key: _day(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_day(one) for one in value]
-    return value.isoformat() if isinstance(value, date | time) else value
-
-
-Day = Annotated[str, BeforeValidator(_day), Field(pattern=r"^\d{4}-\d{2}-\d{2}")]
+Day = Annotated[str, BeforeValidator(stated_day)]
 Country = Annotated[str, Field(pattern="^[A-Z]{2}$")]
 
 
@@ -84,6 +77,11 @@ class LaboratoryFacts(BaseModel):
     place: Literal["laboratory", "customer", "other"] = "laboratory"
     accreditation: StatedLine | None = None
 
+    @model_validator(mode="after")
+    def _days(self) -> LaboratoryFacts:
+        in_order(self.calibrated_on, self.issued)
+        return self
+
 
 _NEVER_REWRITTEN = ("model.json", "training.json", "limits.json")  # by any command but build
 
@@ -108,7 +106,7 @@ def laboratory_facts(meta: Mapping[str, Any], path: Path | None, number: str | N
         stated = read_toml(path, _EXPECTED)
         if stated.pop("schema", None) != 1:
             raise InputError(f"{path}, field schema", "is not 1", "schema = 1")
-        known |= {key: _day(value) for key, value in stated.items()}
+        known |= {key: json_value(value) for key, value in stated.items()}
         where = str(path)
     if number is not None:
         known["number"] = number
@@ -135,13 +133,17 @@ def certificate(
 
     Raises:
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
-            built, the verdict is not PASS and not accepted, or `out` cannot be replaced.
+            built, parts are of two units, its last day has passed, the verdict is not PASS and not accepted,
+            or `out` cannot be replaced.
     """
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     units = [unit_of(place) for place in places]
+    refuse_parts_of_two(folder, {axis: unit.model for axis, unit in zip(axes_in(folder) or ("",), units, strict=True)})
+    _refuse_two_limits(folder, units)
     why = reason_of_release(folder, units, accept_fail)
     first = units[0]
     stated = laboratory_facts(first.model.meta, facts, number)
+    valid_until = _last_day(folder, stated, first)
     missing = list(missing_facts(stated, units))
     if missing and not draft:
         raise InputError(
@@ -156,13 +158,42 @@ def certificate(
         pictures: dict[str | None, Markup | None] = {
             u.model.axis: thermal_picture(place, u) for place, u in zip(places, units, strict=True)
         }
-        page = certificate_page(units, pictures, issued, missing, why)
+        page = certificate_page(units, pictures, issued, valid_until, missing, why)
         write_atomically(stage.folder / "certificate.html", page)
         if not missing:
-            write_atomically(stage.folder / "dcc.xml", dcc_text(units, issued, why))
+            write_atomically(stage.folder / "dcc.xml", dcc_text(units, issued, valid_until, why))
         printed = print_to_pdf(stage.folder / "certificate.html", stage.folder / "certificate.pdf")
     written = {"certificate.html": True, "dcc.xml": not missing, "certificate.pdf": printed}
     return Certified(tuple(out / name for name, there in written.items() if there), printed)
+
+
+def _refuse_two_limits(folder: Path, units: Sequence[UnitResults]) -> None:
+    """Refuse axes that were held against different limits.
+
+    Raises:
+        InputError: They were.
+    """
+    if len({unit.limits.sha256 if unit.limits else None for unit in units}) > 1:
+        raise InputError(str(folder), "axes were held against different limits", "axes that were built together")
+
+
+def _last_day(folder: Path, stated: LaboratoryFacts, first: UnitResults) -> str | None:
+    """Return the last day of the calibration; None where no interval is stated.
+
+    Raises:
+        InputError: It has passed, or the facts name another day of the calibration than the result.
+    """
+    budget = first.budget
+    if budget is None:
+        return None
+    day = stated.calibrated_on
+    if None not in (day, budget.calibrated_on) and str(day)[:10] != str(budget.calibrated_on)[:10]:
+        found = f"is {str(day)[:10]}, and the result was calibrated on {str(budget.calibrated_on)[:10]}"
+        raise InputError("field calibrated_on", found, "the day of this calibration, or a new build")
+    until = last_day(day, budget.interval_days)
+    if until is not None and until < date.today().isoformat():
+        raise InputError(str(folder), f"was valid until {until}", "a calibration that is valid: record and build again")
+    return until
 
 
 def unit_of(folder: Path) -> UnitResults:

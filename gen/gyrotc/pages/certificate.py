@@ -93,6 +93,7 @@ def certificate_page(
     units: Sequence[UnitResults],
     pictures: Mapping[str | None, Markup | None],
     facts: Any,
+    valid_until: str | None,
     missing: Sequence[str],
     accepted: str | None = None,
 ) -> str:
@@ -101,15 +102,26 @@ def certificate_page(
     Args:
         pictures: By axis: bias against temperature; None: it has no traces.
         facts: What the laboratory states.
+        valid_until: Last day of the calibration; None: no interval was stated.
         missing: What is missing makes it a draft.
         accepted: Why the unit is released although a verdict is not PASS.
     """
     template = page_environment().get_template("certificate.html.j2")
     rows = [rows_of(unit) for unit in units]
-    return template.render(units=units, rows=rows, pictures=pictures, facts=facts, missing=missing, accepted=accepted)
+    return template.render(
+        units=units,
+        rows=rows,
+        pictures=pictures,
+        facts=facts,
+        valid_until=valid_until,
+        missing=missing,
+        accepted=accepted,
+    )
 
 
-def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = None) -> str:
+def dcc_text(
+    units: Sequence[UnitResults], facts: Any, valid_until: str | None = None, accepted: str | None = None
+) -> str:
     """The XML of a DCC; arguments as of the page."""
     # Text as a DCC takes it: words with a blank between them, and never none
     environment = html_environment(
@@ -119,6 +131,7 @@ def dcc_text(units: Sequence[UnitResults], facts: Any, accepted: str | None = No
         units=units,
         rows=[rows_of(unit) for unit in units],
         facts=facts,
+        valid_until=valid_until,
         accepted=accepted,
         verdict=worst_of(unit.decision for unit in units) or "",
     )

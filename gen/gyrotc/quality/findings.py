@@ -466,7 +466,7 @@ def saturated_rows(rate: FloatArray) -> int:
     for end in (rate.max(initial=-np.inf), rate.min(initial=np.inf)):
         at = rate == end
         rows = int(np.count_nonzero(at))
-        if _SATURATED_ROWS <= rows < rate.size:
+        if _SATURATED_ROWS <= rows < rate.size - 1:
             repeats = rate[1:] == rate[:-1]
             there = float(np.mean(repeats[at[:-1]]))
             elsewhere = float(np.mean(repeats[~at[:-1]]))

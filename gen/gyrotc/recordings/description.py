@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time, timezone
 from pathlib import Path
@@ -101,17 +101,69 @@ def _instant(value: object) -> object:
     return value if value.tzinfo else value.replace(tzinfo=timezone.utc)
 
 
-def _json_value(value: object) -> object:
+def json_value(value: object) -> object:
     """Free values in JSON types; dates become ISO 8601 text."""
     if isinstance(value, dict):
-        return {str(key): _json_value(inner) for key, inner in value.items()}
+        return {str(key): json_value(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_json_value(inner) for inner in value]
+        return [json_value(inner) for inner in value]
     if isinstance(value, datetime | date | time):
         return value.isoformat()
     if isinstance(value, float) and not abs(value) < float("inf"):
         raise PydanticCustomError("meta", "text, whole numbers, finite numbers, dates, lists or tables")
     return value
+
+
+_A_DAY = "a day in ISO 8601, not after today, such as 2026-03-07"
+
+
+def stated_day(value: object) -> str:
+    """Return a stated day as ISO 8601 text, which may go on with a time.
+
+    Raises:
+        ValueError: It is no day of the calendar, or it has not come yet.
+    """
+    text = value.isoformat() if isinstance(value, date) else value
+    if not isinstance(text, str) or not re.match(r"\d{4}-\d{2}-\d{2}(T|$)", text):
+        raise ValueError(_A_DAY)
+    try:
+        day = datetime.fromisoformat(text).date()
+    except ValueError:
+        raise ValueError(_A_DAY) from None
+    if day > date.today():
+        raise ValueError(_A_DAY)
+    return text
+
+
+def in_order(calibrated_on: str | None, issued: str | None) -> None:
+    """Refuse a certificate that is older than its calibration.
+
+    Raises:
+        ValueError: It is.
+    """
+    if calibrated_on is not None and issued is not None and issued[:10] < calibrated_on[:10]:
+        raise ValueError(f"issued on the day of the calibration ({calibrated_on[:10]}) or later, not {issued[:10]}")
+
+
+def _free_facts(value: object) -> object:
+    """Free values in JSON types; what must be a day is one."""
+    found = json_value(value)
+    if isinstance(found, dict):
+        for name in ("calibrated_on", "issued"):
+            if name in found:
+                found[name] = _fact(name, found[name], stated_day)
+        if "issued" in found:
+            _fact("issued", found["issued"], lambda issued: in_order(found.get("calibrated_on"), issued))
+    return found
+
+
+def _fact(name: str, value: Any, check: Callable[[Any], Any]) -> Any:
+    """Apply a check to a field of `[meta]`, whose errors name it."""
+    try:
+        return check(value)
+    except ValueError as error:
+        facts = {"name": name, "found": _shown(value), "expected": str(error)}
+        raise PydanticCustomError("fact", "{expected}", facts) from None
 
 
 def _one_error(expected: str) -> WrapValidator:
@@ -215,7 +267,7 @@ class Description(_Part):
     units: dict[Label, Label] = {}
     trust_units: bool = False
     source: Sources = ()
-    meta: Annotated[dict[str, Any], BeforeValidator(_json_value)] = {}
+    meta: Annotated[dict[str, Any], BeforeValidator(_free_facts)] = {}
     noise: NoiseEntry | None = None
     fit: dict[Label, Any] = {}
     run: Annotated[tuple[RunEntry, ...], Field(min_length=1)]
@@ -283,6 +335,9 @@ def _wrong_field(detail: ErrorDetails, content: dict[str, Any]) -> InputError:
         return InputError(where, "is missing", f"{detail['loc'][-1]} = ...")
     if kind == "extra_forbidden":
         return InputError(where, "is not known", "a field named in docs/recordings.md (a typing error?)")
+    if kind == "fact":
+        facts = detail["ctx"]
+        return InputError(f"{where}.{facts['name']}", facts["found"], facts["expected"])
     if kind == "too_short":
         return InputError(where, "is empty", "at least one [[run]]")
     expected = re.sub(r"^Input should be |^Value error, ", "", detail["msg"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field
@@ -59,6 +60,10 @@ class Budget(UnitResult):
     calibrated_on: str | None = Field(description="`calibrated_on` of `[meta]`; null: not stated")
     interval_days: Figure = Field(description="until the next calibration, days; null: none is stated")
     valid_until: str | None = Field(description="last day of the interval; null: no date or no interval")
+
+    def expired(self, today: date) -> bool:
+        """Test whether the last day of the interval has passed."""
+        return self.valid_until is not None and self.valid_until < today.isoformat()
 
 
 Verdict = Literal["PASS", "CONDITIONAL PASS", "NOT TESTABLE", "FAIL"]

@@ -88,7 +88,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         table = re.findall(r'class="state"><span[^>]*>([^<]*)<', macros.limits_table(shown.held))
         certified = [row.verdict for row in rows_of(shown)]
         conformity = [row.conformity for row in rows_of(shown)]
-        page = certificate_page([shown], {None: None}, LaboratoryFacts(), ["number"], "drawn")
+        page = certificate_page([shown], {None: None}, LaboratoryFacts(), None, ["number"], "drawn")
         built = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=held)
         again = HeldLimits.model_validate_json(json.dumps(held.content()))
         assert again == held, number

@@ -167,6 +167,11 @@ FACTS = {
     "country in full": ("country = 'Germany'", "country"),
     "schema missing": (None, "field schema"),
     "no date": ("calibrated_on = 'in March'", "calibrated_on"),
+    "no day of the calendar": ("calibrated_on = '2026-13-45'", "calibrated_on"),
+    "no year": ("issued = '0000-00-00'", "issued"),
+    "a day of another form": ("calibrated_on = '01.03.2020'", "calibrated_on"),
+    "a day to come": ("issued = 2999-01-01", "issued"),
+    "issued before the calibration": ("calibrated_on = 2024-03-02\nissued = 2024-03-01", "issued"),
     "a table as a date": ("calibrated_on = { day = 2026-03-02 }", "calibrated_on"),
     "a list as a date": ("issued = [2026-03-02, 10:00:00]", "issued"),
     "an instrument": ("[[instrument]]\nname = 'Pt100'", "instrument"),
@@ -191,7 +196,7 @@ VERIFIED = {
 }  # fmt: skip
 HELD = {
     "schema": "gyrotc.limits/1", "gyrotc_version": "0.1.0", "serial": "A", "axis": None, "product": "NAV",
-    "sha256": "00", "met": True, "limits": [],
+    "sha256": "00", "met": True, "limits": [], "decision_rule": "guard_band",
 }  # fmt: skip
 RESULTS: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
     "text as a count": (Verification, VERIFIED, {"passed": "1"}, "field passed"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date, timedelta
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -47,8 +48,8 @@ manufacturer = "Maker"
 type = "RLG 90"
 procedure = "WI-7.3"
 environment = "23 C"
-calibrated_on = 2026-03-07
-"""
+calibrated_on = CALIBRATED
+""".replace("CALIBRATED", (date.today() - timedelta(days=30)).isoformat())
 
 
 @pytest.fixture(scope="module")
