@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from gyrotc.fleet import Task, do_unit, load_manifest
+from gyrotc.fleet import SUMMARY, Task, do_unit, load_manifest
 from gyrotc.results import FleetEntry, program_of, result_faults
 
 from .driver import run
@@ -39,7 +39,8 @@ def fleet(root: Path, scenario: Path) -> Case:
         if version % 5 == 1:
             shutil.rmtree(out, ignore_errors=True)
         elif version % 5 == 2:
-            (out / "fleet.json").unlink(missing_ok=True)
+            for name in SUMMARY:
+                (out / name).unlink(missing_ok=True)
 
     prepare(0)
     return Case(

@@ -54,13 +54,13 @@ class Case:
 
 
 def content(result: Path) -> Content:
-    """Every file of a result; nothing if it is not there. Hidden names are gyrotc's books (`left_beside`)."""
+    """Every file of a result but its marker, which says the same; hidden names are left over (`left_beside`)."""
     if result.is_file():
         return {"": result.read_bytes()}
     return {
         p.relative_to(result).as_posix(): p.read_bytes()
         for p in sorted(result.rglob("*"))
-        if p.is_file() and not any(name.startswith(".") for name in p.relative_to(result).parts)
+        if p.is_file() and p.name != MARKER and not any(name.startswith(".") for name in p.relative_to(result).parts)
     }
 
 
@@ -78,12 +78,11 @@ def wrong(result: Path) -> list[str]:
 
 
 def left_beside(folder: Path, expected: set[str]) -> set[str]:
-    """Names in a folder that should not be there: any but those expected, and the folder that a link points to."""
-    links = {str(p.readlink()) for p in folder.iterdir() if p.is_symlink()}
-    found = {p.name for p in folder.iterdir()} - expected - links
+    """Names in a folder that should not be there: any but those expected."""
+    found = {p.name for p in folder.iterdir()} - expected
     for result in (folder / name for name in expected):
         if result.is_dir() and read_marker(result) is not None:
-            found |= {str(p.relative_to(folder)) for p in result.rglob(".*") if p.name != MARKER}
+            found |= {str(p.relative_to(folder)) for p in result.rglob(".*")}
     return found
 
 

@@ -129,7 +129,6 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         out = work / "out" / case.data.name / axis
         fitted = fit_dataset(dataset, FitOptions(average_s=AVERAGE_S))
         out.mkdir(parents=True, exist_ok=True)
-        fitted.model.save(out / "model.json")
         emit(fitted.model, out, numerics=("f32",))
         trace = out / "trace" if case.plotted else None
         result = evaluate(out, dataset, average_s=AVERAGE_S, trace=trace, training=fitted.training).content()

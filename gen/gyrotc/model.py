@@ -36,7 +36,8 @@ from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
 from .common.errors import InputError
 from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, read_json
-from .results.files import digest_of, json_text, write_atomically
+from .results.files import write_atomically
+from .results.json_text import digest_of, json_text
 
 __all__ = [
     "MODEL_SCHEMA",

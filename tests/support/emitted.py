@@ -32,7 +32,6 @@ def emitted(folder: Path, model: Model | None = None) -> Path:
     """`folder` with `model.json` and `c/`, as `gyrotc emit` leaves it."""
     model = model or load_model(GOLDEN)
     emit(model, folder)
-    model.save(folder / "model.json")
     return folder
 
 

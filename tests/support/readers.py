@@ -109,9 +109,8 @@ def make_seeds(folder: Path) -> None:
     dataset = load(folder / "data")
     out = folder / "result"
     fitted = fit_dataset(dataset, FitOptions())
-    fitted.model.save(out / "model.json")
-    (out / "training.json").write_text(json.dumps(fitted.training.content()))
     emit(fitted.model, out)
+    (out / "training.json").write_text(json.dumps(fitted.training.content()))
     verification = verify(out, compiled=False)
     evaluation = evaluate(out, dataset, trace=out / "trace", training=fitted.training, compiled=False)
     limits = ROOT / "docs" / "limits.md"

@@ -130,8 +130,8 @@ def lot(
     Example: gyrotc lot fleet --out lot.json
     """
     from ..jobs.lot import lot_of
-    from ..results.files import json_text
     from ..results.folder import write_result
+    from ..results.json_text import json_text
 
     with progress(LOT) as say:
         found = lot_of(fleet, axis=axis, progress=say)

@@ -199,8 +199,9 @@ def compare(
     from ..jobs.comparison import compare as run
     from ..pages.comparison import comparison_picture, comparison_tables, with_published
     from ..recordings.loading import load
-    from ..results.files import json_text, write_atomically
+    from ..results.files import write_atomically
     from ..results.folder import result_folder
+    from ..results.json_text import json_text
 
     with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
         recordings = load(dataset, axis=axis, applied=applied_in(dataset))

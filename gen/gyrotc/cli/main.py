@@ -81,7 +81,7 @@ def main() -> None:
     _single_threaded()
     _returning_columns()
     _without_warnings()
-    from ..results.files import Interrupted, die_of, raise_on_signals
+    from ..results.signals import Interrupted, die_of, raise_on_signals
 
     raise_on_signals()
     try:

@@ -74,8 +74,8 @@ def show(table: Table) -> None:
 
 
 def write_json(path: Path | None, result: dict[str, Any]) -> None:
-    from ..results.files import json_text
     from ..results.folder import write_result
+    from ..results.json_text import json_text
 
     if path == STANDARD_OUTPUT:
         print(json_text(result), end="")

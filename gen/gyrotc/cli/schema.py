@@ -44,7 +44,6 @@ def schema(
 def kinds() -> dict[str, type[BaseModel]]:
     """Every file and output by the name that `gyrotc schema` knows; imported when asked for, as help needs none."""
     from ..model import Model
-    from ..results.base import Marker
     from ..results.diagnosed import Diagnosed, DiagnosisSeries
     from ..results.evaluation import Changes, Comparison, Evaluation
     from ..results.fleet import FleetEntry, FleetSummary, Lot
@@ -71,7 +70,6 @@ def kinds() -> dict[str, type[BaseModel]]:
         "manifest": Manifest,
         "map": MapOnGrid,
         "model": Model,
-        "result": Marker,
         "training": Training,
         "truth": SimulatedTruth,
         "verify-axes": JointVerification,

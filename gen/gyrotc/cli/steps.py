@@ -97,8 +97,9 @@ def fit(
     from ..jobs.applied import applied_in
     from ..jobs.recalibration import with_prior
     from ..recordings.loading import load
-    from ..results.files import json_text, write_atomically
+    from ..results.files import write_atomically
     from ..results.folder import result_folder
+    from ..results.json_text import json_text
     from ..train.fitting import FitOptions, fit_dataset
 
     fitting = FitOptions(prior=lot_in(lot))
@@ -146,23 +147,20 @@ def emit(
     Example: gyrotc emit result/model.json --out result --map result/map.csv
     """
     from ..model import load_model
-    from ..results.files import json_text
     from ..results.folder import result_folder, write_result
+    from ..results.json_text import json_text
     from ..results.release import Emitted, EmittedTable
     from ..tables.emission import emit as run
     from ..tables.map_grid import csv_text, grid_of_map, map_result
     from ..tables.quantisation import rms_growth
 
     loaded = load_model(model)
-    source, target = model / "model.json" if model.is_dir() else model, out / "model.json"
-    elsewhere = target.resolve() != source.resolve()
-    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")[: 1 + elsewhere]) as stage:
+    there = out / "model.json"
+    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")) as stage:
         stage.of(loaded.serial, loaded.axis)
-        if elsewhere and target.is_file() and target.read_text("utf-8") != loaded.to_json():
+        if there.is_file() and there.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
         emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at, progress=say)
-        if elsewhere:
-            loaded.save(stage.folder / "model.json")
     result = Emitted(
         gyrotc_version=__version__,
         serial=loaded.serial,
@@ -214,8 +212,9 @@ def verify(
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
     from ..results.base import read_optional
-    from ..results.files import json_text, write_atomically
+    from ..results.files import write_atomically
     from ..results.folder import result_folder
+    from ..results.json_text import json_text
     from ..results.release import Budget, JointVerification, Verification
     from ..verify.job import verify as run
 
@@ -274,7 +273,8 @@ def evaluate(
     from ..jobs.applied import applied_in
     from ..model import load_model
     from ..recordings.loading import load
-    from ..results.files import json_text, write_atomically
+    from ..results.files import write_atomically
+    from ..results.json_text import json_text
 
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_in(dataset), exam_only=True)

@@ -167,6 +167,8 @@ def _has_recordings(folder: Path) -> bool:
 
 def _is_result(folder: Path) -> bool:
     """Whether gyrotc made it of recordings: also a fleet's folder holds CSV files."""
+    if (folder / SUMMARY[0]).is_file():
+        return True
     try:
         marker = read_marker(folder)
     except InputError:

@@ -25,12 +25,13 @@ from ..common.texts import csv_cell
 from ..pages.chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
 from ..pages.report import page_environment
 from ..quality.thermometers import lag_of
-from ..results.files import json_text, write_atomically, write_own
+from ..results.files import write_atomically, write_own
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, FleetSummary, Reason, ResidualSeries
 from ..results.folder import result_folder
+from ..results.json_text import json_text
 from ..tables.runtime import joint_needs, runtime_texts
 from ..tables.text import ARITHMETICS
-from .manifest import OF_FLEET, RUNTIME, SUMMARY
+from .manifest import RUNTIME, SUMMARY
 from .outliers import (
     BIN_C,
     FIGURES,
@@ -196,13 +197,12 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
         cells = (getattr(entry, column) for column in _COLUMNS)
         writer.writerow(csv_cell(" ".join(c) if isinstance(c, tuple) else "" if c is None else c) for c in cells)
     texts = (json_text(summary.content()), table.getvalue(), page)
-    with result_folder(out, "fleet", entries=OF_FLEET) as stage:
-        for name, text in zip(SUMMARY, texts, strict=True):
-            write_atomically(stage.folder / name, text)
-        if needs := joint_needs(entry.runtime_options for entry in entries if entry.runtime_options):
-            (stage.folder / RUNTIME).mkdir()
+    if needs := joint_needs(entry.runtime_options for entry in entries if entry.runtime_options):
+        with result_folder(out / RUNTIME, "fleet") as stage:
             for name, data in runtime_texts(needs, ARITHMETICS).items():
-                write_own(stage.folder / RUNTIME / name, data)
+                write_own(stage.folder / name, data)
+    for name, text in zip(SUMMARY, texts, strict=True):
+        write_atomically(out / name, text)
     return summary
 
 

@@ -19,10 +19,12 @@ from typing import Any
 
 from ..common.errors import InputError, install_command
 from ..results.cache import program_of
-from ..results.files import Lock, deferred
+from ..results.destination import check_separate
+from ..results.files import check_replaceable
 from ..results.fleet import FleetEntry
-from ..results.marker import KINDS, check_contents, check_separate, final_place
-from .manifest import OF_FLEET, SUMMARY, Fleet, printable
+from ..results.place import held
+from ..results.signals import deferred
+from .manifest import SUMMARY, Fleet, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
@@ -238,23 +240,23 @@ def run_fleet(
             a data set, holds a summary that gyrotc did not write, or another fleet is being written there.
     """
     place = _checked_place(fleet, out)
-    lock = Lock(place / "fleet.json", "fleet")
-    try:
-        return _run(fleet, place, jobs, cluster, done or (lambda _: None))
-    finally:
-        with deferred():
-            try:
+    with held(place):
+        try:
+            return _run(fleet, place, jobs, cluster, done or (lambda _: None))
+        finally:
+            with deferred():
                 clean_units(place, [unit.folder for unit in fleet.units])  # of processes that this one ended
-            finally:
-                lock.release()
 
 
 def _checked_place(fleet: Fleet, out: Path) -> Path:
     """The folder of a fleet, which is there afterwards; raises as `run_fleet`."""
-    place = final_place(out)
-    folders = [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)]  # noqa: PTH112 (never raises)
-    check_separate(out, place, folders, whole=True)
-    check_contents(out, place, KINDS["fleet"], frozenset(OF_FLEET))
+    place = Path(os.path.realpath(out))
+    check_separate(out, [unit.dataset for unit in fleet.units if os.path.isdir(unit.dataset)])  # noqa: PTH112 (never raises)
+    summary = [place / name for name in SUMMARY]
+    check_replaceable(summary[0])
+    for path in summary[1:]:
+        if path.exists() and not summary[0].exists():
+            raise InputError(str(path), "exists and was not written by gyrotc", "another folder; or move it away")
     place.mkdir(parents=True, exist_ok=True)
     return place
 

@@ -22,10 +22,12 @@ from ..quality.events import found_events
 from ..recordings.loading import calibration_day, load, stated_identity
 from ..recordings.records import Dataset
 from ..results.cache import input_hashes, program_of
-from ..results.files import Lock, digest_of, json_text, write_atomically
+from ..results.files import write_atomically
 from ..results.fleet import Facts, FleetEntry
-from ..results.folder import clean, leftovers, result_folder
+from ..results.folder import clean, result_folder
+from ..results.json_text import digest_of, json_text
 from ..results.marker import KINDS, read_marker, result_faults, survey_folder
+from ..results.place import held, unfinished_beside
 from ..tables.runtime import needs_of
 from .manifest import Fleet, Unit, printable
 from .outliers import gyro_facts
@@ -46,19 +48,16 @@ def move_away(place: Path) -> str:
         marker = read_marker(place)
         if marker is None or not survey_folder(place, marker)[1]:
             return ""
-    lock = Lock(place, "fleet")
-    try:
+    with held(place):
         names = (f"{place.name}.changed-{k}" for k in itertools.count(1))
         other = next(path for name in names if not (path := place.with_name(name)).exists())
         place.rename(other)
-    finally:
-        lock.release()
     return other.name
 
 
 def clean_units(out: Path, names: Sequence[str]) -> None:
     """Removes what jobs that were killed left beside results in a fleet's folder; of these names also their locks."""
-    for name in leftovers(out, names):
+    for name in unfinished_beside(out, names):
         with suppress(InputError):  # a job is at work there
             clean(out / name)
 

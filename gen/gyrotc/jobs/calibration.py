@@ -25,9 +25,10 @@ from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
-from ..results.files import json_text, write_atomically
+from ..results.files import sha256, write_atomically
 from ..results.folder import result_folder
-from ..results.marker import MARKER, sha256
+from ..results.json_text import json_text
+from ..results.marker import MARKER
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
 from ..tables.emission import emit
@@ -197,7 +198,6 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
             }
         )
         fitted = replace(fitted, model=model)
-    fitted.model.save(work / "model.json")
     _write(work / "training.json", fitted.training.content())
     say("emitting C")
     emission = emit(fitted.model, work, numerics=order.numerics, runtime_apart=order.in_fleet)

@@ -23,9 +23,9 @@ from ..pages.report import thermal_picture
 from ..pages.unit import UnitResults, unit_in
 from ..recordings.description import in_order, json_value, stated_day
 from ..results.decision import worst_of
-from ..results.files import write_atomically
+from ..results.files import sha256, write_atomically
 from ..results.folder import result_folder
-from ..results.marker import check_intact, sha256
+from ..results.marker import check_intact
 from ..results.release import NEED_REASON, STATED
 from .axes import axes_in, refuse_parts_of_two
 

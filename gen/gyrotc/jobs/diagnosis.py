@@ -15,8 +15,9 @@ from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
-from ..results.files import json_text, write_atomically
+from ..results.files import write_atomically
 from ..results.folder import result_folder
+from ..results.json_text import json_text
 from ..train.fitting import FitOptions
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"

@@ -13,8 +13,8 @@ from ..common.arrays import FloatArray, Progress
 from ..common.errors import InputError
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
-from ..results.files import digest_of
 from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotCluster, LotUnit
+from ..results.json_text import digest_of
 from ..results.marker import check_intact
 from ..results.training import Training
 from ..train.evidence import MEAN_S

@@ -1,6 +1,5 @@
 from .base import Estimate as Estimate
 from .base import Finding as Finding
-from .base import Marker as Marker
 from .base import Numbered as Numbered
 from .base import checked_result as checked_result
 from .base import read_optional as read_optional
@@ -10,6 +9,7 @@ from .cache import program_of as program_of
 from .decision import decision_of as decision_of
 from .decision import failed_checks as failed_checks
 from .decision import worst_of as worst_of
+from .destination import check_separate as check_separate
 from .diagnosed import NOTHING as NOTHING
 from .diagnosed import SURE as SURE
 from .diagnosed import UNNAMED as UNNAMED
@@ -40,11 +40,7 @@ from .evaluation import Requirement as Requirement
 from .evaluation import ResidualTest as ResidualTest
 from .evaluation import RunStatistics as RunStatistics
 from .evaluation import Statistics as Statistics
-from .files import Interrupted as Interrupted
-from .files import Lock as Lock
-from .files import die_of as die_of
-from .files import json_text as json_text
-from .files import raise_on_signals as raise_on_signals
+from .files import sha256 as sha256
 from .files import write_atomically as write_atomically
 from .fleet import Copy as Copy
 from .fleet import Facts as Facts
@@ -57,12 +53,13 @@ from .fleet import Reason as Reason
 from .folder import result_folder as result_folder
 from .folder import scratch_folder as scratch_folder
 from .folder import write_result as write_result
+from .json_text import json_text as json_text
 from .marker import MARKER as MARKER
-from .marker import check_separate as check_separate
-from .marker import marker_of as marker_of
-from .marker import marker_text as marker_text
+from .marker import Marker as Marker
 from .marker import read_marker as read_marker
 from .marker import result_faults as result_faults
+from .marker import write_marker as write_marker
+from .place import held as held
 from .recordings import ImportedFile as ImportedFile
 from .recordings import ImportedFiles as ImportedFiles
 from .release import Budget as Budget
@@ -72,6 +69,9 @@ from .release import MapError as MapError
 from .release import Verification as Verification
 from .release import VerifiedTarget as VerifiedTarget
 from .release import WorstError as WorstError
+from .signals import Interrupted as Interrupted
+from .signals import die_of as die_of
+from .signals import raise_on_signals as raise_on_signals
 from .training import DeclaredUnits as DeclaredUnits
 from .training import Manifest as Manifest
 from .training import Training as Training

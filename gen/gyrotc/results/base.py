@@ -1,12 +1,12 @@
 """What every JSON result has: frozen fields of known types, one form on disk, one way to be read back.
 
-Also what several hold: findings with their sizes; and what stands beside results in a folder: its marker.
+Also what several hold: findings with their sizes.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..common.inputs import checked, parse_json, read_input
 
 if TYPE_CHECKING:
-    from typing_extensions import Self, Unpack
+    from typing_extensions import Self
 
 
 # Far above any figure, and products of two figures of pages still have a square root in float64
@@ -101,70 +101,6 @@ def checked_result(content: Any, kind: type[R], where: str, text: bytes | None =
     if content.get("schema") != schema:
         raise InputError(f"{where}, field schema", repr(content.get("schema"))[:60], repr(schema))
     return checked(kind, content, where, text)
-
-
-class MarkerFields(TypedDict, total=False):
-    """Fields of a marker that a job changes."""
-
-    kind: str
-    command: str
-    serial: str | None
-    axis: str | None
-    files: dict[str, str]
-    parts: tuple[str, ...]
-    pending: dict[str, dict[str, str]]
-    unfinished: bool
-
-
-class Marker(Result):
-    """What in a folder is gyrotc's."""
-
-    schema_: Annotated[Literal["gyrotc.result/1"], Field(alias="schema")] = "gyrotc.result/1"
-    kind: str = Field(
-        description="`result` (build, fit, emit, verify, evaluate), `diagnosis`, `comparison`, "
-        "`data set` (simulate, import), `fleet`, `trace` (traces outside a result)"
-    )
-    command: str = Field(description="that wrote the folder last")
-    serial: str | None = Field(description="gyro serial; null where the folder is not of one gyro")
-    axis: Axis = Field(description="null where it is not of one axis")
-    files: dict[str, str] = Field(
-        description="SHA-256 of every file that gyrotc wrote, by its path in the folder with `/`; without the marker "
-        "itself and those of parts"
-    )
-    parts: tuple[str, ...] = Field(
-        description="paths of folders inside with a marker of their own (an axis, the diagnosis of `build --extend`)"
-    )
-    pending: dict[str, dict[str, str]] = Field(
-        default={},
-        description="only while entries of the folder are replaced one by one, or after such a job was killed: the "
-        "files that each entry will have. An entry is then whole as in `files` or whole as here",
-    )
-    unfinished: bool = Field(
-        default=False,
-        description="true in folders named `.<name>.gyrotc-part-<8 digits>` alone, which a job is writing "
-        "or died writing",
-    )
-
-    def content(self) -> dict[str, Any]:
-        """The JSON object; files and parts by name, the last two fields only where they say something."""
-        found = super().content()
-        found |= {"files": dict(sorted(self.files.items())), "parts": sorted(self.parts)}
-        rare = ("pending", "unfinished")
-        return {name: value for name, value in found.items() if value or name not in rare}
-
-    def but(self, **changed: Unpack[MarkerFields]) -> Marker:
-        """The same marker with other values in some fields."""
-        return self.model_copy(update=dict(changed))
-
-    def known(self, name: str) -> set[str]:
-        """SHA-256 that a file of this path may have."""
-        later = self.pending.get(name.split("/", 1)[0], {})
-        return {table[name] for table in (self.files, later) if name in table}
-
-    def entries(self) -> set[str]:
-        """Names in the folder itself that are gyrotc's."""
-        names = {name.split("/", 1)[0] for name in (*self.files, *self.parts)}
-        return names | {entry for entry, files in self.pending.items() if files}
 
 
 ADVICE = {

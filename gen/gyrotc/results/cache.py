@@ -24,8 +24,8 @@ from platformdirs import user_cache_path
 from .. import __version__, _core
 from ..common.errors import InputError
 from ..common.inputs import read_input, runtime_folders
-from .files import digest_of, write_atomically
-from .marker import sha256
+from .files import sha256, write_atomically
+from .json_text import digest_of
 
 _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures come out of
 

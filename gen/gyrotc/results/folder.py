@@ -1,44 +1,35 @@
-"""A result folder: written beside its place, then exchanged with it in one step where the system can do that."""
+"""A result folder: made beside its place, then exchanged with it in one step, so that it is never seen half-written."""
 
 from __future__ import annotations
 
-import fcntl
 import os
-import re
-import secrets
 import shutil
-import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..common.errors import GyrotcError, InputError
-from .base import Marker
-from .files import Lock, check_replaceable, deferred, sync_folder, unfinished, write_atomically, write_own
+from .destination import check_contents, check_separate, real_path
+from .exchange import exchange
+from .files import check_replaceable, sync_folder, unfinished, write_atomically
 from .marker import (
     KINDS,
     MARKER,
-    OWN,
-    check_contents,
-    check_same_serial,
-    check_separate,
-    final_place,
-    is_inside,
-    marker_of,
-    marker_text,
-    prefix_of,
+    Marker,
+    described,
     read_marker,
     remove_listed,
     result_faults,
-    sha256,
+    top,
     walk,
+    write_marker,
 )
-from .update import Update, can_exchange, exchange, write_marker
+from .place import held, part_of, parts_beside
+from .signals import deferred
 
 _open: list[_Job] = []
-_EARLIER = ".old"
 
 
 class Stage:
@@ -60,18 +51,18 @@ class Stage:
             InputError: An earlier result there is another gyro's.
         """
         if not self._part:
-            check_same_serial(self._job.out, self._job.earlier, serial)
-        parts = self._job.parts
-        parts[self._part] = parts[self._part].but(serial=serial, axis=axis)
+            self._job.check_serial(serial)
+        markers = self._job.markers
+        markers[self._part] = markers[self._part].but(serial=serial, axis=axis)
 
     def stale(self) -> None:
-        """Says that what else gyrotc wrote into the folder no longer holds: it is removed when the new files come.
+        """Says that what else gyrotc wrote into the folder no longer holds: it goes when the new files come.
 
         Raises:
             InputError: Some of it was changed since.
         """
         if not self._part:
-            self._job.whole()
+            self._job.replace_all()
 
 
 @contextmanager
@@ -80,7 +71,7 @@ def result_folder(
     command: str,
     *,
     kind: str | None = None,
-    entries: Iterable[str] | None = None,
+    entries: Collection[str] | None = None,
     inputs: Sequence[Path] = (),
 ) -> Iterator[Stage]:
     """A folder to write into, which becomes `out` when the block ends well; else `out` stays as it was.
@@ -101,27 +92,31 @@ def result_folder(
         GyrotcError: It cannot be written (disk full, no permission).
     """
     kind = KINDS[command] if kind is None else kind
-    names = None if entries is None else frozenset(entries)
-    outer = next((job for job in reversed(_open) if _within(out, job.work)), None)
+    outer = next((job for job in reversed(_open) if job.work in (real := real_path(out), *real.parents)), None)
     if outer is not None:
-        yield outer.part(out, kind, command)
+        yield outer.part(out, Marker(kind, command))
         return
-    job: _Job | None = None
+    place = real_path(out)
     try:
+        check_separate(out, inputs)
         with deferred():
-            job = _Job(out, kind, command, names, inputs)
-        yield Stage(job.work, job, "")
-        job.prepare()
-        with deferred():
-            job.commit()
+            place.parent.mkdir(parents=True, exist_ok=True)
+        with held(place):
+            job = _Job(out, Marker(kind, command), entries)
+            try:
+                with deferred():
+                    job.begin()
+                yield Stage(job.work, job, "")
+                job.describe()
+                with deferred():
+                    job.commit()
+            finally:
+                with deferred():
+                    job.end()
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
         raise GyrotcError(f"{error.filename or out}: {error.strerror or error}") from error
-    finally:
-        with deferred():
-            if job is not None:
-                job.end()
 
 
 def write_result(path: Path, text: str) -> None:
@@ -131,146 +126,113 @@ def write_result(path: Path, text: str) -> None:
         InputError: As `check_replaceable`.
     """
     check_replaceable(path)
-    if not path.is_symlink() and read_marker(path.parent) is not None:
+    if not path.is_symlink() and (path.parent / MARKER).is_file() and read_marker(path.parent) is not None:
         with result_folder(path.parent, "json", kind="", entries=(path.name,)) as stage:
             write_atomically(stage.folder / path.name, text)
     else:
         write_atomically(path, text)
 
 
-def _within(path: Path, folder: Path) -> bool:
-    resolved = path.resolve()
-    return resolved == folder or folder in resolved.parents
-
-
 class _Job:
-    """A folder that is being written, from the lock to its release."""
+    """A folder that is being written, by the one who holds its place."""
 
-    def __init__(
-        self, out: Path, kind: str, command: str, entries: frozenset[str] | None, inputs: Sequence[Path]
-    ) -> None:
+    def __init__(self, out: Path, marker: Marker, entries: Collection[str] | None) -> None:
         self.out = out
-        self.place = final_place(out)
-        self._prefix = prefix_of(self.place)
-        self._entries = entries
-        check_separate(out, self.place, inputs, whole=entries is None)
-        self.place.parent.mkdir(parents=True, exist_ok=True)
-        self._lock = Lock(self.place, command)
-        try:
-            self._recover()
-            _clean_beside(self.place)  # what dead jobs left, which held this lock
-            self._clean_parts()
-            self.earlier = check_contents(out, self.place, kind or None, entries)
-            self.parts = {"": marker_of(kind or (self.earlier.kind if self.earlier else "result"), command)}
-            self.work = self._begun = self._begin()
-        except BaseException:
-            self._lock.release()
-            raise
+        self.place = real_path(out)
+        self.entries = None if entries is None else frozenset(entries)
+        self.work = part_of(self.place)
+        _recover(self.place)
+        self.earlier = check_contents(out, marker.kind or None, self.entries)
+        kind = marker.kind or (self.earlier.kind if self.earlier else "result")
+        self.markers = {"": marker.but(kind=kind)}
+
+    def begin(self) -> None:
+        """Makes the folder to work in, with a marker that lets everybody see what it is."""
+        self.work.mkdir(mode=0o755)
         _open.append(self)
         unfinished.append(self.work)
+        write_marker(self.work, self.markers[""].but(finished=False))
 
-    def _begin(self) -> Path:
-        work = self.place.parent / f"{self._prefix}{secrets.token_hex(4)}"
-        work.mkdir(mode=0o755)
-        try:
-            write_own(work / MARKER, marker_text(self.parts[""].but(unfinished=True)))
-        except BaseException:
-            (work / MARKER).unlink(missing_ok=True)
-            work.rmdir()
-            raise
-        return work
+    def check_serial(self, serial: str) -> None:
+        """Refuses to put a result of one gyro into the place of another's; raises as `Stage.of`."""
+        earlier = self.earlier
+        if earlier is not None and earlier.serial not in (None, serial) and earlier.kind in _OF_ONE_GYRO:
+            found = f"holds the result of serial {earlier.serial}, and this is of {serial}"
+            raise InputError(str(self.out), found, "another folder; or delete the earlier result first")
 
-    def part(self, path: Path, kind: str, command: str) -> Stage:
+    def part(self, path: Path, marker: Marker) -> Stage:
         """A result inside this one, with a marker of its own."""
-        name = path.resolve().relative_to(self.work).as_posix()
+        name = real_path(path).relative_to(self.work).as_posix()
         name = "" if name == "." else name
         path.mkdir(parents=True, exist_ok=True)
-        self.parts.setdefault(name, marker_of(kind, command))
+        self.markers.setdefault(name, marker)
         return Stage(path, self, name)
 
-    def whole(self) -> None:
+    def replace_all(self) -> None:
         """From now on all that gyrotc wrote is replaced, not only the entries asked for."""
-        if self._entries is not None and self.earlier is not None:
-            names = self._entries | self.earlier.entries()
-            self.earlier = check_contents(self.out, self.place, None, names)
-            self._entries = names
+        if self.entries is not None and self.earlier is not None:
+            self.earlier = check_contents(self.out, None, None)
+            self.entries = None
 
-    def prepare(self) -> None:
-        """Gives what was written its markers, and sees to it that all is on disk."""
-        tops = {path.name for path in self.work.iterdir()} - OWN
-        if self._entries is not None and tops - self._entries:
-            raise ValueError(f"{sorted(tops - self._entries)} is not among the entries of this job")
-        for name in sorted(self.parts, reverse=True):
-            self.parts[name] = _described(self.work / name, self.parts[name], self._parts_of(name))
-            if name:
-                write_marker(self.work, self.work / name, self.parts[name])
+    def describe(self) -> None:
+        """Gives what was written, and what stays of the earlier result, their markers; all is on disk then."""
+        for name in sorted(self.markers, reverse=True):
+            inside = f"{name}/" if name else ""
+            parts = tuple(p[len(inside) :] for p in self.markers if p not in ("", name) and p.startswith(inside))
+            found = described(self.work / name, self.markers[name].but(parts=parts))
+            if not name and self.entries is not None and self.earlier is not None:
+                found = self._with_earlier(found, self.earlier, self.entries)
+            write_marker(self.work / name, found)
         for place, _, _ in os.walk(self.work):
             sync_folder(Path(place))
 
-    def _parts_of(self, name: str) -> tuple[str, ...]:
-        """Parts of a part, by their paths in it."""
-        inside = f"{name}/" if name else ""
-        return tuple(part[len(inside) :] for part in self.parts if part != name and part.startswith(inside))
+    def _with_earlier(self, new: Marker, earlier: Marker, entries: Collection[str]) -> Marker:
+        """The marker with what stays of the earlier result, which is linked into the new folder with all else there."""
+        written = {top(name) for name in (*new.files, *new.parts)}
+        if beyond := written.difference(entries):
+            raise ValueError(f"{sorted(beyond)} is not among the entries of this job")
+        for name in walk(self.place):
+            if top(name) in entries:
+                continue
+            path = self.work / name
+            (path if name.endswith("/") else path.parent).mkdir(parents=True, exist_ok=True)
+            if not name.endswith("/"):
+                _link(self.place / name, path)
+        kept = {name: digest for name, digest in earlier.files.items() if top(name) not in entries}
+        parts = [part for part in earlier.parts if top(part) not in entries]
+        who = new if new.serial is not None else earlier
+        return earlier.but(
+            serial=who.serial, axis=who.axis, files=kept | new.files, parts=tuple(sorted({*parts, *new.parts}))
+        )
 
     def commit(self) -> None:
         """Puts the work into its place; what was there before then lies in `work`."""
-        if self._entries is None or not self.place.exists():
-            write_marker(self.work, self.work, self.parts[""])
-            self._put()
-        else:
-            Update(self.place, self.work, self.earlier, self.parts[""], self._entries).commit(self._put)
+        if not self.place.exists():
+            self.work.rename(self.place)
+        elif not exchange(self.work, self.place):
+            aside = part_of(self.place)
+            self.place.rename(aside)  # a job that is killed here leaves both: `_recover`
+            self.work.rename(self.place)
+            aside.rename(self.work)
         sync_folder(self.place.parent)
 
-    def _put(self) -> None:
-        """The whole folder, in one step."""
-        linked = self.place.is_symlink()
-        if not linked and not (self.place.exists() and any(self.place.iterdir())) and can_exchange(self.work):
-            self.work.rename(self.place)
-        elif linked or not self.place.exists() or not exchange(self.work, self.place):
-            self._point()
-
-    def _point(self) -> None:
-        """Where names cannot be exchanged the place is a link, and links can be: a reader always finds a result."""
-        link = self.work.with_name(f"{self.work.name}.link")
-        link.symlink_to(self.work.name)
-        old = self.place.readlink() if self.place.is_symlink() else None
-        earlier = self.work.with_name(f"{self.work.name}{_EARLIER}")
-        if old is None and self.place.exists():
-            self.place.rename(earlier)
-        link.replace(self.place)
-        self.work = earlier if old is None else self.place.parent / old
-
     def end(self) -> None:
-        """Removes what is left of the work, or of the earlier result, and releases the place."""
-        _open.remove(self)
-        unfinished.remove(self._begun)
-        try:
-            _clean_beside(self.place)
-        finally:
-            self._lock.release()
-
-    def _recover(self) -> None:
-        """A job that died between two renames (where names cannot be exchanged) left the place empty."""
-        if not self.place.exists() and not self.place.is_symlink():
-            for path in sorted(self.place.parent.iterdir()):
-                if path.name.startswith(self._prefix) and path.name.endswith(_EARLIER) and not result_faults(path):
-                    path.rename(self.place)
-                    return
-
-    def _clean_parts(self) -> None:
-        """Removes what dead jobs left beside parts of a result that is replaced as a whole; none may be in work."""
-        marker = read_marker(self.place) if self._entries is None and self.place.is_dir() else None
-        for part in marker.parts if marker else ():
-            place = self.place / part
-            if place.parent.is_dir():
-                clean(place)
+        """Removes what is left of the work, or of the earlier result."""
+        if self in _open:
+            _open.remove(self)
+            unfinished.remove(self.work)
+        if self.work.exists():
+            _remove(self.work, self.place)
 
 
-def leftovers(folder: Path, names: Sequence[str] = ()) -> set[str]:
-    """Names in a folder beside which jobs, at work or dead, left a folder; and those of `names` that have a lock."""
-    hidden = {path.name[1:] for path in folder.iterdir() if path.name.startswith(".")}
-    parted = (name.partition(prefix_of(Path())[1:]) for name in hidden)
-    return {name for name, found, _ in parted if found} | {name for name in names if f"{name}.lock" in hidden}
+_OF_ONE_GYRO = frozenset((KINDS["build"], KINDS["diagnose"], KINDS["compare"]))
+
+
+def _link(source: Path, target: Path) -> None:
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:  # a file system without hard links
+        shutil.copy2(source, target, follow_symlinks=False)
 
 
 def clean(place: Path) -> None:
@@ -279,116 +241,49 @@ def clean(place: Path) -> None:
     Raises:
         InputError: A job is writing there.
     """
-    lock = Lock(place, "clean")
+    with held(place):
+        _recover(place)
+
+
+def _recover(place: Path) -> None:
+    """Puts a finished result into a place that a dead job left empty, and removes what it left beside it."""
+    parts = [path for path in parts_beside(place) if path.is_dir() and not path.is_symlink()]
+    if parts and not place.exists():
+        whole = next((path for path in parts if _is_whole(path)), None)
+        if whole is not None:
+            whole.rename(place)
+            parts.remove(whole)
+    for path in parts:
+        _remove(path, place)
+    marker = read_marker(place) if (place / MARKER).is_file() else None
+    for part in marker.parts if marker else ():
+        if (place / part).parent.is_dir() and parts_beside(place / part):
+            clean(place / part)
+
+
+def _is_whole(path: Path) -> bool:
     try:
-        _clean_beside(place)
-    finally:
-        lock.release()
-
-
-def _clean_beside(place: Path) -> None:
-    current = place.readlink().name if place.is_symlink() else ""
-    for path in sorted(place.parent.iterdir()):
-        if not path.name.startswith(prefix_of(place)) or path.name == current:
-            continue
-        if path.is_symlink():
-            path.unlink()
-        elif path.is_dir() and _of_gyrotc(path):
-            for name in remove_listed(path):
-                _carry(path, place, name)
-            if path.is_dir():
-                remove_listed(path)
-
-
-def _of_gyrotc(path: Path) -> bool:
-    """Whether a leftover tells that gyrotc made it: by its marker, or as nothing but a marker ever was in it."""
-    try:
-        return read_marker(path) is not None or not any(path.iterdir())
+        return not result_faults(path)
     except InputError:
-        return {p.name for p in path.iterdir()} <= OWN
+        return False
 
 
-def _carry(old: Path, place: Path, name: str) -> None:
-    """What somebody put into a result while it was replaced goes on into the new one; nobody's file is lost."""
-    source, target = old / name, place / name
-    if target.is_file() and not source.is_symlink() and target.samefile(source):
-        source.unlink()
-    elif place.is_dir() and not target.exists() and not target.is_symlink() and is_inside(place, name):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        source.rename(target)
-    else:
-        print(f"gyrotc: {source} was not written by gyrotc and is left there", file=sys.stderr)
-
-
-def _described(folder: Path, marker: Marker, parts: tuple[str, ...]) -> Marker:
-    """A marker with the hashes of what is in a folder; the files are on disk then, empty folders are gone."""
-    files = {}
-    for name in walk(folder, parts):
-        path = folder / name
-        if not name.endswith("/"):
-            files[name] = sha256(path, sync=True)
-            continue
-        while path != folder and not any(path.iterdir()):
-            path.rmdir()
-            path = path.parent
-    return marker.but(files=files, parts=parts)
-
-
-_PREFIX = ".gyrotc-scratch-"
-_NAME = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")  # as `tempfile` makes it
+def _remove(path: Path, place: Path) -> None:
+    """Removes a folder of a job; what somebody else put into it is kept, under a name that can be seen."""
+    if remove_listed(path):
+        return
+    names = (place.with_name(f"{place.name}.left-{number}") for number in range(1, 1000))
+    kept = next(name for name in names if not os.path.lexists(name))
+    path.rename(kept)
+    print(f"gyrotc: {kept} holds what was in {place} and gyrotc did not write", file=sys.stderr)
 
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
     """An empty folder, this user's alone, in the place for temporary files; gone with all that is in it afterwards.
 
-    Its job holds a lock on it (`flock`). One that nobody holds is of a job that was killed, and is removed here.
-
     Raises:
         OSError: There is no place for temporary files, or no space in it.
     """
-    _clean()
-    folder, lock = _made()
-    try:
-        with folder:
-            yield Path(folder.name)
-    finally:
-        os.close(lock)
-
-
-def _made() -> tuple[tempfile.TemporaryDirectory[str], int]:
-    """A new folder and the handle that locks it."""
-    while True:
-        folder = tempfile.TemporaryDirectory(prefix=_PREFIX)
-        with suppress(FileNotFoundError):  # another job took it for left over before it was locked
-            lock = os.open(folder.name, os.O_RDONLY | os.O_DIRECTORY)
-            with suppress(OSError):  # no locks here; then none can be locked to be removed, either
-                fcntl.flock(lock, fcntl.LOCK_SH)
-            if Path(folder.name).exists():
-                return folder, lock
-            os.close(lock)
-        folder.cleanup()
-
-
-def _clean() -> None:
-    """Removes what jobs of this user left that are dead."""
-    with os.scandir(tempfile.gettempdir()) as entries:
-        left = [entry.path for entry in entries if _NAME.fullmatch(entry.name)]
-    for path in left:
-        with suppress(OSError):  # another's, gone, held, or not to be locked
-            _remove_if_dead(path)
-
-
-def _remove_if_dead(path: str) -> None:
-    handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        if _is_own(os.fstat(handle)):
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(path)
-    finally:
-        os.close(handle)
-
-
-def _is_own(status: os.stat_result) -> bool:
-    """Whether it is as `tempfile` made it: of this user, and for this user alone."""
-    return status.st_uid == os.getuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
+    with tempfile.TemporaryDirectory(prefix="gyrotc-") as folder:
+        yield Path(folder)

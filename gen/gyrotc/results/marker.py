@@ -1,26 +1,30 @@
-"""`.gyrotc-result.json`: what gyrotc wrote into a folder, and so where a result may go and what may be removed.
+"""`SHA256SUMS`: what gyrotc wrote into a folder, so that `sha256sum -c` checks it and only this is ever removed.
 
-Names that stand in a marker are compared with names found in the folder; none is ever opened or removed because
-a marker names it. Parts are followed: `read_marker` takes none that leads out of the folder.
+The first line is a comment to sha256sum; it says what kind of result it is, of which gyro, and which folders inside
+have a marker of their own. Names that stand in a marker are compared with names found in the folder; none is opened
+or removed because a marker names it. A part is followed only where it leads to a folder inside.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
+import re
 import shutil
 import stat
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..common.errors import InputError
-from .base import Marker, checked_result
-from .files import json_text
+from .files import create, sha256, sync_folder
 
-MARKER = ".gyrotc-result.json"
-MARKER_SCHEMA = Marker.schema_id()
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+MARKER = "SHA256SUMS"
 KINDS = {
     "build": "result",
     "fit": "result",
@@ -32,48 +36,104 @@ KINDS = {
     "simulate": "data set",
     "import": "data set",
     "certificate": "certificate",
-    "fleet": "fleet",
+    "fleet": "runtime",
 }
 """Kind of folder that a command writes."""
 
-NEW = ".gyrotc-new"
-OWN = frozenset((MARKER, NEW, ".gyrotc-try-1", ".gyrotc-try-2"))
-"""Names by which gyrotc keeps its books in a folder: the marker, one being written, what exchanges are tried on."""
-
-_AS_WRITTEN = "a folder as gyrotc wrote it; make it again"
-_FREE = frozenset(("c/main.c",))  # the user's
-_ANYBODYS = "model.json"  # has a checksum of its own, and emit works beside one that came from elsewhere
+_NEXT = f".{MARKER}"  # a marker that is being written
+_HEAD = "# gyrotc "
+_LINE = re.compile(r"(\\?)([0-9a-f]{64}) [ *](.+)")
 _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 
-def marker_of(kind: str = "", command: str = "") -> Marker:
-    """A marker of no files yet, of no one gyro."""
-    return Marker(gyrotc_version=__version__, kind=kind, command=command, serial=None, axis=None, files={}, parts=())
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """What in a folder is gyrotc's.
+
+    Attributes:
+        kind: One of `KINDS`, or `trace` (traces outside a result).
+        command: That wrote the folder last.
+        serial: Of the gyro; None where the folder is not of one gyro.
+        axis: None where it is not of one axis.
+        parts: Paths of folders inside with a marker of their own (an axis, a diagnosis).
+        finished: Whether the job that made the folder came to its end.
+        files: SHA-256 of every file that gyrotc wrote, by its path in the folder, without markers and parts.
+    """
+
+    kind: str
+    command: str
+    serial: str | None = None
+    axis: str | None = None
+    parts: tuple[str, ...] = ()
+    finished: bool = True
+    files: dict[str, str] = field(default_factory=dict)
+
+    def but(self, **changed: Any) -> Self:
+        """The same with other values in some fields."""
+        return replace(self, **changed)
+
+    def text(self) -> str:
+        """The file's text, as `sha256sum` writes and reads it, below the line that says whose it is."""
+        head = {
+            "version": __version__,
+            "kind": self.kind,
+            "command": self.command,
+            "serial": self.serial,
+            "axis": self.axis,
+            "parts": sorted(self.parts),
+            "finished": self.finished,
+        }
+        lines = (_line(name, digest) for name, digest in sorted(self.files.items()))
+        return f"{_HEAD}{json.dumps(head)}\n" + "".join(lines)
 
 
-def marker_text(marker: Marker) -> str:
-    """The text of a marker's file; this gyrotc is its writer."""
-    return json_text(marker.model_copy(update={"gyrotc_version": __version__}).content())
+def _line(name: str, digest: str) -> str:
+    escaped = name.replace("\\", "\\\\").replace("\n", "\\n").replace("\r", "\\r")
+    mark = "\\" if escaped != name else ""
+    return f"{mark}{digest}  {escaped}\n"
+
+
+_ESCAPES = {"\\\\": "\\", "\\n": "\n", "\\r": "\r"}
+
+
+def _file_of(line: str) -> tuple[str, str]:
+    """Path and hash that a line states.
+
+    Raises:
+        ValueError: It is no line of a list of hashes.
+    """
+    found = _LINE.fullmatch(line)
+    if found is None:
+        raise ValueError(f"{line[:80]!r} is no line of it")
+    escaped, digest, name = found.groups()
+    return (re.sub(r"\\.", lambda m: _ESCAPES.get(m[0], m[0]), name) if escaped else name), digest
 
 
 def read_marker(folder: Path) -> Marker | None:
     """The marker of a folder; None if it has none.
 
     Raises:
-        InputError: It is damaged.
+        InputError: It is damaged, or gyrotc did not write it.
     """
     path = folder / MARKER
     try:
         facts = path.lstat()
         if not stat.S_ISREG(facts.st_mode) or facts.st_size > _MOST_BYTES:
             raise ValueError("no regular file of a likely size")
-        marker = checked_result(json.loads(path.read_text(encoding="utf-8")), Marker, MARKER)
-        parts = tuple(_checked_part(folder, part) for part in marker.parts)
+        head, *lines = path.read_text(encoding="utf-8").split("\n")
+        if not head.startswith(_HEAD) or lines[-1:] != [""]:
+            raise ValueError(f"it does not begin with {_HEAD.strip()!r}, or ends within a line")
+        said = json.loads(head[len(_HEAD) :])
+        texts = {name: said[name] for name in ("kind", "command", "serial", "axis")}
+        if not all(isinstance(text, str | None) for text in texts.values()):
+            raise ValueError("its first line is not as gyrotc writes it")
+        parts = tuple(_checked_part(folder, part) for part in said["parts"])
+        files = dict(map(_file_of, lines[:-1]))
+        return Marker(**texts, parts=parts, finished=said["finished"] is True, files=files)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (InputError, ValueError, RecursionError) as error:
-        raise InputError(str(path), f"is no marker of a result ({error})", f"a marker, {MARKER_SCHEMA}") from error
-    return marker.but(parts=parts)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(str(path), f"is no marker of a result ({error})", "the list that gyrotc wrote") from error
 
 
 def _checked_part(folder: Path, part: str) -> str:
@@ -85,30 +145,32 @@ def _checked_part(folder: Path, part: str) -> str:
     names = part.split("/")
     if not all(names) or {".", ".."} & set(names) or "\0" in part:
         raise ValueError(f"a part is {part[:80]!r}, which is no folder inside")
-    if not is_inside(folder, part):
+    if (folder / part).is_symlink() or not (folder / part).parent.resolve().is_relative_to(folder.resolve()):
         raise ValueError(f"the part {part[:80]!r} lies behind a link")
     return part
 
 
-def is_inside(folder: Path, name: str) -> bool:
-    """Whether no link on the way to a path in a folder leads out of it."""
-    return (folder / name).parent.resolve().is_relative_to(folder.resolve())
+def write_marker(folder: Path, marker: Marker) -> None:
+    """Writes a folder's marker in one step, on disk when this returns.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    new = folder / _NEXT
+    new.unlink(missing_ok=True)
+    with create(new) as stream:
+        stream.write(marker.text().encode("utf-8"))
+        stream.flush()
+        os.fsync(stream.fileno())
+    new.replace(folder / MARKER)
+    sync_folder(folder)
 
 
-def sha256(path: Path, *, sync: bool = False) -> str:
-    """SHA-256 of a file; with `sync` the file is on disk when this returns."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(2**20):
-            digest.update(block)
-        if sync:
-            os.fsync(file.fileno())
-    return digest.hexdigest()
+def walk(folder: Path, parts: Collection[str] = ()) -> Iterator[str]:
+    """Paths of all that is in a folder but its marker and its parts; an empty folder ends with a slash.
 
-
-def walk(folder: Path, parts: tuple[str, ...] = ()) -> Iterator[str]:
-    """Paths of all that is in a folder but its marker and its parts; an empty folder ends with a slash."""
-    skipped = {*parts, *(Path(p).parent.joinpath(_target(folder / p)).as_posix() for p in parts)}
+    Links are not followed.
+    """
 
     def fails(error: OSError) -> None:
         raise error
@@ -118,77 +180,79 @@ def walk(folder: Path, parts: tuple[str, ...] = ()) -> Iterator[str]:
         if not folders and not files and inside.parts:
             yield f"{inside.as_posix()}/"
         for name in files:
-            if inside.parts or name not in OWN:
+            if inside.parts or name not in (MARKER, _NEXT):
                 yield (inside / name).as_posix()
         for name in list(folders):
             path = (inside / name).as_posix()
-            if (folder / path).is_symlink() and path not in skipped:
-                yield path
-            if path in skipped or (folder / path).is_symlink():
+            if path in parts:
                 folders.remove(name)
+            elif (folder / path).is_symlink():
+                folders.remove(name)
+                yield path
 
 
-def _target(part: Path) -> str:
-    """Name of the folder beside a part that the part is a link to (see `folder._Job._point`), or its own."""
-    target = str(part.readlink()) if part.is_symlink() else part.name
-    return target if target.startswith(f".{part.name}.gyrotc-part-") and "/" not in target else part.name
+def described(folder: Path, marker: Marker) -> Marker:
+    """A marker with the hashes of what is in a folder; the files are on disk then, empty folders are gone."""
+    files = {}
+    for name in walk(folder, marker.parts):
+        path = folder / name
+        if not name.endswith("/"):
+            files[name] = sha256(path, sync=True)
+            continue
+        while path != folder and not any(path.iterdir()):
+            path.rmdir()
+            path = path.parent
+    return marker.but(files=files, finished=True)
 
 
-def survey_folder(folder: Path, marker: Marker, entries: frozenset[str] | None = None) -> tuple[list[str], list[str]]:
+def top(name: str) -> str:
+    """The entry of the folder itself that a path in it begins with."""
+    return name.split("/", 1)[0]
+
+
+def survey_folder(folder: Path, marker: Marker, entries: Collection[str] | None = None) -> tuple[list[str], list[str]]:
     """What is in a folder and not of gyrotc, and what gyrotc wrote and somebody changed: two lists of paths.
 
     Args:
-        entries: Look at these names in the folder only.
+        entries: Look at these names in the folder only; None: at all.
     """
-    foreign: list[str] = []
-    edited: list[str] = []
+    foreign, edited = [], []
     for name in walk(folder, marker.parts):
-        if entries is not None and name.split("/", 1)[0] not in entries:
+        known = marker.files.get(name)
+        if entries is not None and top(name) not in entries:
             continue
-        known = marker.known(name)
-        if not known:
+        if known is None:
             foreign.append(name)
         elif not _is(folder / name, known):
             edited.append(name)
     for part in marker.parts:
-        if not (folder / part).is_dir() or (entries is not None and part.split("/", 1)[0] not in entries):
-            continue
-        own = read_marker(folder / part) or marker_of()
-        for found, more in zip((foreign, edited), survey_folder(folder / part, own), strict=True):
-            found.extend(f"{part}/{name}" for name in more)
+        if (folder / part).is_dir() and (entries is None or top(part) in entries):
+            own = read_marker(folder / part) or Marker(marker.kind, marker.command)
+            for found, more in zip((foreign, edited), survey_folder(folder / part, own), strict=True):
+                found.extend(f"{part}/{name}" for name in more)
     return sorted(foreign), sorted(edited)
 
 
 def result_faults(folder: Path) -> list[str]:
     """What keeps a folder from being a complete result as it was written: a line for each; empty if it is one.
 
-    Files that gyrotc did not write are no fault. A file is whole also where a killed job has replaced some of
-    the folder's entries: each entry is then as before or as after.
+    Files that gyrotc did not write are no fault.
     """
     marker = read_marker(folder)
-    if marker is None or marker.unfinished:
+    if marker is None or not marker.finished:
         return ["no marker" if marker is None else "unfinished"]
-    found = []
-    here = set(walk(folder, marker.parts))
-    for entry in sorted(marker.entries() | set(marker.pending)):
-        versions = [{n: h for n, h in marker.files.items() if n.split("/", 1)[0] == entry}]
-        versions += [marker.pending[entry]] if entry in marker.pending else []
-        listed = here & {name for version in versions for name in version}
-        if not any(
-            listed == set(version) and all(_is(folder / name, {h}) for name, h in version.items())
-            for version in versions
-        ):
-            found.append(f"{entry}: missing or changed")
-    for part in marker.parts:
-        found += [f"{part}/{fault}" for fault in result_faults(folder / part)]
-    return found
+    found = [f"{name}: missing or changed" for name, known in marker.files.items() if not _is(folder / name, known)]
+    return found + [f"{part}/{fault}" for part in marker.parts for fault in result_faults(folder / part)]
+
+
+_AS_WRITTEN = "a folder as gyrotc wrote it; make it again"
 
 
 def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -> None:
     """Refuses a result of which a file is missing, or is not as gyrotc wrote it.
 
     Args:
-        names: Paths of files and folders in it; others are not looked at, nor is what a user may make his own.
+        names: Paths of files and folders in it; others are not looked at, nor is the example that a user makes his own.
         needed: A folder without a marker is refused, too.
 
     Raises:
@@ -199,10 +263,8 @@ def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -
         if needed:
             raise InputError(str(folder), f"has no {MARKER}", _AS_WRITTEN)
         return
-    if marker.unfinished or marker.pending:
-        raise InputError(str(folder), "is not whole: a job was killed in it", "that command again")
     for name, known in sorted(marker.files.items()):
-        if _among(name, names) and name not in _FREE and not _is(folder / name, {known}):
+        if _among(name, names) and name != EXAMPLE and not _is(folder / name, known):
             found = "is not as gyrotc wrote it" if os.path.lexists(folder / name) else "is missing"
             raise InputError(str(folder / name), found, _AS_WRITTEN)
     for part in marker.parts:
@@ -210,156 +272,57 @@ def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -
         if inside and not _among(part, names):
             check_intact(folder / part, inside)
     for name in names:
-        listed = name in (*marker.files, _ANYBODYS) or any(_among(name, [part]) for part in marker.parts)
+        listed = name in marker.files or any(_among(name, [part]) for part in marker.parts)
         if not listed and os.path.lexists(folder / name) and not (folder / name).is_dir():
             raise InputError(str(folder / name), "was not written by gyrotc", _AS_WRITTEN)
+
+
+EXAMPLE = "c/main.c"
+"""What a user may change in a result and go on using it."""
 
 
 def _among(name: str, names: Collection[str]) -> bool:
     return any(name == other or name.startswith(f"{other}/") for other in names)
 
 
-def _is(path: Path, known: set[str]) -> bool:
-    return path.is_file() and not path.is_symlink() and sha256(path) in known
+def _is(path: Path, known: str) -> bool:
+    return path.is_file() and not path.is_symlink() and sha256(path) == known
 
 
-def remove_listed(folder: Path) -> list[str]:
+def remove_listed(folder: Path) -> bool:
     """Removes what gyrotc wrote into a folder, and the folder if nothing else is in it.
 
+    Of a job that did not come to its end nobody knows a list; its folder had a name that only it knew, and all goes.
+
     Returns:
-        Paths that are left because gyrotc did not write them, or not like this.
+        Whether it is gone: else it holds what gyrotc did not write, or not like this.
     """
     try:
-        marker = read_marker(folder) or marker_of()
+        marker = read_marker(folder)
     except InputError:
-        marker = marker_of()
-    if marker.unfinished:
-        for path in folder.iterdir():
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path)
-            elif path.name not in OWN:
-                path.unlink()
-        _remove_empty(folder)
-        return []
-    left = []
+        return False
+    if marker is None:
+        return _remove_empty(folder)
+    if not marker.finished:
+        shutil.rmtree(folder)
+        return True
     for part in marker.parts:
-        path = folder / part
-        target = path.with_name(_target(path))
-        if target.is_dir() and not target.is_symlink():
-            left += [f"{part}/{name}" for name in remove_listed(target)]
-        if path.is_symlink() and not target.exists():
-            path.unlink()
+        if (folder / part).is_dir():
+            remove_listed(folder / part)
     for name in list(walk(folder, marker.parts)):
-        known = marker.known(name)
-        if known and _is(folder / name, known):
+        if name in marker.files and _is(folder / name, marker.files[name]):
             (folder / name).unlink()
-        elif not name.endswith("/"):
-            left.append(name)
-    if not left:
-        _remove_empty(folder)
-    return left
+    return _remove_empty(folder)
 
 
-def _remove_empty(folder: Path) -> None:
-    """The folders inside, then the marker, then the folder: a kill between leaves what is recognisably gyrotc's."""
+def _remove_empty(folder: Path) -> bool:
+    """Removes a folder in which there are folders only, and its marker last; whether it was one."""
+    if any(not name.endswith("/") for name in walk(folder)):
+        return False
     for place, _, _ in os.walk(folder, topdown=False):
         if Path(place) != folder:
             Path(place).rmdir()
-    for name in (*sorted(OWN - {MARKER}), MARKER):
+    for name in (_NEXT, MARKER):
         (folder / name).unlink(missing_ok=True)
     folder.rmdir()
-
-
-_PACKAGE = Path(__file__).resolve().parents[1]
-_SHOWN = 3  # names in a message
-
-
-def final_place(out: Path) -> Path:
-    """Where `out` is: links are followed, but for one that gyrotc made, to a folder beside it."""
-    place = out.parent.resolve() / out.name if out.name not in ("", "..") else out.resolve()
-    if place.is_symlink() and not str(place.readlink()).startswith(prefix_of(place)):
-        return place.resolve()
-    return place
-
-
-def prefix_of(place: Path) -> str:
-    """How the names begin that jobs give, beside a place, to what is not in it yet or any more."""
-    return f".{place.name}.gyrotc-part-"
-
-
-def check_separate(out: Path, place: Path, inputs: Sequence[Path], *, whole: bool) -> None:
-    """Refuses an `out` that is a file, or is, holds or lies in what the job reads or gyrotc's own sources.
-
-    Args:
-        whole: The folder is replaced. A job that only adds to it may stand above: a project with its `.venv`.
-
-    Raises:
-        InputError: It is.
-    """
-    if place.exists() and not place.is_dir():
-        raise InputError(str(out), "is a file", "the name of a folder")
-    if place.parent == place or place.is_mount():
-        raise InputError(str(out), "is the root of a file system", "a folder inside it")
-    named = [(path, "the data set") for path in inputs] + [(path, "gyrotc's sources") for path in _sources()]
-    for path, name in named:
-        other = Path(os.path.realpath(path))  # resolve() raises for a loop of links until Python 3.13
-        if place == other:
-            raise InputError(str(out), f"is {name}", "a folder beside it")
-        if whole and place in other.parents:
-            raise InputError(str(out), f"is above {name} ({path})", "a folder of its own")
-        if other in place.parents:
-            raise InputError(str(out), f"lies inside {name} ({path})", "a folder outside it")
-
-
-def _sources() -> list[Path]:
-    root = _PACKAGE.parents[1]
-    checkout = [root / name for name in ("gen", "libc", "include")]
-    return checkout if all(path.is_dir() for path in checkout) else [_PACKAGE]
-
-
-def check_contents(out: Path, place: Path, kind: str | None, entries: frozenset[str] | None) -> Marker | None:
-    """The marker of what stands at `place`, once it is seen that gyrotc wrote all of it, or all of its `entries`.
-
-    Raises:
-        InputError: Something there would be lost that gyrotc did not write, or it is another kind of result.
-    """
-    if not place.exists():
-        return None
-    marker = read_marker(place)
-    if marker is None:
-        names = sorted(path.name for path in place.iterdir())
-        lost = names if entries is None else sorted(set(names) & entries)
-        if lost:
-            found = f"exists and was not written by gyrotc (no {MARKER}): {_some(lost)}"
-            raise InputError(str(out), found, "a new folder or one with a result; move or delete what is there")
-        return None
-    if kind is not None and marker.kind != kind:
-        found = f"holds the {marker.kind} of gyrotc {marker.command}"
-        raise InputError(str(out), found, f"a new folder, or a {kind}")
-    foreign, edited = survey_folder(place, marker, entries)
-    if foreign:
-        found = f"holds what gyrotc did not write: {_some(foreign)}"
-        raise InputError(str(out), found, "nothing else in a result that is replaced; move it away")
-    if edited:
-        found = f"was changed since gyrotc wrote it: {_some(edited)}"
-        raise InputError(str(out), found, "a result as it was written; move the changed file away or delete it")
-    return marker
-
-
-def check_same_serial(out: Path, marker: Marker | None, serial: str) -> None:
-    """Refuses to put a result of one gyro into the place of another's.
-
-    Raises:
-        InputError: It would.
-    """
-    if marker is not None and marker.serial not in (None, serial) and marker.kind in _OF_ONE_GYRO:
-        found = f"holds the result of serial {marker.serial}, and this is of {serial}"
-        raise InputError(str(out), found, "another folder; or delete the earlier result first")
-
-
-_OF_ONE_GYRO = frozenset((KINDS["build"], KINDS["diagnose"], KINDS["compare"]))
-
-
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
+    return True

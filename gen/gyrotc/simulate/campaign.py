@@ -23,8 +23,9 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..recordings.description import dataset_toml
 from ..recordings.importers.rows import FileFormat
-from ..results.files import create, json_text, write_own
+from ..results.files import create, write_own
 from ..results.folder import result_folder
+from ..results.json_text import json_text
 from ..results.recordings import SimulatedTruth, TrueLot, TrueRun
 from .gyro import CELL_S, BiasMap, bridge_arcsec, draw_map, quantised
 from .instrument import SimulatedRecord, record

@@ -87,7 +87,7 @@ def emit(
     runtime_apart: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Emission:
-    """Write `out/c/`. The folder appears whole or not at all; one that gyrotc wrote is replaced.
+    """Write `out/c/` and the `out/model.json` that it is made of, both or neither, in place of earlier ones.
 
     Args:
         numerics: The arithmetics; None: every one that the runtime has.
@@ -113,13 +113,14 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
 
 
 def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
-    """Puts a folder with exactly these files in place of `out/c`.
+    """Puts a folder with exactly these files in place of `out/c`, and the model beside it.
 
     Raises:
-        InputError: Something in `out/c` was not written by gyrotc, or was changed since.
+        InputError: Something in `out` was not written by gyrotc, or these were changed since.
     """
-    with result_folder(out, "emit", entries=("c",)) as stage:
+    with result_folder(out, "emit", entries=("c", "model.json")) as stage:
         stage.of(model.serial, model.axis)
+        model.save(stage.folder / "model.json")
         (stage.folder / "c").mkdir()
         for name, data in texts.items():
             write_own(stage.folder / "c" / name, data)

@@ -18,7 +18,7 @@ from ..common.inputs import read_input
 from ..mirror.table import Numeric
 from ..model import Model
 from ..results.base import Axis, Numbered
-from ..results.files import json_text
+from ..results.json_text import json_text
 
 RECORD = "emission.json"
 SHARED_RUNTIME: Final = "../../runtime"

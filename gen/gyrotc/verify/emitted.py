@@ -26,8 +26,8 @@ from ..common.inputs import runtime_folders
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
 from ..model import SERIAL, Model
-from ..results.files import write_own
-from ..results.marker import MARKER, sha256
+from ..results.files import sha256, write_own
+from ..results.marker import MARKER
 from ..results.release import VerifiedFile
 from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options

@@ -33,8 +33,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import read_toml
 from ..results import cache
-from ..results.files import canonical_json, digest_of, write_own
+from ..results.files import write_own
 from ..results.folder import scratch_folder
+from ..results.json_text import canonical_json, digest_of
 
 LIMIT_S = 600  # s, elapsed: docs/design.md, "Trust"
 # Of each process. Data: four times what a compiler at -O3 or an emulator with its translations takes (below 0.5 GiB).

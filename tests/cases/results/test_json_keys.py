@@ -22,11 +22,8 @@ from gyrotc.results import (
     HeldLimits,
     Limit,
     MapDifference,
-    Marker,
     Numbered,
     checked_result,
-    marker_of,
-    marker_text,
 )
 from pydantic import ValidationError
 from pydantic_core import PydanticUndefined
@@ -243,15 +240,6 @@ def test_an_entry_of_a_fleet_tells_the_summary_what_it_may_know() -> None:
         "findings": ["large_weights"],
     }  # fmt: skip
     assert entry.as_kept().kept and entry.as_kept() != entry and entry.as_kept().content() == entry.content()
-
-
-def test_a_marker_is_written_by_name_and_says_no_more_than_it_has_to() -> None:
-    marker = marker_of("result", "build").but(files={"b": "1", "a": "2"}, parts=("z", "y"))
-    assert list(json.loads(marker_text(marker))["files"]) == ["a", "b"]
-    assert json.loads(marker_text(marker))["parts"] == ["y", "z"]
-    assert not {"pending", "unfinished"} & set(json.loads(marker_text(marker.but(pending={}, unfinished=False))))
-    again = checked_result(json.loads(marker_text(marker.but(unfinished=True))), Marker, "marker")
-    assert again.unfinished and again.known("a") == {"2"} and again.entries() == {"a", "b", "y", "z"}
 
 
 def test_a_result_that_is_no_number_cannot_be_made() -> None:

@@ -13,7 +13,7 @@ import pytest
 import typer
 from conftest import ROOT, quick_and_slow, run_gyrotc
 from gyrotc.common import InputError
-from gyrotc.results import Lock, write_atomically
+from gyrotc.results import held, write_atomically
 from recordings import columns, toml, write_csv
 
 PACKAGE = ROOT / "gen" / "gyrotc"
@@ -181,30 +181,24 @@ def _refused_or_replaced(
 
 
 def test_a_job_that_was_killed_is_no_hindrance(tmp_path: Path) -> None:
-    """What it left is known by its lock: the next job writes in its place."""
+    """What it left is known by its name: the next job removes it."""
     path = tmp_path / "c.json"
-    part = path.with_name(".c.json.gyrotc-part")
-    part.write_bytes(YEARS)
-    with pytest.raises(InputError, match="gyrotc did not write it"):
-        write_atomically(path, "{}")
-    assert part.read_bytes() == YEARS and list(tmp_path.iterdir()) == [part]
-    held = Lock(path, "check")
-    os.close(held._file)  # as the system does when its process dies
+    for name in (".c.json.gyrotc-part-0123abcd", ".c.json.lock"):
+        (tmp_path / name).write_bytes(b"")
     write_atomically(path, "{}")
     assert [p.name for p in tmp_path.iterdir()] == ["c.json"]
 
 
-def test_a_lock_that_a_power_cut_left_is_taken(tmp_path: Path) -> None:
+def test_what_is_no_lock_is_left_as_it_is(tmp_path: Path) -> None:
     lock = tmp_path / ".R.lock"
-    for content in (b"", bytes(100)):
-        lock.write_bytes(content)
-        Lock(tmp_path / "R", "fit").release()
-        assert not lock.exists()
-    for content in (b"{}", b"[" * 4000, b'{"command": 1}', bytes(5000)):
-        lock.write_bytes(content)
-        with pytest.raises(InputError, match="is no lock of gyrotc"):
-            Lock(tmp_path / "R", "fit")
-        assert lock.read_bytes() == content
+    lock.write_bytes(YEARS)
+    with pytest.raises(InputError, match="is no lock of gyrotc"), held(tmp_path / "R"):
+        pytest.fail("began")
+    assert lock.read_bytes() == YEARS
+    lock.unlink()
+    with held(tmp_path / "R"):
+        assert lock.exists()
+    assert not lock.exists()
 
 
 def test_a_link_to_a_device_is_not_written_to(tmp_path: Path) -> None:
@@ -217,8 +211,7 @@ def test_a_link_to_a_device_is_not_written_to(tmp_path: Path) -> None:
 _WRITING = ("write_text", "write_bytes", "touch", "copyfile", "copy2", "copytree", "symlink_to")
 _DOOR = {
     "results/files.py",
-    "results/folder.py symlink_to",  # a new name beside a result, where names cannot be exchanged
-    "results/update.py copy2",  # into a folder that the job has just made
+    "results/folder.py copy2",  # into a folder that the job has just made
     "cli/fleet.py copytree",  # likewise
     "recordings/importers/job.py open",  # into a scratch folder that the job has just made
     "recordings/importers/csv_table.py open",  # likewise

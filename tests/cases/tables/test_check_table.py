@@ -106,7 +106,6 @@ def test_seeded_fault_in_the_uncertainty_is_seen(word: int, numeric: str, tmp_pa
     words = _words(table, "sigma")
     words[word] += 4
     write_texts(tmp_path, emit_texts(model, Emission({numeric: replace(table, sigma=words)}, {}), asked=True), model)
-    model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1 and f"word {word} of the uncertainty" in done.stdout, done.stdout
 
@@ -135,7 +134,6 @@ def test_a_bound_that_proves_nothing_is_seen(uncertain: Path, tmp_path: Path) ->
 def test_a_table_shifted_by_zero_at_is_the_model(tmp_path: Path) -> None:
     model = load_model(GOLDEN)
     emit(model, tmp_path, zero_at=21.0625)
-    model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -277,7 +275,6 @@ def test_seeded_fault_of_quantisation_is_seen(
     table = quantise_all(model, [numeric]).tables[numeric]
     emission = Emission({numeric: FAULTS[name](table)}, {})
     write_texts(tmp_path, emit_texts(model, emission, asked=True), model)
-    model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1, (name, done.stdout, done.stderr)
 
@@ -289,7 +286,6 @@ def test_seeded_fault_in_terms_or_bank_is_seen(name: str, numeric: str, tmp_path
     model = _extended(3)
     table = EXTENDED_FAULTS[name](quantise_all(model, [numeric]).tables[numeric])
     write_texts(tmp_path, emit_texts(model, Emission({numeric: table}, {}), asked=True), model)
-    model.save(tmp_path / "model.json")
     done = _check(tmp_path)
     assert done.returncode == 1, (name, done.stdout, done.stderr)
 

@@ -197,7 +197,7 @@ def _board_output(folder: Path, *defines: str) -> str:
 
 
 def test_log_of_a_board_is_checked_and_kept(copy: Path, gyrotc: Command) -> None:
-    log = copy / "bench.log"
+    log = copy.parent / "bench.log"
     text = _board_output(copy, 'BOARD_NAME="bench 7, iar 9"', "BOARD_VECTORS=777")
     log.write_text("login:\r\n" + text.replace("\n", "\r\n") + "\r\n$ ")
     assert gyrotc("verify", copy, "--target", FAST).returncode == 0
@@ -219,7 +219,7 @@ def test_log_with_one_wrong_digit_fails(copy: Path, gyrotc: Command, crc: bool) 
     lines = _board_output(copy, f"BOARD_CRC={int(crc)}").splitlines()
     k = 40 if crc else 4000
     lines[k] = lines[k][:-1] + ("0" if lines[k][-1] != "0" else "1")
-    log = copy / "bench.log"
+    log = copy.parent / "bench.log"
     log.write_text("\n".join(lines) + "\n")
     done = gyrotc("verify", copy, "--log", log)
     assert done.returncode == 1
@@ -238,7 +238,7 @@ def test_log_that_is_damaged_cut_off_or_foreign_is_refused(copy: Path) -> None:
         "another model": re.sub(r" crc [0-9a-f]{8}", " crc 01234567", text),
         "empty": "",
     }
-    log = copy / "bench.log"
+    log = copy.parent / "bench.log"
     for name, content in cases.items():
         log.write_text(content)
         with pytest.raises((CheckFailed, InputError), match=r"bench\.log"):
@@ -344,7 +344,6 @@ def test_a_tampered_file_is_named(name: str, copy: Path) -> None:
 
 def test_what_was_emitted_passes_with_any_options(tmp_path: Path) -> None:
     model = load_model(GOLDEN)
-    model.save(tmp_path / "model.json")
     for numerics in (None, ["f32"], ["q31", "f32"]):
         for zero_at in (None, 20.0, -0.1):
             emit(model, tmp_path, numerics=numerics, zero_at=zero_at)

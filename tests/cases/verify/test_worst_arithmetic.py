@@ -21,7 +21,6 @@ def scaled(size: float) -> Model:
 def test_the_error_bound_is_that_of_the_worst_arithmetic(size: float, worst: str, tmp_path: Path) -> None:
     """float32 rounds in shares of a value; fixed point has one step for all of a table."""
     model = scaled(size)
-    model.save(tmp_path / "model.json")
     emit(model, tmp_path)
     found = verify(tmp_path, compiled=False)
     bounds = {error.numeric: error.bound_dph for error in found.errors}

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from conftest import Command
 from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet, write_summary
-from gyrotc.results import FleetEntry
+from gyrotc.results import FleetEntry, Marker, result_faults, write_marker
 from gyrotc.train import FitOptions
 from gyrotc.verify import verify
 from recordings import columns, toml, write_csv
@@ -87,7 +87,8 @@ def test_a_gyro_takes_80_kilobytes_beside_one_runtime_for_all(fleet: Path) -> No
         files = [path for path in (fleet / name).rglob("*") if path.is_file()]
         assert sum(path.stat().st_size for path in files) <= 80_000
         assert not [path.name for path in files if path.name.startswith(("gtc.", "vectors_")) or path.suffix == ".html"]
-    assert sorted(path.name for path in (fleet / "runtime").iterdir()) == ["gtc.c", "gtc.h", "gtc_config.h"]
+    assert sorted(path.name for path in (fleet / "runtime").glob("gtc*")) == ["gtc.c", "gtc.h", "gtc_config.h"]
+    assert result_faults(fleet / "runtime") == []
 
 
 def test_a_gyro_of_a_fleet_is_verified_with_the_shared_runtime(fleet: Path, gyrotc: Command) -> None:
@@ -225,12 +226,11 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
 def test_no_file_of_the_summary_outlives_what_it_says(
     tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before: without `fleet.json` (a kill between the three files) the others kept the figures of replaced results."""
+    """A fleet that is stopped leaves no figures of results that it has replaced."""
     gyro(tmp_path / "d" / "RLG-1", "RLG-1")
     out, manifest = tmp_path / "out", tmp_path / "fleet.toml"
     manifest.write_text('schema = 1\ndatasets = ["d/*"]\n')
     assert gyrotc("fleet", manifest, "--out", out).returncode == 0
-    (out / "fleet.json").unlink()
     manifest.write_text('schema = 1\ndatasets = ["d/*"]\n[options]\nseed = 1\n')
 
     def stopped(_jobs: int, tasks: Sequence[Task]) -> Iterator[Any]:
@@ -256,7 +256,7 @@ def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(t
     left = [out / f".RLG-{k}.gyrotc-part-0123abcd" for k in (1, 2)]
     for path in left:
         path.mkdir()
-        (path / ".gyrotc-result.json").write_text('{"schema": "gyrotc.result/1", "kind": "result"}')
+        write_marker(path, Marker("result", "build", finished=False))
     for name in ("RLG-1", "RLG-2", "thesis"):
         (out / f".{name}.lock").write_text("")
     shutil.rmtree(tmp_path / "d" / "RLG-1")

@@ -23,7 +23,7 @@ from gyrotc.common import InputError
 from gyrotc.fleet import SUMMARY, Fleet, Task, Unit, do_unit, load_manifest, run, run_fleet
 from gyrotc.fleet import run as pool
 from gyrotc.fleet import unit as units
-from gyrotc.results import MARKER, FleetEntry, Lock, input_hashes, program_of, result_faults
+from gyrotc.results import MARKER, FleetEntry, held, input_hashes, program_of, result_faults
 from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -95,8 +95,8 @@ TAMPERED: dict[str, Callable[[Path], object]] = {
     "its status": _edit("entry.json", '"status": "done"', '"status": "dune"'),
     "a type of the entry": _edit("entry.json", '"findings": [', '"findings": [1, '),
     "deep nesting": lambda folder: (folder / "entry.json").write_text("[" * 100_000),
-    "the marker": _edit(".gyrotc-result.json", '"schema"', '"scheme"'),
-    "a list of the marker": _edit(".gyrotc-result.json", '"model.json"', '"mode1.json"'),
+    "the marker": _edit(MARKER, '"kind"', '"kine"'),
+    "a list of the marker": _edit(MARKER, "  model.json", "  mode1.json"),
     "an empty entry": lambda folder: (folder / "entry.json").write_text(""),
     "half the files": lambda folder: [p.unlink() for p in sorted((folder / "c").iterdir())[::2]],
     "the evaluation": lambda folder: (folder / "evaluate.json").unlink(),
@@ -151,14 +151,14 @@ def test_one_fleet_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     reported = []
 
     def meanwhile(_jobs: int, tasks: list[Task]) -> Any:
-        with pytest.raises(InputError, match="another job writes there: gyrotc fleet, process") as caught:
+        with pytest.raises(InputError, match="another job writes there") as caught:
             run_fleet(fleet, out)
         reported.append(caught.value)
         yield 0, do_unit(tasks[0])
 
     monkeypatch.setattr(run, "on_processes", meanwhile)
     assert run_fleet(fleet, out)[0].status == "done"
-    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", MARKER, "runtime", *SUMMARY}
+    assert reported and {path.name for path in out.iterdir()} == {"RLG-1", "runtime", *SUMMARY}
 
 
 @pytest.mark.parametrize("place", ["d", "d/RLG-1", "d/RLG-1/out", "."])
@@ -196,9 +196,8 @@ def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
     before = {path.name for path in out.iterdir()}
     shutil.copytree(task.out, out / ".RLG-1.gyrotc-part-01234567")
     (out / ".RLG-1.lock").touch()
-    busy = Lock(out / "RLG-1", "verify")
-    assert run_fleet(task.fleet, out)[0].kept
-    busy.release()
+    with held(out / "RLG-1"):
+        assert run_fleet(task.fleet, out)[0].kept
     assert run_fleet(task.fleet, out)[0].kept
     assert {path.name for path in out.iterdir()} == before
 
@@ -415,5 +414,5 @@ def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
         _agrees(out)
     assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert _agrees(out) == 3
-    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), MARKER, *SUMMARY}
+    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), *SUMMARY}
     assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}

@@ -48,7 +48,7 @@ def test_build_leaves_every_promised_file(demo: Path) -> None:
     names = {p.name for p in result.iterdir()}
     assert names == {
         "model.json", "training.json", "c", "verify.json", "evaluate.json", "trace", "report.html",
-        "manifest.json", "budget.json", ".gyrotc-result.json",
+        "manifest.json", "budget.json", "SHA256SUMS",
     }  # fmt: skip
     assert len(list((result / "trace").glob("run-*.csv"))) == 12
     assert not [p for p in demo.iterdir() if p.name.startswith(".out") or "gyrotc-part" in p.name]
@@ -182,7 +182,7 @@ def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: P
     done = gyrotc("build", tmp_path / "triad", *HOST, "--out", tmp_path / "r")
     assert done.returncode == 0, done.stderr
     assert {p.name for p in (tmp_path / "r").iterdir()} == {
-        "x", "y", "z", "c", "report.html", ".gyrotc-result.json",
+        "x", "y", "z", "c", "report.html", "SHA256SUMS",
     }  # fmt: skip
     c = tmp_path / "r" / "c"
     assert {f"gtc_triad_{axis}.c" for axis in "xyz"} <= {p.name for p in c.iterdir()}

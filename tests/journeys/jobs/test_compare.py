@@ -112,7 +112,6 @@ def test_every_method_stands_beside_the_paper_s_figures(tmp_path: Path, gyrotc: 
     assert json.loads((tmp_path / "again.json").read_text()) == result
     recordings = load(data)
     model = fit_dataset(recordings, FitOptions()).model
-    model.save(out / "model.json")
     emit(model, out, numerics=["f32"])
     evaluation = evaluate(out, recordings, compiled=False).content()
     # compare judges the map in float64, evaluate the bits of the C code: the same within rounding.

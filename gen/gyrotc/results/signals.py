@@ -1,0 +1,63 @@
+"""Signals that end a job are raised where it can clean up, and wait while a result changes places."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupted(BaseException):
+    """A signal asked the process to end. No `Exception`: nothing but clean-up may catch it."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+class _State:
+    depth = 0
+    waiting: int | None = None
+
+
+def raise_on_signals() -> None:
+    """From now on SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread; those ignored stay so."""
+    for number in _ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _on_signal)
+
+
+def _on_signal(number: int, _frame: FrameType | None) -> None:
+    for other in _ENDING:  # the clean-up that now begins is not interrupted again
+        signal.signal(other, signal.SIG_IGN)
+    if _State.depth:
+        _State.waiting = number
+    else:
+        raise Interrupted(number)
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Inside, a signal waits until the outermost block has ended. Other threads are never interrupted anyway."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _State.depth += 1
+    try:
+        yield
+    finally:
+        _State.depth -= 1
+        if _State.depth == 0 and _State.waiting is not None:
+            number, _State.waiting = _State.waiting, None
+            raise Interrupted(number)
+
+
+def die_of(number: int) -> None:
+    """Ends the process by the signal itself, so that a shell sees 128 + number and stops its loop."""
+    signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)
