@@ -61,7 +61,7 @@ CASES = (
     Case("nothing shared", 0.0),
     Case("two clusters", 0.93, clusters=2),
 )
-"""The family strengths are those of docs/simulation.md, section 6."""
+"""The family strengths are those of docs/simulation.md, section 5."""
 
 
 @dataclass(frozen=True, slots=True)

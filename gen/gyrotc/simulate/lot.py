@@ -3,7 +3,7 @@
 Every parameter has a standard score; that of a unit is √F · (score of its cluster) + √(1 − F) · (score of its own),
 so that F, the strength of the family, is the correlation of each parameter between two units: at 0 they share nothing
 but their scenario, at 1 they are one gyro. Within a unit parameters with a common cause are correlated, too. What the
-scores stand for, and from where their spreads are: docs/simulation.md, section 6.
+scores stand for, and from where their spreads are: docs/simulation.md, section 5.
 """
 
 from __future__ import annotations
