@@ -143,7 +143,7 @@ BINARY_CASES = [
     Case("MATLAB 7.3", "new.mat", mat_73),
     Case("HDF5, units as attributes", "imu.h5", hdf5_attributes, axes=True),
     Case("HDF5, a table", "table.h5", hdf5_table),
-    Case("HDF5, one of two gyros", "two.h5", hdf5_two_gyros, ("--table", "gyro_2"), axes=True),
+    Case("HDF5, one of two gyros", "two.h5", hdf5_two_gyros, ("--set", "table=gyro_2"), axes=True),
     Case("HDF5, temperature of another group", "apart.h5", hdf5_thermometer, axes=True),
     Case(
         "Parquet, stamps, units as metadata",

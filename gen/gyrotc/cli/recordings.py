@@ -52,46 +52,20 @@ def import_(
             help="What a column is, e.g. rate=G1, time=t, device=SN; may be repeated.",
         ),
     ] = None,
-    table: Annotated[
-        str | None, typer.Option("--table", help="Which of several tables (sheets, groups) of a file.")
+    stated: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Any key of map.toml, e.g. table=gyro_2, time.zone=UTC, csv.missing=ERR; may be repeated.",
+        ),
     ] = None,
-    where: Annotated[
-        str | None, typer.Option("--where", help="The rows that are taken, e.g. 'id == 3': those of one sensor.")
-    ] = None,
-    hold: Annotated[
-        bool, typer.Option("--hold", help="Each reading of temperature and channels holds until the next one.")
-    ] = False,
     join: Annotated[
         list[Path] | None, typer.Option("--join", help="A file with the temperature at the same time; may be repeated.")
     ] = None,
     tolerance_s: Annotated[
         float | None,
         typer.Option("--tolerance-s", min=1e-6, help="For how long a reading of a joined file holds, s."),
-    ] = None,
-    rate_hz: Annotated[
-        float | None, typer.Option("--rate-hz", min=1e-6, help="Rows per second, where no column holds times.")
-    ] = None,
-    time_format: Annotated[
-        str | None, typer.Option("--time-format", help='Form of stamps, e.g. "%d/%m/%Y %H:%M:%S.%f".')
-    ] = None,
-    time_zone: Annotated[
-        str | None, typer.Option("--time-zone", help="Zone of stamps without one: Europe/Berlin, UTC, +01:00.")
-    ] = None,
-    leave_out_late: Annotated[
-        bool, typer.Option("--leave-out-late", help="Leave out rows whose time is not behind that of the row before.")
-    ] = False,
-    csv: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--csv",
-            metavar="KEY=VALUE",
-            help="How a CSV file is written, e.g. missing=ERR, comment=!, decimal=,; may be repeated.",
-        ),
-    ] = None,
-    format: Annotated[RunFormat, typer.Option("--format", help="Format of the runs.")] = RunFormat.parquet,
-    pulse_weight: Annotated[
-        float | None,
-        typer.Option("--pulse-weight-arcsec", min=1e-12, help="Angle of one pulse, where pulses are counted."),
     ] = None,
     exam: Annotated[
         bool | None,
@@ -116,16 +90,10 @@ def import_(
 
     known = load_map(map_file) if map_file else Map()
     units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}
-    stated = {"rate_hz": rate_hz, "format": time_format, "zone": time_zone}
-    content = known.model_dump()
-    content["csv"] |= _csv(csv or [], content["csv"])
-    content["pulse_weight_arcsec"] = pulse_weight or known.pulse_weight_arcsec
-    content["hold"] |= hold
-    content["where"] = where or known.where
-    content["time"]["leave_out_late"] |= leave_out_late
+    content = _with_keys(known.model_dump(), stated or [])
     content["join"] = _joins(join or [], tolerance_s) or content["join"]
-    chosen = _stated(content, units, stated, _columns(column or []), table)
-    options = ImportOptions(serial, format.value, trust_units, dry_run, exam)
+    chosen = _stated(content, units, _columns(column or []))
+    options = ImportOptions(serial, trust_units, dry_run, exam)
     with progress() as say:
         result = import_files(
             files, out, checked_map(chosen, "options"), options, ask=_ask, say=tell,
@@ -135,21 +103,34 @@ def import_(
         write_json(json_file, result.result().content())
 
 
-def _stated(
-    content: dict[str, Any],
-    units: dict[str, str | None],
-    time_keys: dict[str, Any],
-    columns: dict[str, Any],
-    table: str | None,
-) -> dict[str, Any]:
+def _with_keys(content: dict[str, Any], stated: list[str]) -> dict[str, Any]:
+    """Put `key=value` options into a map; a list of values gets another one.
+
+    Raises:
+        InputError: A key is none of a map, or names several.
+    """
+    for one in stated:
+        path, _, value = one.partition("=")
+        *tables, key = path.split(".")
+        part: Any = content
+        for table in tables:
+            part = part.get(table) if isinstance(part, dict) else None
+        if not value or not isinstance(part, dict) or key not in part or isinstance(part[key], dict):
+            known = (f"{name}.{inner}" for name in ("time", "csv") for inner in content[name])
+            expected = f"KEY=VALUE with KEY one of table, where, hold, pulse_weight_arcsec, {', '.join(known)}"
+            raise InputError("--set", repr(one), expected)
+        part[key] = (*part[key], value) if isinstance(part[key], tuple | list) else value
+    return content
+
+
+def _stated(content: dict[str, Any], units: dict[str, str | None], columns: dict[str, Any]) -> dict[str, Any]:
     """A map with what options state."""
     content["units"] |= {kind: unit for kind, unit in units.items() if unit is not None}
-    content["time"] |= {key: value for key, value in time_keys.items() if value is not None}
     if any(role.startswith(("rate", "pulses")) for role in columns):
         for role in _ROLES[3:]:
             content["columns"][role] = None
     content["columns"] |= columns
-    return content | ({"table": table} if table is not None else {})
+    return content
 
 
 def _columns(stated: list[str]) -> dict[str, Any]:
@@ -174,18 +155,6 @@ def _joins(files: list[Path], tolerance_s: float | None) -> list[dict[str, Any]]
         expected = "--join FILE --tolerance-s S: for how long a reading of the file holds"
         raise InputError("--join" if files else "--tolerance-s", found, expected)
     return [{"file": str(file), "tolerance_s": tolerance_s} for file in files]
-
-
-def _csv(stated: list[str], known: dict[str, Any]) -> dict[str, Any]:
-    """`key=value` options as `[csv]` of a map; `missing` and `comment` add to what is there."""
-    keys: dict[str, Any] = {}
-    for one in stated:
-        key, _, value = one.partition("=")
-        if key not in known or not value:
-            raise InputError("--csv", repr(one), f"KEY=VALUE with KEY one of {', '.join(known)}")
-        many = key in ("missing", "comment")
-        keys[key] = (*keys.get(key, known[key]), value) if many else int(value) if value.isdecimal() else value
-    return keys
 
 
 def _ask(question: str) -> str | None:

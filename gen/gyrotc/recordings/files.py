@@ -205,7 +205,7 @@ def blocks_of_lines(
                 text = block if plain else decoder.decode(block, final=not left).encode()
             except UnicodeDecodeError as error:
                 found, place = f"bytes that are no {encoding}", number + rest.count(b"\n")
-                raise InputError(f"{name}, after line {place}", found, "another --csv encoding=...") from error
+                raise InputError(f"{name}, after line {place}", found, "another --set csv.encoding=...") from error
             block = _with_lf(rest + text, last=not left)
             end = len(block) if not left else block.rfind(b"\n") + 1
             if end == 0 and len(block) > _LONGEST_LINE:

@@ -85,7 +85,7 @@ def test_a_point_that_may_part_thousands_or_decimals_is_not_taken(tmp_path: Path
     status, _, error = run_alone("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 2
     assert "no column that gives a rate" in error
-    stated = ("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--csv", "thousands=.")
+    stated = ("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--set", "csv.thousands=.")
     status, _, error = run_alone(*stated)
     assert status == 0, error
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1200.0
@@ -190,28 +190,28 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     "a word among numbers": (
         lines(OWN, lambda k, t, r: f"{10 * k},{t},{'OVR' if k == 300 else r}"),
         (),
-        ("line 302, column rate_dph", "'OVR'", "--csv missing"),
-        ("--csv", "missing=OVR"),
+        ("line 302, column rate_dph", "'OVR'", "--set csv.missing"),
+        ("--set", "csv.missing=OVR"),
     ),
     "a line of words": (
         lines(OWN, lambda k, t, r: f"{10 * k},{t},{r}" if k != 300 else "Logger restarted"),
         (),
-        ("line 302", "Logger restarted", "--csv comment"),
-        ("--csv", "comment=Logger"),
+        ("line 302", "Logger restarted", "--set csv.comment"),
+        ("--set", "csv.comment=Logger"),
     ),
     "day or month": (
         lines(
             "time,temp_c,rate_dph", lambda k, t, r: f"03/04/2026 {8 + k // 360:02d}:{k // 6 % 60:02d}:{k % 6}0,{t},{r}"
         ),
         (),
-        ("cannot be distinguished", '--time-format "%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
-        ("--time-format", "%d/%m/%Y %H:%M:%S"),
+        ("cannot be distinguished", '--set time.format="%d/%m/%Y %H:%M:%S"', '"%m/%d/%Y %H:%M:%S"'),
+        ("--set", "time.format=%d/%m/%Y %H:%M:%S"),
     ),
     "stamps too coarse": (
         lines("time,temp_c,rate_dph", lambda k, t, r: f"2026-03-01 08:{k // 100:02d}:{k // 10 % 60:02d},{t},{r}"),
         (),
-        ("line 3", "the time of the row before", "--rate-hz"),
-        ("--rate-hz", "0.1"),
+        ("line 3", "the time of the row before", "--set time.rate_hz"),
+        ("--set", "time.rate_hz=0.1"),
     ),
     "two thermometers": (
         lines("time_s,T1 [C],T2 [C],rate_dph", lambda k, t, r: f"{10 * k},{t},{t},{r}"),
@@ -222,8 +222,8 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     "no times": (
         lines("temp_c,rate_dph", lambda k, t, r: f"{t},{r}"),
         (),
-        ("no column that gives a time", "--rate-hz"),
-        ("--rate-hz", "0.1"),
+        ("no column that gives a time", "--set time.rate_hz"),
+        ("--set", "time.rate_hz=0.1"),
     ),
     "the hours of deg/hr taken for a time": (
         lines("Excel date,Temp C,Rate deg/hr", lambda k, t, r: f"{46100 + k / 8640:.9f},{t},{r}"),
@@ -256,8 +256,8 @@ REFUSED: dict[str, tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
             lambda k, t, r: f"{10000 * k:,};{t:.4f};{r:.6f}".replace(",", "#").replace(".", ",").replace("#", "."),
         ),
         (),
-        ("no column that gives a time", "as Zeit [ms] holds", "--csv thousands=."),
-        ("--csv", "thousands=."),
+        ("no column that gives a time", "as Zeit [ms] holds", "--set csv.thousands=."),
+        ("--set", "csv.thousands=."),
     ),
     "a unit that is none": (
         lines("time_s,temp_c,gyro", lambda k, t, r: f"{10 * k},{t},{r}"),
@@ -351,12 +351,10 @@ def test_several_files_become_several_runs(tmp_path: Path, run: Run) -> None:
             lines(OWN, lambda k, t, r, noise=noise: f"{10 * k},{t},{r + noise[k]}")  # type: ignore[misc]
         )
     result = tmp_path / "import.json"
-    status, _, error = run(
-        "import", tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "R", "--format", "csv", "--json", result
-    )
+    status, _, error = run("import", tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "R", "--json", result)
     assert status == 0, error
     dataset = load(tmp_path / "R")
-    assert [run.file for run in dataset.runs] == ["a.csv", "b.csv"]
+    assert [run.file for run in dataset.runs] == ["a.parquet", "b.parquet"]
     assert [source["file"] for source in dataset.sources] == ["a.csv", "b.csv"]
     assert json.loads(result.read_text())["schema"] == "gyrotc.import/1"
     assert dataset.runs[0].power_on_s is None
@@ -589,7 +587,12 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 
 
 GOES_ON = {
-    "pulses": ("time_s,pulses,temp_c", "{k},{k},20.5", "--pulse-weight-arcsec W", ("--pulse-weight-arcsec", "2.0")),
+    "pulses": (
+        "time_s,pulses,temp_c",
+        "{k},{k},20.5",
+        "--set pulse_weight_arcsec=W",
+        ("--set", "pulse_weight_arcsec=2.0"),
+    ),
     "increments": (
         "Time (s),DeltaAngle X (rad),Temp (C)",
         "{k},0.0001{k},20.5",
@@ -612,7 +615,7 @@ def test_the_option_that_is_named_goes_on(case: str, tmp_path: Path, run: Run) -
 
 
 def test_a_line_that_looks_like_a_row_is_never_offered_as_a_comment(tmp_path: Path, run: Run) -> None:
-    """Before: --csv comment="1000" was offered, which leaves out 10000 too."""
+    """Before: csv.comment="1000" was offered, which leaves out 10000 too."""
     lines = ["time_s,temp_c,rate_dph", *(f"{10 * k},20.5,{k % 7}" + ",x" * (k == 100) for k in range(200))]
     (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
     _, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
@@ -664,8 +667,8 @@ def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(tmp_path: Path,
     (tmp_path / "a.csv").write_text(text + "\n", "utf-8")
     status, _, error = run("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert status == 2
-    assert '--time-format "%H:%M" or --time-format "%M:%S"' in error
-    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--time-format", "%M:%S")[0] == 0
+    assert '--set time.format="%H:%M" or --set time.format="%M:%S"' in error
+    assert run("import", tmp_path / "a.csv", "--out", tmp_path / "R", "--set", "time.format=%M:%S")[0] == 0
     assert load(tmp_path / "R").runs[0].row_period_s == 10.0
 
 
@@ -684,5 +687,5 @@ def test_a_column_of_text_that_should_hold_numbers_is_named(tmp_path: Path, run:
     status, _, error = run(*command)
     assert status == 2
     assert "temp_c holds '20,29'" in error
-    assert run(*command, "--csv", "decimal=,", "--csv", "thousands=.")[0] == 0
+    assert run(*command, "--set", "csv.decimal=,", "--set", "csv.thousands=.")[0] == 0
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1400.0

@@ -28,7 +28,6 @@ from gyrotc.cli.output import folded
 from gyrotc.cli.progress import BUILD, DIAGNOSE, EMIT, FIT, StageLine
 from gyrotc.cli.recordings import RunFormat
 from gyrotc.model import Model
-from gyrotc.recordings.importers import rows
 from gyrotc.results import MARKER
 from gyrotc.simulate import campaign
 from gyrotc.tables import emit
@@ -288,7 +287,7 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [(RunFormat, (campaign.FileFormat, rows.FileFormat))],
+    [(RunFormat, (campaign.FileFormat,))],
     ids=["runs"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:

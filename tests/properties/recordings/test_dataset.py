@@ -396,9 +396,9 @@ def test_the_correction_that_was_applied_is_added_back(tmp_path: Path) -> None:
     rows = load(folder, applied=applied).runs[0].rows()
     expected = columns()["rate_dph"] + 0.5 * columns()["temperature_c"] + 10.0
     np.testing.assert_allclose(rows.rate_dph, expected)
-    with pytest.raises(InputError, match="the hash of the model given"):
+    with pytest.raises(InputError, match="the hash of that model"):
         load(folder, applied=Applied("cd" * 32, applied.correction_dph))
-    with pytest.raises(InputError, match="'none', and the model given"):
+    with pytest.raises(InputError, match="'none', and applied_model has"):
         load(folder_of(tmp_path / "plain"), applied=applied)
 
 

@@ -190,8 +190,8 @@ CHANGES = {
         two_parts(stamped, stamped_four, names="stamp,temperature_c,rate_dph"),
         202,
         "stamp,temperature_c,rate_dph,supply_v",
-        "--rate-hz",
-        "0.1",
+        "--set",
+        "time.rate_hz=0.1",
     ),
 }
 
@@ -278,8 +278,8 @@ def test_the_option_that_a_refusal_names_goes_on(case: str, tmp_path: Path, gyro
     done = gyrotc("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert done.returncode == 2
     assert f"a.csv, line {line}" in done.stderr
-    (option,) = re.findall(r'--csv (\w+="[^"]+")', done.stderr)
-    found = imported(gyrotc, tmp_path / "a.csv", "--csv", option.replace('"', ""))
+    (option,) = re.findall(r'--set (csv\.\w+="[^"]+")', done.stderr)
+    found = imported(gyrotc, tmp_path / "a.csv", "--set", option.replace('"', ""))
     assert found.rows == kept
     assert {reason[:9]: count for reason, count in found.left_out.items()} == left
 
@@ -331,7 +331,7 @@ def test_what_is_left_out_is_counted(case: str, tmp_path: Path, gyrotc: Command)
 
 def test_rows_above_names_that_were_stated_are_counted(tmp_path: Path, gyrotc: Command) -> None:
     (tmp_path / "a.csv").write_text("\n".join([*PREAMBLE, *two_parts(three, four, again=SUPPLY)]) + "\n")
-    found = imported(gyrotc, tmp_path / "a.csv", "--csv", "header_line=205")
+    found = imported(gyrotc, tmp_path / "a.csv", "--set", "csv.header_line=205")
     assert found.rows == 200
     assert found.left_out == {"above the stated line of names": 200}
 
@@ -382,8 +382,8 @@ def test_a_sheet_of_two_layouts_is_refused_with_what_to_do(tmp_path: Path, gyrot
         [NAMES, *rows(three, 0, 200)],
         [SUPPLY, *rows(four, 200, 400)],
     )
-    assert imported(gyrotc, tmp_path / "b.xlsx", "--table", "Sheet").rows == 200
-    assert imported(gyrotc, tmp_path / "b.xlsx", "--table", "Sheet1").rows == 200
+    assert imported(gyrotc, tmp_path / "b.xlsx", "--set", "table=Sheet").rows == 200
+    assert imported(gyrotc, tmp_path / "b.xlsx", "--set", "table=Sheet1").rows == 200
 
 
 DIGITS = "1" * 200_000 + "x"

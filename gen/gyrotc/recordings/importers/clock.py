@@ -181,7 +181,7 @@ class Clock:
             self.origin = other.origin
         else:
             found = f"has {self.words}, and the rates have {other.words}: nothing says how far one clock is ahead"
-            expected = "times of one kind in both: stamps of known zones (--time-zone), or one counter"
+            expected = "times of one kind in both: stamps of known zones (--set time.zone=...), or one counter"
             raise InputError(self._file, found, expected)
 
     @property
@@ -234,7 +234,7 @@ class Clock:
         if np.any(held & ~good):
             row = int(np.argmax(held & ~good))
             where = f"{self._file}, {self._table.place(chunk.row(row))}, column {self._columns[0].name}"
-            hint = f"a stamp of the form {self.form}; --time-format names another"
+            hint = f"a stamp of the form {self.form}; --set time.format=... names another"
             raise InputError(where, repr(texts[row].as_py()), hint)
         return ns, good
 
@@ -302,7 +302,7 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     if columns[0].kind == "number":
         form = form_of_parts(columns)
         if not form:
-            raise InputError(file, f"parts of a time in {', '.join(c.name for c in columns)}", "--time-format")
+            raise InputError(file, f"parts of a time in {', '.join(c.name for c in columns)}", "--set time.format=...")
         return form
     if columns[-1].kind == "number":
         return f"{_form(file, columns[:-1])} %f"
@@ -311,12 +311,12 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     forms = forms_of(texts)
     where = f"{file}, column {' and '.join(c.name for c in columns)}"
     if not forms:
-        expected = '--time-format such as "%Y-%m-%d %H:%M:%S.%f"'
+        expected = '--set time.format="%Y-%m-%d %H:%M:%S.%f" or another form'
         raise InputError(where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected)
     if forms == ["%H:%M"]:
         found = f"{texts[0]!r}: hours and minutes, or minutes and seconds"
-        raise InputError(where, found, '--time-format "%H:%M" or --time-format "%M:%S"')
+        raise InputError(where, found, '--set time.format="%H:%M" or --set time.format="%M:%S"')
     if len(forms) > 1:
-        choices = " or ".join(f'--time-format "{form}"' for form in forms[:3])
+        choices = " or ".join(f'--set time.format="{form}"' for form in forms[:3])
         raise InputError(where, f"{texts[0]!r}: day and month cannot be distinguished", choices)
     return forms[0]

@@ -317,7 +317,7 @@ def _text(name: str, head: bytes, encoding: str) -> str:
     except UnicodeDecodeError as error:
         line = head[: error.start].count(b"\n") + 1
         found = f"bytes that are no {encoding}"
-        choices = "--csv encoding=... with cp932 (Japanese), gb18030 (Chinese), cp1251 (Cyrillic) or latin-1"
+        choices = "--set csv.encoding=... with cp932 (Japanese), gb18030 (Chinese), cp1251 (Cyrillic) or latin-1"
         raise InputError(f"{name}, line {line}", found, choices) from error
     if "\x00" in text:
         raise InputError(name, *_BINARY)
@@ -367,7 +367,7 @@ def _instead(name: str, line: str) -> str:
     if re.search(r"[0-9] ?[A-DF-Za-df-z°%]", line):
         sed = f"sed -E 's/([0-9]) ?[A-DF-Za-df-z°%][^,;0-9 ]*/\\1/g' {name} > {name}.csv"
         return f"numbers alone: {sed} takes the units out, and options state them (--rate-unit, ...)"
-    return "rows of numbers; --csv delimiter=... and --csv decimal=... name marks that are not seen"
+    return "rows of numbers; --set csv.delimiter=... and --set csv.decimal=... name marks that are not seen"
 
 
 def _last(lines: Sequence[T]) -> Sequence[T]:
@@ -384,7 +384,7 @@ def _first_row(name: str, split: Sequence[tuple[int, list[str]]], count: int, de
             following = [_like(cells, kinds, decimal, count) for _, cells in split[k : k + 8]]
             if sum(following) >= _ENOUGH * len(following):
                 return k
-    raise InputError(name, "no rows of numbers", "rows of numbers; --csv header_line=N names the line of the header")
+    raise InputError(name, "no rows of numbers", "rows of numbers, or --set csv.header_line=N: the line of the header")
 
 
 def _like(cells: Sequence[str], kinds: Sequence[str], decimal: str, count: int) -> bool:

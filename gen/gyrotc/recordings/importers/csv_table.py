@@ -270,7 +270,7 @@ class CsvTable(LoggerTable):
             return int(plain) if kind == pa.int64() and plain.lstrip("+-").isdigit() else value
         if len(row) > 1 and not any(c in one.missing or is_number(c, one.decimal, one.thousands) for c in row):
             raise other_names(self.path.name, line, row)
-        hint = f'--csv missing="{cell[:20]}" takes it as no reading'
+        hint = f'--set csv.missing="{cell[:20]}" takes it as no reading'
         raise InputError(f"{self.path.name}, line {line}, column {name}", repr(cell[:40]), f"a number; {hint}")
 
 

@@ -36,7 +36,7 @@ from ..tables import LoggerFile, LoggerTable
 from .csv_table import open_csv
 from .map_file import MAP_FILE, Choice, ImportPlan, JoinMap, Map, map_text
 from .propose import Ask, propose
-from .rows import NAMES_OF_COLUMNS, FileFormat, ImportedRows, RowsChunk, RunFile
+from .rows import NAMES_OF_COLUMNS, ImportedRows, RowsChunk, RunFile
 from .selection import NO_DEVICE
 
 _BLOCK_BYTES = 2**22  # of a read: bounds memory
@@ -198,7 +198,7 @@ def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator
     for choice in (plan.temperature, *plan.values, *plan.channels):
         yield _line(choice.role, choice.source, _unit_words(choice), _why(choice))
     if rows.clock.needs_zone:
-        yield "  the stamps have no zone: when the run started is left out (--time-zone Europe/Berlin would say it)"
+        yield "  the stamps have no zone: when the run started is left out (--set time.zone=Europe/Berlin would say it)"
     if plan.where:
         yield _line("rows", str(plan.where), "", "as stated")
     if plan.device:
@@ -284,14 +284,12 @@ class ImportOptions:
 
     Attributes:
         serial: Serial of the gyro; else that of the map, of the file, or the name of the folder.
-        format: Format of the runs that are written.
         trust_units: Values that contradict their units are taken; it is recorded.
         dry_run: Read the files and tell how, but write nothing.
         exam: The last file is the exam, which judges the correction and is not trained on; None: a person is asked.
     """
 
     serial: str | None = None
-    format: FileFormat = "parquet"
     trust_units: bool = False
     dry_run: bool = False
     exam: bool | None = None
@@ -425,7 +423,7 @@ class _Import:
                     self.serial = serial_of(self._options.serial, self.kept, file, rows.device.name, self._out)
                     if stage is not None:
                         stage.of(self.serial)
-                name = f"{run_name(path, names)}.{self._options.format}"
+                name = f"{run_name(path, names)}.parquet"
                 target = stage.folder / name if stage is not None else None
                 run = self._run(file, rows, chain([first] if first else [], chunks), name, target)
                 devices.setdefault(run.device, path.name)
@@ -440,7 +438,7 @@ class _Import:
         layout = rows.layout
         columns_of = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]
         with ExitStack() as stack:
-            sink = stack.enter_context(RunFile(target, self._options.format, columns_of)) if target else None
+            sink = stack.enter_context(RunFile(target, "parquet", columns_of)) if target else None
             for k, (columns, done) in enumerate(chunks):
                 for line in preview(rows) if k == 0 else ():
                     self._tell(line)

@@ -181,7 +181,7 @@ def row_misfit(
     remedy = _damaged(name, line, line, len(row), count)[1]
     word = _beginning(row)
     if not numbers and word:
-        remedy = f'{count} cells; --csv comment="{word}" leaves out lines that begin so'
+        remedy = f'{count} cells; --set csv.comment="{word}" leaves out lines that begin so'
     return SeveralLayouts(where, found, remedy)
 
 

@@ -81,10 +81,10 @@ def _of_equal_times(times: Times) -> Iterator[str]:
         of_sensors = len(counts) > 1 and min(counts.values()) >= _MIN_REPEATS and column.name not in times.clock.names
         if of_sensors and column.kind != "stamp":
             condition = shlex.quote(f"{column.name} == {next(iter(counts))}")
-            yield f"--where {condition} if {column.name} tells sensors apart"
+            yield f"--set where={condition} if {column.name} tells sensors apart"
             break
-    yield "--leave-out-late takes the first row of each time"
-    yield "--rate-hz R counts rows of one sensor that come at a fixed rate"
+    yield "--set time.leave_out_late=true takes the first row of each time"
+    yield "--set time.rate_hz=R counts rows of one sensor that come at a fixed rate"
 
 
 def _of_falling_times(times: Times, at: int) -> str:
@@ -94,10 +94,10 @@ def _of_falling_times(times: Times, at: int) -> str:
         return f"rows from the oldest to the newest: {times.table.turned_round(times.file)}"
     fall = times.before_s[at] - times.time_s[at]
     if times.clock.needs_zone and _about_an_hour(fall, steps):
-        return "the zone of the stamps, such as --time-zone Europe/Berlin, as when summer time ends"
+        return "the zone of the stamps, such as --set time.zone=Europe/Berlin, as when summer time ends"
     behind = times.time_s[at : at + _MAX_LATE_ROWS]
     if at == len(times.time_s) - 1 or np.any(behind > times.before_s[at]):
-        return "--leave-out-late leaves out rows that come late"
+        return "--set time.leave_out_late=true leaves out rows that come late"
     row = times.chunk.row(int(times.rows[at]))
     return f"a run for each start of the clock: {times.table.cut_in_two(times.file, row)}"
 
@@ -123,7 +123,7 @@ def refuse_skipped_hour(times: Times) -> None:
         if hour < _NIGHT_ENDS_H and _about_an_hour(float(steps[at]) - float(np.median(usual)), usual):
             found = f"{steps[at]:.10g} s after the row before: an hour is skipped, as when summer time begins"
             expected = (
-                "the zone of the stamps, such as --time-zone Europe/Berlin; --time-zone UTC if an hour was really not "
-                "recorded"
+                "the zone of the stamps, such as --set time.zone=Europe/Berlin; --set time.zone=UTC if an hour was "
+                "really not recorded"
             )
             raise InputError(times.place(at), found, expected)

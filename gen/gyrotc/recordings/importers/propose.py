@@ -71,7 +71,7 @@ class Units:
                 self._asked[kind] = self._checked(kind, answer, "the answer")
         if kind not in self._asked:
             compact = kind == "time" and any(column.sample) and all(_is_compact(cell) for cell in column.sample if cell)
-            option = f'--time-format "{COMPACT}"' if compact else f'{OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
+            option = f'--set time.format="{COMPACT}"' if compact else f'{OPTIONS[kind]} "..." ({_EXAMPLES[kind]})'
             self._missing.append((kind, column.name, option))
             return ""
         return self._asked[kind]
@@ -116,8 +116,8 @@ def in_text(file: LoggerFile, kind: str) -> str:
                 if _HEXADECIMAL.fullmatch(shown):
                     return f"; or, as {column.name} holds {shown[:40]!r}, 0x before each of its numbers"
                 return (
-                    f"; or, as {column.name} holds {shown[:40]!r}, --csv decimal=, (or .) and --csv thousands=. "
-                    "(or another mark), or --csv missing=WORD"
+                    f"; or, as {column.name} holds {shown[:40]!r}, --set csv.decimal=, (or .) and "
+                    "--set csv.thousands=. (or another mark), or --set csv.missing=WORD"
                 )
     return ""
 
@@ -205,7 +205,7 @@ def _where(file: LoggerFile, main: LoggerTable, chosen: Map) -> Where | None:
     if main.column(where.column) is None:
         names = ", ".join(column.name for column in main.columns)
         found = f"no column {where.column!r} beside the rates"
-        raise InputError(file.path.name, found, f"--where with one of: {names}")
+        raise InputError(file.path.name, found, f"--set where=... with one of: {names}")
     return where
 
 
@@ -229,7 +229,7 @@ def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
     found = [table for table in own if table.name == chosen.table]
     if not found:
         names = ", ".join(table.name for table in own)
-        raise InputError(file.path.name, f"no table {chosen.table!r}", f"--table with one of: {names}")
+        raise InputError(file.path.name, f"no table {chosen.table!r}", f"--set table=NAME with one of: {names}")
     return found
 
 
@@ -267,9 +267,7 @@ def _values(file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map) -> lis
         raise InputError(file.path.name, unseen, increments(file) or name_it("rate") + in_text(file, "rate"))
     if len(top) > 1:
         names = ", ".join(repr(table.name) for table, _, _ in top)
-        raise InputError(
-            file.path.name, f"rates in {names}", f"--table with one of them, e.g. --table {top[0][0].name!r}"
-        )
+        raise InputError(file.path.name, f"rates in {names}", f"one of them, e.g. --set table={top[0][0].name!r}")
     table, columns, _ = top[0]
     return [(role, table, column, why) for role, column, why in columns]
 
@@ -282,7 +280,7 @@ def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str],
     """
     if value[0] == "pulses" and chosen.pulse_weight_arcsec is None:
         found = f"column {value[2].name} counts pulses, and the angle of one stands nowhere"
-        raise InputError(file.path.name, found, "--pulse-weight-arcsec W")
+        raise InputError(file.path.name, found, "--set pulse_weight_arcsec=W")
 
 
 def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
@@ -380,7 +378,7 @@ def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[
         return [(top[0], "its name" if len(top) == 1 else "its name, the first of that kind")], None, ""
     if main.rate_hz is not None:
         return [], main.rate_hz, main.why_rate
-    expected = '--column time="..." , or --rate-hz R where rows come at a fixed rate and no column holds times'
+    expected = '--column time="..." , or --set time.rate_hz=R where rows come at a fixed rate and no column holds times'
     unseen = f"no column that gives a time among {listed(file)}"
     raise InputError(file.path.name, unseen, expected + in_text(file, "time"))
 

@@ -160,7 +160,7 @@ class ImportedRows:
             return ""
         if self.plan.temperature.table is not self.plan.main:
             return "; a larger tolerance of the joined file (--tolerance-s), or a file of the same time"
-        return "; --hold holds each reading of temperature and channels until the next one"
+        return "; --set hold=true holds each reading of temperature and channels until the next one"
 
     def name_of(self, choice: Choice) -> str:
         """Name of the column that a choice becomes."""
@@ -328,7 +328,9 @@ class ImportedRows:
             option = f"--{kind}-unit {likely}" if likely else f"another --{kind}-unit"
             if kind != "time" and fault.rows < _MAX_SHARE * len(rows):
                 raw = self._raw(fault.column, chunk, int(rows[fault.row]))
-                option = f"--csv missing={raw} takes {'it' if fault.rows == 1 else 'these'} as no reading, or {option}"
+                option = (
+                    f"--set csv.missing={raw} takes {'it' if fault.rows == 1 else 'these'} as no reading, or {option}"
+                )
             expected = f"{fault.expected.split(';')[0]}: {option}, or another --column {kind}=..."
             raise InputError(f"{self.file}, {place}, column {fault.column}", fault.found + read, expected)
 

@@ -44,7 +44,7 @@ class Where:
         """
         column, equal, value = (part.strip().strip("\"'") for part in text.partition("=="))
         if not (column and equal and value):
-            raise InputError("--where", repr(text), "COLUMN == VALUE, such as 'id == 3'")
+            raise InputError("where", repr(text), "COLUMN == VALUE, such as 'id == 3'")
         return Where(column, _canonical(value))
 
     def __str__(self) -> str:
@@ -124,7 +124,7 @@ def several_devices(where: str, column: str, names: Sequence[str]) -> InputError
     found = f"column {column} names several devices: {', '.join(map(repr, names[:_MAX_LISTED]))}{more}"
     condition = shlex.quote(f"{column} == {names[0]}")
     expected = (
-        f"the rows of one gyro in a data set: --where {condition} picks them, "
+        f"the rows of one gyro in a data set: --set where={condition} picks them, "
         f"--column device={NO_DEVICE} if the column names no gyros"
     )
     return InputError(where, found, expected)
