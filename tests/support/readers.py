@@ -19,7 +19,7 @@ from gyrotc.diagnose import build_bank, diagnose, records_of, series_of, signatu
 from gyrotc.fleet import load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages import write_diagnosis_page
-from gyrotc.quality import check
+from gyrotc.quality import check, judge
 from gyrotc.recordings import load
 from gyrotc.results import DeclaredUnits, Evaluation, Manifest, read_result
 from gyrotc.results import cache as kept
@@ -222,9 +222,12 @@ def _used(folder: Path, axis: str | None = None) -> None:
     if found.problems:
         raise found.problems[0]
     dataset = load(folder, axis=axis)
+    judged = judge(dataset.runs)
     for run in dataset.runs:
         rows = run.rows()
-        blocks = run_blocks(rows, run, block_s=10.0, slope_blocks=6, max_step_c=0.5, max_rate_c_per_min=20.0)
+        blocks = run_blocks(
+            rows, run, judged.usable(run, rows), block_s=10.0, slope_blocks=6, max_step_c=0.5, max_rate_c_per_min=20.0
+        )
         assert len(blocks.valid)
         inside = run.in_span(rows.time_s)
         average_rows(

@@ -26,9 +26,10 @@ from ..common.texts import file_stem
 from ..mirror.history import Replay
 from ..mirror.table import Table, Words
 from ..model import Model, load_model
+from ..quality.event_findings import row_count
 from ..quality.findings import RunFacts, run_facts
 from ..quality.inspection import findings_of_run
-from ..quality.outliers import departing_rows
+from ..quality.judgement import Judged, judge
 from ..quality.thermometers import late_findings
 from ..recordings.records import Dataset, Rows, Run
 from ..results.base import Finding, read_result
@@ -43,6 +44,7 @@ from ..results.evaluation import (
     Statistics,
 )
 from ..results.files import create
+from ..results.rows import RowsCount
 from ..results.training import Training
 from ..simulate.scenario import simulated_floor
 from ..tables.emission import emitted_tables
@@ -80,7 +82,7 @@ class AnsweredRows:
 class _Part:
     """A run, its averaged samples, the steps that differ from the reference, plain facts, squares of its 1 sigma.
 
-    `robust`: The samples without rows that are outliers, and how many rows these are.
+    `robust`: The samples of usable rows alone. `rows`: Count of rows, used and left out.
     """
 
     run: Run
@@ -90,7 +92,7 @@ class _Part:
     findings: tuple[Finding, ...]
     squares: tuple[float, int]
     robust: Averages
-    outlier_rows: int
+    rows: RowsCount
 
 
 def evaluate(
@@ -102,6 +104,7 @@ def evaluate(
     trace: Path | None = None,
     trace_rows: int | None = None,
     training: Training | None = None,
+    judged: Judged | None = None,
     compiled: bool = True,
     trust_code: bool = False,
     progress: Progress | None = None,
@@ -116,6 +119,7 @@ def evaluate(
         trace_rows: Most rows of it: a longer run's are means of as few rows as that takes; None: every row.
         training: What `training.json` says; default that of `folder`, where it was made from these
             recordings. Without an exam run its figures of spans left out count.
+        judged: Judgement of the rows of the runs; None: they are judged here.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         watch: Called with each run and its means.
@@ -131,6 +135,7 @@ def evaluate(
         raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
     table = tables[chosen]
     window = average_s or model.average_s
+    judged = judged or judge(dataset.runs)
     parts = []
     compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
     with compiling as program:
@@ -143,6 +148,7 @@ def evaluate(
                     model,
                     table,
                     program,
+                    judged,
                     average_s=window,
                     trace=trace,
                     trace_rows=trace_rows,
@@ -165,11 +171,11 @@ def evaluate(
 
 def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Training | None) -> Evaluation:
     """The result with what training says of it, and with uncertainties."""
-    outliers = training.outliers if training else None
+    rows = training.rows if training else None
     role = "exam" if result.exam else "train"
     update = {
         "generalises": training.generalises if training else None,
-        "rows_left_out": outliers.rows if outliers else None,
+        "rows_left_out": rows.bad if rows else None,
         "uncertainty": _uncertainties(result, parts),
         "residual": _residual_test(result, parts),
         "sigma_rms_dph": root_mean(p.squares for p in parts if p.run.role == role),
@@ -206,8 +212,8 @@ def _residual_test(result: Evaluation, parts: Sequence[_Part]) -> ResidualTest |
     if judged is None:
         return None
     figures: Statistics = judged[1].after
-    if judged[0] != "left_out" and result.without_outliers is not None:
-        figures = result.without_outliers
+    if judged[0] != "left_out" and result.usable is not None:
+        figures = result.usable
     known = result.noise_floor_source == "simulated"
     trained = [p for p in parts if p.run.role == "train" and not known]
     role = "exam" if result.exam else "train"
@@ -269,6 +275,7 @@ def _one_run(
     model: Model,
     table: Table,
     program: tuple[Target, Path] | None,
+    judged: Judged,
     *,
     average_s: float,
     trace: Path | None,
@@ -279,8 +286,9 @@ def _one_run(
     inside = run.in_span(rows.time_s)
     times = rows.time_s if inside.all() else rows.time_s[inside]
     averager = Averager(times, average_s)
-    wild = departing_rows(rows, run, max(round(model.block_s / run.row_period_s), 1))
-    robust = Averager(times, average_s) if wild.size else averager
+    judgement, usable = judged.of(run), judged.usable(run, rows)
+    count = row_count(judgement)
+    robust = Averager(times, average_s) if count.bad else averager
     each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
     squares: list[tuple[float, int]] = []
     wrong: int | None = None
@@ -294,23 +302,20 @@ def _one_run(
             bias, status, scored = part.bias_dph[span], part.status[span], part.scored[span]
             averager.add(time, temperature, rate, rate - bias, scored)
             if robust is not averager:
-                kept = part.scored.copy()
-                first, after = np.searchsorted(wild, (part.rows.start, part.rows.stop))
-                kept[wild[first:after] - part.rows.start] = False
-                robust.add(time, temperature, rate, rate - bias, kept[span])
+                robust.add(time, temperature, rate, rate - bias, (part.scored & usable[part.rows])[span])
             if written:
                 written((time, temperature, rate, bias), status)
             plain = (status == 0) & scored
             squares.append(squares_of(None if part.sigma_dph is None else part.sigma_dph[span][plain]))
             wrong = None if part.mismatches is None else (wrong or 0) + part.mismatches
     facts, together = run_facts(run, rows), squares_in_all(squares)
-    found = tuple(findings_of_run(run, rows, facts, wild))
-    return _Part(run, averager.averages(), wrong, facts, found, together, robust.averages(), int(wild.size))
+    found = tuple(findings_of_run(judgement, facts))
+    return _Part(run, averager.averages(), wrong, facts, found, together, robust.averages(), count)
 
 
-def _without_outliers(parts: Sequence[_Part]) -> Statistics | None:
-    """Figures of several runs without rows that are outliers; None where there are none."""
-    if not any(part.outlier_rows for part in parts):
+def _of_usable(parts: Sequence[_Part]) -> Statistics | None:
+    """Return the figures of the usable rows of several runs; None where all rows are usable."""
+    if not any(part.rows.bad for part in parts):
         return None
     return Statistics(**statistics_of(np.concatenate([part.robust.after_dph for part in parts])))
 
@@ -329,10 +334,10 @@ def _evaluated(part: _Part, average_s: float, constant_dph: float) -> EvaluatedR
         before=Statistics(**statistics_of(a.before_dph)),
         constant=_run_statistics(replace(a, after_dph=a.before_dph - constant_dph), average_s),
         after=_run_statistics(a, average_s),
+        rows=part.rows,
     )
-    if part.outlier_rows:
-        robust = {"outlier_rows": part.outlier_rows, "without_outliers": _without_outliers([part])}
-        entry = entry.model_copy(update=robust)
+    if part.rows.bad:
+        entry = entry.model_copy(update={"usable": _of_usable([part])})
     if run.from_s is None and run.to_s is None:
         return entry
     return entry.model_copy(update={"from_s": run.from_s, "to_s": run.to_s})
@@ -362,7 +367,7 @@ def _result(
         runs=tuple(_evaluated(p, average_s, constant_dph) for p in parts),
         train=Pooled.of(train, constant_dph) if train else None,
         exam=Pooled.of(exam, constant_dph) if exam else None,
-        without_outliers=_without_outliers([p for p in parts if p.run.role == ("exam" if exam else "train")]),
+        usable=_of_usable([p for p in parts if p.run.role == ("exam" if exam else "train")]),
         findings=(),
         model=ModelSizes(
             method=model.method,

@@ -193,6 +193,7 @@ FindingName = Literal[
     "not_of_its_lot", "prior_does_not_hold",
     "shared_rows", "shared_axes", "rate_held", "temperature_late", "residual_above_noise", "residual_below_noise",
     "sign_reversed", "axes_exchanged", "gain_changed", "unit_changed", "thermometer_changed", "stuck_temperature",
+    "temperature_outliers", "stuck_rate", "end_stop", "noise_changes",
 ]  # fmt: skip
 UpperBound = Annotated[float, Field(ge=0.0, le=1e12)] | None
 
@@ -233,7 +234,7 @@ class AtMost(_Part):
     table_bytes: UpperBound = None
     rom_bytes: UpperBound = None
     ram_bytes: UpperBound = None
-    rows_left_out: UpperBound = None  # rows of training that were spikes or bursts
+    rows_left_out: UpperBound = None  # rows of training that were left out for what they show
 
 
 class AtLeast(_Part):

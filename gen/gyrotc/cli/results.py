@@ -213,10 +213,10 @@ def summary_line(result: Evaluation) -> str:
             f"; RMS {with_uncertainty(rms, spread.get('rms_dph'))} deg/h = {rms / floor:.4f} x noise floor "
             f"({result.noise_floor_source})"
         )
-    if (robust := result.without_outliers) is not None and robust.rms_dph is not None:
+    if (robust := result.usable) is not None and robust.rms_dph is not None:
         role = "exam" if result.exam else "train"
-        rows = sum(run.outlier_rows for run in result.runs if run.role == role)
-        text += f"; {sci(robust.rms_dph)} without {rows} rows that are outliers"
+        rows = sum(run.rows.bad for run in result.runs if run.role == role and run.rows)
+        text += f"; {sci(robust.rms_dph)} without {rows} rows that say nothing of the gyro"
     return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
 
 

@@ -16,6 +16,7 @@ from ..causes.base import History
 from ..common.arrays import PART, BoolArray, FloatArray, parts_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory
+from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset, Rows, Run
 
 _BLOCK_BYTES = 8 * 64  # of the features of a block that are averaged together
@@ -30,7 +31,8 @@ class RunRecord:
         name: Name of the run in messages and tables.
         history: The whole record at its native rate.
         rate_dph: Measured rate less the mean of all runs, deg/h, shape (n,); 0 where it does not count.
-        usable: Rows in the run's span, outside its exclusions, with a finite rate, shape (n,).
+        usable: Rows that may be used, shape (n,).
+        outliers: Rows of the file whose rates were left out as outliers.
         environment: Environment as the data set names it.
         channels: Auxiliary channels by name, shape (n,) each.
     """
@@ -40,6 +42,7 @@ class RunRecord:
     rate_dph: FloatArray
     usable: NDArray[np.bool_]
     environment: str = ""
+    outliers: int = 0
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
@@ -108,15 +111,9 @@ class Records:
         """A feature of the histories as joined block means, shape (N, k)."""
         return self.average([feature(run.history) for run in self.runs])
 
-    def target(self, masks: Sequence[NDArray[np.bool_]] | None = None) -> FloatArray:
-        """Block means of the measured rate, deg/h, shape (N,); `masks` (per run) leave rows out."""
-        use = [r.usable for r in self.runs] if masks is None else masks
-        return np.concatenate(
-            [
-                self.average_run(k, np.where(u, r.rate_dph, 0.0), u)
-                for k, (r, u) in enumerate(zip(self.runs, use, strict=True))
-            ]
-        )
+    def target(self) -> FloatArray:
+        """Return the block means of the measured rate, deg/h, shape (N,)."""
+        return self.average([np.where(run.usable, run.rate_dph, 0.0) for run in self.runs])
 
     def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
         """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
@@ -167,8 +164,10 @@ _MIN_BLOCKS = 1000  # below this number of blocks they are made shorter than the
 _MAX_BLOCKS = 5000  # above it longer
 
 
-def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float) -> Records:
-    """Records of all runs of one role.
+def records_of(
+    dataset: Dataset, role: str, *, block_s: float, average_s: float, judged: Judged | None = None
+) -> Records:
+    """Return the records of all runs of one role.
 
     The mean rate is taken off: the static map leaves out weak directions, and with them a trace of any constant, which
     beside a large one (Earth's rate) would look like an effect.
@@ -176,9 +175,13 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
     Blocks are `average_s` long, shorter down to `block_s` where the recordings are short. Runs without two blocks are
     left out.
 
+    Args:
+        judged: Judgement of the rows of the runs; None: they are judged here.
+
     Raises:
         InputError: There is no such run, or nothing usable in them.
     """
+    judged = judged or judge(dataset.runs)
     runs = [run for run in dataset.runs if run.role == role]
     if not runs:
         raise InputError(str(dataset.folder), f"no run has the role {role}", "at least one run with it")
@@ -188,7 +191,7 @@ def records_of(dataset: Dataset, role: str, *, block_s: float, average_s: float)
         day = None
         if run.started is not None and first is not None:
             day = (run.started - first).total_seconds() / 86400.0
-        found.append(_record(run, dataset.channels, k, len(runs), day, block_s))
+        found.append(_record(run, judged, dataset.channels, k, len(runs), day, block_s))
     if not any(r.usable.any() for r in found):
         raise InputError(str(dataset.folder), "no usable row", "rows with a temperature and a rate")
     records = _in_blocks(tuple(r for r in found if len(r.usable) > 1), block_s, average_s)
@@ -213,9 +216,11 @@ def block_length(runs: Sequence[RunRecord], block_s: float, average_s: float) ->
     return max(round(wanted / row), 1) * row
 
 
-def _record(run: Run, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float) -> RunRecord:
+def _record(
+    run: Run, judged: Judged, channels: Sequence[str], number: int, count: int, day: float | None, block_s: float
+) -> RunRecord:
     rows = run.rows()
-    usable = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
+    usable = judged.usable(run, rows) & np.isfinite(rows.temperature_c)
     for name in channels:
         usable &= np.isfinite(rows.channels[name])
     group = max(round(min(block_s, 10.0) / run.row_period_s), 1) if run.row_period_s < _ROW_S else 1
@@ -225,7 +230,9 @@ def _record(run: Run, channels: Sequence[str], number: int, count: int, day: flo
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: _bridged(rows.time_s, rows.channels[name]) for name in channels}
-    return RunRecord(name_of(run), history, np.where(usable, rows.rate_dph, 0.0), usable, run.environment, values)
+    outliers = judged.of(run).count().get("rate outlier", 0)
+    rate = np.where(usable, rows.rate_dph, 0.0)
+    return RunRecord(name_of(run), history, rate, usable, run.environment, outliers, values)
 
 
 def name_of(run: Run) -> str:

@@ -16,6 +16,7 @@ from ..common.metrics import HALF_HOUR_S, LEAST_SPAN_C, Averages
 from ..common.statistics import running_mean
 from ..model import Model
 from ..quality.events import found_events
+from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset, Run, joined_runs
 from ..results.base import Finding
 from ..results.diagnosed import (
@@ -78,13 +79,15 @@ def diagnose(
     *,
     options: FitOptions | None = None,
     progress: Progress | None = None,
+    judged: Judged | None = None,
 ) -> Diagnosis:
-    """Runs the whole diagnosis on the training runs; exam runs measure the gain only.
+    """Run the whole diagnosis on the training runs; exam runs measure the gain only.
 
     Args:
         dataset: Recordings. `truth.json` beside them is never opened.
         options: As for `fit`, whose defaults are taken where there are none.
         progress: Called with what is being done.
+        judged: Judgement of the rows of the runs; None: they are judged here.
 
     Raises:
         InputError: No training run, or nothing usable in them.
@@ -92,8 +95,9 @@ def diagnose(
     say = progress or (lambda _: None)
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    events = found_events(dataset)
-    found = _diagnosed(whole, options or FitOptions(), say)
+    judged = judged or judge(dataset.runs)
+    events = found_events(dataset, judged)
+    found = _diagnosed(whole, judged, options or FitOptions(), say)
     reported = {"events": tuple(events)}
     steps = (*_about(events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
@@ -109,24 +113,25 @@ def _about(events: Sequence[Finding]) -> list[str]:
     ]
 
 
-def _diagnosed(dataset: Dataset, chosen: FitOptions, say: Progress) -> Diagnosis:
+def _diagnosed(dataset: Dataset, judged: Judged, chosen: FitOptions, say: Progress) -> Diagnosis:
     """All stages behind the events."""
-    records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s)
+    records = records_of(dataset, "train", block_s=chosen.block_s, average_s=chosen.average_s, judged=judged)
     undecidable = _undecidable(records)
     if undecidable:
         return Diagnosis(not_testable(dataset, chosen, undecidable), None, None, None)
     known = {record.name for record in records.runs}
     short = [run for run in dataset.runs if run.role == "train" and name_of(run) not in known]
-    found = _of_long_runs(replace(dataset, runs=tuple(r for r in dataset.runs if r not in short)), records, chosen, say)
+    long = replace(dataset, runs=tuple(r for r in dataset.runs if r not in short))
+    found = _of_long_runs(long, judged, records, chosen, say)
     text = "{} is left out: it has no two blocks of {:g} s"
     missing = (*found.result.missing, *(text.format(name_of(run), records.block_s) for run in short))
     return replace(found, result=found.result.model_copy(update={"missing": missing}))
 
 
-def _of_long_runs(dataset: Dataset, records: Records, chosen: FitOptions, say: Progress) -> Diagnosis:
+def _of_long_runs(dataset: Dataset, judged: Judged, records: Records, chosen: FitOptions, say: Progress) -> Diagnosis:
     """All stages behind the choice of runs."""
     # Before the search: the rows of a whole recording and what the search remembers need not fit into memory together.
-    refitting = Refitting(dataset, records, chosen, single_cycle=is_single_cycle(records))
+    refitting = Refitting(dataset, records, chosen, judged=judged, single_cycle=is_single_cycle(records))
     if not any(mean_count(run, chosen.average_s) for run in refitting.train):
         text = f"No training run has a mean over {chosen.average_s:g} s: record longer ones."
         return Diagnosis(not_testable(dataset, chosen, text), None, None, None)

@@ -11,16 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc, ndtr, pdtrc
+from scipy.special import chdtrc, fdtrc, pdtrc
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray, Progress
 from ..common.statistics import main_directions, orthonormal
-from ..mirror.front_end import samples_per_block
-from ..quality.findings import SPIKE_SIGMAS
-from ..quality.outliers import BLOCK_S, departing
+from ..quality.odds import FALSE_ALARMS
 from .attribution import Attribution, attribute, overlap
-from .blocks import Records, RunRecord, centred_slope
+from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
@@ -130,15 +128,14 @@ def search_of(
 ) -> Search:
     """The search with the coarsest map that the data do not reject."""
     checked = screen(records) if screened is None else screened
-    y, empty = cleaned_means(records, checked)
-    left_out = np.eye(records.size)[:, empty] if empty.size else None
+    y = records.target()
     channels = _channels(records)
     for level in range(len(LEVELS)):
         bank = bank_of(records, level, say)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
-        search = open_search(records, bank, y, channels=channels, beside=left_out, sigma=checked.sigma, declared=colour)
+        search = open_search(records, bank, y, channels=channels, sigma=checked.sigma, declared=colour)
         if level + 1 == len(LEVELS) or fits_exactly(records, level + 1) or not needs_finer(search):
             break
     return search
@@ -200,43 +197,32 @@ class Screened:
     """What the screens found and what is done about it.
 
     Attributes:
-        masks: Per run, rows that are kept, shape (n,).
         sigma: Factor of the noise of every block, median 1, shape (N,); None: even.
         findings: Causes of the family `noise` found here.
     """
 
-    masks: tuple[NDArray[np.bool_], ...]
     sigma: FloatArray | None
     findings: tuple[NoiseFinding, ...]
 
 
 def screen(records: Records) -> Screened:
     """Runs all screens."""
-    masks = tuple(_without_outliers(run) for run in records.runs)
-    kept = sum(int(mask.sum()) for mask in masks)
-    rows = sum(int(run.usable.sum()) for run in records.runs)
+    found = sum(run.outliers for run in records.runs)
     findings: list[tuple[str, float, dict[str, float]]] = []
-    if (found := rows - kept) >= _MANY:
-        by_chance = float(pdtrc(found - 1, 2.0 * float(ndtr(-SPIKE_SIGMAS)) * rows))
+    if found >= _MANY:
+        rows = sum(len(run.usable) for run in records.runs)
+        by_chance = float(pdtrc(found - 1, FALSE_ALARMS * len(records.runs)))
         findings.append(("outliers", by_chance, {"count": float(found), "share": found / rows}))
-    sigma, p_variance, ratio = _variance(records, masks)
+    sigma, p_variance, ratio = _variance(records)
     if sigma is not None:
         findings.append(("noise_variance", p_variance, {"ratio": ratio}))
     step = _temperature_step(records)
     if step is not None:
         findings.append(("temperature_quantisation", 0.0, {"step_c": step}))
-    return Screened(masks, sigma, tuple(NoiseFinding(id, p, values, NOISE_WORDS[id]) for id, p, values in findings))
+    return Screened(sigma, tuple(NoiseFinding(id, p, values, NOISE_WORDS[id]) for id, p, values in findings))
 
 
-def _without_outliers(run: RunRecord) -> NDArray[np.bool_]:
-    """Usable rows of a run that are no spikes and no parts of bursts, by the rule that training has."""
-    keep: NDArray[np.bool_] = run.usable.copy()
-    at = np.flatnonzero(keep)
-    keep[at[departing(run.rate_dph[at], samples_per_block(BLOCK_S, run.row_s))]] = False
-    return keep
-
-
-def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray | None, float, float]:
+def _variance(records: Records) -> tuple[FloatArray | None, float, float]:
     """Does the quick part of the noise depend on |dT/dt|, T or the time since power-on?
 
     The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a
@@ -245,7 +231,7 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Flo
     Returns:
         Factor of every block's standard deviation or None, p-value, ratio of largest to smallest (95 % range).
     """
-    value, at = _quick_power(records, masks)
+    value, at = _quick_power(records)
     design = _variance_design(records)
     usable_rows = value > 0.0
     logs, x = np.log(value[usable_rows]), design[at[usable_rows]]
@@ -268,11 +254,11 @@ def _variance(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[Flo
     return sigma, p, ratio
 
 
-def _quick_power(records: Records, masks: Sequence[NDArray[np.bool_]]) -> tuple[FloatArray, NDArray[np.int64]]:
+def _quick_power(records: Records) -> tuple[FloatArray, NDArray[np.int64]]:
     """Mean squared difference of neighbouring usable rows of a block, and the block, where there are such rows."""
     power, index = [], []
     for k, (run, span) in enumerate(zip(records.runs, records.spans(), strict=True)):
-        usable = masks[k]
+        usable = run.usable
         pair = usable[1:] & usable[:-1]
         square = np.where(pair, np.diff(np.where(usable, run.rate_dph, 0.0)) ** 2, 0.0)
         number = records.index[k][1:]
@@ -318,15 +304,3 @@ def _temperature_step(records: Records) -> float | None:
         if unit >= 0.05 and even.mean() > 0.95 and still > 0.5:
             steps.append(unit)
     return float(np.median(steps)) if len(steps) * 2 > len(records.runs) else None
-
-
-def cleaned_means(records: Records, screened: Screened) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Block means without the outliers, and the blocks of which nothing is left (their value is 0).
-
-    The blocks themselves stay the same, so that a bank of the temperature records stays valid.
-    """
-    empty = []
-    for k, (keep, span) in enumerate(zip(screened.masks, records.spans(), strict=True)):
-        count = np.bincount(records.index[k], weights=keep)
-        empty.append(np.flatnonzero(count[records.kept[k]] == 0) + span.start)
-    return records.target(screened.masks), np.concatenate(empty)

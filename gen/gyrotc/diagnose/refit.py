@@ -21,9 +21,8 @@ from ..common.arrays import FloatArray, give_back
 from ..common.metrics import Averages, average_rows
 from ..mirror.front_end import blocks_since_power_on
 from ..mirror.recursions import Course, CourseChannel, TermOutcome
-from ..quality.outliers import stretches_left_out
+from ..quality.judgement import Judged
 from ..recordings.records import Dataset, Run
-from ..results.training import LeftOutRows
 from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
 from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned_samples, joined, scaling_of
 from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_basis
@@ -121,7 +120,6 @@ class Played:
         block_s: Length of a block, s.
         environment: Environment as the data set names it.
         longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
-        left_out: Rows that were left out as outliers.
         seen: Channels and differences at the training samples, where they may be inputs of the map's model.
     """
 
@@ -136,7 +134,6 @@ class Played:
     block_s: float
     environment: str
     longest_same_s: float
-    left_out: list[LeftOutRows]
     seen: Mapping[str, FloatArray]
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
@@ -159,21 +156,30 @@ class Played:
 _KEPT = 2 * MOST_TERMS  # outcomes of terms for each run: those of two full tables
 
 
-def play_runs(dataset: Dataset, runs: Sequence[Run], front: FrontEnd, *, channels: bool = False) -> list[Played]:
+def play_runs(
+    dataset: Dataset, runs: Sequence[Run], front: FrontEnd, judged: Judged, *, channels: bool = False
+) -> list[Played]:
     """Front end over all runs; `channels`: with what training chooses channels by."""
     first = min((r.started for r in dataset.runs if r.started is not None), default=None)
     played = []
     for k, run in enumerate(runs):
-        played.append(_played(dataset, run, k, front, first, channels=channels))
+        played.append(_played(dataset, run, k, front, judged, first, channels=channels))
         give_back()  # what the rows of a whole recording took
     return played
 
 
 def _played(
-    dataset: Dataset, run: Run, number: int, front: FrontEnd, first: datetime | None, *, channels: bool
+    dataset: Dataset,
+    run: Run,
+    number: int,
+    front: FrontEnd,
+    judged: Judged,
+    first: datetime | None,
+    *,
+    channels: bool,
 ) -> Played:
     rows = run.rows()
-    blocks = front.blocks(run, rows)
+    blocks = front.blocks(run, rows, judged)
     data = samples_of(blocks, front.block_s, number)
     before = blocks_since_power_on(rows, run, front.block_s)
     rows = readings_alone(rows)
@@ -193,7 +199,6 @@ def _played(
         block_s=front.block_s,
         environment=run.environment,
         longest_same_s=longest_same_s(blocks.stream.samples, run.row_period_s),
-        left_out=stretches_left_out(run, blocks.left_out_s),
         seen=seen_by_target(dataset, rows, blocks) if channels else {},
     )
 

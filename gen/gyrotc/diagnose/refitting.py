@@ -14,6 +14,8 @@ import numpy as np
 from ..causes import CATALOGUE
 from ..common.arrays import BoolArray
 from ..common.metrics import Averages
+from ..quality.event_findings import rows_used
+from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset
 from ..train.data import TrainingData, joined, training_spans
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
@@ -55,14 +57,23 @@ class Refitting:
     Of a single cycle the map beside any effect is one of T alone (see `cycle`).
     """
 
-    def __init__(self, dataset: Dataset, records: Records, options: FitOptions, *, single_cycle: bool) -> None:
+    def __init__(
+        self,
+        dataset: Dataset,
+        records: Records,
+        options: FitOptions,
+        *,
+        judged: Judged | None = None,
+        single_cycle: bool,
+    ) -> None:
         self.records = records
         self.single_cycle = single_cycle
         self.runs = [r for r in dataset.runs if r.role == "train"]
         self.front = front_end(self.runs, options.block_s)
-        self.train = play_runs(dataset, self.runs, self.front, channels=options.channels)
+        self._judged = judged or judge(dataset.runs)
+        self.train = play_runs(dataset, self.runs, self.front, self._judged, channels=options.channels)
         self.average_s = options.average_s
-        exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front)
+        exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front, self._judged)
         self.exam = [run for run in exam if mean_count(run, self.average_s)]
         self._fits: list[tuple[list[Effect], bool, Fit]] = []
         self.arguments: dict[str, Any] = {
@@ -82,7 +93,7 @@ class Refitting:
         return Read(
             joined([run.data for run in self.train]),
             {name: np.concatenate([run.seen[name] for run in self.train]) for name in self.train[0].seen},
-            [stretch for run in self.train for stretch in run.left_out],
+            rows_used(self._judged, self.runs),
             max(run.longest_same_s for run in self.train),
         )
 

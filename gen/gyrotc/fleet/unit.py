@@ -245,4 +245,4 @@ def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]])
     if not built.evaluation.structure_left:
         return facts
     named = (f for f in built.evaluation.findings if f.id == "run_outlier")
-    return facts.model_copy(update={"own": (*found_events(dataset), *named)})
+    return facts.model_copy(update={"own": (*found_events(dataset, built.judged), *named)})

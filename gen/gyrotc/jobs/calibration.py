@@ -21,6 +21,7 @@ from ..common.errors import InputError
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
+from ..quality.judgement import Judged, judge
 from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed
@@ -58,6 +59,7 @@ class Built:
     diagnosis: Diagnosed | None = None
     limits: HeldLimits | None = None
     changes: Changes | None = None
+    judged: Judged | None = None
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -187,8 +189,10 @@ def build_into(
 def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Progress) -> Built:
     options = with_prior(options.with_stated(dataset.fit), dataset, order.prior, order.ageing_dph, order.limits)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
-    fitted, diagnosis = _extended(dataset, work, options, say) if order.extend else (None, None)
-    fitted = fitted or fit_dataset(dataset, options, progress=say)
+    say("judging rows")
+    judged = judge(dataset.runs)
+    fitted, diagnosis = _extended(dataset, work, options, judged, say) if order.extend else (None, None)
+    fitted = fitted or fit_dataset(dataset, options, judged=judged, progress=say)
     if order.limits:
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
         model = model.model_copy(
@@ -212,6 +216,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         trace=None if order.in_fleet else work / "trace",
         trace_rows=_TRACE_ROWS,
         training=fitted.training,
+        judged=judged,
         compiled=not order.in_fleet,
         progress=lambda file: say(f"replaying {file}"),
         watch=order.watch,
@@ -233,14 +238,17 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     if not order.in_fleet:
         say("drawing the report")
         write_report(work)
-    return Built(fitted.model, fitted.training, evaluation, verification, emission.refused, diagnosis, held, changes)
+    refused = emission.refused
+    return Built(fitted.model, fitted.training, evaluation, verification, refused, diagnosis, held, changes, judged)
 
 
-def _extended(dataset: Dataset, work: Path, options: FitOptions, say: Progress) -> tuple[Fitted | None, Diagnosed]:
+def _extended(
+    dataset: Dataset, work: Path, options: FitOptions, judged: Judged, say: Progress
+) -> tuple[Fitted | None, Diagnosed]:
     """The extended model where one is shipped, and the diagnosis, which `work/diagnosis` shows."""
     from .diagnosis import diagnose_dataset
 
-    found = diagnose_dataset(dataset, work / "diagnosis", options=options, progress=say)
+    found = diagnose_dataset(dataset, work / "diagnosis", options=options, judged=judged, progress=say)
     extended = found.result.extended
     if extended is None or extended.model is None or found.training is None:
         return None, found.result

@@ -18,6 +18,7 @@ from .. import __version__
 from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average_rows
+from ..quality.judgement import judge
 from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.records import Dataset, Run
 from ..results.evaluation import Comparison, Group, Method, Pooled
@@ -91,7 +92,8 @@ def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, lis
     if not training:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     front = front_end(training, options.block_s)
-    blocks = [front.blocks(run) for run in training]
+    judged = judge(dataset.runs)
+    blocks = [front.blocks(run, judged=judged) for run in training]
     parts = [samples_of(b, front.block_s, k) for k, b in enumerate(blocks)]
     data = joined(parts)
     if len(data) == 0:
@@ -101,7 +103,7 @@ def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, lis
     if exam:
         held = [
             _Held(run.environment or run.file, samples_of(b, front.block_s, k), everything, b.begins_s)
-            for k, (run, b) in enumerate((run, front.blocks(run)) for run in exam)
+            for k, (run, b) in enumerate((run, front.blocks(run, judged=judged)) for run in exam)
         ]
         return data, [h for h in held if len(h.samples)], "exam"
     left_out = _left_out(training, data, parts, blocks)

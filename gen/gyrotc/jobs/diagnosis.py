@@ -13,6 +13,7 @@ from ..common.arrays import Progress
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
+from ..quality.judgement import Judged
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
 from ..results.files import write_atomically
@@ -29,12 +30,14 @@ def diagnose_dataset(
     *,
     options: FitOptions | None = None,
     progress: Progress | None = None,
+    judged: Judged | None = None,
 ) -> Diagnosis:
     """Diagnoses a data set and writes the result into a folder.
 
     Args:
         out: Folder that gets `diagnose.json`, `report.html`, pictures and the extended model; None: no files.
         options: As for `fit`, without an earlier model.
+        judged: Judgement of the rows of the runs; None: they are judged here.
 
     Raises:
         InputError: As `diagnose` and `result_folder`.
@@ -43,7 +46,7 @@ def diagnose_dataset(
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        found = diagnose(dataset, options=chosen, progress=progress)
+        found = diagnose(dataset, options=chosen, progress=progress, judged=judged)
         return _saved(stage.folder, found, progress) if stage else found
 
 

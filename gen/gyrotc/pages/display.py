@@ -77,7 +77,7 @@ _STEMS = {
     "table": "table",
     "rom": "code and constants",
     "ram": "memory",
-    "rows_left_out": "rows of training left out as outliers",
+    "rows_left_out": "rows of training left out for what they show",
     "centers": "centers",
     "improvement": "improvement: RMS that a constant leaves ÷ RMS after",
     "improvement_about_zero": "RMS before ÷ after, mean included",

@@ -33,7 +33,8 @@ from ..results.evaluation import Calibration, EvaluatedRun
 from ..results.files import write_atomically
 from ..results.folder import result_folder
 from ..results.release import VERDICTS
-from ..results.training import LeftOutRows, NoiseTerms, Training
+from ..results.rows import LeftOutRows
+from ..results.training import NoiseTerms, Training
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import (
     CONSTANT_PASSES,
@@ -230,7 +231,7 @@ def write_report(folder: Path) -> Path:
         for stretch in unit.left_out:
             of_file.setdefault(stretch.file, []).append(stretch)
         left_out = [  # files, stretches of them, and the line that leaves these out of all figures
-            (name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "outlier")) for name, mine in of_file.items()
+            (name, mine, exclude_line(((s.from_s, s.to_s) for s in mine), "left out")) for name, mine in of_file.items()
         ]
         text = template.render(unit=unit, pictures=pictures, left_out=left_out, **vars(unit))
     return write_page(folder, text)

@@ -12,7 +12,8 @@ from ..results.decision import decision_of, failed_checks
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation
 from ..results.release import VERDICTS, Budget, HeldLimits, Limit, Verdict, Verification
-from ..results.training import CandidateModel, LeftOutRows, Manifest, Training
+from ..results.rows import LeftOutRows
+from ..results.training import CandidateModel, Manifest, Training
 from .display import COVERAGE, limit_words, plain, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
@@ -98,9 +99,9 @@ class UnitResults:
 
     @property
     def left_out(self) -> tuple[LeftOutRows, ...]:
-        """Stretches of rows that training left out as outliers."""
-        outliers = self.training.outliers if self.training else None
-        return outliers.stretches if outliers else ()
+        """Stretches of rows that training left out for what they show."""
+        rows = self.training.rows if self.training else None
+        return rows.stretches if rows else ()
 
     @property
     def capped(self) -> tuple[str, ...]:

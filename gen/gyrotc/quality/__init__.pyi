@@ -1,6 +1,8 @@
 from .changes import Change as Change
 from .changes import changes_of as changes_of
 from .curves import curve_findings as curve_findings
+from .event_findings import row_count as row_count
+from .event_findings import row_findings as row_findings
 from .events import found_events as found_events
 from .findings import finding as finding
 from .findings import run_facts as run_facts
@@ -10,9 +12,13 @@ from .fits import evidence_beside_memories as evidence_beside_memories
 from .inspection import CheckResult as CheckResult
 from .inspection import check as check
 from .inspection import findings_of_run as findings_of_run
-from .outliers import departing as departing
-from .outliers import departing_rows as departing_rows
-from .thermometers import displaced as displaced
-from .thermometers import jumps_of as jumps_of
-from .thermometers import stuck_stretches as stuck_stretches
+from .judgement import Judged as Judged
+from .judgement import Judgement as Judgement
+from .judgement import judge as judge
+from .jumps import jumps as jumps
+from .noise import noise_parts as noise_parts
+from .odds import Event as Event
+from .outlying import outlying as outlying
+from .repeats import piles as piles
+from .repeats import stuck as stuck
 from .thermometers import thermometer_findings as thermometer_findings

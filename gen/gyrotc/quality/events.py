@@ -11,48 +11,47 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray, steps_are, those
 from ..recordings.records import Dataset, Exclusion, Rows, Run, joined_runs
 from ..results.base import Finding
 from .changes import Change, changes_of
 from .curves import curve_findings
-from .findings import RunFacts, finding, run_facts
-from .outliers import departing_rows, spike_findings
-from .thermometers import temperature_findings_of
+from .event_findings import row_findings
+from .findings import finding, run_facts
+from .judgement import Judged, judge
 
 _LOST_S = 60.0  # no rows for longer
 
 
-def found_events(dataset: Dataset) -> list[Finding]:
-    """Events of the training runs, those of whole runs first; of such a run nothing else is said."""
+def found_events(dataset: Dataset, judged: Judged | None = None) -> list[Finding]:
+    """Return the events of the training runs, those of whole runs first; of such a run nothing else is said.
+
+    Args:
+        judged: Judgement of the rows of the runs; None: they are judged here.
+    """
+    judged = judged or judge(dataset.runs)
     whole = [run for run in joined_runs(dataset.runs) if run.role == "train"]
     facts = [run_facts(run, run.rows()) for run in whole]
     training = {run.file for run in whole}
     of_runs = [found for found in curve_findings(dataset, facts) if found.file in training]
     files = {found.file for found in of_runs}
-    return [*of_runs, *(event for event in events_of(whole, facts, files) if event.file not in files)]
+    return [*of_runs, *(event for event in events_of(whole, judged, files) if event.file not in files)]
 
 
-def events_of(runs: Sequence[Run], facts: Sequence[RunFacts], without: Collection[str | None] = ()) -> list[Finding]:
+def events_of(runs: Sequence[Run], judged: Judged, without: Collection[str | None] = ()) -> list[Finding]:
     """Events of training runs, by run in order of time.
 
     Args:
         without: Files whose rates are not those of the gyro: changes of the others are not judged against them.
     """
-    found: list[list[Finding]] = []
-    departing: list[NDArray[np.int64]] = []
-    for run, f in zip(runs, facts, strict=True):
-        of_run, left_out = _of_rows(run, f)
-        found.append(of_run)
-        departing.append(left_out)
-    judged = _Judged(runs, departing, without)
-    changes = changes_of(judged)
+    found = [list(row_findings(judged.of(run))) + list(_dropouts(run, run.rows())) for run in runs]
+    rows = _UsableRows(runs, judged, without)
+    changes = changes_of(rows)
     for number, run in enumerate(runs):
         its_changes = [change for change in changes if change.run == number]
         if its_changes:
-            time = judged[number][0]
+            time = rows[number][0]
             found[number] += _of_changes(run, its_changes, float(time[0]), float(time[-1]) + run.row_period_s)
         again = {_at(event)[1] for event in found[number] if event.id == "restart"}
         found[number] = [e for e in found[number] if e.id != "dropout" or _at(e)[0] not in again]
@@ -66,23 +65,11 @@ def _at(event: Finding) -> tuple[float, float]:
     return event.time_s.value, event.time_s.low
 
 
-def _of_rows(run: Run, f: RunFacts) -> tuple[list[Finding], NDArray[np.int64]]:
-    """Events that a run's rows show by themselves, and the rows that say nothing of its rate."""
-    rows = run.rows()
-    wild = departing_rows(rows, run)
-    of_thermometer = list(temperature_findings_of(run, rows, f))
-    lost = [np.arange(*np.searchsorted(rows.time_s, span)) for event in of_thermometer for span in event.leave_out_s]
-    found = [*spike_findings(run, rows, wild), *of_thermometer, *_dropouts(run, rows)]
-    return found, np.unique(np.concatenate([wild, *lost]))
+class _UsableRows(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
+    """Time, temperature and rate of the usable rows of each run; one run is in memory at a time."""
 
-
-class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
-    """Time, temperature and rate of the rows of each run that count; one run is in memory at a time."""
-
-    def __init__(
-        self, runs: Sequence[Run], departing: Sequence[NDArray[np.int64]], without: Collection[str | None]
-    ) -> None:
-        self._runs, self._departing, self._without = runs, departing, without
+    def __init__(self, runs: Sequence[Run], judged: Judged, without: Collection[str | None]) -> None:
+        self._runs, self._judged, self._without = runs, judged, without
         self._read: tuple[int, tuple[FloatArray, FloatArray, FloatArray]] | None = None
 
     def __len__(self) -> int:
@@ -94,9 +81,7 @@ class _Judged(Sequence[tuple[FloatArray, FloatArray, FloatArray]]):
         if self._read is None or self._read[0] != number:
             self._read = None
             rows = self._runs[number].rows()
-            good = self._runs[number].in_span(rows.time_s)
-            good &= np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
-            good[self._departing[number]] = False
+            good = self._judged.usable(self._runs[number], rows) & np.isfinite(rows.temperature_c)
             good &= self._runs[number].file not in self._without
             columns = [rows.time_s, rows.temperature_c, rows.rate_dph]
             del rows  # each column goes as its own rows are chosen: a long recording is not held twice

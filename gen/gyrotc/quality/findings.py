@@ -25,8 +25,6 @@ ValueWithLimits = tuple[float, float, float]
 _LINES = 20  # stretches that a line holds: more are a fault of the recording
 
 _COARSE_STEP_C = 0.25  # at 1 C/min a slope over 100 s then rests on fewer than seven steps
-_STUCK_S = 60.0  # longer than a gyro waits between two readings
-_STUCK_ROWS = 30  # and not fewer rows, so that slow loggers are not questioned
 _LATE_S = 3.0e8  # ten years: a time since some epoch, not since power-on
 _SMALL_DPH = 1e-5  # below the noise of any gyro; deg/s or rad/s taken for deg/h
 _MOVED_ROWS = 60  # that differ from the one before: fewer do not show the steps of a rate
@@ -140,12 +138,8 @@ def held_findings(f: RunFacts) -> Iterator[Finding]:
         )
 
 
-def constant_findings(f: RunFacts, rows: Rows, *, coarse: bool) -> Iterator[Finding]:
-    """Columns of one value, coarse temperatures, rates that are tiny or stay, a clock that began long ago.
-
-    Args:
-        coarse: Whether the rate comes in coarse steps, and so repeats.
-    """
+def constant_findings(f: RunFacts) -> Iterator[Finding]:
+    """Yield columns of one value, coarse temperatures, tiny rates, a clock that began long ago."""
     for column in f.constant:
         yield finding("constant_channel", f"{column} holds one value in all {f.rows} rows", f)
     step = f.temperature_step_c
@@ -156,12 +150,6 @@ def constant_findings(f: RunFacts, rows: Rows, *, coarse: bool) -> Iterator[Find
     if 0.0 < f.largest_dph < _SMALL_DPH:
         text = f"no rate exceeds {f.largest_dph:.3g} deg/h; are they in deg/s or rad/s?"
         yield finding("small_rates", text, f)
-    stuck = f.stuck_s > max(_STUCK_S, _STUCK_ROWS * f.row_period_s)
-    if stuck and not coarse and "rate" not in f.constant:
-        text = f"the rate stays at one value for {f.stuck_s:.4g} s"
-        first, count = longest_stretch(rows.rate_dph)
-        span = float(rows.time_s[first]), float(rows.time_s[first + count - 1])
-        yield finding("stuck_rate", text, f, marks=(Mark(f.file, (first + 1, first + count), span),))
     if abs(f.first_s) > _LATE_S:
         text = f"time starts at {f.first_s:.10g} s; it should count from power-on"
         yield finding("time_since_epoch", text, f)
@@ -255,7 +243,7 @@ _HOLD_C_PER_MIN = 0.1  # slower than this a chamber holds, or settles
 _COUNTER_BITS = (8, 12, 16, 18, 20, 24, 32)
 _LEAST_HELD = 30  # rates: fewer do not show a rhythm
 _HELD = 0.9  # of them held for as long as the others, to a row: their rhythms need not fit
-SPIKE_SIGMAS = 7.0  # once in 4e11 normal rows: a clean recording loses none
+_WRAP_SIGMAS = 7.0  # once in 4e11 normal rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +274,6 @@ class RunFacts:
         noise_dph: Scatter from row to row, robust.
         wrapped: Where a counter of pulses passed its end: time of the first place, bits of the counter, places.
         saturated_rows: Rows that repeat the largest or the smallest rate where others hardly ever repeat; 0: none.
-        stuck_s: Longest stretch of one identical rate.
         held_rows: For how many rows each rate is held; 1: every row has its own.
         constant: Columns that hold one value only.
         earth: Earth's rate that was taken off, None where there was nothing to take off.
@@ -315,7 +302,6 @@ class RunFacts:
     noise_dph: float
     wrapped: tuple[float, int, int] | None
     saturated_rows: int
-    stuck_s: float
     held_rows: int
     constant: tuple[str, ...]
     earth: EarthRate | None
@@ -361,7 +347,6 @@ def run_facts(run: Run, rows: Rows) -> RunFacts:
         noise_dph=float(noise),
         wrapped=_wrapped(rows, finite, run.pulse_weight_arcsec),
         saturated_rows=saturated_rows(rate),
-        stuck_s=longest_stretch(rate)[1] * run.row_period_s,
         held_rows=_held(rate),
         constant=_constant(rows, inside, rate),
         earth=run.earth,
@@ -435,7 +420,7 @@ def _wrapped(rows: Rows, finite: BoolArray, weight_arcsec: float | None) -> tupl
         rest = np.abs(step - size * np.rint(step / size))
         wraps = np.flatnonzero((np.abs(step) > 0.5 * size) & (rest < size / 8.0))
         usual = MAD_TO_SIGMA * median(rest)
-        wraps = wraps[rest[wraps] <= SPIKE_SIGMAS * usual + 4.0]
+        wraps = wraps[rest[wraps] <= _WRAP_SIGMAS * usual + 4.0]
         if len(wraps) and usual < size / 32.0:
             return float(time[use][wraps[0] + 1]), bits, len(wraps)
     return None

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
 from ..common.errors import InputError
@@ -19,10 +18,12 @@ from ..model import Model
 from ..recordings.description import Problems
 from ..recordings.loading import asked_axes, load_reporting
 from ..recordings.plausibility import TRUSTED
-from ..recordings.records import Applied, Dataset, Mark, Rows, Run
+from ..recordings.records import Applied, Dataset, Mark, Run
 from ..results.base import Finding, MarkedRows
 from ..results.recordings import Checked, CheckedRun, Problem
+from ..results.rows import RowsCount
 from .curves import contradiction_findings, curve_findings, open_questions
+from .event_findings import row_count, row_findings
 from .findings import (
     RunFacts,
     coarse_rate_findings,
@@ -37,8 +38,8 @@ from .findings import (
     shared_rows_findings,
     temperature_findings,
 )
-from .outliers import departing_rows, spike_findings
-from .thermometers import temperature_findings_of, thermometer_findings
+from .judgement import Judgement, judge
+from .thermometers import thermometer_findings
 from .timing import time_findings
 
 _HOLDS = 0.8  # share of the time: beyond it dT/dt is learnt from less than a fifth
@@ -56,6 +57,7 @@ class CheckResult:
         warnings: What a person should look at.
         not_testable: What the recordings cannot tell.
         facts: Axis and facts of every run that could be read.
+        counts: Count of the rows of these runs.
         marks: Rows that a problem is about, by its text.
     """
 
@@ -65,6 +67,7 @@ class CheckResult:
     warnings: tuple[Finding, ...]
     not_testable: tuple[Finding, ...]
     facts: tuple[tuple[str | None, RunFacts], ...]
+    counts: tuple[RowsCount, ...]
     marks: Mapping[str, tuple[Mark, ...]]
 
     def lines(self) -> Iterator[str]:
@@ -78,8 +81,8 @@ class CheckResult:
                     yield f"  next: {one.next}"
                 if one.exclude:
                     yield f"  paste: {one.exclude}"
-        for axis, f in self.facts:
-            yield _run_line(axis, f)
+        for (axis, f), count in zip(self.facts, self.counts, strict=True):
+            yield _run_line(axis, f, count)
         verdict = "fit refuses these recordings" if self.problems else "fit takes these recordings"
         yield f"{_counted(self.problems, 'problem')}, {_counted(self.warnings, 'warning')}: {verdict}"
 
@@ -95,7 +98,7 @@ class CheckResult:
             ),
             warnings=self.warnings,
             not_testable=self.not_testable,
-            runs=tuple(_checked_run(axis, f) for axis, f in self.facts),
+            runs=tuple(_checked_run(axis, f, count) for (axis, f), count in zip(self.facts, self.counts, strict=True)),
         )
 
 
@@ -123,6 +126,7 @@ def check(
     warnings: _Seen = {}
     untold: _Seen = {}
     facts: list[tuple[str | None, RunFacts]] = []
+    counts: list[RowsCount] = []
     serial: str | None = None
     axes = _axes(folder, axis)
     for one in axes:
@@ -134,17 +138,20 @@ def check(
         if dataset is not None:
             _refuse_another(earlier or {}, dataset)
             serial = dataset.serial
+            progress("judging rows")
+            judged = judge(dataset.runs)
             looked = []
             for k, run in enumerate(dataset.runs, 1):
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")
-                looked.append(_looked_at(run))
+                looked.append(_looked_at(run, judged.of(run)))
             of_axis = [f for f, _ in looked]
             together = _of_all_runs(dataset, of_axis, earlier)
             _see(warnings, (*together, *(warning for _, of_run in looked for warning in of_run)), one)
             _see(untold, open_questions(dataset, of_axis, earlier), one)
             facts += [(one, f) for f in of_axis]
+            counts += [row_count(judged.of(run)) for run in dataset.runs]
     named, open_ = (tuple(_of_axes(w, of, len(axes)) for w, of in found.values()) for found in (warnings, untold))
-    return CheckResult(serial, axis, tuple(problems.values()), named, open_, tuple(facts), marks)
+    return CheckResult(serial, axis, tuple(problems.values()), named, open_, tuple(facts), tuple(counts), marks)
 
 
 _Seen = dict[tuple[str, str, str], tuple[Finding, list[str | None]]]  # and the axes that show it
@@ -175,19 +182,19 @@ def _axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
         return (axis,)
 
 
-def _run_line(axis: str | None, f: RunFacts) -> str:
+def _run_line(axis: str | None, f: RunFacts, count: RowsCount) -> str:
     earth = f", Earth's rate {f.earth.rate_dph:.4f} +- {f.earth.sigma_dph:.4f} deg/h off" if f.earth else ""
     return (
         f"{f.file}{'' if f.from_s is None else f' from {f.from_s:.6g} s'}{f', axis {axis}' if axis else ''} "
-        f"({f.role}): {f.rows} rows of "
-        f"{f.row_period_s:.4g} s, {f.temperature_c[0]:.4g} ... {f.temperature_c[1]:.4g} C, "
+        f"({f.role}): {count.words()}; a row every {f.row_period_s:.4g} s, "
+        f"{f.temperature_c[0]:.4g} ... {f.temperature_c[1]:.4g} C, "
         f"mean {f.mean_dph:.4g} deg/h, noise {f.noise_dph:.2g} deg/h a row{earth}"
     )
 
 
-def _checked_run(axis: str | None, f: RunFacts) -> CheckedRun:
+def _checked_run(axis: str | None, f: RunFacts, count: RowsCount) -> CheckedRun:
     earth = (f.earth.rate_dph, f.earth.sigma_dph) if f.earth else (None, None)
-    return CheckedRun.of_object(f, axis=axis, earth_rate_dph=earth[0], earth_rate_sigma_dph=earth[1])
+    return CheckedRun.of_object(f, axis=axis, rows=count, earth_rate_dph=earth[0], earth_rate_sigma_dph=earth[1])
 
 
 def _counted(things: Sequence[object], word: str) -> str:
@@ -202,16 +209,11 @@ def _refuse_another(models: Mapping[str, Model], dataset: Dataset) -> None:
             raise InputError("--previous", f"is of gyro {model.serial}{axis}", f"gyro {dataset.serial}{axis}")
 
 
-def findings_of_run(run: Run, rows: Rows, f: RunFacts, wild: NDArray[np.int64]) -> Iterator[Finding]:
-    """What the rows of a run show by themselves of its thermometer, its rate and its counter.
-
-    Args:
-        wild: Its rows that are spikes or parts of bursts.
-    """
-    yield from temperature_findings_of(run, rows, f)
+def findings_of_run(judgement: Judgement, f: RunFacts) -> Iterator[Finding]:
+    """Yield what the rows of a run show by themselves of its temperature sensor, its rate and its counter."""
     yield from counter_findings(f)
     yield from held_findings(f)
-    yield from spike_findings(run, rows, wild)
+    yield from row_findings(judgement)
 
 
 def findings_of_data_set(
@@ -230,17 +232,16 @@ def findings_of_data_set(
     yield from curve_findings(dataset, facts, earlier)
 
 
-def _looked_at(run: Run) -> tuple[RunFacts, list[Finding]]:
+def _looked_at(run: Run, judgement: Judgement) -> tuple[RunFacts, list[Finding]]:
     """Facts of a run, and the warnings that its rows alone raise."""
     rows = run.rows()
     f = run_facts(run, rows)
-    coarse = list(coarse_rate_findings(run, rows))
     found = [
-        *constant_findings(f, rows, coarse=bool(coarse)),
+        *constant_findings(f),
         *time_findings(run, rows),
-        *coarse,
+        *coarse_rate_findings(run, rows),
         *copied_channel_findings(run, rows),
-        *findings_of_run(run, rows, f, departing_rows(rows, run)),
+        *findings_of_run(judgement, f),
     ]
     return f, found
 

@@ -118,6 +118,11 @@ ADVICE = {
     "left_out": "Nothing, if it is meant so.",
     "mostly_holds": "Record ramps at several rates, up and down.",
     "no_temperature_information": "Record runs in a chamber, over the temperatures that the product will see.",
+    "end_stop": "Look at the range of the sensor and of its converter, and at what the logger writes for a reading "
+    "that it does not have.",
+    "noise_changes": "Look for what disturbed the gyro then: motion, a supply, another mode or filter. Record the run "
+    "again if most of it is disturbed.",
+    "temperature_outliers": "Look for a loose contact of the temperature sensor or a garbled line.",
     "rate_outliers": "Look for what disturbed the gyro at these times; paste the exclude line into the run's [[run]] "
     "of dataset.toml to leave them out of every figure, too.",
     "row_periods_differ": "Nothing, if the logger was set so; else look which of the files has a wrong time unit.",

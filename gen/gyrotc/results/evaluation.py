@@ -12,6 +12,7 @@ from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
 from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits, Verdict
+from .rows import RowsCount
 
 
 class Published(Part):
@@ -140,9 +141,11 @@ class EvaluatedRun(Part):
     before: Statistics = Field(description="before compensation")
     constant: RunStatistics = Field(description="after subtraction of `constant_dph` of the result")
     after: RunStatistics = Field(description="after compensation")
-    outlier_rows: Count = Field(default=0, description="rows that are spikes or parts of bursts")
-    without_outliers: Statistics | None = Field(
-        default=None, description="after compensation, without these rows; null: there are none"
+    rows: RowsCount | None = Field(default=None, description="rows, used and left out; null: an older result")
+    usable: Statistics | None = Field(
+        default=None,
+        description="after compensation, of the rows that may be used alone; null if no row is left out for what it "
+        "shows",
     )
 
 
@@ -192,9 +195,7 @@ class ResidualTest(Part):
     )
     autocorrelation_limit: Figure = Field(description="four standard deviations above what white noise has")
     lags: Count = Field(description="number of lags")
-    rms_over_floor: Amount = Field(
-        description="RMS over the noise floor, without rows that are spikes or parts of bursts"
-    )
+    rms_over_floor: Amount = Field(description="RMS over the noise floor, of the rows that may be used")
     rms_over_floor_band: tuple[Amount, Amount] = Field(
         description="four standard deviations on either side of what white noise has, the floor estimated from as many "
         "means; at most 1.3"
@@ -248,7 +249,7 @@ class Evaluation(UnitResult):
         default=None, description="whether the correction held on history that it had not seen; null: not known"
     )
     rows_left_out: Count | None = Field(
-        default=None, description="rows of training runs that were outliers; null: not known"
+        default=None, description="rows of training runs that were left out for what they show; null: not known"
     )
     sigma_rms_dph: Amount | None = Field(
         default=None,
@@ -264,10 +265,10 @@ class Evaluation(UnitResult):
     residual: ResidualTest | None = Field(
         default=None, description="of the runs that the model is judged by; null without an RMS or a noise floor"
     )
-    without_outliers: Statistics | None = Field(
+    usable: Statistics | None = Field(
         default=None,
-        description="of all exam runs, else of all training runs, after compensation without rows that are spikes or "
-        "parts of bursts; null: there are none",
+        description="of all exam runs, else of all training runs, after compensation, of the rows that may be used "
+        "alone; null if no row is left out for what it shows",
     )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:

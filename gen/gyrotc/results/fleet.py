@@ -71,7 +71,9 @@ class FleetUnit(Part):
     limits_held: Count | None = Field(default=None, description="limits in all; null without limits")
     expanded_uncertainty_dph: Figure = Field(default=None, description="U of `after_rms_dph` (95.45 %), deg/h")
     date: str | None = Field(default=None, description="`calibrated_on` of the data set, else the day of its last run")
-    rows_left_out: Count | None = Field(default=None, description="rows of training that were outliers")
+    rows_left_out: Count | None = Field(
+        default=None, description="rows of training that were left out for what they show"
+    )
     moved_to: str | None = Field(
         default=None, description="folder of an earlier result of the gyro that somebody had changed"
     )

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from .base import Axis, Count, Figure, Finding, MarkedRows, Numbered, Part, Result, Share
+from .rows import RowsCount
 
 
 class Problem(Part):
@@ -26,7 +27,7 @@ class CheckedRun(Part):
     from_s: Figure = Field(description="start of the span, s; null for the whole file")
     role: str = Field(description="`train` or `exam`")
     environment: str | None = Field(description="free text of the data set")
-    rows: Count = Field(description="rows in the span")
+    rows: RowsCount = Field(description="rows of the run, kept and left out")
     first_s: float = Field(description="time of the first row, s")
     last_s: float = Field(description="time of the last row, s")
     row_period_s: float = Field(description="median, s")

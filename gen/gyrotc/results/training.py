@@ -9,6 +9,7 @@ from pydantic import Field
 from .base import Amount, Count, Figure, Finding, Part, UnitResult
 from .evaluation import MapDifference, Pooled
 from .fleet import KnownMap, LotUse, UnitCurve
+from .rows import RowsUsed
 
 
 class CheckedCell(Part):
@@ -177,23 +178,6 @@ class ChannelTried(Part):
     )
 
 
-class LeftOutRows(Part):
-    """A stretch of rows that were left out."""
-
-    file: str = Field(description="as in `dataset.toml`")
-    from_s: float = Field(description="time of the first row, s")
-    to_s: float = Field(description="half a row after the last, s")
-    rows: Annotated[int, Field(ge=1)] = Field(description="number of rows")
-
-
-class Outliers(Part):
-    """Spikes and bursts, which do not reach the fit."""
-
-    rows: Count = Field(description="rows that were left out")
-    share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(description="of all rows")
-    stretches: tuple[LeftOutRows, ...] = Field(description="the first 200")
-
-
 class MapMeans(Part):
     """What the runs say of the map, gathered: what a lot is learnt from."""
 
@@ -243,7 +227,9 @@ class Training(UnitResult):
         default=None,
         description="recorded channels that were tried as inputs; absent where `[fit]` does not ask for `channels`",
     )
-    outliers: Outliers | None = Field(default=None, description="rows that were left out; absent of an extended model")
+    rows: RowsUsed | None = Field(
+        default=None, description="rows of the training runs, used and left out; absent of an extended model"
+    )
     means: MapMeans | None = Field(
         default=None, description="what the runs say of the map; absent of an extended model"
     )

@@ -19,13 +19,15 @@ from ..common.errors import InputError
 from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
 from ..model import Model
-from ..quality.outliers import outliers_of, stretches_left_out
+from ..quality.event_findings import rows_used
+from ..quality.judgement import Judged, judge
 from ..recordings.fit_options import AUTO, SIMPLE, BuildOptions
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..results.base import Finding
 from ..results.evaluation import Pooled
-from ..results.training import CandidateModel, DeclaredUnits, LeftOutRows, MapMeans, NoiseTerms, Training
+from ..results.rows import RowsUsed
+from ..results.training import CandidateModel, DeclaredUnits, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
 from .data import RunSpan, TrainingData, cleaned_samples, joined, scaling_of, training_spans, whole_runs
 from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
@@ -99,11 +101,19 @@ class FrontEnd:
     lead_blocks: int = 1
     agree_s: float = AGREE_S
 
-    def blocks(self, run: Run, rows: Rows | None = None) -> Blocks:
-        """Runs over a run; `rows`: those of its file, where they are in memory already."""
+    def blocks(self, run: Run, rows: Rows | None = None, judged: Judged | None = None) -> Blocks:
+        """Run over a run.
+
+        Args:
+            rows: Those of its file, where they are in memory already.
+            judged: Judgement of its rows and of those of the other runs; None: they are judged alone.
+        """
+        rows = run.rows() if rows is None else rows
+        judged = judge([run]) if judged is None else judged
         return run_blocks(
-            run.rows() if rows is None else rows,
+            rows,
             run,
+            judged.usable(run, rows),
             block_s=self.block_s,
             slope_blocks=self.slope_blocks,
             max_step_c=self.max_step_c,
@@ -148,9 +158,18 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
 
 
 def fit_dataset(
-    dataset: Dataset, options: FitOptions, *, read: Read | None = None, progress: Progress | None = None
+    dataset: Dataset,
+    options: FitOptions,
+    *,
+    judged: Judged | None = None,
+    read: Read | None = None,
+    progress: Progress | None = None,
 ) -> Fitted:
-    """Fits a model to the training runs of a data set; `read`: what the front end made of them, where it is known.
+    """Fit a model to the training runs of a data set.
+
+    Args:
+        judged: Judgement of the rows of its runs; None: they are judged here.
+        read: What the front end made of the training runs, where it is known.
 
     Raises:
         InputError: No training run, or too few usable samples.
@@ -163,7 +182,9 @@ def fit_dataset(
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
     stretches = joined_runs(runs)
-    read = read or _read(dataset, stretches, front, say, channels=options.channels)
+    if read is None:
+        say("judging rows")
+        read = _read(dataset, stretches, front, judged or judge(dataset.runs), say, channels=options.channels)
     data = read.data
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -188,7 +209,7 @@ def fit_dataset(
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, data, fitted, front, options, spans, left_out)
     content: dict[str, Any] = {
-        "outliers": outliers_of(read.left_out, float(data.weight.sum())),
+        "rows": read.rows,
         "means": _means(data, fitted),
     }
     content |= {"lot": fitted.lot} if fitted.lot else {}
@@ -207,33 +228,33 @@ class Read:
     Attributes:
         data: Training samples.
         channels: What the target would see of each recorded channel, shape (samples,).
-        left_out: Rows that were left out as outliers.
+        rows: Count of the rows that were used and left out.
         longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
     """
 
     data: TrainingData
     channels: dict[str, FloatArray]
-    left_out: list[LeftOutRows]
+    rows: RowsUsed
     longest_same_s: float
 
 
-def _read(dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, say: Progress, *, channels: bool) -> Read:
+def _read(
+    dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, judged: Judged, say: Progress, *, channels: bool
+) -> Read:
     """Reads the training runs."""
     parts, columns = [], []
-    left_out: list[LeftOutRows] = []
     longest_s = 0.0
     for k, run in enumerate(stretches):
         say(f"reading {run.file}")
         rows = run.rows()
-        blocks = front.blocks(run, rows)
+        blocks = front.blocks(run, rows, judged)
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
         rows = readings_alone(rows)
         columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
-        left_out += stretches_left_out(run, blocks.left_out_s)
         del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
     whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
-    return Read(joined(parts), whole, left_out, longest_s)
+    return Read(joined(parts), whole, rows_used(judged, stretches), longest_s)
 
 
 def map_method(method: str) -> str:

@@ -23,7 +23,6 @@ from ..mirror.front_end import (
 )
 from ..mirror.recursions import F32
 from ..mirror.samples import PLAUSIBLE_C, Guarded
-from ..quality.outliers import departing_rows
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
@@ -47,7 +46,6 @@ class Blocks:
     status: NDArray[np.int32]  # status bits in force, as in gtc.h, without those of the map
     rate_dph: NDArray[np.float64]  # mean measured rate of the block's rows in the span (NaN: none)
     rows: NDArray[np.int64]  # number of these rows
-    left_out_s: NDArray[np.float64]  # times of rows that were left out of these means as spikes or bursts
     steps: Steps  # every correction of the run
     in_force: NDArray[np.int64]  # the correction in force that the map made last (-1 before the first sample)
     stream: SampleStream  # its samples
@@ -68,6 +66,7 @@ class Blocks:
 def run_blocks(
     rows: Rows,
     run: Run,
+    usable: NDArray[np.bool_],
     *,
     block_s: float,
     slope_blocks: int,
@@ -82,7 +81,8 @@ def run_blocks(
 
     Args:
         rows: All rows of the run's file.
-        run: Gives row period and span.
+        run: Gives the row period.
+        usable: Which rows count for the means of the rate.
         block_s: Length of a block, s.
         slope_blocks: Window of dT/dt, blocks.
         max_step_c: Largest accepted change between two samples, C, besides ...
@@ -122,7 +122,7 @@ def run_blocks(
     starts = np.minimum(np.arange(n_blocks + 1) * n, stream.samples.size)
     first_row = stream.first_rows(starts)
     start_s = _time_of(starts[:-1], stream, rows.time_s)
-    rate, count, left_out = _mean_rate(rows, run, first_row, n)
+    rate, count = _mean_rate(rows, usable, first_row, n)
     return Blocks(
         start_s=start_s,
         valid=steps.valid,
@@ -132,7 +132,6 @@ def run_blocks(
         status=status,
         rate_dph=rate,
         rows=count,
-        left_out_s=rows.time_s[left_out],
         steps=steps,
         in_force=_last_map(steps, k),
         stream=stream,
@@ -175,26 +174,23 @@ def _time_of(samples: NDArray[np.integer], stream: SampleStream, time_s: NDArray
 
 
 def _mean_rate(
-    rows: Rows, run: Run, first_row: NDArray[np.int64], rows_per_block: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Mean measured rate and number of rows in the span, for each block, and the rows that were left out.
+    rows: Rows, usable: NDArray[np.bool_], first_row: NDArray[np.int64], rows_per_block: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the mean measured rate and the number of usable rows of each block.
 
     Args:
         first_row: Of each block, and that behind the last block's; shape (blocks + 1,).
     """
-    left_out = departing_rows(rows, run, rows_per_block)
     n_blocks, together = len(first_row) - 1, max(1, _PART // rows_per_block)
     count, total = np.zeros(n_blocks), np.zeros(n_blocks)
     for start in range(0, n_blocks, together):
         of_blocks = first_row[start : start + together + 1]
         part = slice(of_blocks[0], of_blocks[-1])
         block = np.repeat(np.arange(len(of_blocks) - 1), np.diff(of_blocks))
-        here, blocks = run.in_span(rows.time_s[part]), slice(start, start + len(of_blocks) - 1)
-        here &= np.isfinite(rows.rate_dph[part])
-        here[left_out[slice(*np.searchsorted(left_out, of_blocks[[0, -1]]))] - part.start] = False
+        here, blocks = usable[part], slice(start, start + len(of_blocks) - 1)
         rate = np.where(here, rows.rate_dph[part], 0.0)
         count[blocks] = np.bincount(block, weights=here, minlength=len(of_blocks) - 1)
         total[blocks] = np.bincount(block, weights=rate, minlength=len(of_blocks) - 1)
     with np.errstate(invalid="ignore"):
         mean = total / count
-    return mean, count.astype(np.int64), left_out
+    return mean, count.astype(np.int64)

@@ -128,9 +128,9 @@ def test_runs_without_an_exam_are_judged_by_each_left_out_and_without_their_spik
     left_out = result["left_out"]
     assert result["exam"] is None and left_out["samples"] > 200
     assert left_out["after"]["rms_dph"] < 1e-3, "training has left the spikes out"
-    usual = result["without_outliers"]["rms_dph"]
+    usual = result["usable"]["rms_dph"]
     assert usual < 1e-3 < result["train"]["after"]["rms_dph"]
-    assert "without 12 rows that are outliers" in text
+    assert "without 12 rows" in text
     stated = re.search(r"improvement ([\d.]+).* against a constant on spans left out", text)
     assert stated and float(stated[1]) == pytest.approx(left_out["improvement"], rel=0.05)
     page = (tmp_path / "r" / "report.html").read_text()
@@ -152,9 +152,9 @@ def test_spikes_of_an_exam_are_in_the_plain_figure_and_not_in_the_robust_one(tmp
     (tmp_path / "out").mkdir()
     built = build_into(tmp_path / "out", load(tmp_path / "RLG-1"), FitOptions(), numerics=["f32"])
     clean, exam = built.evaluation.runs[0], built.evaluation.runs[2]
-    assert exam.outlier_rows == len(spikes) and clean.outlier_rows == 0 and clean.without_outliers is None
-    assert exam.without_outliers is not None and built.evaluation.without_outliers == exam.without_outliers
-    plain, robust, other = exam.after.rms_dph, exam.without_outliers.rms_dph, clean.after.rms_dph
+    assert exam.rows.left_out == {"rate outlier": len(spikes)} and clean.rows.left_out == {} and clean.usable is None
+    assert exam.usable is not None and built.evaluation.usable == exam.usable
+    plain, robust, other = exam.after.rms_dph, exam.usable.rms_dph, clean.after.rms_dph
     assert plain and robust and other and plain > 5.0 * robust and robust < 2.0 * other
-    assert "without 3 rows that are outliers" in summary_line(built.evaluation)
-    assert "(3 rows)" in write_report(tmp_path / "out").read_text("utf-8")
+    assert "without 3 rows" in summary_line(built.evaluation)
+    assert "(without 3 rows)" in write_report(tmp_path / "out").read_text("utf-8")

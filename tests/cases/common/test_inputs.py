@@ -147,7 +147,7 @@ def test_a_block_longer_than_the_recording_takes_no_more_memory_than_it(tmp_path
     write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": 2e-6 * table["time_s"]})
     [run] = load(state(tmp_path / "RLG-1", "trust_units = true")).runs
     settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
-    assert len(run_blocks(run.rows(), run, block_s=3600.0, **settings).valid) == 1
+    assert len(run_blocks(run.rows(), run, np.ones(run.n_rows, dtype=bool), block_s=3600.0, **settings).valid) == 1
 
 
 def test_gaps_that_make_more_samples_than_memory_is_granted_for(tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_gaps_that_make_more_samples_than_memory_is_granted_for(tmp_path: Path) 
     write_csv(tmp_path / "RLG-1" / "a.csv", table | {"time_s": np.round(time, 6)})
     [run] = load(state(tmp_path / "RLG-1", "trust_units = true")).runs
     settings = {"slope_blocks": 6, "max_step_c": 5.0, "max_rate_c_per_min": 1e9}
-    reported = refused(lambda: run_blocks(run.rows(), run, block_s=10.0, **settings))
+    reported = refused(lambda: run_blocks(run.rows(), run, np.ones(run.n_rows, dtype=bool), block_s=10.0, **settings))
     assert reported.startswith("a.csv: ") and "GiB of memory" in reported
 
 

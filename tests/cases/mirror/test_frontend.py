@@ -22,7 +22,8 @@ def blocks_of(temperature: np.ndarray, time_s: np.ndarray | None = None, **chang
     from_s = changes.pop("from_s", 0.0)
     rows, run = recording(np.asarray(temperature, dtype=float), time_s, from_s=from_s)
     options = {"block_s": 4.0, "slope_blocks": 3, "max_step_c": 1.0, "max_rate_c_per_min": 60.0}
-    return run_blocks(rows, run, **(options | changes))
+    usable = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph)
+    return run_blocks(rows, run, usable, **(options | changes))
 
 
 def test_the_input_in_force_comes_from_the_blocks_before() -> None:

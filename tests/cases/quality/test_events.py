@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,15 +16,13 @@ from gyrotc.quality import (
     changes_of,
     check,
     curve_findings,
-    departing,
-    displaced,
+    found_events,
     run_facts,
-    stuck_stretches,
     thermometer_findings,
 )
 from gyrotc.quality import changes as changes_module
-from gyrotc.quality.events import _Judged, found_events, without_events
-from gyrotc.recordings import Dataset, Rows, load
+from gyrotc.quality.events import without_events
+from gyrotc.recordings import Dataset, load
 from gyrotc.results import Finding
 from gyrotc.simulate import simulate
 from gyrotc.train import FitOptions, Fitted, fit_dataset
@@ -364,12 +361,12 @@ def test_ten_spikes_cost_less_than_a_hundredth_of_the_floor(tmp_path: Path, clea
     assert departure(spiked, clean) < 0.01 * floor
     assert abs(spiked.training.noise_floor_dph / floor - 1.0) < 0.01
     assert spiked.training.centers == clean.training.centers
-    reported = spiked.training.content()["outliers"]
-    assert reported["rows"] == 10
+    reported = spiked.training.content()["rows"]
+    assert reported["left_out"] == {"rate outlier": 10} and reported["kept"] == ROWS - 10
     assert [s["from_s"] for s in reported["stretches"]] == at.tolist()
     [warning] = [d for d in check(tmp_path / "R").warnings if d.id == "rate_outliers"]
     again = fitted(tmp_path / "R", table, f"{RUN}\n{warning.exclude}")  # pasted as it is offered
-    assert again.training.content()["outliers"]["rows"] == 0
+    assert again.training.content()["rows"]["left_out"] == {"excluded": 10}
     assert "rate_outliers" not in {d.id for d in check(tmp_path / "R").warnings}
 
 
@@ -377,32 +374,12 @@ def test_a_burst_is_left_out_whole(tmp_path: Path, clean: Fitted) -> None:
     table = cycle()
     table["rate_dph"][9000:9015] += np.random.default_rng(3).normal(0.0, 20.0, 15)
     burst = fitted(tmp_path / "R", table)
-    assert 14 <= burst.training.content()["outliers"]["rows"] <= 30
+    assert 14 <= burst.training.content()["rows"]["left_out"]["rate outlier"] <= 30
     assert departure(burst, clean) < 0.1 * clean.training.noise_floor_dph
 
 
 def test_a_clean_recording_loses_nothing(clean: Fitted) -> None:
-    assert clean.training.content()["outliers"] == {"rows": 0, "share": 0.0, "stretches": []}
-
-
-NOISES: dict[str, Callable[[np.random.Generator, int], Floats]] = {
-    "white": lambda g, n: g.normal(0.0, 1.0, n),
-    "quantised": lambda g, n: np.round(g.normal(0.0, 0.3, n)),
-    "rare counts": lambda g, n: (g.random(n) < 0.002) * 1.0,
-    "low pass": lambda g, n: np.convolve(g.normal(0.0, 1.0, n + 99), np.ones(100) / 100.0, "valid"),
-    "Laplace": lambda g, n: g.laplace(0.0, 1.0, n),
-    "louder from the middle on": lambda g, n: g.normal(0.0, 1.0, n) * np.where(np.arange(n) < n // 2, 1.0, 10.0),
-    "a lasting step": lambda g, n: g.normal(0.0, 1.0, n) + np.where(np.arange(n) < n // 2, 0.0, 40.0),
-    "ramps": lambda g, n: np.abs(np.arange(n) - n / 2) / 60.0 + g.normal(0.0, 0.1, n),
-    "constant": lambda g, n: np.zeros(n),
-}
-
-
-@pytest.mark.parametrize("rows_per_block", [1, 10, 100])
-@pytest.mark.parametrize("name", NOISES)
-def test_less_than_a_thousandth_of_a_clean_recording_is_left_out(name: str, rows_per_block: int) -> None:
-    rate = NOISES[name](np.random.default_rng(11), 200_000)
-    assert departing(rate, rows_per_block).sum() < 200
+    assert clean.training.content()["rows"] == {"read": ROWS, "kept": ROWS, "left_out": {}, "stretches": []}
 
 
 def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean: Fitted) -> None:
@@ -431,8 +408,8 @@ def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Pat
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "Rows left out of training" in page
     lines = (
-        "exclude = [{from_s = 5000.0, to_s = 5000.5, reason = &#34;outlier&#34;}, "
-        "{from_s = 9000.0, to_s = 9000.5, reason = &#34;outlier&#34;}]"
+        "exclude = [{from_s = 5000.0, to_s = 5000.5, reason = &#34;left out&#34;}, "
+        "{from_s = 9000.0, to_s = 9000.5, reason = &#34;left out&#34;}]"
     )
     assert lines in page
 
@@ -506,63 +483,6 @@ def test_two_runs_say_nothing(sound: Dataset) -> None:
     assert list(thermometer_findings(replace(sound, runs=sound.runs[:2]))) == []
 
 
-@pytest.mark.parametrize("averaged", [False, True])
-@pytest.mark.parametrize("wavering", [0.0, 0.2, 0.5])
-def test_a_coarse_thermometer_that_holds_is_not_stuck(wavering: float, averaged: bool) -> None:
-    """A converter of 1/16 C in holds of half an hour and an hour; stuck on a ramp it is reported with its rows."""
-    rng = np.random.default_rng(SEED + 5)
-    time = np.arange(5 * 3600.0)
-    true = np.interp(time / 3600.0, [0, 1, 1.5, 2, 2.5, 3.5, 5], [20, 20, 50, 50, 0, 0, 1])
-    read = np.round(true / 0.0625 + wavering * rng.standard_normal(time.size)) * 0.0625
-    stuck = read.copy()
-    stuck[4800:5400] = stuck[4800]  # within the ramp from 20 to 50 C
-    for values, expected in ((read, []), (stuck, [480])):
-        rows = np.round(values.reshape(-1, 10).mean(axis=1), 4) if averaged else values[9::10]
-        found = stuck_stretches(rows, 10.0)
-        assert [first for first, _ in found] == pytest.approx(expected, abs=1), found
-
-
-def test_a_hold_that_is_entered_and_left_slowly_is_not_stuck_where_readings_were_averaged() -> None:
-    """Averages of a converter of 0.1 C differ by less than its step; of repeated rows they do not."""
-    time = np.arange(8 * 3600.0)
-    settled = np.where(time < 10_000.0, -np.expm1(-time / 1500.0), 1.0)
-    true = 45.0 * settled + 0.3 - 30.0 * np.maximum(time - 18_000.0, 0.0) ** 2 / 10_800.0**2
-    rows = np.round((0.1 * np.round(true / 0.1)).reshape(-1, 60).mean(axis=1), 4)
-    assert stuck_stretches(rows, 60.0) == []
-    rows[40:80] = rows[40]
-    assert stuck_stretches(rows, 60.0) == [(40, 40)]
-
-
-def lagged(time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Temperature of a block in a case that follows a programme of ramps within ten minutes."""
-    programme = np.interp(time / 3600.0, [0, 1, 1.5, 3, 4, 5, 6, 8], [20, 20, 50, 50, -10, -10, 30, 30])
-    lag = np.exp(-np.arange(0.0, 3600.0, 10.0) / 600.0)
-    past = np.r_[np.full(lag.size, programme[0]), programme]
-    return np.convolve(past, lag / lag.sum())[lag.size : past.size]
-
-
-@pytest.mark.parametrize(("size", "settles_s"), [(1.5, 0.0), (-4.0, 40.0), (-4.0, 60.0), (0.0, 0.0)])
-def test_a_thermometer_that_shifts_or_comes_off_is_named_with_what_lies_behind(size: float, settles_s: float) -> None:
-    """A coarse converter, rows of ten seconds: what it does as nowhere else in the run, wherever cells begin."""
-    rng = np.random.default_rng(SEED + 7)
-    time = np.arange(0.0, 3600.0 * HOURS, 10.0)
-    for at in (10_000.0, 10_015.0, 10_030.0, 10_045.0):
-        since = np.maximum(time - at, 0.0)
-        moved = size * (-np.expm1(-since / settles_s) if settles_s else 1.0 * (since > 0.0))
-        read = 0.0625 * np.round((lagged(time) + moved) / 0.0625 + 0.2 * rng.standard_normal(time.size))
-        found = displaced(time, read, 0.0625)
-        assert len(found) == (size != 0.0), (at, found)
-        assert all(abs(jump.time_s - at) <= 120.0 and jump.lasting for jump in found)
-
-
-def test_a_sharp_corner_of_a_programme_is_no_jump() -> None:
-    """Its two lines meet within the minutes that are left out: both a jump and a corner then leave noise alone."""
-    time = np.arange(0.0, 6000.0, 10.0)
-    for corner in (500.0, 590.0, 630.0, 2000.0):
-        noise = np.random.default_rng(SEED + 8).normal(0.0, 0.005, time.size)
-        assert displaced(time, 20.0 + 0.1 * np.minimum(time, corner) + noise, 0.001) == ()
-
-
 @pytest.mark.parametrize("factor", [1e-3, 57.29578])
 def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: float) -> None:
     def in_unit(columns: EventColumns) -> None:
@@ -570,21 +490,6 @@ def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: flo
 
     dataset = load(state(ramps(tmp_path, in_unit), "trust_units = true"))
     assert [(e.id, e.file) for e in of_curves(dataset)] == [("unit_changed", "2.csv")]
-
-
-def test_a_run_with_a_spike_is_in_memory_once(tmp_path: Path) -> None:
-    """Before: its columns without the spike beside those with it, 625 MiB of 8.6 million rows."""
-    n = 2**19
-    write_csv(tmp_path / "1.csv", {name: np.arange(60.0) for name in ("time_s", "temperature_c", "rate_dph")})
-    (tmp_path / "dataset.toml").write_text(toml('file = "1.csv"'))
-    (run,) = load(state(tmp_path, "trust_units = true")).runs
-    long = replace(run, reader=lambda: Rows(np.arange(float(n)), np.zeros(n), np.zeros(n), {}))
-    tracemalloc.start()
-    judged = _Judged([long], [np.array([100])], ())[0]
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert [len(column) for column in judged] == [n - 1] * 3
-    assert peak < 4.6 * 8 * n, "three columns, the next one without the spike, and which rows count"
 
 
 class _Fresh(Sequence[Any]):

@@ -1,0 +1,111 @@
+"""Find rows that hold a value which the sensor did not measure: stuck, at an end stop, or written for no reading.
+
+A value that repeats oftener than chance repeats it is stuck. A rate that piles up at its largest value, its smallest,
+or at zero is at an end stop or was not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..common.arrays import FloatArray, IntArray, parts_of
+from .odds import OCTAVE, cost_of
+
+# Rows to one share of repetitions: a coarse value repeats more at some levels than at others.
+_GROUP = 100
+# Quantile of these shares, and the factor of its odds, that are taken as what chance does at most.
+_OFTEN, _MORE_OFTEN = 0.9, 2.0
+# Steps of a column from row to row at their 95 % quantile, times this: no ramp of the programme goes on by more.
+_RELEASE = 3.0
+_ON_RAMPS = 0.95
+# Distinct values among the first rows: with fewer, what looks like a pile is a step of the converter.
+_MIN_LEVELS = 4 * OCTAVE
+_SAMPLE = 2**14
+# No smooth distribution over so many levels has one with this many times the rows of the levels beside it.
+_PILE = 2.0
+
+
+class Repeats(NamedTuple):
+    """A stretch of one value: first row, row after the last, the value, log-odds."""
+
+    first: int
+    end: int
+    value: float
+    log_odds: float
+
+
+def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
+    """Find stretches in which a value repeats oftener than chance repeats it.
+
+    Args:
+        values: A column of finite values in order of time.
+        needs_release: A stretch counts only if the next value shows that the quantity went on: a temperature may hold.
+    """
+    n = len(values)
+    if n < 2:
+        return []
+    starts = np.concatenate([[0], *(p.start + 1 + np.flatnonzero(_steps(values, p)) for p in parts_of(n - 1))])
+    if len(starts) == 1:
+        return []  # a column of one value is no event of the run: the finding `constant_channel` names it
+    lengths = np.diff(np.r_[starts, n])
+    again = np.ones(n - 1, dtype=bool)
+    again[starts[1:] - 1] = False
+    count = max(len(again) // _GROUP, 1)
+    shares = again[: len(again) // count * count].reshape(count, -1).mean(axis=1)
+    chance = max(float(np.quantile(shares, _OFTEN)), 1.0 / n)
+    if chance == 1.0:
+        chance = float(again.mean())
+    chance = _MORE_OFTEN * chance / (1.0 + (_MORE_OFTEN - 1.0) * chance)
+    odds = -(lengths - 1) * np.log(chance) - cost_of(2.0 * n)
+    likely = np.flatnonzero(odds > 0.0)
+    if needs_release:
+        moves = np.abs(np.diff(values[starts]))
+        release = _RELEASE * float(np.quantile(moves, _ON_RAMPS))
+        likely = likely[(likely < len(moves)) & (moves[np.minimum(likely, len(moves) - 1)] > release)]
+    return [
+        Repeats(int(starts[k]), int(starts[k] + lengths[k]), float(values[starts[k]]), float(odds[k])) for k in likely
+    ]
+
+
+def _steps(values: FloatArray, part: slice) -> FloatArray:
+    return np.diff(values[part.start : part.stop + 1])
+
+
+def resolution(values: FloatArray) -> float:
+    """Return the smallest difference of two of the first values; infinite if they are all the same."""
+    levels = np.unique(values[:_SAMPLE])
+    return float(np.diff(levels).min()) if len(levels) > 1 else np.inf
+
+
+def piles(rate: FloatArray) -> Iterator[tuple[Repeats, IntArray]]:
+    """Yield the values at which a rate piles up, and the stretches of rows that hold them, shape (k, 2).
+
+    Rows within an octave of one another are one stretch: what lies between two rows at an end stop is the part of the
+    noise that the stop did not cut off.
+    """
+    n = len(rate)
+    if n == 0 or len(np.unique(rate[:_SAMPLE])) < _MIN_LEVELS:
+        return
+    for value in dict.fromkeys((float(rate.max()), float(rate.min()), 0.0)):
+        at = np.flatnonzero(rate == value)
+        if len(at) <= OCTAVE:
+            continue
+        beside = max(_beside(rate - value), _beside(value - rate))
+        share, most = len(at) / (len(at) + beside), _PILE / (1.0 + _PILE)
+        if share <= most:
+            continue
+        odds = len(at) * np.log(share / most) - cost_of(3.0)
+        odds += beside * np.log((1.0 - share) / (1.0 - most)) if beside else 0.0
+        if odds > 0.0:
+            first = at[np.diff(at, prepend=-n) > OCTAVE]
+            end = at[np.diff(at, append=2 * n) > OCTAVE] + 1
+            yield Repeats(int(first[0]), int(end[-1]), value, float(odds)), np.stack([first, end], axis=1)
+
+
+def _beside(distance: FloatArray) -> int:
+    """Return how many rows are at the next level above 0."""
+    above = distance[distance > 0.0]
+    return int(np.count_nonzero(above < 1.5 * above.min())) if len(above) else 0
