@@ -166,15 +166,16 @@ class _Columns:
 
     def judge(self) -> None:
         """Look for events of every kind."""
-        usable = self._usable()
-        if len(usable) < 2:
+        if len(self._usable()) < 2:
             return
-        self._gaps(usable)
-        self._repeats(usable)
+        self._gaps()
+        self._stuck("temperature")
         self._temperature()
+        self._stuck("rate")
+        self._piles()
         self._rate()
 
-    def _gaps(self, usable: IntArray) -> None:
+    def _gaps(self) -> None:
         """Times without rows, other than those that are excluded."""
         time, period = self._rows.time_s, self._run.row_period_s
         inside = np.flatnonzero(self.reason != 255)
@@ -183,28 +184,23 @@ class _Columns:
             first, end = int(inside[k]), int(inside[k + 1])
             self._event("gap", "time", (first, end + 1), float(time[end] - time[first]), period, np.inf)
 
-    def _repeats(self, usable: IntArray) -> None:
-        """Rates that are stuck or at an end stop, and temperatures that are stuck."""
-        time, period = self._rows.time_s, self._run.row_period_s
+    def _stuck(self, column: Column) -> None:
+        """Stretches in which a column is stuck."""
+        usable, time = self._usable(), self._rows.time_s
+        values = _taken(self._rows.rate_dph if column == "rate" else self._rows.temperature_c, usable)
+        for one in stuck(values, needs_release=column == "temperature"):
+            rows = int(usable[one.first]), int(usable[one.end - 1]) + 1
+            length = float(time[rows[1] - 1] - time[rows[0]]) + self._run.row_period_s
+            self._event("stuck", column, rows, length, self._run.row_period_s, one.log_odds, f"{column} stuck")
 
-        def of_file(first: int, end: int) -> tuple[int, int]:
-            return int(usable[first]), int(usable[end - 1]) + 1
-
-        columns: tuple[Column, ...] = ("rate", "temperature")
-        for column in columns:
-            values = _taken(self._column(column), usable)
-            for one in stuck(values, needs_release=column == "temperature"):
-                rows = of_file(one.first, one.end)
-                length = float(time[rows[1] - 1] - time[rows[0]]) + period
-                self._event("stuck", column, rows, length, period, one.log_odds, f"{column} stuck")
+    def _piles(self) -> None:
+        """Rates at an end stop."""
+        usable = self._usable()
         for pile, stretches in piles(_taken(self._rows.rate_dph, usable)):
-            rows = of_file(pile.first, pile.end)
+            rows = int(usable[pile.first]), int(usable[pile.end - 1]) + 1
             self._event("end_stop", "rate", rows, pile.value, 0.0, pile.log_odds)  # only some of these rows hold it
             for first, end in stretches.tolist():
-                self._mark(slice(*of_file(first, end)), "rate at end stop")
-
-    def _column(self, column: Column) -> FloatArray:
-        return self._rows.rate_dph if column == "rate" else self._rows.temperature_c
+                self._mark(slice(int(usable[first]), int(usable[end - 1]) + 1), "rate at end stop")
 
     def _temperature(self) -> None:
         """Temperatures that leave the course of the others, for a time or for good."""

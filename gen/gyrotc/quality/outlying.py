@@ -30,6 +30,8 @@ _EXPECTED_SINGLES = 0.3
 _CLIP = 3.0
 # Share of its deviation within which the level behind a stretch has to be that before it.
 _BACK = 0.5
+# Log-odds of the last block of a stretch, at least: a block of the noise that happens to lie far does not lengthen it.
+_LIKELY = 1.0
 # Larger log-odds of a block count as this: sums keep their digits.
 _MAX_SCORE = 1e4
 # Outliers bend the column by more than this share of their deviation within a block. A corner of a programme bends it
@@ -69,7 +71,10 @@ def outlying(values: FloatArray, longest: int) -> list[Outliers]:
         row_sigma = row_sigma or scale.usual_sigma
         for first, end, odds in scale.segments(cost):
             level = scale.level(max(first - 1, 0), min(end + 1, len(blocks)))
-            far = float(np.max(np.abs(blocks[first:end] - scale.level(first, end))))
+            off = blocks[first:end] - scale.level(first, end)
+            if first == 0 and _fades(off):
+                continue  # a warm-up that lasts few blocks
+            far = float(np.max(np.abs(off)))
             around = blocks[max(first - 2, 0) : end + 2]
             bend = float(np.abs(np.diff(around, 2)).max())
             if bend < (_BEND_OF_ROWS if n == 1 else _BEND_OF_BLOCKS) * far:
@@ -83,8 +88,8 @@ def outlying(values: FloatArray, longest: int) -> list[Outliers]:
                 size = float(np.mean(blocks[first:end])) - 0.5 * (before + after)
                 rows = _refined(clean, edges, (first, end), (0.5 * (before + after), size), row_sigma)
             line = np.linspace(before, after, rows[1] - rows[0])
-            off = values[rows[0] : rows[1]] - line
-            found.append(Outliers(*rows, float(off[np.argmax(np.abs(off))]), row_sigma, odds))
+            beyond = values[rows[0] : rows[1]] - line
+            found.append(Outliers(*rows, float(beyond[np.argmax(np.abs(beyond))]), row_sigma, odds))
             if clean is values:
                 clean = values.copy()
             clean[rows[0] : rows[1]] = line
@@ -201,17 +206,23 @@ def _cut(score: FloatArray, first: int, cost: float, of_one: float) -> Iterator[
     """
     begin, height, best, at = -1, 0.0, 0.0, -1
     for k, value in enumerate(score.tolist()):
-        if begin < 0 and value > 0.0:
+        if begin < 0 and value > _LIKELY:
             begin, height, best = k, 0.0, 0.0
         if begin >= 0:
             height += value
-            if height > best:
+            if height > best and value > _LIKELY:
                 best, at = height, k
             if height < best - cost or height <= 0.0 or k == len(score) - 1:
                 best -= of_one if at == begin else cost
                 if best > 0.0:
                     yield first + begin, first + at + 1, best
                 begin = -1
+
+
+def _fades(off: FloatArray) -> bool:
+    """Test whether three deviations or more become smaller one after the other, all to one side."""
+    size = np.abs(off)
+    return len(off) >= 3 and bool((off > 0.0).all() or (off < 0.0).all()) and bool((np.diff(size) < 0.0).all())
 
 
 def _line(values: FloatArray) -> FloatArray:
