@@ -51,29 +51,28 @@ test:
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@ctest --test-dir build/fuzz -j2 --output-on-failure
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile -m "not slow"
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
 targets:
 	@tools/setup.sh targets
-	@$(PYTHON) -m pytest -q -rs tests/targets tests/cases/verify/test_negative_controls.py --results docs
+	@$(PYTHON) -m pytest -q -rs tests/targets --results docs
 
 ## every input of a table, no run-time error, rounding bounds (Frama-C, Gappa, Z3; minutes): docs/results.md
 prove:
 	@tools/setup.sh prove
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/prove --results docs
 
-## style and types (ruff, mypy), imports; the C library's warnings, symbols, fused operations, MISRA, analysers; 80 diagnoses
+## style and types (ruff, mypy), imports; the C library's warnings, symbols, fused operations, MISRA, analysers; tests/check
 check:
 	@tools/setup.sh check
 	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools bench
 	@.venv/bin/ruff format --config gen/pyproject.toml --check gen tests tools bench
 	@cd gen && ../.venv/bin/mypy gyrotc && ../.venv/bin/lint-imports --config pyproject.toml
 	@$(PYTHON) tools/check_libc
-	@$(PYTHON) -m pytest -q tests/journeys/repository/test_examples.py -k notebook
 	@$(PYTHON) -m bench.paper.page docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/cases/paper/test_paper_reference.py
-	@$(PYTHON) -m pytest -q -n 2 tests/cases/diagnose/test_diagnose_fixed.py -k "eighty or fresh"
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/check
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 from gyrotc.assess import load_limits
-from gyrotc.jobs import build_into
 from gyrotc.mirror import replay
 from gyrotc.recordings import load
 from gyrotc.results import Budget, read_result
 from gyrotc.simulate import simulate
 from gyrotc.tables import quantise
-from gyrotc.train import FitOptions
+from jobs import built_for_fleet
 
 from .campaigns import Settings, say
 from .page import Figure, ResultsTable
@@ -82,10 +81,9 @@ def coverage_of(number: int, seed: int) -> Covered:
             plan = work / "scenario.toml"
             plan.write_text(campaign.scenario, "utf-8")
         (work / "limits.toml").write_text(_LIMITS, "utf-8")
-        (work / "out").mkdir()
         simulate(plan, seed=seed, out=work / "data", format="parquet")
         limits = load_limits(work / "limits.toml")
-        built = build_into(work / "out", load(work / "data"), FitOptions(), limits=limits)
+        built = built_for_fleet(work / "out", load(work / "data"), limits=limits)
         budget = read_result(work / "out" / "budget.json", Budget)
         exam = list(exam_of(plan, seed))
     table = quantise(built.model, "f32")

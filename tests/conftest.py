@@ -47,6 +47,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [item for item in items if item not in set(absent)]
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Print the seed of the order, also with `-q`."""
+    seed = config.getoption("randomly_seed", None)
+    terminalreporter.write_line("" if seed is None else f"the same order again: --randomly-seed={seed}")
+
+
 def require(missing: str | None) -> None:
     """Fail where something is missing that `make test` installs."""
     if missing is not None:
@@ -128,10 +134,12 @@ def packed(name: str, content: bytes) -> bytes:
     return _head(name, content) + content
 
 
-def quick_and_slow(quick: Sequence[Any], slow: Sequence[Any]) -> list[Any]:
-    """Cases of a parametrised test, of which `make test` runs the quick ones."""
-    marked = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in slow)
-    return [*quick, *marked]
+@pytest.fixture
+def few_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Emit few known answers: where they follow a planted fault, few show it as well as all."""
+    from gyrotc.tables import vectors
+
+    monkeypatch.setattr(vectors, "N_RANDOM", 200)
 
 
 @pytest.fixture(scope="session")

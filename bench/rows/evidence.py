@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from gyrotc.common import CheckFailed, InputError
-from gyrotc.jobs import build_into
 from gyrotc.recordings import load
 from gyrotc.train import FitOptions
+from jobs import built_for_fleet
 
 from ..campaigns import say
 from .sets import FAULTS, drawn_set, faulty, written
@@ -36,10 +36,9 @@ def found(kind: str, seed: int, number: int) -> set[str]:
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         out = Path(folder, "out")
-        out.mkdir()
         try:
             dataset = load(written(Path(folder, "data"), runs))
-            built = build_into(out, dataset, FitOptions(method="cubic"))
+            built = built_for_fleet(out, dataset, FitOptions(method="cubic"))
         except CheckFailed as error:
             return {str(error)}
         except InputError:

@@ -13,7 +13,7 @@ from gyrotc.model import Model, load_model
 from gyrotc.tables import emitted_tables
 from gyrotc.verify import visit_all
 from results import Results
-from test_primitives import CURVE_ERROR, F32_CURVE_ERROR, F32_GAUSS_ERROR, _run
+from test_primitives import CURVE_ERROR, F32_CURVE_ERROR, F32_GAUSS_ERROR, printed_by
 
 Progress = Callable[[str], None]
 
@@ -81,7 +81,7 @@ def test_every_input_agrees_and_keeps_the_bound(
 
 def test_every_argument_of_the_float32_gaussian_and_of_is_missing(tmp_path: Path, results: Results) -> None:
     """The proofs of the step functions take the second for granted (tests/prove/eva/step.c)."""
-    found = _run("primitives_f32", tmp_path)
+    found = printed_by("primitives_f32", tmp_path)
     visited, wrong, worst = found["gauss"]
     _add(results, "float32: gauss", visited, wrong, float(worst))
     _add(results, "float32: missing or a number", *found["missing"])
@@ -93,7 +93,7 @@ def test_every_argument_of_the_float32_gaussian_and_of_is_missing(tmp_path: Path
 @pytest.mark.parametrize("half", [0, 1], ids=["long multiply", "16-bit halves"])
 def test_every_argument_of_the_fixed_point_gaussian(half: int, tmp_path: Path, results: Results) -> None:
     """Of the other primitives: every input of some ranges, corners and random arguments."""
-    found = _run("primitives_q31", tmp_path, half=half)
+    found = printed_by("primitives_q31", tmp_path, half=half)
     kind = f"fixed point, {'16-bit halves' if half else 'long multiply'}"
     for name, (visited, wrong, *worst) in found.items():
         _add(results, f"{kind}: {name}", visited, wrong, *(float(units) * 2.0**-29 for units in worst))
@@ -104,7 +104,7 @@ def test_every_argument_of_the_fixed_point_gaussian(half: int, tmp_path: Path, r
 @pytest.mark.parametrize("half", [0, 1], ids=["long multiply", "16-bit halves"])
 def test_every_reading_of_a_channel_in_fixed_point(half: int, tmp_path: Path, results: Results) -> None:
     """The two Gaussians of a curve, for three records with the ends of their ranges among them."""
-    visited, wrong, worst = _run("primitives_q31", tmp_path, "curve", "1", half=half)["curve"]
+    visited, wrong, worst = printed_by("primitives_q31", tmp_path, "curve", "1", half=half)["curve"]
     kind = f"fixed point, {'16-bit halves' if half else 'long multiply'}"
     _add(results, f"{kind}: curve", visited, wrong, float(worst))
     assert (int(visited), wrong) == (3 * (2**32 - 1), "0")
@@ -113,7 +113,7 @@ def test_every_reading_of_a_channel_in_fixed_point(half: int, tmp_path: Path, re
 
 def test_every_reading_of_a_channel_in_float32(tmp_path: Path, results: Results) -> None:
     """NaN and infinity among them: the sum is a number all the same."""
-    visited, wrong, worst = _run("primitives_f32", tmp_path, "curve", "1")["curve"]
+    visited, wrong, worst = printed_by("primitives_f32", tmp_path, "curve", "1")["curve"]
     _add(results, "float32: curve", visited, wrong, float(worst))
     assert (int(visited), wrong) == (3 * 2**32, "0")
     assert float(worst) <= F32_CURVE_ERROR

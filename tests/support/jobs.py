@@ -1,12 +1,17 @@
-"""The job of an emitted folder, for tests that vary the target."""
+"""Jobs of the package as tests need them: of an emitted folder, and of a gyro of a fleet."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+from gyrotc.jobs import Built, build_into
 from gyrotc.mirror import answers
 from gyrotc.model import load_model
+from gyrotc.recordings import Dataset
+from gyrotc.results import result_folder
 from gyrotc.tables import emitted_tables, make_vectors
+from gyrotc.train import FitOptions
 from gyrotc.verify import Job
 
 
@@ -17,3 +22,10 @@ def job_of(folder: Path) -> Job:
     vectors = make_vectors(model, tuple(tables))
     expected = {n: answers(table, vectors) for n, table in tables.items()}
     return Job(folder / "c", model, tables, expected, trusted=True)
+
+
+def built_for_fleet(out: Path, dataset: Dataset, options: FitOptions | None = None, **more: Any) -> Built:
+    """Build without a compiler and without pictures, as a fleet does it, into the new folder `out`."""
+    with result_folder(out, "build") as stage:
+        stage.of(dataset.serial)
+        return build_into(stage.folder, dataset, options or FitOptions(), **more)

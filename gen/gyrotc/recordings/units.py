@@ -17,8 +17,6 @@ from fractions import Fraction
 from functools import cache
 from typing import Literal
 
-import numpy as np
-
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 
@@ -143,8 +141,7 @@ class Conversion:
         """Values in gyrotc's own unit; the same array where that is the file's."""
         if not self.changes:
             return values
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out or refused with its row
-            converted = values * self.factor
+        converted = values * self.factor
         if self.offset:
             converted += self.offset
         return converted

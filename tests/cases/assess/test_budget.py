@@ -20,7 +20,6 @@ from gyrotc.assess import (
     load_limits,
 )
 from gyrotc.common import Averages, InputError, statistics_of, time_statistics
-from gyrotc.jobs import build_into
 from gyrotc.model import load_model
 from gyrotc.pages import rounded, write_report
 from gyrotc.recordings import load
@@ -39,7 +38,7 @@ from gyrotc.results import (
     worst_of,
 )
 from gyrotc.simulate import simulate
-from gyrotc.train import FitOptions
+from jobs import built_for_fleet
 
 LIMITS = """schema = 1
 [interval]
@@ -56,9 +55,9 @@ degrees_of_freedom = 9
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    data, folder = tmp_path_factory.mktemp("data"), tmp_path_factory.mktemp("built")
+    data, folder = tmp_path_factory.mktemp("data"), tmp_path_factory.mktemp("built") / "paper"
     simulate("paper", seed=5, out=data / "paper", format="parquet")
-    build_into(folder, load(data / "paper"), FitOptions())
+    built_for_fleet(folder, load(data / "paper"))
     write_report(folder)
     return folder
 

@@ -11,11 +11,11 @@ import pytest
 from conftest import HOST, run_here
 from gyrotc.assess import residual_test
 from gyrotc.cli.results import summary_line
-from gyrotc.jobs import build_into
 from gyrotc.pages import write_report
 from gyrotc.recordings import load
 from gyrotc.results import RMS_OVER_FLOOR, ResidualTest
 from gyrotc.train import FitOptions, robust_sigma
+from jobs import built_for_fleet
 from numpy.typing import NDArray
 from recordings import columns, toml, write_csv
 
@@ -149,8 +149,7 @@ def test_spikes_of_an_exam_are_in_the_plain_figure_and_not_in_the_robust_one(tmp
     head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"'
     runs = ['file = "a.csv"', 'file = "b.csv"', 'file = "c.csv"\nrole = "exam"']
     (tmp_path / "RLG-1" / "dataset.toml").write_text(toml(*runs, head=head))
-    (tmp_path / "out").mkdir()
-    built = build_into(tmp_path / "out", load(tmp_path / "RLG-1"), FitOptions(), numerics=["f32"])
+    built = built_for_fleet(tmp_path / "out", load(tmp_path / "RLG-1"), FitOptions(), numerics=["f32"])
     clean, exam = built.evaluation.runs[0], built.evaluation.runs[2]
     assert exam.rows.left_out == {"rate outlier": len(spikes)} and clean.rows.left_out == {} and clean.usable is None
     assert exam.usable is not None and built.evaluation.usable == exam.usable

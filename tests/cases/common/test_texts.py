@@ -17,12 +17,11 @@ import jinja2
 import pytest
 from conftest import Command
 from emitted import recorded
-from gyrotc.assess import evaluate, load_limits
+from gyrotc.assess import evaluate
 from gyrotc.cli import output, progress
 from gyrotc.cli.results import evaluation_table, verify_table
 from gyrotc.common import (
     C_COMMENT,
-    InputError,
     c_code,
     c_comment,
     c_environment,
@@ -37,14 +36,13 @@ from gyrotc.common import (
     toml_key,
     toml_value,
 )
-from gyrotc.fleet import load_manifest, write_summary
+from gyrotc.fleet import write_summary
 from gyrotc.jobs import extended_scenario
 from gyrotc.model import Model, table_id
 from gyrotc.pages import Panel, drawing, report
 from gyrotc.pages import write_diagnosis_page as write_page
 from gyrotc.recordings import Problems, dataset_toml, load, parse_description
 from gyrotc.results import Diagnosed, Estimate, FleetEntry, VerifiedTarget, checked_result
-from gyrotc.simulate import scenario
 from gyrotc.tables import emit_texts, quantise_all
 from gyrotc.verify import checked_sources, table_files, verify
 from hostile import hostile_strings
@@ -592,37 +590,6 @@ def test_columns_of_a_recording_are_reported_as_they_are(tmp_path: Path, model_d
     for name, content in texts.items():
         (tmp_path / name).write_bytes(content)
     assert checked_sources(tmp_path, tmp_path, table_files(model)) == tmp_path
-
-
-def _read_or_refused(read: Callable[[], object]) -> None:
-    try:
-        read()
-    except InputError as error:
-        assert "\x1b" not in terminal_text(str(error))
-
-
-@pytest.mark.slow
-def test_manifests_limits_and_scenarios_are_read_or_refused_in_words(tmp_path: Path) -> None:
-    path = tmp_path / "x.toml"
-    for text in HOSTILE:
-        word, key = toml_value(text), toml_key(text)
-        options = f"[options]\nmethod = {word}\n[[unit]]\ndataset = {word}"
-        for content in (f"datasets = [{word}]", f"limits = {word}", f"axis = {word}", options, f"{key} = 1"):
-            path.write_text(f"schema = 1\n{content}\n", "utf-8")
-            _read_or_refused(lambda: load_manifest(path))
-        for content in (f"product = {word}", f"[at_most]\n{key} = 1.0", f"[needs]\ntargets = [{word}]"):
-            path.write_text(f"schema = 1\n{content}\n", "utf-8")
-            _read_or_refused(lambda: load_limits(path))
-        for content in (
-            f"title = {word}",
-            f"[[channel]]\nname = {word}\n[[cause]]\nid = {word}",
-            f"{key} = 1",
-            f'extends = {word}\ntitle = "x"',
-            f"[gyro]\nserial = {word}",
-        ):
-            ground = "" if content.startswith("extends") else 'extends = "paper"\n'
-            path.write_text(f"{ground}{content}\n", "utf-8")
-            _read_or_refused(lambda: scenario.read(path))
 
 
 # ---- file names and terminals ----

@@ -500,34 +500,6 @@ def test_an_interval_holds_every_top_that_reaches_as_far_as_its_likelihood() -> 
     assert high == pytest.approx(7.0 + np.sqrt((drop - 2.0) / 40.0), abs=0.01)
 
 
-@pytest.mark.slow
-def test_the_interval_of_a_weak_waves_period_is_taken_over_the_whole_grid(case: Case) -> None:
-    """Of a weak wave another period may do as well: about the best one alone the interval missed it."""
-    print("seed", SEED + 5)
-    rng, records = np.random.default_rng(SEED + 5), case.campaign.records
-    grid = [c for c, _ in case.gains.plain if c.id == "path_length_periodicity"]
-    period = float(grid[len(grid) // 3].values["period_c"])
-    wave = columns_of(records, "path_length_periodicity", {"period_c": period})[:, 0]
-    several = inside = 0
-    for _ in range(12):
-        noise = LEVEL_DPH * rng.standard_normal(records.size)
-        search = case.campaign.search(1e-4 * case.campaign.temperature + 0.25 * LEVEL_DPH * wave + noise)
-        gains = Gains(search)
-        best = best_of([p for p in gains.single() if p.members[0] in grid], gains.size)
-        [cause] = refine(search, gains, best.members)
-        assert cause.profile is not None
-        found = cause.parameters["period_c"]
-        values, energy = cause.profile
-        near = values[energy >= energy.max() - stats.chi2.ppf(0.95, 1)]
-        assert {c.values["period_c"] for c in grid} <= set(values.tolist()), "every period is asked"
-        assert found.low <= near.min() <= found.value <= near.max() <= found.high
-        gaps = energy[(values > near.min()) & (values < near.max())] < energy.max() - 3.9
-        several += bool(gaps.any())
-        inside += found.low <= period <= found.high
-    print(f"{several} of 12 with another top, {inside} hold the period")
-    assert inside >= 8, "0.95 of 12 but for one in a thousand series"
-
-
 def test_the_size_of_random_draws_covers_the_truth_as_often_as_it_says() -> None:
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
@@ -889,13 +861,6 @@ def test_a_declaration_that_is_not_contradicted_counts(campaign: Campaign) -> No
         left_by_true_cause(search).worst == left_by_true_cause(search).p_value == left_by_true_cause(quieter).p_value
     ), "its level is that of the data"
     assert left_by_true_cause(louder).p_value >= left_by_true_cause(search).p_value
-
-
-@pytest.mark.slow
-def test_a_likeliest_colour_that_is_too_fast_is_not_believed_alone(campaign: Campaign) -> None:
-    """Of twelve recordings of a true cause in a random walk, 5 left less than 1 % by the likeliest colour."""
-    p_values = [left_by_true_cause(measured(campaign, Colour(walk=0.3), seed, None)).p_value for seed in range(12)]
-    assert sum(p < 0.01 for p in p_values) <= 1, p_values
 
 
 def test_what_never_settles_is_no_warm_up(campaign: Campaign) -> None:

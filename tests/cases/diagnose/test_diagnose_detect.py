@@ -207,14 +207,6 @@ def test_a_planted_cause_is_found_and_noise_alone_is_not(quiet: Search, planted:
     assert detect(planted.extended(column), "map and beside")[0].p_value > 0.01, "nothing beside it"
 
 
-@pytest.mark.slow
-def test_p_values_of_noise_are_not_too_small_in_many_campaigns(campaign: Campaign) -> None:
-    smallest = []
-    for seed in range(SEED, SEED + 12):
-        smallest.append(detect(campaign.search(noise(campaign, seed)), "map and beside")[0].p_value)
-    assert np.mean(np.array(smallest) < 0.1) <= 0.5, "12 draws of a tenth: six have a chance of 1 in 20000"
-
-
 def test_a_detection_limit_is_the_amplitude_at_the_needed_signal_to_noise_ratio(quiet: Search) -> None:
     view = quiet.likeliest
     white = Whitener(view.colour, quiet.records.kept, BLOCK_S)

@@ -116,7 +116,6 @@ def scaled(noise: Declared, factor: float) -> Declared:
     return Declared(*(factor * v for v in values))
 
 
-@pytest.mark.slow
 def test_what_is_hidden_is_named_in_the_first_place(made: Callable[[str], Case]) -> None:
     assert made("hysteresis").answer.causes == ["hysteresis"]
     assert made("auxiliary").answer.causes == ["auxiliary"]
@@ -163,15 +162,6 @@ def same_answer(found: Answer, case: Case) -> None:
     assert {n: p.value for n, p in now.items()} == pytest.approx({n: p.value for n, p in was.items()}, rel=1e-3)
 
 
-@pytest.mark.slow
-def test_the_effect_turned_round_has_the_same_name(made: Callable[[str], Case]) -> None:
-    case = made("hysteresis")
-    found = answer(changed(case.records, lambda r: replace(r, rate_dph=-r.rate_dph)), case.declared)
-    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
-    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
-    assert now["amplitude_dph_per_c"].value == pytest.approx(-was["amplitude_dph_per_c"].value, rel=1e-6)
-
-
 def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
     made: Callable[[str], Case],
 ) -> None:
@@ -193,18 +183,6 @@ def test_anything_the_static_map_can_do_leaves_the_statistics_as_they_are(
         assert np.abs(a - b).max() < 1e-6 * np.abs(a).max()
 
 
-@pytest.mark.slow
-def test_a_channel_shifted_round_in_time_loses_its_name(made: Callable[[str], Case]) -> None:
-    case = made("auxiliary")
-
-    def shifted(run: RunRecord) -> RunRecord:
-        half = len(run.rate_dph) // 2
-        return replace(run, channels={k: np.roll(v, half) for k, v in run.channels.items()})
-
-    assert "auxiliary" not in answer(changed(case.records, shifted), case.declared).causes
-
-
-@pytest.mark.slow
 def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str], Case]) -> None:
     """Nothing in the recordings can say which of the two acts."""
     case = made("auxiliary")
@@ -218,7 +196,6 @@ def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str],
     assert rival.distance == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.slow
 def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
     made: Callable[[str], Case], drawing: Drawing, tmp_path: Path
 ) -> None:
@@ -233,25 +210,6 @@ def test_an_effect_of_the_training_runs_alone_is_not_shipped_or_graded_as_harm(
     assert result["causes"][0]["gain"]["low"] < 0.0
     # The training runs alone say what is shipped; the exam only grades, and says here that it harms.
     assert result["extended"] is None or result["extended"]["gain"]["rms_removed_dph"]["low"] < 0.0
-
-
-@pytest.mark.slow
-def test_noise_declared_twice_too_high_or_low_is_reported(made: Callable[[str], Case]) -> None:
-    case = made("")
-    for factor in (0.5, 2.0):
-        found = answer(case.records, scaled(case.declared, factor))
-        assert found.verdict == "noise_differs"
-        assert found.analysis.noise[0].id == "noise_level"
-        assert found.analysis.noise[0].parameters["ratio"] == pytest.approx(1.0 / factor, rel=0.05)
-
-
-@pytest.mark.slow
-def test_truth_beside_the_recordings_is_not_looked_at(made: Callable[[str], Case]) -> None:
-    folder = made("hysteresis").folder
-    before = diagnose(load(folder)).result
-    (folder / "truth.json").write_text('{"causes": [{"id": "warm_up"}]}', encoding="utf-8")
-    assert diagnose(load(folder)).result == before
-    (folder / "truth.json").unlink()
 
 
 def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
@@ -281,9 +239,8 @@ def diagnosed(name: str, cut_s: float, axis: str, folder: Path, gyrotc: Command)
     return dict(json.loads((folder / "out" / "diagnose.json").read_text()))
 
 
-@pytest.mark.slow
 @pytest.mark.measured("mpu6000-chamber-cycle")
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("axis", ["y"])
 def test_no_name_of_a_measured_cycle_does_harm_on_the_branch_it_has_not_seen(
     axis: str, tmp_path: Path, gyrotc: Command
 ) -> None:
@@ -339,7 +296,6 @@ def test_causes_with_a_column_for_every_block_are_no_fault(tmp_path: Path) -> No
     assert diagnose(dataset, options=FitOptions(average_s=100.0, block_s=20.0)).result.verdict != "not_testable"
 
 
-@pytest.mark.slow
 @pytest.mark.measured("mpu6000-chamber-cycle")
 def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
     """Every second five minutes: a record that is late by more leaves no sample whose input is known."""
@@ -347,7 +303,6 @@ def test_spans_shorter_than_a_late_record_are_no_fault(tmp_path: Path) -> None:
     assert diagnose(cut_out(tmp_path, SOURCE, spans)).result.verdict == "unexplained"
 
 
-@pytest.mark.slow
 @pytest.mark.measured("mpu6050-isothermal")
 def test_nothing_is_said_of_a_constant_temperature(tmp_path: Path, gyrotc: Command) -> None:
     result = diagnosed("mpu6050-isothermal", 524.0, "x", tmp_path, gyrotc)

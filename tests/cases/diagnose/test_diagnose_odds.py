@@ -103,23 +103,6 @@ def _reported(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, flo
     return chosen[0].id, probabilities_of(chosen[0].id, likely)
 
 
-@pytest.mark.slow
-def test_gradients_and_lags_that_the_catalogue_does_not_have_are_reported_apart(
-    quiet: Gains, campaign: Campaign
-) -> None:
-    """By the evidence, and surer of what is true than likelihoods of equally many functions are."""
-    print("seed", SEED)
-    rng = np.random.default_rng(SEED)
-    hidden = ["thermal_gradient", "cavity_lag"] * 8
-    drawn = [_with(quiet, campaign, name, rng) for name in hidden]
-    found = [_reported(one) for one in drawn]
-    wrong = [reported for name, reported in zip(hidden, found, strict=True) if reported[0] != name]
-    assert len(wrong) <= 2, wrong
-    of_truth = [reported[1].get(name, 0.0) for name, reported in zip(hidden, found, strict=True)]
-    before = [_reported(one, weighed=False)[1].get(name, 0.0) for name, one in zip(hidden, drawn, strict=True)]
-    assert np.mean(of_truth) > 0.85 and np.mean(of_truth) > np.mean(before) + 0.1, (of_truth, before)
-
-
 @pytest.mark.parametrize("clock", ["time_misalignment", "a queue of 13 to 20 minutes"])
 def test_a_late_clock_is_held_against_memories_on_the_blocks_that_it_knows(
     quiet: Gains, campaign: Campaign, clock: str

@@ -269,7 +269,6 @@ def test_a_build_from_a_check_run_says_what_came_from_the_earlier_model(world: P
     assert earlier, "the earlier model is also what the result is compared with"
 
 
-@pytest.mark.slow
 def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path) -> None:
     out = tmp_path / "built"
     bumped = dataset(tmp_path / "bumped", 15, "2026-06-01", check=True, change=CHANGES["local"])

@@ -152,7 +152,6 @@ def test_a_unit_with_one_run_gains_what_its_lot_knows() -> None:
     assert 0.4 < np.median(inside) < 2.0  # the table's sigma is of the size of the error
 
 
-@pytest.mark.slow
 def test_scores_of_the_lots_own_units_are_as_expected() -> None:
     """p-values of units drawn from the prior itself are uniform, whatever their runs tell."""
     _, prior, _ = family(11)
@@ -180,7 +179,6 @@ def test_a_stranger_is_reported_and_calibrated_without_the_lot() -> None:
     assert coverage(data, with_lot) == coverage(data, alone)
 
 
-@pytest.mark.slow
 def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
     rng = np.random.default_rng(31)
     units = []
@@ -194,7 +192,6 @@ def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
     assert len(found.state.means) == 1
 
 
-@pytest.mark.slow
 def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     rng = np.random.default_rng(71)
     side = np.arange(20) % 2
@@ -208,7 +205,6 @@ def test_two_clusters_are_found_and_a_unit_goes_to_its_own() -> None:
     assert use is not None and use.cluster == found.state.cluster[int(np.argmax(side == 1))]
 
 
-@pytest.mark.slow
 def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     rng = np.random.default_rng(41)
     units = [calibrated(rng, unit_map(rng, 1e-4)) for _ in range(15)]
@@ -218,13 +214,11 @@ def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     assert lot.units[4].cluster is None and "U4" in lot.text
 
 
-@pytest.mark.slow
 def test_a_lot_of_few_units_knows_its_mean_badly() -> None:
     few, many = family(51, units=4)[1], family(51, units=40)[1]
     assert few.alone().rms_sigma_dph() > many.alone().rms_sigma_dph()
 
 
-@pytest.mark.slow
 def test_the_same_units_give_the_same_file() -> None:
     rng = np.random.default_rng(61)
     units = [calibrated(rng, unit_map(rng, 2e-4)) for _ in range(6)]

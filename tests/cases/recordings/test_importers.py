@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import gzip
+import importlib
+import importlib.util
 import json
 import os
 import random
 import re
 import subprocess
-import sys
 from collections.abc import Callable
 from datetime import datetime, timezone
 from pathlib import Path
@@ -17,12 +18,11 @@ from zoneinfo import ZoneInfo
 import h5py
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 import scipy.io
 from conftest import Command, run_gyrotc
 from gyrotc.quality import check
-from gyrotc.recordings import load, units
+from gyrotc.recordings import LoggerFile, load, units
 from gyrotc.recordings.importers import ImportOptions, Map, Stamps, import_files, load_map
 from gyrotc.results import ImportedFiles, read_result
 from logger_analysis import ANALYSIS_CASES
@@ -521,33 +521,6 @@ def test_a_column_name_of_many_blanks_is_not_searched(monkeypatch: pytest.Monkey
     assert sum(steps) <= 100_000, "more than a step for each character"
 
 
-@pytest.mark.slow
-def test_a_long_file_needs_little_memory(tmp_path: Path) -> None:
-    """Twelve megabytes and four times that need the same memory within 60 MiB: nothing is kept of the rows."""
-    peaks = []
-    row = "{},{:.3f},20.123456,0.123456\n"
-    for k, blocks in enumerate((1, 4)):
-        path = tmp_path / f"{k}.csv"
-        with path.open("w") as file:
-            file.write("time_s,temperature_c,rate_dph,supply_v\n")
-            for block in range(blocks):
-                start = block * 400_000
-                file.writelines(row.format(n / 100, 20.0 + (n % 1000) / 1000) for n in range(start, start + 400_000))
-        program = (
-            "import sys; from gyrotc.cli.main import run; status = run(sys.argv[1:]); "
-            "facts = dict(line.split(':') for line in open('/proc/self/status')); "  # ru_maxrss has the parent's, too
-            "print(status, int(facts['VmHWM'].split()[0]) // 1024)"
-        )
-        command = [sys.executable, "-c", program, "import", str(path), "--out", str(tmp_path / f"R{k}")]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        status, peak = done.stdout.splitlines()[-1].split()
-        assert status == "0", done.stderr
-        peaks.append(int(peak))
-        assert pq.ParquetFile(tmp_path / f"R{k}" / f"{k}.parquet").metadata.num_rows == blocks * 400_000
-    assert peaks[1] < peaks[0] + 60, peaks
-    assert peaks[1] < 700, peaks
-
-
 @pytest.mark.parametrize(
     ("name", "extra", "head"),
     [
@@ -563,6 +536,11 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     from gyrotc.recordings import tables
     from gyrotc.recordings.importers import job as import_job
 
+    def in_this_process(parser: import_job.Parser, path: Path) -> LoggerFile:
+        module = importlib.import_module(parser.module, "gyrotc.recordings")
+        file: LoggerFile = getattr(module, parser.function)(path)
+        return file
+
     class Importlib:
         """Finds nothing."""
 
@@ -572,7 +550,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 
     (tmp_path / name).write_bytes(head + bytes(2000))
     monkeypatch.setattr(tables, "importlib", Importlib)
-    monkeypatch.setattr(import_job, "open_in_child", lambda opener, path: opener(path))
+    monkeypatch.setattr(import_job, "open_confined", in_this_process)
     status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
     assert status == 2
     assert error.startswith(f"gyrotc: {name}: ")

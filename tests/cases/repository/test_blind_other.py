@@ -14,10 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 
 from tests.blind.other import heat, noise  # noqa: E402
-from tests.blind.other.grade import table  # noqa: E402
 from tests.blind.other.mechanisms import Scene, draw_map  # noqa: E402
-from tests.blind.other.record import IMITATED, draw_recording  # noqa: E402
-from tests.blind.other.run import orders, run  # noqa: E402
 from tests.blind.other.yardstick import Yardstick  # noqa: E402
 
 WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
@@ -34,25 +31,6 @@ def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:
                 assert node.level <= 1 and not str(node.module).startswith(("gyrotc", "tests")), name
 
 
-@pytest.mark.slow
-def test_heat_comes_to_rest_at_the_air_and_keeps_its_balance() -> None:
-    """Without a discharge all volumes end at the air; with it, the case is above by power / to_air."""
-    rng = np.random.default_rng(3)
-    body = heat.draw_body(rng)
-    still = heat.Body(**{**vars(body), "ripple_c": 1e-6})
-    command = np.full(12_000, 20.0)
-    command[2000:] = 40.0
-    dark = heat.run_heat(still, command, 0.0, np.random.default_rng(1), lit=False)
-    lit = heat.run_heat(still, command, 0.0, np.random.default_rng(1))
-    for values in (dark.sensor, dark.deep, dark.case):
-        assert values[-1] == pytest.approx(dark.air[-500:].mean(), abs=0.1)
-    above = lit.case[-1000:].mean() - lit.air[-1000:].mean()
-    assert above == pytest.approx(body.discharge / body.to_air, rel=0.02)
-    assert lit.deep[-1] > lit.sensor[-1] > lit.case[-1]
-    half = [int(np.argmax(x[2000:] > 30.0)) for x in (dark.case, dark.sensor, dark.mirror)]
-    assert half == sorted(half), "the mirror comes last"
-
-
 def test_noise_has_the_covariance_that_the_yardstick_counts_on() -> None:
     level = noise.PowerLaw(1e-3, 2e-4, 1.2)
     rng = np.random.default_rng(8)
@@ -61,16 +39,6 @@ def test_noise_has_the_covariance_that_the_yardstick_counts_on() -> None:
     drawn = means.T @ means / len(means)
     assert np.trace(drawn) == pytest.approx(np.trace(wanted), rel=0.05)
     assert drawn[0, 5] == pytest.approx(wanted[0, 5], abs=0.2 * wanted[0, 0])
-
-
-@pytest.mark.slow
-def test_a_seed_gives_the_same_recording_and_foreign_ones_are_foreign() -> None:
-    one, again = (draw_recording(11, 4, "foreign", "", hours=2.0) for _ in range(2))
-    for a, b in zip(one.tables, again.tables, strict=True):
-        np.testing.assert_array_equal(a, b)
-    assert one.truth.kind == again.truth.kind and one.truth.imitated <= IMITATED
-    wanted = orders(100)
-    assert [sum(s == name for s, _ in wanted) for name in ("clean", "foreign", "one")] == [45, 30, 25]
 
 
 def test_a_map_of_a_late_temperature_is_no_foreign_effect() -> None:
@@ -88,10 +56,3 @@ def test_a_map_of_a_late_temperature_is_no_foreign_effect() -> None:
     assert stick.imitated([np.tanh((t - edge) / 6.0) for t in late]) > 0.8
     noises = [np.repeat(rng.normal(size=t.size // 100 + 1), 100)[: t.size] for t in late]
     assert stick.imitated(noises) < 0.5, "noise is nobody's"
-
-
-@pytest.mark.slow
-def test_a_slice_of_the_world_is_diagnosed(tmp_path: Path) -> None:
-    rows = run(SEED, RECORDS, tmp_path, hours=2.0)
-    assert len(rows) == RECORDS and table(rows)
-    assert not [row["error"] for row in rows if row["verdict"] == "error"]

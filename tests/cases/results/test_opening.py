@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from conftest import ROOT, quick_and_slow, run_gyrotc
+from conftest import ROOT, run_gyrotc
 from gyrotc.common import InputError
 from gyrotc.results import held, write_atomically
 from recordings import columns, toml, write_csv
@@ -68,22 +68,15 @@ COMMANDS = {
     "emit": ("emit", "fleet/RLG-1/model.json", "--out", "E", "--map", "map.csv"),
     "import": ("import", "data/RLG-1/run-01.csv", "--out", "I", "--serial", "A"),
     "simulate": ("simulate", "paper-20C", "--raw-hz", "0.01", "--out", "S"),
-    "report": ("report", "fleet/RLG-1"),
     "certificate": ("certificate", "fleet/RLG-1", "--draft", "--out", "C"),
     "fleet": ("fleet", "data", "--out", "fleet"),  # whose gyro is done before: no process is needed for it
-    "verify": ("verify", "fleet/RLG-1", "--target", "host-gcc-O2", "--json", "v.json"),
-    "evaluate": ("evaluate", "fleet/RLG-1", "data/RLG-1", "--trace", "T"),
-    "build": ("build", "data/RLG-1", "--target", "host-gcc-O2", "--out", "B"),
-    "compare": ("compare", "data/RLG-1", "--out", "M"),
-    "diagnose": ("diagnose", "data/RLG-1", "--out", "D"),
 }
-SLOW = ("report", "verify", "evaluate", "build", "compare", "diagnose")
 WRITE_NOTHING = {"schema"}  # but to standard output
-# A file by `write_atomically`, as check --json, of units that take minutes; a folder by `result_folder`, as fit.
-AS_OTHERS = {"lot"}
+# These take longer: they write a file as check --json does, or a folder as fit does.
+AS_OTHERS = {"lot", "report", "verify", "evaluate", "build", "compare", "diagnose"}
 
 
-@pytest.fixture(params=quick_and_slow([name for name in COMMANDS if name not in SLOW], SLOW))
+@pytest.fixture(params=COMMANDS)
 def command(request: pytest.FixtureRequest) -> tuple[str, ...]:
     found: tuple[str, ...] = COMMANDS[request.param]
     return found

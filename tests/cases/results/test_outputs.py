@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import HOST, Command, quick_and_slow
+from conftest import HOST, Command
 from gyrotc.cli import main
 from gyrotc.common import GyrotcError, InputError
 from gyrotc.results import (
@@ -525,7 +525,7 @@ def test_a_closed_pipe_is_reported_as_shells_expect(made: Path) -> None:
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, "")
 
 
-@pytest.mark.parametrize("number", quick_and_slow([signal.SIGTERM], [signal.SIGINT, signal.SIGHUP]))
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_cleans_up_and_ends_as_shells_expect(number: signal.Signals, made: Path, tmp_path: Path) -> None:
     """While it waits for a compiler, which says that it was started and then never ends."""
     tools, started, place = tmp_path / "tools", tmp_path / "started", tmp_path / "place"

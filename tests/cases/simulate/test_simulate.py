@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -338,19 +337,6 @@ def test_allantools_finds_the_declared_noise_in_a_recording(tmp_path: Path) -> N
     assert np.sqrt(np.mean(np.square(found), axis=0))[:4] == pytest.approx(expected[:4], rel=0.15)
     assert np.sqrt(np.mean(np.square(found), axis=0))[4] == pytest.approx(expected[4], rel=0.5)
     assert (quantum > white)[0] and (white > quantum + flicker + walk)[2] and (walk > white + flicker)[4]
-
-
-@pytest.mark.slow
-def test_the_memory_does_not_grow_with_the_rows(short: Path, tmp_path: Path) -> None:
-    """2.4 million rows a run in less than 80 MB; held at once they would take some 200."""
-    tracemalloc.start()
-    try:
-        made(short, tmp_path / "data", raw_hz=2000.0, format="parquet")
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert load(tmp_path / "data").runs[0].row_period_s == pytest.approx(5e-4)
-    assert peak < 80e6
 
 
 def test_class_noise_is_that_of_an_ordinary_unit() -> None:

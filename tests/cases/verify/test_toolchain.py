@@ -224,7 +224,7 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
     assert _asked(source, tmp_path) == sound and compiled.count == 3 + len(spoiled), "others may write there"
 
 
-@pytest.mark.parametrize("name", ["host-gcc-O2", pytest.param("cortex-m4f", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["host-gcc-O2"])
 def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, compiled: _Compiled) -> None:
     target = all_targets()[name]
     require(target.missing())

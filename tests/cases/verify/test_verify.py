@@ -38,25 +38,6 @@ def copy(whole: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole, tmp_path / "copy"))
 
 
-@pytest.mark.slow
-def test_every_target_of_the_common_tools_agrees_in_every_bit(whole: Path) -> None:
-    """Two byte orders, two word lengths, hardware, software and double evaluation of float."""
-    names = ["cortex-m0", "cortex-m4f", "s390x", *(n for n in all_targets() if n.startswith("host-"))]
-    result = verify(whole, targets=names).content()
-    assert result["failed"] == 0 and result["missing"] == 0
-    for entry in result["targets"]:
-        assert (entry["status"], entry["mismatches"]) == ("pass", 0), entry
-        assert entry["vectors"] >= 20000
-        assert entry["ram_bytes"] == 0
-        assert entry["code_bytes"] > 0  # how many is the compiler's decision: clang 14 at -O3 makes 68,042 on a host
-    for name in ("cortex-m0", "cortex-m4f"):
-        for entry in (e for e in result["targets"] if e["name"] == name):
-            cost = entry["instructions"]
-            assert 0 < cost["min"] <= cost["mean"] <= cost["max"]
-            assert entry["stack_bytes"] > 0
-    assert result["worst_error_dph"]["value"] <= result["error_bound_dph"]
-
-
 def test_a_flipped_bit_of_the_table_fails(copy: Path) -> None:
     flip(next((copy / "c").glob("gtc_rlg_0042.c")), r"\.crc = 0x([0-9a-f]{8})")
     for entry in entries(copy, FAST).values():
@@ -78,7 +59,6 @@ def test_a_flipped_bit_of_a_weight_fails(copy: Path) -> None:
     assert entry["status"] == "fail" and entry["mismatches"] >= 1
 
 
-@pytest.mark.slow
 def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
     flip(copy / "c" / "vectors_rlg_0042.h", r"VECTORS_SEED 0x([0-9a-f]{8})UL", bit=7)
     for entry in entries(copy, FAST).values():
@@ -92,7 +72,6 @@ def test_a_flipped_bit_of_the_emitted_answers_fails(copy: Path) -> None:
     assert [e["mismatches"] for e in result["emitted"] if e["status"] == "fail"] == [1]
 
 
-@pytest.mark.slow
 def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     path = copy / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())
@@ -103,7 +82,6 @@ def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     assert {e["file"]: e["mismatches"] for e in result["emitted"]}[path.name] == 1
 
 
-@pytest.mark.slow
 def test_a_flipped_bit_of_the_reference_fails(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*arguments: Any) -> dict[str, np.ndarray]:
         words = {numeric: rows.copy() for numeric, rows in expected_answers(*arguments).items()}
@@ -129,7 +107,6 @@ def test_code_that_does_not_compile_is_no_pass(copy: Path) -> None:
         assert entry["status"] == "fail" and "nonsense" in entry["error"]
 
 
-@pytest.mark.slow
 def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
     whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,7 +122,6 @@ def test_a_missing_default_target_is_listed_and_a_missing_named_one_fails(
         assert (result["failed"] > 0) == bool(failed)
 
 
-@pytest.mark.slow
 def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path: Path) -> None:
     """Host, emulated board, the other byte order; a wrong constant of the front end is seen in the rows."""
     names = [FAST, "cortex-m4f", "s390x"]
@@ -247,7 +223,6 @@ def test_log_that_is_damaged_cut_off_or_foreign_is_refused(copy: Path) -> None:
         verify(copy, log=copy / "absent.log")
 
 
-@pytest.mark.slow
 def test_groups_of_a_crc_log_are_compared_each(whole: Path, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(whole, tmp_path / "copy"))
     everything = {p.numeric: p for p in read_output(_board_output(folder))}
@@ -392,8 +367,7 @@ def test_the_example_may_be_edited_and_not_be_missing(copy: Path, gyrotc: Comman
     assert _wrong(copy) == {"main.c": "missing"}
 
 
-@pytest.mark.slow
-def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path, gyrotc: Command) -> None:
+def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path) -> None:
     unit, model = tmp_path / "unit", load_model(GOLDEN)
     models = {axis: model.model_copy(update={"axis": axis}) for axis in "xy"}
     sources = {}
@@ -404,17 +378,16 @@ def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path, gy
     for name, data in joint_texts(models, sources, "f32").items():
         (unit / "c" / name).write_bytes(data)
     assert axes_in(unit) == ("x", "y") and axes_in(unit / "x") == ()
-    assert gyrotc("verify", unit, "--target", "host-gcc-O2").returncode == 0
-    assert json.loads((unit / "verify.json").read_text())["failed"] == 0
     results = {axis: verify(unit / axis, compiled=False) for axis in "xy"}
-    for file in sorted((unit / "c").iterdir()):
+    assert verify_axes(unit, results).failed == 0
+    for file in sorted(path for path in (unit / "c").iterdir() if path.name != "main.c"):  # is the user's to edit
         right = file.read_bytes()
         file.write_bytes(right[:-1] + b" ")
         result = verify_axes(unit, results).content()
         assert [e["file"] for e in result["emitted"] if e["status"] == "fail"] == [file.name]
         file.write_bytes(right)
     (unit / "x" / "c" / "gtc.h").unlink()
-    assert gyrotc("verify", unit, "--target", "host-gcc-O2").returncode == 1
+    assert verify_axes(unit, {axis: verify(unit / axis, compiled=False) for axis in "xy"}).failed > 0
 
 
 def test_options_stand_in_the_record_and_not_in_a_comment(copy: Path) -> None:

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 from typing import Any, get_args
 
 import pytest
-from conftest import Command, invoked, on_terminal, quick_and_slow
+from conftest import Command, invoked, on_terminal
 from emitted import emitted
 from gyrotc.cli import progress as stage_module
 from gyrotc.cli.application import GROUPS, INSTEAD
@@ -128,7 +128,6 @@ COMMANDS = {
     "verify": ("verify", "made"),
     "emit": ("emit", "made", "--out", "out"),
 }
-_QUICK = ("fit", "fleet", "verify")
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +139,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", quick_and_slow(_QUICK, [name for name in COMMANDS if name not in _QUICK]))
+@pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c_is_one_line_and_leaves_nothing(name: str, desk: Path) -> None:
     """At a moment drawn within the first second and a half: imports, work, or its end."""
     seed = random.SystemRandom().randrange(10**6)

@@ -143,7 +143,6 @@ def test_the_extended_simulation_does_what_the_plain_one_does_not(built: Path) -
     assert all(d["extended"]["p_value"] > 0.01 for d in rare), "the extended one does not"
 
 
-@pytest.mark.slow
 def test_the_truth_is_not_looked_at(built: Path, tmp_path: Path, gyrotc: Command) -> None:
     """Without truth.json and truth/ the same result, but for the names of the files."""
     blind = tmp_path / "blind"

@@ -148,7 +148,6 @@ def test_the_page_of_a_gyro_is_drawn_when_it_is_asked_for(fleet: Path, gyrotc: C
     assert "RLG-1" in (fleet / "RLG-1" / "report.html").read_text()
 
 
-@pytest.mark.slow
 def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyrotc: Command) -> None:
     """What the reference says that the C code does is what the C code does."""
     fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
@@ -161,7 +160,6 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
         assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-@pytest.mark.slow
 def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     gyro(tmp_path / "a" / "RLG-1", "RLG-1")
     rows = columns(360)
@@ -191,7 +189,6 @@ def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
 def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         gyro(tmp_path / "d" / name, "RLG-1")
@@ -200,7 +197,6 @@ def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     assert "serial RLG-1 is also that of another" in (entries[0].reason or "")
 
 
-@pytest.mark.slow
 def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) -> None:
     for k in range(4):
         gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
@@ -219,7 +215,7 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("done (done before)") >= 2
     assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
-        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html",
+        *(f"RLG-{k}" for k in range(4)), "fleet.json", "fleet.csv", "fleet.html", "runtime",
     }  # fmt: skip
 
 
@@ -246,7 +242,6 @@ def test_no_file_of_the_summary_outlives_what_it_says(
     assert "unfinished" in (out / "fleet.html").read_text()
 
 
-@pytest.mark.slow
 def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(tmp_path: Path) -> None:
     """Also beside a result whose gyro is no longer in the manifest; locks of others stay."""
     for k in (1, 2):
@@ -314,7 +309,6 @@ def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command, mo
     assert done.returncode == 2 and "Dask is not installed" in done.stderr
 
 
-@pytest.mark.slow
 def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:
     """Before: such a fleet passed without a word."""
     for k in (1, 2):

@@ -6,9 +6,7 @@ import csv
 import ctypes
 import json
 import os
-import random
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -21,14 +19,12 @@ import pytest
 from gyrotc.assess import load_limits
 from gyrotc.common import InputError
 from gyrotc.fleet import SUMMARY, Fleet, Task, Unit, do_unit, load_manifest, run, run_fleet
-from gyrotc.fleet import run as pool
 from gyrotc.fleet import unit as units
-from gyrotc.results import MARKER, FleetEntry, held, input_hashes, program_of, result_faults
+from gyrotc.results import MARKER, FleetEntry, held, input_hashes, program_of
 from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
-KILLS = int(os.environ.get("GYROTC_KILLS", "3"))
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
 
 
@@ -304,25 +300,6 @@ def test_wrong_types_in_a_manifest_are_refused(line: str, tmp_path: Path) -> Non
         load_manifest(tmp_path / "fleet.toml")
 
 
-def _dies(task: Any) -> FleetEntry:
-    """Stands in for a job: of those in `dying` the process is killed, as by a system out of memory."""
-    if task.unit.name in task.fleet.numerics:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return FleetEntry(name=task.unit.name, axis=None, status="done")
-
-
-@pytest.mark.slow
-def test_killed_processes_concern_their_units_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "do_unit", _dies)
-    units = tuple(Unit(tmp_path / f"RLG-{k}", None) for k in range(4))
-    fleet = Fleet(units, FitOptions(), ("RLG-1",), None)
-    entries = run_fleet(fleet, tmp_path / "out", jobs=1)
-    assert [entry.name for entry in entries] == [unit.name for unit in units]
-    died = {entry.name for entry in entries if "its process died" in (entry.reason or "")}
-    assert died == {"RLG-1"}
-    assert sum(entry.status == "done" for entry in entries) == 3
-
-
 def test_a_summary_never_speaks_of_what_is_being_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fleet that is stopped anywhere leaves a summary that says so."""
     for k in range(2):
@@ -374,45 +351,3 @@ def test_no_process_outlives_its_fleet(tmp_path: Path) -> None:
     while any(_alive(pid) for pid in children):
         assert time.monotonic() < end, "a process goes on writing for a fleet that is gone"
         time.sleep(0.05)
-
-
-def _agrees(out: Path) -> int:
-    """Every unit is whole, and what the summary says of a gyro as done is what lies in its folder; how many are."""
-    for folder in out.glob("RLG-*"):
-        assert result_faults(folder) == [], folder
-    if not (out / "fleet.json").exists():
-        return 0
-    summary = json.loads((out / "fleet.json").read_text())
-    done = [entry for entry in summary["serials"] if entry["status"] == "done"]
-    for entry in done:
-        kept = json.loads((out / entry["name"] / "entry.json").read_text())
-        assert {name: kept[name] for name in entry} == entry
-    return len(done)
-
-
-@pytest.mark.slow
-def test_a_fleet_killed_at_random_times(tmp_path: Path) -> None:
-    """Everything in its process group is killed: of each gyro the earlier result or the new one, and nothing else."""
-    seed = random.SystemRandom().randrange(10**6)
-    print(f"seed {seed}")
-    draw = random.Random(seed)
-    out = tmp_path / "out"
-    command = [PROGRAM, "fleet", tmp_path / "d", "--out", out, "--jobs", "2"]
-    for k in range(3):
-        gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
-    begun = time.monotonic()
-    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
-    length_s = time.monotonic() - begun
-    assert _agrees(out) == 3
-    for kill in range(KILLS):
-        for k in range(3):
-            gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=10 * kill + k + 10)
-        job = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-        time.sleep(draw.uniform(0.3, 1.0) * length_s)
-        os.killpg(job.pid, draw.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))
-        job.wait()
-        _agrees(out)
-    assert subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode == 0
-    assert _agrees(out) == 3
-    assert {p.name for p in out.iterdir()} == {*(f"RLG-{k}" for k in range(3)), *SUMMARY}
-    assert {p.name for p in tmp_path.iterdir()} == {"d", "out"}

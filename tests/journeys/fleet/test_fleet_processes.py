@@ -49,7 +49,6 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
     import distributed
 
@@ -77,7 +76,6 @@ def _dies_once(task: Task) -> FleetEntry:
     return do_unit(task)
 
 
-@pytest.mark.slow
 def test_a_unit_whose_process_is_killed_is_done_again(
     lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

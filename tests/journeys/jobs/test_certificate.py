@@ -10,12 +10,12 @@ from xml.etree import ElementTree
 import pytest
 from gyrotc.assess import load_limits
 from gyrotc.common import InputError
-from gyrotc.jobs import build_into, certificate, laboratory_facts, missing_facts
+from gyrotc.jobs import certificate, laboratory_facts, missing_facts
 from gyrotc.pages import certificate as printing
 from gyrotc.pages import digits_of, unit_in
 from gyrotc.recordings import load
-from gyrotc.results import Manifest, read_result, result_folder
-from gyrotc.train import FitOptions
+from gyrotc.results import Manifest, read_result
+from jobs import built_for_fleet
 from recordings import columns, toml, write_csv
 
 REASON = "kept for a test bench"
@@ -61,10 +61,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (data / "dataset.toml").write_text(toml('file = "run-01.csv"', head=head))
     (folder / "limits.toml").write_text(LIMITS)
     (folder / "facts.toml").write_text(FACTS)
-    with result_folder(out, "build") as stage:
-        stage.of("RLG-1")
-        limits = load_limits(folder / "limits.toml")
-        build_into(stage.folder, load(data), FitOptions(), limits=limits)
+    built_for_fleet(out, load(data), limits=load_limits(folder / "limits.toml"))
     return out
 
 

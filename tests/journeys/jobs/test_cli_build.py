@@ -135,7 +135,6 @@ def test_report_alone_gives_the_same_page(demo: Path, gyrotc: Command) -> None:
 
 
 @pytest.mark.measured("mpu6000-chamber-cycle")
-@pytest.mark.slow
 def test_a_real_chamber_cycle_builds_a_constant_and_says_why(tmp_path: Path, gyrotc: Command) -> None:
     done = gyrotc("build", MEASURED / "mpu6000-chamber-cycle", "--axis", "z", *HOST, "--out", tmp_path / "r")
     assert done.returncode == 0, done.stderr
@@ -176,7 +175,6 @@ def _three_axes(source: Path, folder: Path) -> None:
         np.savetxt(folder / name, np.stack(columns, axis=1), fmt="%.9g", delimiter=",", header=header, comments="")
 
 
-@pytest.mark.slow
 def test_all_axes_share_one_runtime_and_run_in_one_image(demo: Path, tmp_path: Path, gyrotc: Command) -> None:
     _three_axes(demo / "data", tmp_path / "triad")
     done = gyrotc("build", tmp_path / "triad", *HOST, "--out", tmp_path / "r")
@@ -353,7 +351,6 @@ def test_units_and_columns_are_not_guessed() -> None:
         gyrotc.Dataset.from_pandas(frame(1), rate_unit="furlong")
 
 
-@pytest.mark.slow
 def test_build_gives_what_the_command_gives(tmp_path: Path) -> None:
     rows = columns(720)
     write_csv(tmp_path / "RLG-1" / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})

@@ -89,7 +89,6 @@ def test_header_and_report_show_the_lot(world: Path) -> None:
         run_here("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
 
 
-@pytest.mark.slow
 def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> None:
     data, out = world / "few", world / "few-out"
     data.mkdir()

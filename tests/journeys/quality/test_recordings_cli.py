@@ -27,7 +27,6 @@ def test_check_accepts(case: str, tmp_path: Path, gyrotc: Command) -> None:
     assert len(result["runs"]) >= 1
 
 
-@pytest.mark.slow
 def test_a_refused_build_leaves_an_older_result_alone(tmp_path: Path, gyrotc: Command) -> None:
     described(tmp_path / "RLG-1")
     small = columns() | {"rate_dph": columns()["rate_dph"] - 20.0}

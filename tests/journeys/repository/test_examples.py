@@ -49,7 +49,6 @@ def test_every_example_is_on_the_page() -> None:
     assert sorted(listed) == sorted(p.name for p in EXAMPLES.iterdir() if p.is_dir() and (p / "README.md").exists())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["filter", "many_serials", "minimal", "rtos", "triad", "two_slots"])
 def test_the_commands_of_a_page_run_and_leave_nothing_to_be_tracked(
     name: str, gyros: dict[str, Path], tmp_path: Path
@@ -69,7 +68,6 @@ def test_the_commands_of_a_page_run_and_leave_nothing_to_be_tracked(
     assert _run("git", "ls-files", "--others", "--exclude-standard", cwd=tmp_path) == ""
 
 
-@pytest.mark.slow
 def test_triad_compensates_each_axis_by_its_own_table(tmp_path: Path) -> None:
     folder = tmp_path / "examples" / "triad"
     shutil.copytree(EXAMPLES / "triad", folder)
@@ -146,7 +144,6 @@ def test_a_filter_in_cpp_integrates_the_corrected_rate(tmp_path: Path) -> None:
     assert abs(float(found[1]) - 0.01 / 6.0) < 1e-5 and float(found[2]) >= 1e-6 / 6.0
 
 
-@pytest.mark.slow
 def test_the_notebook_builds_a_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its cells in order, as Jupyter runs them, and what it would show of the last line of each."""
     monkeypatch.chdir(tmp_path)

@@ -52,7 +52,7 @@ def placed(found: list[Change], order: list[int], clocks: list[float]) -> list[t
     return sorted((order[one.run], one.kind, round(one.time_s[0] - clocks[one.run], 1)) for one in found)
 
 
-@examples(12)
+@examples(8)
 @given(shorts=shorts, row_s=st.sampled_from([10.0, 60.0]), clock_s=clocks_s, data=st.data())
 def test_a_step_of_a_long_run_is_found_beside_any_other_runs(
     shorts: list[tuple[float, float, float]], row_s: float, clock_s: float, data: st.DataObject
@@ -70,7 +70,7 @@ def test_a_step_of_a_long_run_is_found_beside_any_other_runs(
     assert step.size[1] <= 1.1 * STEP_DPH and step.size[2] >= 0.9 * STEP_DPH
 
 
-@examples(6)
+@examples(4)
 @given(shorts=shorts, data=st.data())
 def test_order_and_clocks_move_no_change(shorts: list[tuple[float, float, float]], data: st.DataObject) -> None:
     rng = np.random.default_rng(SEED)

@@ -26,7 +26,7 @@ def _expected(stream: Stream) -> Any:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(80)
+@examples(60)
 @given(data=st.data())
 def test_reference_and_c_agree_bit_for_bit_on_any_stream(numeric: Numeric, data: st.DataObject) -> None:
     """In every return value, correction, uncertainty and age; no intermediate number leaves its range."""
@@ -45,7 +45,7 @@ def test_reference_and_c_agree_bit_for_bit_on_any_stream(numeric: Numeric, data:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(40)
+@examples(30)
 @given(data=st.data())
 def test_no_correction_exceeds_the_authority_of_its_table(numeric: Numeric, data: st.DataObject) -> None:
     """Also for words that are no readings of a sensor: infinities, NaN of any payload, the largest numbers."""
@@ -62,7 +62,7 @@ def test_no_correction_exceeds_the_authority_of_its_table(numeric: Numeric, data
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(40)
+@examples(30)
 @given(data=st.data())
 def test_a_state_that_is_saved_and_restored_anywhere_goes_on_as_if_nothing_had_happened(
     numeric: Numeric, data: st.DataObject
@@ -85,7 +85,7 @@ def test_a_state_that_is_saved_and_restored_anywhere_goes_on_as_if_nothing_had_h
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(30)
+@examples(22)
 @given(data=st.data())
 def test_losses_that_are_reported_in_parts_are_one_loss(numeric: Numeric, data: st.DataObject) -> None:
     """The host may report a time without readings at once or in two calls."""
@@ -109,7 +109,7 @@ def test_losses_that_are_reported_in_parts_are_one_loss(numeric: Numeric, data: 
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(40)
+@examples(30)
 @given(data=st.data())
 def test_a_history_that_is_read_in_parts_is_the_whole_history(numeric: Numeric, data: st.DataObject) -> None:
     stream = data.draw(streams(numeric))
@@ -125,7 +125,7 @@ def test_a_history_that_is_read_in_parts_is_the_whole_history(numeric: Numeric, 
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-@examples(60)
+@examples(45)
 @given(data=st.data())
 def test_a_table_is_within_its_stated_bound_of_the_model(numeric: Numeric, data: st.DataObject) -> None:
     """For any input, within the envelope and beyond it, at centers of Gaussians and at edges of regions."""

@@ -6,8 +6,6 @@ import contextlib
 import hashlib
 import json
 import random
-import subprocess
-import sys
 import weakref
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
@@ -15,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
 from drawn import examples
@@ -414,31 +411,6 @@ def test_a_channel_that_not_every_run_has_is_left_out_and_reported(tmp_path: Pat
 
 
 # ---- size ----
-
-
-@pytest.mark.slow
-def test_six_recordings_of_100_hz_need_less_than_half_a_gibibyte(tmp_path: Path) -> None:
-    n = 2_880_000
-    folder = tmp_path / "RLG-1"
-    folder.mkdir()
-    time = np.arange(n) * 0.01
-    temperature = np.round(20.0 + 40.0 * np.sin(time / 3000.0), 4)
-    rng = np.random.default_rng(3)
-    for index in range(6):  # of other rates: equal files would be one run
-        rate = np.round(rng.normal(0.007, 0.06, n), 6)
-        table = pa.table({"time_s": np.round(time, 2), "temperature_c": temperature, "rate_dph": rate})
-        pacsv.write_csv(table, folder / f"{index}.csv")
-    program = (
-        "import sys; from pathlib import Path; from gyrotc.recordings.loading import load\n"
-        "rows = sum(len(run.rows()) for run in load(Path(sys.argv[1])).runs)\n"
-        "peak = Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]\n"
-        "print(rows, peak)"
-    )
-    # A fresh process, and the mark of its own memory: ru_maxrss would count this process's before exec.
-    done = subprocess.run([sys.executable, "-c", program, str(folder)], capture_output=True, text=True, check=True)
-    rows, peak_kib = map(int, done.stdout.split())
-    assert rows == 6 * n
-    assert peak_kib < 512 * 1024
 
 
 @pytest.mark.parametrize("case", ACCEPTED)

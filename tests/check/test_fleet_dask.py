@@ -21,7 +21,7 @@ import pytest
 from conftest import ROOT, Command, on_terminal
 from gyrotc.fleet import Cluster, load_manifest, run_fleet
 from gyrotc.fleet import run as running
-from gyrotc.results import MARKER, FleetEntry
+from gyrotc.results import FleetEntry
 from recordings import columns, toml, write_csv
 
 SERIALS = ("RLG-1", "RLG-2", "RLG-3")
@@ -254,84 +254,18 @@ class Held:
         return status, [unit["status"] for unit in units], said
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("killed", ["worker", "worker of a nanny", "nanny"])
-def test_a_gyro_whose_worker_is_killed_is_done_by_another(
-    world: Path, alone: Dask, tmp_path: Path, killed: str
-) -> None:
+def test_a_gyro_whose_worker_is_killed_is_done_by_another(world: Path, alone: Dask, tmp_path: Path) -> None:
     held = Held(world, tmp_path)
     for name in WORKERS:
-        alone.worker(name, "--no-nanny" if killed == "worker" else "--nanny", preload=held.preload)
+        alone.worker(name, "--no-nanny", preload=held.preload)
     held.start(alone.address)
     held.wait_until(lambda: len(held.begun()) == 2)
-    if killed == "nanny":
-        alone.kill(WORKERS[0])
-    else:
-        os.kill(held.begun()[0], signal.SIGKILL)
+    os.kill(held.begun()[0], signal.SIGKILL)
     held.let_go()
     status, states, said = held.end()
     assert status == 0 and states == ["done"] * 3, said
 
 
-@pytest.mark.slow
-def test_what_is_done_is_not_done_again_when_its_worker_is_killed(world: Path, alone: Dask, tmp_path: Path) -> None:
-    held = Held(world, tmp_path, held=SERIALS[1:])
-    alone.worker("anna", "--no-nanny", preload=held.preload)
-    held.start(alone.address)
-    held.wait_until(lambda: held.begun("RLG-2"))
-    alone.worker("bert", "--no-nanny", preload=held.preload)
-    alone.kill("anna")
-    held.let_go()
-    status, states, said = held.end()
-    assert status == 0 and states == ["done"] * 3, said
-    assert len(held.begun("RLG-1")) == 1 and len(held.begun("RLG-2")) == 2
-
-
-@pytest.mark.slow
-def test_with_three_workers_killed_every_table_is_the_one_made_here(
-    world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
-) -> None:
-    names = [f"RLG-{k:04d}" for k in range(MANY)]
-    for seed, name in enumerate(names, 100):
-        gyro(tmp_path / "lab" / name, name, seed=seed)
-    held = Held(world, tmp_path, held=(), lab=tmp_path / "lab")
-    for worker in WORKERS:
-        alone.worker(worker, "--nanny", preload=held.preload)
-    held.start(alone.address)
-    for kill in (1, 2, 3):  # each with another gyro: one that costs three workers has failed
-        victim = names[kill * len(names) // 4]
-        held.wait_until(lambda victim=victim: held.begun(victim))
-        os.kill(held.begun(victim)[-1], signal.SIGKILL)
-    status, states, said = held.end()
-    assert status == 0 and states == ["done"] * len(names), said
-    assert len(set(held.begun())) >= len(WORKERS) + 2  # processes: those killed, and those that came for them
-    done = gyrotc("fleet", held.lab, "--out", tmp_path / "here")
-    assert done.returncode == 0, done.stdout + done.stderr
-    tables = [[_tables(place / name) for place in (held.out, tmp_path / "here")] for name in names]
-    for name, (made, here) in zip(names, tables, strict=True):
-        assert len(here) > 5 and made == here, name
-
-
-def _tables(unit: Path) -> dict[str, bytes]:
-    """The model and every emitted file."""
-    return {path.name: path.read_bytes() for path in [unit / "model.json", *(unit / "c").iterdir()]}
-
-
-@pytest.mark.slow
-def test_a_gyro_that_costs_three_workers_has_failed_and_the_others_are_done(
-    world: Path, alone: Dask, tmp_path: Path
-) -> None:
-    held = Held(world, tmp_path, held=(), deadly="RLG-2")
-    for name in WORKERS:
-        alone.worker(name, "--nanny", preload=held.preload)
-    held.start(alone.address)
-    status, states, said = held.end()
-    assert status == 1 and states == ["done", "failed", "done"], said
-    assert "RLG-2: failed; 3 workers died with it, the last one " in said
-    assert len(held.begun("RLG-2")) == 3
-
-
-@pytest.mark.slow
 def test_what_a_lost_scheduler_leaves_is_unfinished_and_done_by_the_next_call(
     world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
 ) -> None:
@@ -349,34 +283,6 @@ def test_what_a_lost_scheduler_leaves_is_unfinished_and_done_by_the_next_call(
     assert done.returncode == 0 and "RLG-1: done (done before)" in done.stdout
 
 
-@pytest.mark.slow
-def test_what_is_left_when_all_workers_are_lost_is_unfinished(world: Path, alone: Dask, tmp_path: Path) -> None:
-    held = Held(world, tmp_path, held=SERIALS[1:])
-    alone.worker("anna", "--no-nanny", preload=held.preload)
-    held.start(alone.address, "--wait", "1")
-    held.wait_until(lambda: held.begun("RLG-2") and "RLG-1: done" in held.said())
-    alone.kill("anna")
-    status, states, said = held.end()
-    assert status == 1 and states == ["done", "unfinished", "unfinished"], said
-    assert f"waiting for a worker of {alone.address}" in said
-    assert f"RLG-3: unfinished; {alone.address}: no worker in 1 s; give the command again" in said
-
-
-@pytest.mark.slow
-def test_a_fleet_whose_client_was_killed_goes_on(world: Path, alone: Dask, tmp_path: Path, gyrotc: Command) -> None:
-    held = Held(world, tmp_path)
-    alone.worker("anna", "--no-nanny", preload=held.preload)  # one, so that no gyro is begun twice at a time
-    held.start(alone.address)
-    held.wait_until(held.begun)
-    held.client.kill()
-    held.client.wait()
-    held.let_go()
-    done = gyrotc("fleet", held.lab, "--out", held.out, "--scheduler", alone.address)
-    assert done.returncode == 0 and "3 of 3 done, 0 failed" in done.stdout, done.stdout + done.stderr
-    assert [path.name for path in held.out.iterdir() if path.name.startswith(".")] == [MARKER]
-
-
-@pytest.mark.slow
 def test_a_worker_with_another_gyrotc_refuses_with_both_versions(world: Path, alone: Dask, tmp_path: Path) -> None:
     older = 'from gyrotc.fleet import unit\nunit.__version__, unit.program_of = "0.0.1", lambda: 64 * "0"\n'
     alone.worker("anna", "--no-nanny", preload=older)
@@ -388,22 +294,6 @@ def test_a_worker_with_another_gyrotc_refuses_with_both_versions(world: Path, al
         assert f"worker anna: is 0.0.1 ({16 * '0'}), and {task.version} ({task.program[:16]})" in (entry.reason or "")
 
 
-@pytest.mark.slow
-def test_on_a_full_disk_a_gyro_fails_and_leaves_nothing(
-    world: Path, alone: Dask, tmp_path: Path, gyrotc: Command
-) -> None:
-    """A process that may write no file above 20 kB stands for the disk."""
-    full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))\n"
-    alone.worker("anna", "--no-nanny", preload=full)
-    fleet = ("fleet", world / "lab" / "few", "--out", tmp_path / "out")
-    done = gyrotc(*fleet, "--scheduler", alone.address)
-    assert done.returncode == 1 and done.stdout.count("File too large") == 3, done.stdout + done.stderr
-    assert not list((tmp_path / "out").glob("*RLG*"))
-    done = gyrotc(*fleet)
-    assert done.returncode == 0 and "3 of 3 done" in done.stdout
-
-
-@pytest.mark.slow
 def test_every_command_of_the_page_runs(world: Path, alone: Dask, tmp_path: Path, gyrotc: Command) -> None:
     text = (ROOT / "docs" / "fleet.md").read_text("utf-8")
     for words, here in (
@@ -418,11 +308,11 @@ def test_every_command_of_the_page_runs(world: Path, alone: Dask, tmp_path: Path
     for program, command, *words in commands:
         if command == "worker":
             alone.start("workers", [program, command, *words])
-        if program != "gyrotc":  # the scheduler has been started with a port of its own
+        if (program, command) != ("gyrotc", "fleet"):  # the scheduler has been started with a port of its own
             continue
         shutil.rmtree(tmp_path / "fleet", ignore_errors=True)
         done = gyrotc(command, *words, cwd=tmp_path)
         assert done.returncode == 0, (command, words, done.stdout, done.stderr)
         assert "3 of 3 done" in done.stdout
     found = [" ".join(words[:2]) for words in commands]
-    assert set(found) == {"dask scheduler", "dask worker", "gyrotc fleet"}
+    assert set(found) >= {"dask scheduler", "dask worker", "gyrotc fleet"}

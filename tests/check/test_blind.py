@@ -14,13 +14,11 @@ from pathlib import Path
 import pytest
 from scipy.stats import binom
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 
 from tests.blind.grade import alarmed, family_right, wrong_family  # noqa: E402
 from tests.blind.run import Plan, run  # noqa: E402
 from tests.blind.table import text  # noqa: E402
-
-pytestmark = pytest.mark.slow
 
 RECORDS = 40
 CHANCE = 2e-5  # of one of five checks

@@ -38,7 +38,6 @@ def unpacked(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / TOP
 
 
-@pytest.mark.slow
 def test_made_twice_it_is_the_same(archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     assert archives.sdist(tmp_path).read_bytes() == archive.read_bytes()
@@ -47,7 +46,6 @@ def test_made_twice_it_is_the_same(archive: Path, tmp_path: Path, monkeypatch: p
     assert gzip.decompress(archive.read_bytes()) and archive.read_bytes()[4:8] == b"\0\0\0\0"
 
 
-@pytest.mark.slow
 def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unpacked: Path) -> None:
     tracked = subprocess.run(
         ["git", "ls-files", "gen", "include", "libc"], cwd=ROOT, capture_output=True, text=True, check=False
@@ -65,7 +63,6 @@ def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unp
     assert not [p for p in unpacked.rglob("*") if p.suffix in (".so", ".pyc")]
 
 
-@pytest.mark.slow
 def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp_path: Path) -> None:
     """Without the sources beside it: it finds the runtime that it carries."""
     program = (
@@ -89,7 +86,6 @@ def test_the_unpacked_generator_emits_the_golden_files_alone(unpacked: Path, tmp
         assert (tmp_path / "out" / "c" / name).read_bytes() == (model.parent / name).read_bytes()
 
 
-@pytest.mark.slow
 def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
     generator, c = (json.loads(path.read_text("utf-8")) for path in archives.sboms(tmp_path))
     for bom in (generator, c):
@@ -115,7 +111,6 @@ def test_bills_of_materials_name_what_is_needed(tmp_path: Path) -> None:
         assert component["hashes"][0]["content"] == hashlib.sha256(content).hexdigest()
 
 
-@pytest.mark.slow
 def test_every_file_has_a_licence_that_lies_in_licenses() -> None:
     """REUSE: one rule for all; the text of the licence it names is there. `reuse lint` says the rest."""
     rules = (ROOT / "REUSE.toml").read_text("utf-8")
@@ -164,7 +159,6 @@ def clone(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_from_tag_to_archives(clone: Path) -> None:
     """Prepared where nothing is set up yet; archives of the tag, packages by the tag's own generator."""
     reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
@@ -199,7 +193,6 @@ def test_from_tag_to_archives(clone: Path) -> None:
     assert "there is a tag v0.2.0 already" in _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "why"),
     [
@@ -214,21 +207,18 @@ def test_what_is_no_release_is_refused(clone: Path, words: tuple[str, ...], why:
     assert why in _run("tools/release.sh", *words, cwd=clone, status=2)
 
 
-@pytest.mark.slow
 def test_archives_need_what_make_setup_makes_and_say_so(clone: Path) -> None:
     _run("git", "tag", "v9.9.9", cwd=clone)
     reported = _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2, python="")
     assert "there is no .venv here: make setup" in reported
 
 
-@pytest.mark.slow
 def test_a_tag_of_another_version_is_refused(clone: Path) -> None:
     _run("git", "tag", "v9.9.9", cwd=clone)
     assert "holds another version" in _run("tools/release.sh", "archive", "v9.9.9", cwd=clone, status=2)
     assert not (clone / "build" / "release").exists()
 
 
-@pytest.mark.slow
 def test_pip_from_the_sources_carries_runtime_and_licences(tmp_path: Path) -> None:
     """As `pip install ./gen`, or from git with `#subdirectory=gen`, builds it: a wheel that can emit."""
     made = tmp_path / "made"

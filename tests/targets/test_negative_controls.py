@@ -19,8 +19,6 @@ from jobs import job_of
 from libc_build import UNGUARDED
 from models import bank_of, random_model, random_terms
 
-pytestmark = pytest.mark.slow
-
 SELF_TEST_FAILED = "vector 0: status fffffffd"  # GTC_E_SELF_TEST
 LAYOUT_REFUSED = "vector 0: status fffffffe"  # GTC_E_LAYOUT
 IMAGE_REFUSED = "vector 0: status fffffffc"  # GTC_E_IMAGE

@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 from conftest import HOST, MEASURED, Command
 
-pytestmark = pytest.mark.slow
-
 SETS = ("mpu6000-chamber-cycle", "mpu6050-isothermal")
 
 

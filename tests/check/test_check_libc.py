@@ -11,7 +11,7 @@ import pytest
 from emitted import spoil
 from libc_build import UNGUARDED
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 TOOL = ROOT / "tools" / "check_libc"
 sys.path.insert(0, str(TOOL))
 
