@@ -77,15 +77,15 @@ def _warm_up(a: Averages) -> float:
 def _profile(a: Averages) -> tuple[float, ...]:
     """Temperature at equal times from the start of a run, C."""
     at = np.arange(a.time_s[0], a.time_s[-1], PROFILE_S)
-    return tuple(round(float(t), 3) for t in np.interp(at, a.time_s, a.temperature_c))
+    return tuple(round(float(t), 2) for t in np.interp(at, a.time_s, a.temperature_c))
 
 
 def _series(file: str, a: Averages) -> ResidualSeries:
-    every = max(1, a.after_dph.size // _POINTS)
+    every = -(-a.after_dph.size // _POINTS)
     return ResidualSeries(
         file=file,
         time_s=tuple(float(t) for t in a.time_s[::every]),
-        rate_dph=tuple(float(r) for r in a.after_dph[::every]),
+        rate_dph=tuple(float(f"{r:.4g}") for r in a.after_dph[::every]),
     )
 
 

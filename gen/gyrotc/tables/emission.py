@@ -141,7 +141,7 @@ def emit_texts(
         emission: Its tables.
         asked: The arithmetics were asked for by name.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
-        runtime_apart: Without runtime, vectors, board test and example: these are made again where they are needed.
+        runtime_apart: Table and image alone: vectors, board test and the rest are made again where they are needed.
     """
     options = Options.model_validate(
         {
@@ -202,7 +202,8 @@ def _texts(made: _Made, options: Options) -> dict[str, bytes]:
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)
-        texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(image_of(table)).encode("ascii")
+        if options.runtime is None:
+            texts[f"gtc_{model.id}{suffix}.hex"] = _intel_hex(image_of(table)).encode("ascii")
     texts[RECORD] = record_text(model, options, texts)
     return texts
 

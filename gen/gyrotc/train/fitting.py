@@ -6,6 +6,7 @@ block, window and limits, and the refits with spans left out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -62,7 +63,9 @@ _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse 
 _COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
 # of T and of dT/dt: 80 words in a table; an odd number of slopes, so that rest has cells of its own
 _UNCERTAINTY_CELLS = (8, 5)
-_MEANS_DIGITS = 8  # of gathered means: a bias may be a million times its noise
+# Gathered means are kept to this share of their noise, and their inputs to a tenth of what sensors resolve.
+_MEANS_SHARE = 0.01
+_MEANS_C_DECIMALS, _MEANS_C_PER_MIN_DECIMALS, _MAX_DECIMALS = 3, 4, 12
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
@@ -269,18 +272,21 @@ def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
 
 
 def _means(data: TrainingData, fitted: Fit) -> MapMeans:
-    """What a lot is learnt from, in as many digits as its noise leaves."""
+    """Return what a lot is learnt from, in as many digits as its noise leaves."""
     samples = cleaned_samples(data)
     found, mean_s = means_of_unit(samples, scaling_of(samples), fitted.outcome.process)
 
-    def rounded(values: NDArray[np.float64]) -> tuple[float, ...]:
-        return tuple(float(f"{v:.{_MEANS_DIGITS}g}") for v in values)
+    resolution = max(_MEANS_SHARE * found.sigma_dph, 10.0**-_MAX_DECIMALS)  # recordings may have no noise at all
+    decimals = math.ceil(-math.log10(resolution))
+
+    def rounded(values: NDArray[np.float64], decimals: int) -> tuple[float, ...]:
+        return tuple(np.round(values, decimals).tolist())
 
     return MapMeans(
-        temperature_c=rounded(found.temperature_c),
-        slope_c_per_min=rounded(found.slope_c_per_min),
-        bias_dph=rounded(found.bias_dph),
-        count=rounded(found.count),
+        temperature_c=rounded(found.temperature_c, _MEANS_C_DECIMALS),
+        slope_c_per_min=rounded(found.slope_c_per_min, _MEANS_C_PER_MIN_DECIMALS),
+        bias_dph=rounded(found.bias_dph, decimals),
+        count=rounded(found.count, 1),
         sigma_dph=found.sigma_dph,
         mean_s=mean_s,
     )
