@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..mirror.samples import PLAUSIBLE_C
+from ..mirror.readings import PLAUSIBLE_C
 from ..model import Guard, Model
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
 

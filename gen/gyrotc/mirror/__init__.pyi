@@ -16,6 +16,7 @@ from .history import stand_in as stand_in
 from .q31 import GAUSS_ERROR as GAUSS_ERROR
 from .q31 import exp2 as exp2
 from .q31 import exp2_table as exp2_table
+from .readings import Guarded as Guarded
 from .recursions import F32 as F32
 from .recursions import FLOAT64 as FLOAT64
 from .recursions import Q31 as Q31
@@ -28,7 +29,6 @@ from .recursions import delayed as delayed
 from .recursions import first_order as first_order
 from .recursions import play as play
 from .recursions import recursion_of as recursion_of
-from .samples import Guarded as Guarded
 from .table import ARRAYS as ARRAYS
 from .table import CHANNEL_LOST as CHANNEL_LOST
 from .table import CLAMPED as CLAMPED

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..common.arrays import steps_are
 from ..common.inputs import need_memory
+from .readings import READING_HELD, READING_RESTART, Guarded, judge_readings
 from .recursions import Arithmetic, Course, NumberArray
-from .samples import READING_HELD, READING_RESTART, Guarded, judge_readings
 from .table import WARMING
 
 if TYPE_CHECKING:

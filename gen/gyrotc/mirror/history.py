@@ -27,6 +27,7 @@ from .front_end import (
     period_us,
     with_missing,
 )
+from .readings import Guarded
 from .recursions import (
     F32,
     Q31,
@@ -40,7 +41,6 @@ from .recursions import (
     TermOutcome,
     recursion_of,
 )
-from .samples import Guarded
 from .sigma import evidence_of, sigma_bits
 from .table import CHANNEL_LOST, CLAMPED, E_ARG, HELD, MISSING_Q31, UNCOVERED, Table, Words
 

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
+from ..mirror.readings import PLAUSIBLE_C
 from ..mirror.recursions import TableKind
-from ..mirror.samples import PLAUSIBLE_C
 from ..mirror.table import SERIAL_WORDS, Numeric, Words, f32_words
 from ..model import Guard, Model, Rules, Term, Uncertainty
 

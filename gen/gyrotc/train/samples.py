@@ -21,8 +21,8 @@ from ..mirror.front_end import (
     period_us,
     samples_per_block,
 )
+from ..mirror.readings import PLAUSIBLE_C, Guarded
 from ..mirror.recursions import F32
-from ..mirror.samples import PLAUSIBLE_C, Guarded
 
 if TYPE_CHECKING:
     from ..recordings.records import Rows, Run
