@@ -134,51 +134,76 @@ def test_json_has_the_statistics_of_the_recordings(demo: Path, evaluation: dict[
             assert {k: run[side][k] for k in expected_of} == pytest.approx(expected_of, rel=1e-4, abs=1e-8)
 
 
-def test_the_page_says_how_many_times_smaller_the_rms_and_the_scatter_became(demo: Path, page: str) -> None:
+def test_the_page_has_the_figures_before_with_a_constant_and_after(demo: Path, page: str) -> None:
     before, after = statistics(pooled(demo, EXAM, "rate_dph")), statistics(pooled(demo, EXAM, "remains_dph"))
-    table = table_with(page, "before ÷ after")
+    table = table_with(page, "with the table ± U")
     flat = statistics(pooled(demo, EXAM, "rate_dph") - constant_of(demo))
-    for name, key, was in (
-        ("RMS, the mean included", "rms_dph", before),
-        ("RMS that a constant leaves", "rms_dph", flat),
-        ("standard deviation about the mean", "std_dph", before),
+    for name, key in (
+        ("RMS", "rms_dph"),
+        ("standard deviation about the mean", "std_dph"),
+        ("largest magnitude", "max_abs_dph"),
     ):
         row = row_of(table, name)
-        assert digits(row[1], was[key]) and digits(row[2], after[key], share=0.06), row
-        assert not row[3] or digits(row[3], was[key] / after[key]), row
+        assert digits(row[1], before[key]) and digits(row[2], flat[key], share=0.01), row
+        assert digits(row[3], after[key], share=0.06), row
     assert digits(row_of(table, "mean")[1], before["mean_dph"])
-    assert digits(row_of(table, "largest magnitude")[1], before["max_abs_dph"])
-    assert digits(row_of(table, "largest magnitude")[2], after["max_abs_dph"], share=0.06)
-    shown = re.search(r'class="value">([^<]*)</div><div class="label">improvement against a constant</div>', page)
-    assert shown and digits(shown[1], flat["rms_dph"] / after["rms_dph"])
+    ratios = row_of(table, "RMS before ÷ RMS after: improvement")
+    assert digits(ratios[1], before["rms_dph"] / after["rms_dph"])
+    assert digits(ratios[2], flat["rms_dph"] / after["rms_dph"])
 
 
 def test_the_page_says_of_each_run_what_its_recording_gives(demo: Path, page: str, evaluation: dict[str, Any]) -> None:
     table = table_with(page, "angle in 1 h, arcsec")
     for run in evaluation["runs"]:
         own = means_of(demo, run["file"])
-        before, after = statistics(own["rate_dph"].to_numpy()), statistics(own["remains_dph"].to_numpy())
+        after = statistics(own["remains_dph"].to_numpy())
         row = row_of(table, run["file"])
+        flat = statistics(own["rate_dph"].to_numpy() - evaluation["constant_dph"])
         assert row[1] == run["role"] and int(row[3]) == len(own)
-        assert digits(row[4], before["rms_dph"]) and digits(row[5], after["rms_dph"]), row
+        assert digits(row[4], flat["rms_dph"]) and digits(row[5], after["rms_dph"]), row
         assert digits(row[6], after["std_dph"]) and digits(row[8], after["max_abs_dph"], share=0.06), row
         hours = own["remains_dph"].groupby(np.floor((own["time_s"] - own["time_s"].iloc[0]) / 3600.0 + 1e-9))
         angle = 3600.0 * hours.mean()[hours.count() >= 0.9 * 36]  # 1 deg/h is 1 arcsec/s
         assert digits(row[9], float(np.sqrt(np.mean(angle**2)))), row
 
 
-def test_the_noise_floor_is_the_allan_deviation_at_the_averaging_time(demo: Path, page: str) -> None:
-    """Of the corrected training runs; allantools gives each run's, pooled here by the number of differences."""
-    squares, weights = [], []
-    for file in RUNS[:6]:
-        remains = run_of(demo, file)["remains_dph"].to_numpy()[10:]
-        _, deviation, _, n = allantools.oadev(remains, rate=0.1, data_type="freq", taus=[AVERAGE_S])
-        squares.append(deviation[0] ** 2)
-        weights.append(n[0])
-    expected = float(np.sqrt(np.average(squares, weights=weights)))
-    table = table_with(page, "of the bias before compensation")
-    (row,) = (r for r in table if r[0].startswith("noise floor of 100 s means"))
-    assert digits(row[1], expected, share=0.05)
+def shown_on_the_first_screen(page: str) -> dict[str, str]:
+    """Return the figures above the picture, by their labels."""
+    head, _, _ = page.partition("<main>")
+    found = re.findall(r'<div class="value">([^<]*)</div><div class="label">([^<]*)</div>', head)
+    return {label: value for value, label in found}
+
+
+def test_each_figure_of_the_first_screen_is_that_of_the_recordings(demo: Path, page: str) -> None:
+    """Gain with U, RMS, noise floor of the truth, and the bytes of each file."""
+    shown = shown_on_the_first_screen(page)
+    left, remains = pooled(demo, EXAM, "rate_dph") - constant_of(demo), pooled(demo, EXAM, "remains_dph")
+    gain = float(np.sqrt(np.mean(left**2) / np.mean(remains**2)))
+    value, spread = shown["improvement against a constant"].removesuffix(" ×").split(" ± ")
+    assert float(value) == pytest.approx(gain, abs=0.006)
+    assert float(spread) == pytest.approx(2.0 * robust_error_of_the_gain(demo), rel=0.4)
+    rms = shown["RMS of 100 s means, deg/h"]
+    assert digits(rms, float(np.sqrt(np.mean(remains**2))), share=0.06)
+    truth = [np.load(demo / "data" / "truth" / file.replace(".csv", ".noise.npy")) for file in EXAM]
+    floor = np.concatenate([np.asarray(noise).reshape(-1, 10).mean(axis=1) for noise in truth])
+    assert digits(shown["noise floor of 100 s means, deg/h"], float(np.sqrt(np.mean(floor**2))))
+    for name, size in re.findall(r'class="mono">c/([^<]*)</td><td class="n">([\d ]+) bytes', page):
+        assert int(size.replace(" ", "")) == (demo / "result" / "c" / name).stat().st_size, name
+
+
+def robust_error_of_the_gain(folder: Path) -> float:
+    """Return the standard error of the gain, a ratio of means: by the delta method, over spans of two hours."""
+    rows = []
+    for file in EXAM:
+        means = means_of(folder, file)
+        span = file + (means["time_s"] // 7200.0).astype(int).astype(str)
+        left = (means["rate_dph"] - constant_of(folder)) ** 2
+        rows.append(pd.DataFrame({"left": left, "remains": means["remains_dph"] ** 2, "span": span}))
+    table = pd.concat(rows, ignore_index=True)
+    ratio = table["left"].mean() / table["remains"].mean()
+    sums = (table["left"] - ratio * table["remains"]).groupby(table["span"]).sum()
+    of_ratio = np.sqrt((sums**2).sum()) / len(table) / table["remains"].mean()
+    return float(of_ratio / (2.0 * np.sqrt(ratio)))
 
 
 def test_slopes_of_the_bias_are_those_of_a_plane(demo: Path, page: str) -> None:
@@ -188,7 +213,7 @@ def test_slopes_of_the_bias_are_those_of_a_plane(demo: Path, page: str) -> None:
     t, rate = (np.concatenate([m[name] for m in means]) for name in ("temperature_c", "rate_dph"))
     columns = np.column_stack([np.ones_like(t), t, slope])
     plane, *_ = np.linalg.lstsq(columns, rate, rcond=None)
-    table = table_with(page, "of the bias before compensation")
+    table = table_with(page, "bias before compensation, by a plane")
     assert digits(row_of(table, "slope in temperature, deg/h/C")[1], plane[1], share=0.05)
     assert digits(row_of(table, "slope in temperature rate, deg/h/(C/min)")[1], plane[2], share=0.1)
 
@@ -225,13 +250,14 @@ def test_the_bias_over_time_shows_measured_and_compensated_means(
 ) -> None:
     for run in evaluation["runs"]:
         (panel,) = (p for p in panels if p.title == f"{run['environment']} ({run['role']})")
-        means = means_of(demo, run["file"], corrected=False)
+        means = means_of(demo, run["file"])
         hours = (means["time_s"] - means["time_s"].iloc[0]).to_numpy() / 3600.0
         lines = {s.colour: s for s in panel.series if s.kind == "line"}
-        assert panel.pixels_off(lines["before"], hours, means["rate_dph"].to_numpy()) < NEAR
+        left = means["rate_dph"].to_numpy() - evaluation["constant_dph"]
+        assert panel.pixels_off(lines["before"], hours, left) < NEAR
         assert panel.pixels_off(lines["after"], hours, means["remains_dph"].to_numpy()) < NEAR
         labels = {s.label for s in lines.values()} - {""}
-        assert not labels or (lines["before"].label, lines["after"].label) == ("measured", "compensated")
+        assert not labels or (lines["before"].label, lines["after"].label) == ("less a constant", "compensated")
 
 
 def drawn_on(panel: PanelRead, colour: str, x: Floats, y: Floats, label: str | None = None) -> None:
@@ -244,33 +270,26 @@ def drawn_on(panel: PanelRead, colour: str, x: Floats, y: Floats, label: str | N
 
 
 def test_the_bias_over_temperature_shows_each_branch_before_and_after(demo: Path, panels: list[PanelRead]) -> None:
-    means = [means_of(demo, file, corrected=False) for file in RUNS]
+    means = [means_of(demo, file) for file in RUNS]
     t, before, after = (np.concatenate([m[c] for m in means]) for c in ("temperature_c", "rate_dph", "remains_dph"))
     slope = np.concatenate([np.gradient(m["temperature_c"], m["time_s"] / 60.0) for m in means])
     held, heating, cooling = np.abs(slope) <= REST_C_PER_MIN, slope > REST_C_PER_MIN, slope < -REST_C_PER_MIN
-    by_title = {panel.title: panel for panel in panels}
-    branches = (("covered", held), ("before", heating), ("after", cooling))
-    for colour, of in branches:
-        label = {"covered": "held", "before": "heating", "after": "cooling"}[colour]
-        drawn_on(by_title["measured, and the map"], colour, t[of], before[of], label)
-        drawn_on(by_title["what remains, over temperature"], colour, t[of], after[of])
-        drawn_on(by_title["what remains, over dT/dt"], colour, slope[of], after[of])
-    both = by_title["before and after, on one scale"]
-    drawn_on(both, "covered", t, before, "before")
-    for colour, label, of in (
-        ("accent", "after, held", held),
-        ("before", "after, heating", heating),
-        ("after", "after, cooling", cooling),
-    ):
-        drawn_on(both, colour, t[of], after[of], label)
     model = load_model(demo / "result" / "model.json")
-    first = by_title["measured, and the map"]
+    constant = model.fallback_dph
+    by_title = {panel.title.split(" of ")[0]: panel for panel in panels}
+    first, below = by_title["before, less a constant"], by_title["after, on the same scale"]
+    for colour, label, of in (("covered", "held", held), ("before", "heating", heating), ("after", "cooling", cooling)):
+        drawn_on(first, colour, t[of], before[of] - constant, label)
+        drawn_on(below, colour, t[of], after[of])
+        drawn_on(by_title["what remains, over temperature"], colour, t[of], after[of], label)
+        drawn_on(by_title["what remains, over dT/dt"], colour, slope[of], after[of], label)
     line = first.labelled("map at rest")
-    assert first.pixels_off(line, line.x, model.map_dph(line.x, 0.0 * line.x)) < 2 * NEAR
+    assert first.pixels_off(line, line.x, model.map_dph(line.x, 0.0 * line.x) - constant) < 2 * NEAR
     for of in (heating, cooling):
         rate = float(np.median(slope[of]))
-        line = first.labelled(f"map at {rate:+.2g} C/min".replace("-", "−"))
-        assert first.pixels_off(line, line.x, model.map_dph(line.x, np.full(line.x.size, rate))) < 2 * NEAR
+        line = first.labelled(f"{rate:+.2g} C/min".replace("-", "−"))
+        expected = model.map_dph(line.x, np.full(line.x.size, rate)) - constant
+        assert first.pixels_off(line, line.x, expected) < 2 * NEAR
 
 
 def test_cuts_through_the_map_are_those_of_the_model(demo: Path, panels: list[PanelRead]) -> None:
@@ -280,7 +299,8 @@ def test_cuts_through_the_map_are_those_of_the_model(demo: Path, panels: list[Pa
     assert len(cuts.series) == 3
     for rate in rates:
         line = cuts.labelled(f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−"))
-        assert cuts.pixels_off(line, line.x, model.map_dph(line.x, np.full(line.x.size, rate))) < 2 * NEAR
+        expected = model.map_dph(line.x, np.full(line.x.size, rate)) - model.fallback_dph
+        assert cuts.pixels_off(line, line.x, expected) < 2 * NEAR
 
 
 def test_the_allan_picture_shows_the_deviation_of_what_remains(demo: Path, panels: list[PanelRead]) -> None:

@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PICTURES_EVERY = 50  # drawing takes a second
 _TRACED = ("bias_against_temperature", "_bias_over_time")
 _DRAWN = ("map_with_centers", "curve_by_size", "prior_and_posterior", "allan_deviation", "_trend")
-_PICTURES = dict.fromkeys((*_TRACED, *_DRAWN), lambda *_: None)
+_PICTURES = dict.fromkeys((*_TRACED, *_DRAWN), lambda *_: None) | {"residual_pictures": lambda *_: ()}
 SCENARIO = """title = "small"
 [profile.a]
 start_c = 20.0

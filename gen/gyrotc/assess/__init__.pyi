@@ -12,7 +12,6 @@ from .findings import residual_test as residual_test
 from .limits import AtLeast as AtLeast
 from .limits import AtMost as AtMost
 from .limits import Limits as Limits
-from .limits import coverage_factor as coverage_factor
 from .limits import decided as decided
 from .limits import held_against as held_against
 from .limits import instruments_in as instruments_in

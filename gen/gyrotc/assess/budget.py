@@ -26,12 +26,13 @@ from scipy.special import log_ndtr
 from .. import __version__
 from ..common.arrays import FloatArray
 from ..common.metrics import FIRST_S, HALF_HOUR_S, HOUR_S, Averages
+from ..common.statistics import coverage_factor
 from ..model import Model
 from ..recordings.fit_options import SIMPLE
 from ..results.evaluation import PARTS, Calibration, Changes, EvaluatedRun, Evaluation, FigureUncertainty
 from ..results.release import Budget, Contribution, Instrument, Verification
 from ..results.training import Training
-from .limits import Limits, coverage_factor, instruments_in, last_day
+from .limits import Limits, instruments_in, last_day
 
 _STEP = 0.01  # of the range of temperatures, for the map's gradient
 DAYS_A_YEAR = 365.25  # the Julian year

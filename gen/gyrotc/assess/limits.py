@@ -19,11 +19,11 @@ from statistics import NormalDist
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
-from scipy.special import stdtrit
 
 from .. import __version__
 from ..common.errors import InputError
 from ..common.inputs import checked, parse_toml, read_input
+from ..common.statistics import coverage_factor
 from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
 from ..results.decision import worst_of
 from ..results.evaluation import Evaluation, FigureUncertainty, RunStatistics, Statistics
@@ -42,16 +42,10 @@ from .product_guards import ProductGuard
 from .requirements import LEAST_FREEDOM
 
 _NORMAL = NormalDist()
-_UPPER = _NORMAL.cdf(2.0)  # 95.45 % lie between -2 and 2 sigma
 _ON_TRAINING = (
     "judged on the training runs themselves, which a fit follows too well: record a run for the exam and give it "
     'role = "exam"'
 )
-
-
-def coverage_factor(freedom: float | None) -> float:
-    """k of 95.45 %: 2, or Student's t where the degrees of freedom are few (JCGM 100:2008, G.3)."""
-    return 2.0 if freedom is None else float(stdtrit(freedom, _UPPER))
 
 
 def decided(

@@ -10,7 +10,6 @@ from rich.table import Table as RichTable
 
 from ..pages.display import (
     CONSTANT_PASSES,
-    COVERAGE,
     bound_words,
     limit_words,
     measured_words,
@@ -200,7 +199,7 @@ def summary_line(result: Evaluation) -> str:
     if found is None or not found[1].improvement:
         return "no sample to judge by"
     part, known = found[1], result.uncertainty or {}
-    spread = {name: COVERAGE * one.standard for name, one in known.items()}
+    spread = {name: one.expanded for name, one in known.items()}
     simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
     published = result.exam and simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
     text = (

@@ -18,6 +18,7 @@ from .statistics import CHI2_95_ONE as CHI2_95_ONE
 from .statistics import CHI2_95_TWO as CHI2_95_TWO
 from .statistics import NORMAL_95 as NORMAL_95
 from .statistics import TOLERANCE as TOLERANCE
+from .statistics import coverage_factor as coverage_factor
 from .statistics import main_directions as main_directions
 from .statistics import orthonormal as orthonormal
 from .texts import C_COMMENT as C_COMMENT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.special import chdtri, ndtri
+from scipy.special import chdtri, ndtr, ndtri, stdtrit
 
 from .arrays import FloatArray, parts_of
 from .metrics import MAD_TO_SIGMA
@@ -26,6 +26,14 @@ def cell_means(length_s: float, time_s: FloatArray, *columns: FloatArray) -> tup
     first = np.concatenate(begun)
     count = np.diff(np.r_[first, len(time_s)])
     return tuple(np.add.reduceat(v, first) / count for v in (time_s, *columns))
+
+
+_UPPER = float(ndtr(2.0))  # 95.45 % of a normal distribution lie between -2 and 2 sigma
+
+
+def coverage_factor(freedom: float | None) -> float:
+    """Return k of 95.45 %: 2, or Student's t where the degrees of freedom are few (JCGM 100:2008, G.3)."""
+    return 2.0 if freedom is None else float(stdtrit(freedom, _UPPER))
 
 
 def noise_of(z: FloatArray) -> float:

@@ -69,9 +69,9 @@ class Gain:
         return GainOnUnseen(
             exam_rms_before_dph=self.rms_before,
             exam_rms_after_dph=self.rms_after,
-            share_of_excess_removed=_at_most_all(self.share),
-            low=_at_most_all(self.low),
-            high=_at_most_all(self.high),
+            share_of_excess_removed=self.share,
+            low=self.low,
+            high=self.high,
             rms_removed_dph=_with_limits(self.rms_before - self.rms_after, self.rms_removed),
             angle_1h_removed_arcsec=angle,
             angle_1h_before_arcsec=self.angle_before,
@@ -79,11 +79,6 @@ class Gain:
             rms_30min_before_dph=self.half_hour_before,
             rms_30min_after_dph=self.half_hour_after,
         )
-
-
-def _at_most_all(share: float | None) -> float | None:
-    """A share; what is left may by chance be less than the floor."""
-    return None if share is None else min(share, 1.0)
 
 
 def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from .. import __version__
-from ..assess.limits import coverage_factor
 from ..common.errors import GyrotcError, InputError
 from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
@@ -228,7 +227,7 @@ def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequen
         verdict=built.unit.decision,
         limits_met=sum(limit.met for limit in held.limits) if held and held.limits else None,
         limits_held=len(held.limits) if held and held.limits else None,
-        expanded_uncertainty_dph=coverage_factor(known.freedom) * known.standard if known else None,
+        expanded_uncertainty_dph=known.expanded if known else None,
         date=calibration_day(dataset.meta, (run.started for run in dataset.runs)),
         rows_left_out=built.evaluation.rows_left_out,
         facts=_facts(dataset, built, runs),

@@ -33,6 +33,7 @@ from ..results.marker import MARKER
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
 from ..tables.emission import emit
+from ..tables.runtime import RUNTIME_FILES
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify.job import chosen_targets, verify
 from .applied import applied_in
@@ -286,4 +287,9 @@ def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, s
         sources=tuple(dataset.sources),
         program=program_of(),
         files={p.relative_to(folder).as_posix(): sha256(p) for p in files},
+        firmware={
+            p.name: p.stat().st_size
+            for p in (folder / "c" / name for name in (*RUNTIME_FILES, f"gtc_{model.id}.h", f"gtc_{model.id}.c"))
+            if p.is_file()
+        },
     )

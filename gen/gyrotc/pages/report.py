@@ -26,6 +26,7 @@ from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average_rows
 from ..common.texts import file_stem, html_environment
+from ..mirror.table import HELD
 from ..model import Model
 from ..recordings.description import exclude_line
 from ..results.decision import worst_of
@@ -70,11 +71,11 @@ class _Traced:
     left_out_s: list[float]
 
 
-def _bias_over_time(traced: Sequence[_Traced]) -> Markup | None:
-    """Measured and compensated bias, one panel a run, common scales; marks above rows that training left out."""
+def _bias_over_time(traced: Sequence[_Traced], constant_dph: float) -> Markup | None:
+    """Bias with a constant and with the map taken off, one panel a run, common scales; marks above rows left out."""
     if not traced:
         return None
-    rates = np.concatenate([np.r_[one.means.before_dph, one.means.after_dph, 0.0] for one in traced])
+    rates = np.concatenate([np.r_[one.means.before_dph - constant_dph, one.means.after_dph, 0.0] for one in traced])
     span = (float(rates.min()), float(rates.max()))
     pictures = []
     for k, one in enumerate(traced):
@@ -83,7 +84,7 @@ def _bias_over_time(traced: Sequence[_Traced]) -> Markup | None:
         first = one.means.time_s[0]
         hours = (one.means.time_s - first) / 3600.0
         panel.horizontal(0.0)
-        panel.line(hours, one.means.before_dph, BEFORE, "" if k else "measured", width=1.0)
+        panel.line(hours, one.means.before_dph - constant_dph, BEFORE, "" if k else "less a constant", width=1.0)
         panel.line(hours, one.means.after_dph, AFTER, "" if k else "compensated", width=1.0)
         if one.left_out_s:
             panel.tops((np.array(one.left_out_s) - first) / 3600.0)
@@ -92,23 +93,30 @@ def _bias_over_time(traced: Sequence[_Traced]) -> Markup | None:
 
 
 def map_with_centers(model: Model) -> Markup | None:
-    """The map over its envelope, hatched where there was no training data, with its centers; and cuts through it."""
+    """Draw the map less its constant over the envelope, hatched where there was no training data; and cuts through it.
+
+    The constant can be thousands of times the swing of the map, which no scale would show beside it.
+    """
+
+    def swing(t: FloatArray, rate: FloatArray) -> FloatArray:
+        return np.asarray(model.map_dph(t, rate) - model.fallback_dph)
+
     (t0, t1), (r0, r1) = _shown(model.envelope.temperature_c), _shown(model.envelope.slope_c_per_min)
     t, r = np.linspace(t0, t1, 160), np.linspace(r0, r1, 80)
     tt, rr = np.meshgrid(t, r)
     seen = model.coverage
     hidden = np.array([[c == "0" for c in row] for row in seen.rows]) if seen is not None else None
     surface = Panel(x="temperature, C", y="dT/dt, C/min", title="dots: centers (rings: beyond); hatched: not trained")
-    surface.image(model.map_dph(tt, rr), (t0, t1), (r0, r1), "bias, deg/h", hidden)
+    surface.image(swing(tt, rr), (t0, t1), (r0, r1), "bias less a constant, deg/h", hidden)
     centers = np.array([c for network in model.networks for c in network.centers]).reshape(-1, 2)
     places = np.clip(centers, (t0, r0), (t1, r1))
     within = np.all(places == centers, axis=1)
     for of, hollow in ((within, False), (~within, True)):
         surface.dots(places[of, 0], places[of, 1], ACCENT, size=7.0, hollow=hollow)
-    cuts = Panel(x="temperature, C", y="bias, deg/h", title="cuts through the map")
+    cuts = Panel(x="temperature, C", y="bias less a constant, deg/h", title="cuts through the map")
     for rate, dash, color in zip(np.linspace(r0, r1, 3), ("5 3", "", "1.5 2.5"), (AFTER, COVERED, BEFORE), strict=True):
         label = f"{round(rate, 2) + 0.0:+.2f} C/min".replace("-", "−")  # + 0.0: not "-0.00"
-        cuts.line(t, model.map_dph(t, np.full_like(t, rate)), color, label, dash=dash, width=1.4)
+        cuts.line(t, swing(t, np.full_like(t, rate)), color, label, dash=dash, width=1.4)
     return side_by_side(drawing([surface], width=HALF, height=240.0), drawing([cuts], width=HALF, height=220.0))
 
 
@@ -187,8 +195,8 @@ def _moved(panel: Panel, at: Sequence[float], history: Sequence[Calibration]) ->
     panel.dots(x[~more], total[~more], AFTER, size=8.0, hollow=True)
 
 
-def prior_and_posterior(training: Training) -> Markup | None:
-    """Prior, recordings and posterior where temperature stands still, deg/h over C; None where nothing was known."""
+def prior_and_posterior(training: Training, constant_dph: float) -> Markup | None:
+    """Prior, recordings and posterior where temperature stands still, less a constant; None where nothing was known."""
     if training.lot is not None:
         curve, name = training.lot.curve, f"the lot alone, {training.lot.units} units"
     elif training.prior is not None:
@@ -198,22 +206,22 @@ def prior_and_posterior(training: Training) -> Markup | None:
     if curve is None:
         return None
     t = np.array(curve.temperature_c)
-    panel = Panel(x="temperature, C", y="bias at rest, deg/h")
+    panel = Panel(x="temperature, C", y="bias at rest less a constant, deg/h")
     for mean, sigma, color, label in (
         (curve.prior_dph, curve.prior_sigma_dph, COVERED, name),
         (curve.posterior_dph, curve.posterior_sigma_dph, AFTER, "with this unit's own runs"),
     ):
-        middle, half = np.array(mean), _BAND * np.array(sigma)
+        middle, half = np.array(mean) - constant_dph, _BAND * np.array(sigma)
         panel.band(t, middle - half, middle + half, color)
         panel.line(t, middle, color, label, width=1.4)
     if (means := training.means) is not None:
         still = np.abs(means.slope_c_per_min) <= _REST_C_PER_MIN
-        at = np.array(means.temperature_c)[still], np.array(means.bias_dph)[still]
+        at = np.array(means.temperature_c)[still], np.array(means.bias_dph)[still] - constant_dph
         panel.dots(*at, BEFORE, "its recordings at rest")
     return drawing([panel], width=HALF)
 
 
-_TRACE_COPIES = 3.0 * 8.0 * 4  # bytes a row of its four columns while they are averaged
+_TRACE_COPIES = 3.0 * 8.0 * 5  # bytes a row of its five columns while they are averaged
 _LEAST_ROW_BYTES = 12  # six cells and their commas
 
 
@@ -301,18 +309,20 @@ def _pictures(folder: Path, unit: UnitResults) -> dict[str, Markup | None]:
     traced, training = list(_traced(folder, unit)), unit.training
     return {
         "thermal": bias_against_temperature(unit.model, [one.means for one in traced]),
-        "bias": _bias_over_time(traced),
+        "residuals": side_by_side(*residual_pictures([one.means for one in traced])),
+        "bias": _bias_over_time(traced, unit.model.fallback_dph),
         "map": map_with_centers(unit.model),
         "curve": curve_by_size(training) if training else None,
-        "lot": prior_and_posterior(training) if training else None,
+        "lot": prior_and_posterior(training, unit.model.fallback_dph) if training else None,
         "allan": allan_deviation(training.noise) if training else None,
         "trend": _trend(unit),
     }
 
 
 def thermal_picture(folder: Path, unit: UnitResults) -> Markup | None:
-    """Bias of one axis against temperature, from the traces of its folder; None where there are none."""
-    return bias_against_temperature(unit.model, [one.means for one in _traced(folder, unit)])
+    """Bias of one axis against temperature and what remains of it, from the traces; None where there are none."""
+    means = [one.means for one in _traced(folder, unit)]
+    return side_by_side(bias_against_temperature(unit.model, means), *residual_pictures(means))
 
 
 def _trend(unit: UnitResults) -> Markup | None:
@@ -336,7 +346,7 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     path = next((folder / n for n in names if (folder / n).is_file()), None)
     if path is None:
         return None
-    names = ["time_s", "temperature_c", "rate_dph", "compensated_dph"]
+    names = ["time_s", "temperature_c", "rate_dph", "compensated_dph", "status"]
     types = pacsv.ConvertOptions(include_columns=names, column_types=dict.fromkeys(names, pa.float64()))
     file, size = open_input(path, str(path), "a trace")
     refuse_above("recording_mib", size / 2**20, str(path), "MiB")
@@ -348,10 +358,11 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     time_s = np.concatenate(columns[0])
     if not (np.isfinite(time_s).all() and np.all(time_s[1:] > time_s[:-1])):
         raise InputError(f"{path}, column time_s", "times that do not increase", "a trace as gyrotc wrote it")
-    scored = np.ones(len(time_s), dtype=bool)
+    # Rows without a correction of their own would set the scale: before the first one, the whole bias remains.
+    scored = np.concatenate(columns.pop()).astype(np.int64) & HELD == 0
     del time_s
     # Popped, so that a full-rate trace is not in memory twice.
-    return average_rows(*(np.concatenate(columns.pop(0)) for _ in names), scored=scored, average_s=average_s)
+    return average_rows(*(np.concatenate(columns.pop(0)) for _ in names[:-1]), scored=scored, average_s=average_s)
 
 
 def _times(value: float | None) -> str:
@@ -377,50 +388,74 @@ def sorted_by_rate(slope: FloatArray) -> tuple[tuple[str, str, BoolArray], ...]:
 
 
 def bias_against_temperature(model: Model, runs: Sequence[Averages]) -> Markup | None:
-    """Bias over temperature before and after, then what remains over temperature and over its rate.
+    """Draw the bias over temperature, with the map and its U, and below it what remains, on one scale.
+
+    The constant that the table falls back to is taken off above, so that a large one does not flatten both.
 
     Args:
         runs: Means of every run that has some.
     """
+    means = _joined(runs)
+    if means is None:
+        return None
+    t, before, after, slope = means
+    kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
+    constant = f"{model.fallback_dph:+.4g}".replace("-", "−")
+    above = Panel(y="deg/h", title=f"before, less a constant of {constant} deg/h")
+    below = Panel(x="temperature, C", y="deg/h", title="after, on the same scale")
+    for panel in (above, below):
+        panel.horizontal(0.0)
+    for label, color, of in kinds:
+        above.dots(t[of], before[of] - model.fallback_dph, color, label, size=_DOT)
+        below.dots(t[of], after[of], color, size=_DOT)
+    _fit(above, model, kinds, slope)
+    return drawing([above, below], width=HALF, height=100.0, share_x=True, share_y=True)
+
+
+def residual_pictures(runs: Sequence[Averages]) -> tuple[Markup, ...]:
+    """Draw what remains over temperature and over its rate, each on its own scale; nothing without means."""
+    means = _joined(runs)
+    if means is None:
+        return ()
+    t, _, after, slope = means
+    over_t = Panel(x="temperature, C", y="residual, deg/h", title="what remains, over temperature")
+    over_rate = Panel(x="dT/dt, C/min", y="residual, deg/h", title="what remains, over dT/dt")
+    for panel, x in ((over_t, t), (over_rate, slope)):
+        panel.horizontal(0.0)
+        for label, color, of in sorted_by_rate(slope):
+            if of.any():
+                panel.dots(x[of], after[of], color, label, size=_DOT)
+    return tuple(drawing([panel], width=HALF, height=210.0) for panel in (over_t, over_rate))
+
+
+def _joined(runs: Sequence[Averages]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Return temperature, rate before and after, and rate of temperature of all means; None where there are none."""
     there = [a for a in runs if a.time_s.size]
     if not there:
         return None
-    t = np.concatenate([a.temperature_c for a in there])
-    before, after = (np.concatenate([getattr(a, name) for a in there]) for name in ("before_dph", "after_dph"))
     slope = np.concatenate(  # zero of a single one
         [np.gradient(a.temperature_c, a.time_s / 60.0) if a.time_s.size > 1 else np.zeros(1) for a in there]
     )
-    kinds = [kind for kind in sorted_by_rate(slope) if kind[2].any()]
-    first = Panel(x="temperature, C", y="bias, deg/h", title="measured, and the map")
-    second = Panel(x="temperature, C", y="bias, deg/h", title="before and after, on one scale")
-    third = Panel(x="temperature, C", y="residual, deg/h", title="what remains, over temperature")
-    fourth = Panel(x="dT/dt, C/min", y="residual, deg/h", title="what remains, over dT/dt")
-    second.dots(t, before, COVERED, "before", size=_DOT)
-    for panel in (second, third, fourth):
-        panel.horizontal(0.0)
-    for label, color, of in kinds:
-        first.dots(t[of], before[of], color, label, size=_DOT)
-        second.dots(t[of], after[of], color if label != "held" else ACCENT, f"after, {label}", size=_DOT)
-        third.dots(t[of], after[of], color, size=_DOT)
-        fourth.dots(slope[of], after[of], color, size=_DOT)
-    _fit(first, model, kinds, slope)
-    return side_by_side(*(drawing([panel], width=HALF, height=210.0) for panel in (first, second, third, fourth)))
+    t, before, after = (
+        np.concatenate([getattr(a, name) for a in there]) for name in ("temperature_c", "before_dph", "after_dph")
+    )
+    return t, before, after, slope
 
 
 def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]], slope: FloatArray) -> None:
-    """The map at the median rate of heating and of cooling, and at rest with its band of U."""
+    """Draw the map less its constant: at the median rate of heating and of cooling, and at rest with its band of U."""
     t0, t1 = model.envelope.temperature_c
     t = np.linspace(t0, t1, 160) if t1 > t0 else np.array([t0 - 0.5, t0 + 0.5])
-    rest = model.map_dph(t, np.zeros_like(t))
+    rest = model.map_dph(t, np.zeros_like(t)) - model.fallback_dph
     sigma = _sigma_at_rest(model, t)
     if sigma is not None:
-        panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U of the map at rest, k = 2")
+        panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U, k = 2")
     panel.line(t, rest, ACCENT, "map at rest", width=1.4)
     for label, color, of in kinds:
         if label != "held":
             rate = float(np.median(slope[of]))
-            words = f"map at {rate:+.2g} C/min".replace("-", "−")
-            panel.line(t, model.map_dph(t, np.full_like(t, rate)), color, words, dash="5 3", width=1.6)
+            words = f"{rate:+.2g} C/min".replace("-", "−")
+            panel.line(t, model.map_dph(t, np.full_like(t, rate)) - model.fallback_dph, color, words, dash="5 3")
 
 
 def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:

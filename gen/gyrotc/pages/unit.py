@@ -8,13 +8,13 @@ from pathlib import Path
 
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
-from ..results.decision import decision_of, failed_checks
+from ..results.decision import decision_of, failed_checks, next_step
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation
 from ..results.release import VERDICTS, Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.rows import LeftOutRows
 from ..results.training import CandidateModel, Manifest, Training
-from .display import COVERAGE, limit_words, plain, words
+from .display import limit_words, plain, with_uncertainty, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
@@ -98,6 +98,38 @@ class UnitResults:
         return "; ".join(limit_words(one.limit) for one in self.held if one.verdict == verdict)
 
     @property
+    def next_step(self) -> str:
+        """What to do next with the unit."""
+        return next_step(self.evaluation, self.limits, bool(self.failures), diagnosed=self.diagnosis is not None)
+
+    @property
+    def achieved(self) -> str:
+        """What the table achieves, in a sentence; empty where nothing was measured."""
+        judged = self.judged
+        if judged is None or judged.after.rms_dph is None:
+            return ""
+        left = with_uncertainty(judged.after.rms_dph, self.spread("rms_dph"))
+        gain = with_uncertainty(judged.improvement, self.spread("improvement"))
+        return f"On {self.judged_on} the table leaves {left} deg/h RMS; a constant leaves {gain} times as much."
+
+    @property
+    def lacking(self) -> str:
+        """What the recordings lack for a PASS, the gravest; empty where they lack nothing."""
+        lacking = [one for one in self.evaluation.requirements if not one.met]
+        return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).text if lacking else ""
+
+    @property
+    def quiet(self) -> bool:
+        """Test whether there is nothing that a person should know of the data."""
+        evaluation = self.evaluation
+        return not (evaluation.findings or evaluation.structure_left or self.model.warnings)
+
+    @property
+    def firmware(self) -> dict[str, int]:
+        """Files that a firmware is built with, and their bytes."""
+        return self.manifest.firmware if self.manifest else {}
+
+    @property
     def left_out(self) -> tuple[LeftOutRows, ...]:
         """Stretches of rows that training left out for what they show."""
         rows = self.training.rows if self.training else None
@@ -114,9 +146,9 @@ class UnitResults:
         return _RULES[self.limits.decision_rule] if self.limits else ""
 
     def spread(self, figure: str) -> float | None:
-        """Expanded uncertainty (k = 2) of a figure."""
+        """Expanded uncertainty of a figure."""
         known = (self.evaluation.uncertainty or {}).get(figure)
-        return COVERAGE * known.standard if known else None
+        return known.expanded if known else None
 
     @property
     def over_floor(self) -> float | None:
@@ -144,6 +176,7 @@ class UnitResults:
             *((words(key), plain(value)) for key, value in meta.items()),
             ("recordings", f"{train} for training, {len(self.evaluation.runs) - train} for the exam"),
             ("correction", f"{self.model.method}, model {self.model.hash[:12]}"),
+            ("description", str(self.model.meta.get("description", ""))),
             ("made with", f"gyrotc {self.evaluation.gyrotc_version}"),
         ]
         return [(name, value) for name, value in found if value]

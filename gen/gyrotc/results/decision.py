@@ -19,6 +19,39 @@ def decision_of(limits: HeldLimits | None, verification: Verification | None, ev
     return "FAIL" if failed else limits.verdict if limits else None
 
 
+def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool, *, diagnosed: bool) -> str:
+    """Return what to do next with a unit, one step: what stands in the way comes before what would be better.
+
+    Args:
+        failures: Whether a check of its code failed.
+        diagnosed: Whether it was diagnosed already.
+    """
+    if failures:
+        return (
+            "Do not use the table: its code is not the model. Build it again, and report it if the check fails again."
+        )
+    lacking = [one for one in evaluation.requirements if not one.met]
+    if lacking:
+        return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).next
+    if evaluation.structure_left and not diagnosed:
+        return "gyrotc diagnose DATASET: the residual is more than noise, and it names the cause."
+    broken = [one for one in limits.limits if one.verdict == "FAIL"] if limits else []
+    if broken:
+        return (
+            "Reject the unit, or state another limit: what remains is noise, which no map takes off."
+            if any(one.part for one in broken)
+            else "See the limits below: what is not met does not depend on the recordings."
+        )
+    advised = [one.next for one in evaluation.findings if one.next]
+    if advised:
+        return advised[0]
+    if limits is None or limits.verdict is None:
+        return "State the limits of the product in a file, and build again with --limits."
+    if limits.verdict != "PASS":
+        return "Record more or longer test runs: the figures are within the limits, their uncertainty is not."
+    return "Build the files below into the firmware; gyrotc certificate writes the certificate."
+
+
 def failed_checks(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:
     """Yield what failed of the proof that the emitted code is the model, in words."""
     if verification:

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
+from ..common.statistics import coverage_factor
 from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits, Verdict
 from .rows import RowsCount
@@ -155,6 +156,11 @@ class FigureUncertainty(Part):
     standard: Amount = Field(description="1 sigma, in the unit of the figure")
     freedom: Figure = Field(description="degrees of freedom; null: many")
     method: str = Field(description="what it rests on")
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U of 95.45 %."""
+        return coverage_factor(self.freedom) * self.standard
 
 
 class ModelSizes(Part):

@@ -254,3 +254,6 @@ class Manifest(UnitResult):
     sources: tuple[Any, ...] = Field(description="`[source]` of recordings that were imported")
     program: str = Field(default="", description="SHA-256 of the program; empty: of a gyrotc that did not state it")
     files: dict[str, str] = Field(description="SHA-256 of every file, by its path in the folder")
+    firmware: dict[str, Count] = Field(
+        default={}, description="files of `c/` that a firmware is built with, by their names, and their bytes"
+    )

@@ -12,14 +12,13 @@ from gyrotc.assess import (
     Limits,
     budget_of,
     combined,
-    coverage_factor,
     decided,
     figure_uncertainties,
     instruments_in,
     last_day,
     load_limits,
 )
-from gyrotc.common import Averages, InputError, statistics_of, time_statistics
+from gyrotc.common import Averages, InputError, coverage_factor, statistics_of, time_statistics
 from gyrotc.model import load_model
 from gyrotc.pages import rounded, write_report
 from gyrotc.recordings import load

@@ -191,7 +191,7 @@ def test_no_limits_are_no_pass(tmp_path: Path, text: str) -> None:
     page = (tmp_path / "C" / "certificate.html").read_text("utf-8")
     assert "No limits were given" in page and "PASS" not in page
     assert _status("report", folder) == 0
-    assert "<strong>No verdict</strong>" in (folder / "report.html").read_text("utf-8")
+    assert "<strong>No limits given</strong>" in (folder / "report.html").read_text("utf-8")
     (tmp_path / "fleet.toml").write_text('schema = 1\ndatasets = ["RLG-1"]\nlimits = "limits.toml"\n')
     assert _status("fleet", tmp_path / "fleet.toml", "--out", tmp_path / "F", "--jobs", "1") == 0
     [entry] = json.loads((tmp_path / "F" / "fleet.json").read_text())["serials"]

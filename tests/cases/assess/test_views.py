@@ -92,7 +92,7 @@ def test_all_views_of_drawn_results_agree(model_dict: dict[str, Any]) -> None:
         built = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=held)
         again = HeldLimits.model_validate_json(json.dumps(held.content()))
         assert again == held, number
-        assert banner == [shown.verdict or "No verdict"], number
+        assert banner == [shown.verdict or "No limits given"], number
         assert re.findall(r"<strong>([^<]*)</strong>", page)[:1] == ([shown.verdict] if shown.verdict else []), number
         assert re.findall(r'class="state"><span[^>]*>([^<]*)<', page) == table, number
         assert conformity == [_IN_DCC[one.verdict] for one in shown.held], number

@@ -300,7 +300,7 @@ def _write_unit(folder: Path, result: dict[str, Any], model_dict: dict[str, Any]
 def test_the_report_of_a_build_and_of_axes(
     result: dict[str, Any], model_dict: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = ("thermal", "bias", "map", "curve", "allan")
+    names = ("thermal", "residuals", "bias", "map", "curve", "allan")
     monkeypatch.setattr(report, "_pictures", lambda *_: dict.fromkeys(names))
 
     def one(text: Callable[[], str]) -> str:

@@ -182,7 +182,7 @@ def test_no_key_stands_where_words_should(name: str, pages: dict[str, Path], tab
 def test_the_unit_page_begins_with_the_verdict(pages: dict[str, Path], tab: Browser) -> None:
     tab.open(pages["unit"])
     text = tab.value("document.body.innerText")
-    first = tab.value("document.querySelector('main').firstElementChild.innerText")
+    first = tab.value("document.querySelector('.verdict').innerText")
     assert first.startswith("FAIL for NAV") and "1 of 2 limits is not met" in first
     rows = tab.value("[...document.querySelectorAll('main table')][0].innerText")
     assert rows.index("FAIL") < rows.index("PASS"), "what failed stands first"
