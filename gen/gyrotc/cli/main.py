@@ -9,6 +9,7 @@ import logging
 import os
 import platform
 import signal
+import stat
 import sys
 import tempfile
 import traceback
@@ -81,6 +82,7 @@ def main() -> None:
     _single_threaded()
     _returning_columns()
     _without_warnings()
+    os.umask(os.umask(0) & ~stat.S_IRWXU)  # what gyrotc writes it reads again
     from ..results.signals import Interrupted, die_of, raise_on_signals
 
     raise_on_signals()

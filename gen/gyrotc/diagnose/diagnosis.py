@@ -180,6 +180,8 @@ def _undecidable(records: Records) -> str:
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
     if float(np.ptp(temperature)) < LEAST_SPAN_C:
         return f"Temperature spans only {np.ptp(temperature):.2f} C: nothing can be learnt about temperature here."
+    if not any(np.any(run.rate_dph[run.usable]) for run in records.runs):
+        return "All rates are the same: connect the gyro, and record again."
     if fits_exactly(records):
         return f"A map of (T, dT/dt) fits {records.size} blocks of {records.block_s:.4g} s exactly: record more."
     return ""

@@ -299,9 +299,14 @@ def _run(
     for k, entry in on_dask(cluster, left) if cluster and left else on_processes(jobs, left):
         entries[waiting[k]] = entry
         say(entry)
+    done = [entries[number] for number in range(len(tasks))]
+    judged = list(_one_of_each_serial(done))
+    for before, after in zip(done, judged, strict=True):
+        if before.status != after.status:
+            say(after)
     found = [
         entry.model_copy(update={"released": why}) if (why := fleet.releases.get(entry.serial or "")) else entry
-        for entry in _one_of_each_serial([entries[number] for number in range(len(tasks))])
+        for entry in judged
     ]
     write_summary(out, found)
     return found
@@ -319,6 +324,6 @@ def _one_of_each_serial(entries: Sequence[FleetEntry]) -> Iterator[FleetEntry]:
         if entry.serial is None or counts[(entry.serial, entry.axis)] < 2:
             yield entry
             continue
-        reason = f"serial {entry.serial} is also that of another data set"
+        reason = f"serial {entry.serial} is also that of another data set; serial = ... in dataset.toml states its own"
         others = f"; {entry.reason}" if entry.reason else ""
         yield entry.model_copy(update={"status": "failed", "reason": reason + others})

@@ -18,6 +18,7 @@ from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
 from .description import (
     FILE,
+    MIN_ROWS,
     UNKNOWN_SERIAL,
     Description,
     Problems,
@@ -417,6 +418,12 @@ def _recordings(folder: Path, description: Description, problems: Problems) -> t
         if recording is None:
             continue
         first, last = recording.time_s[[0, -1]]
+        late_s = abs(description.temperature_late_s)
+        if late_s and last - first - late_s < MIN_ROWS * recording.row_period_s:
+            found = f"{description.temperature_late_s:g} s, and {name} is {last - first:.6g} s long: no row is left"
+            expected = "a delay of the temperature that is far shorter than every recording, or none"
+            problems.add(InputError(f"{FILE}, field temperature_late_s", found, expected))
+            continue
         for index, entry in enumerate(description.run):
             if entry.file != name:
                 continue

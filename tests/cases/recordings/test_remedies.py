@@ -318,3 +318,26 @@ def test_nul_bytes_behind_the_last_row_are_said(command: str, tmp_path: Path, gy
     }[command]()
     assert done.returncode == 0
     assert "300 rows" in done.stdout and "512 NUL bytes" in done.stdout
+
+
+@pytest.mark.parametrize("late", [2990.0, -2985.0])
+def test_a_delay_of_the_temperature_beyond_the_recording_is_refused(late: float, folder: Path, gyrotc: Command) -> None:
+    data = folder / "D"
+    data.mkdir()
+    (data / "a.csv").write_bytes(PLAIN)
+    text = f'schema = 1\nserial = "R"\nearth_rate = "removed"\ntemperature_late_s = {late}\n[[run]]\nfile = "a.csv"\n'
+    (data / "dataset.toml").write_text(text)
+    for command in (("check", data), ("build", data, "--out", folder / "R")):
+        done = gyrotc(*command)
+        assert done.returncode == 2
+        assert "field temperature_late_s" in done.stdout + done.stderr
+    (data / "dataset.toml").write_text(text.replace(str(late), "20.0"))
+    assert gyrotc("check", data).returncode == 0
+
+
+def test_rates_that_are_all_alike_are_not_diagnosed(folder: Path, gyrotc: Command) -> None:
+    (folder / "D").mkdir()
+    (folder / "D" / "a.csv").write_bytes(table(NAMES, fixed(TIME), T, ["0.0"] * ROWS))
+    done = gyrotc("diagnose", folder / "D", "--out", folder / "R")
+    assert done.returncode == 0
+    assert "All rates are the same" in done.stdout + done.stderr
