@@ -106,8 +106,8 @@ def checked_result(content: Any, kind: type[R], where: str, text: bytes | None =
 ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
     "coarse_temperature": "Record more digits of the thermometer, or one with a finer resolution.",
-    "coarse_time": "Number the rows instead of trusting the stamps: gyrotc import FILE --rate-hz R, or record finer "
-    "stamps.",
+    "coarse_time": "Number the rows instead of trusting the stamps: gyrotc import FILE --set time.rate_hz=R, or record "
+    "finer stamps.",
     "constant_channel": "Look whether the sensor was connected; take the column out if it says nothing.",
     "counter_wrapped": "Add the range of the counter behind each such place, or store the counts with their sign.",
     "earth_rate_not_stated": 'Say in dataset.toml what was done about it: earth_rate = "removed", "none" or "compute".',
@@ -136,9 +136,10 @@ ADVICE = {
     "stuck_temperature": "Look at the thermometer's wiring; paste the exclude line.",
     "temperature_late": "Pair the files of this run anew and convert them again, or leave the run out.",
     "units_trusted": "Nothing, if the values are right as they are; else declare their unit.",
-    "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --rate-hz R.",
-    "time_jumps": "Number the rows instead, gyrotc import FILE --rate-hz R, or cut the file there into two runs by "
-    "to_s and from_s.",
+    "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --set "
+    "time.rate_hz=R.",
+    "time_jumps": "Number the rows instead, gyrotc import FILE --set time.rate_hz=R, or cut the file there into two "
+    "runs by to_s and from_s.",
     "time_since_epoch": "State power_on_s of the run, or subtract the time of power-on; gyrotc import does that.",
 }
 """What to do next, by the id of a finding."""
