@@ -359,7 +359,7 @@ def cost() -> list[dict[str, Any]]:
                 source = Path(place) / f"{name}-{numeric}.c"
                 text = (HERE / "snapshot.c").read_text("utf-8")
                 source.write_text(f"#define OF_{numeric.upper()} 1\n{text}", "utf-8")
-                sources = [source, c / "gtc.c", c / "gtc_sim_0003.c"]
+                sources = [source, c / f"gtc_{numeric}.c", c / "gtc_sim_0003.c"]
                 program = source.with_suffix("")
                 compile_c(target, sources, program, include=c)
                 run = run_program(target, program)

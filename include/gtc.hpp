@@ -59,22 +59,32 @@ struct F32 {
     typedef gtc_f32_angle_t Sum;
     typedef gtc_f32_snapshot_t Snapshot;
     static int check(const Table *table) noexcept { return gtc_f32_check(table); }
+    static int check_words(const Table *table) noexcept { return gtc_f32_check_words(table); }
     static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
     {
         return gtc_f32_open(table, words, n, id);
     }
     static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_f32_init(state, table, us); }
-    static int sample(State *state, uint_least32_t us, const Number *x) noexcept
+    static int sample(State *state, const Table *table, uint_least32_t us, const Number *x) noexcept
     {
-        return gtc_f32_sample(state, us, x);
+        return gtc_f32_sample(state, table, us, x);
     }
-    static int bias(const State *state, Number *b) noexcept { return gtc_f32_bias(state, b); }
-    static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_f32_snapshot(state, all); }
-    static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
+    static int bias(const State *state, const Table *table, Number *b) noexcept
     {
-        return gtc_f32_rezero(state, rate, seconds);
+        return gtc_f32_bias(state, table, b);
     }
-    static int save(const State *state, gtc_word_t *words) noexcept { return gtc_f32_save(state, words); }
+    static int snapshot(const State *state, const Table *table, Snapshot *all) noexcept
+    {
+        return gtc_f32_snapshot(state, table, all);
+    }
+    static int rezero(State *state, const Table *table, Number rate, uint_least32_t seconds) noexcept
+    {
+        return gtc_f32_rezero(state, table, rate, seconds);
+    }
+    static int save(const State *state, const Table *table, gtc_word_t *words) noexcept
+    {
+        return gtc_f32_save(state, table, words);
+    }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
     {
@@ -91,22 +101,32 @@ struct Q31 {
     typedef gtc_q31_angle_t Sum;
     typedef gtc_q31_snapshot_t Snapshot;
     static int check(const Table *table) noexcept { return gtc_q31_check(table); }
+    static int check_words(const Table *table) noexcept { return gtc_q31_check_words(table); }
     static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
     {
         return gtc_q31_open(table, words, n, id);
     }
     static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_q31_init(state, table, us); }
-    static int sample(State *state, uint_least32_t us, const Number *x) noexcept
+    static int sample(State *state, const Table *table, uint_least32_t us, const Number *x) noexcept
     {
-        return gtc_q31_sample(state, us, x);
+        return gtc_q31_sample(state, table, us, x);
     }
-    static int bias(const State *state, Number *b) noexcept { return gtc_q31_bias(state, b); }
-    static int snapshot(const State *state, Snapshot *all) noexcept { return gtc_q31_snapshot(state, all); }
-    static int rezero(State *state, Number rate, uint_least32_t seconds) noexcept
+    static int bias(const State *state, const Table *table, Number *b) noexcept
     {
-        return gtc_q31_rezero(state, rate, seconds);
+        return gtc_q31_bias(state, table, b);
     }
-    static int save(const State *state, gtc_word_t *words) noexcept { return gtc_q31_save(state, words); }
+    static int snapshot(const State *state, const Table *table, Snapshot *all) noexcept
+    {
+        return gtc_q31_snapshot(state, table, all);
+    }
+    static int rezero(State *state, const Table *table, Number rate, uint_least32_t seconds) noexcept
+    {
+        return gtc_q31_rezero(state, table, rate, seconds);
+    }
+    static int save(const State *state, const Table *table, gtc_word_t *words) noexcept
+    {
+        return gtc_q31_save(state, table, words);
+    }
     static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
                        uint_least32_t off) noexcept
     {
@@ -129,63 +149,69 @@ template <class A> struct Runtime {
 
     static Status check(const Table &table) noexcept { return Status(A::check(&table)); }
 
+    static Status check_words(const Table &table) noexcept { return Status(A::check_words(&table)); }
+
     static Status open(Table &table, const gtc_word_t *words, uint_least32_t n_words, uint_least32_t expected_id) noexcept
     {
         return Status(A::open(&table, words, n_words, expected_id));
     }
 
-    /* One state; owned by one task. */
+    /* One state and its table; owned by one task. */
     class Correction {
     public:
-        Correction() noexcept : state_() {}
+        Correction() noexcept : state_(), table_(nullptr) {}
         Status init(const Table &table, uint_least32_t period_us) noexcept
         {
-            return Status(A::init(&state_, &table, period_us));
+            table_ = &table;
+            return Status(A::init(&state_, table_, period_us));
         }
         /* Of a table with one channel, so many microseconds after the call before. */
         Status sample(uint_least32_t elapsed_us, Celsius temp) noexcept
         {
             const Number channel = temp.value();
-            const bool alone = (state_.table != nullptr) && (state_.table->n_channels == 1U);
-            return Status(alone ? A::sample(&state_, elapsed_us, &channel) : GTC_E_ARG);
+            const bool alone = (table_ != nullptr) && (table_->n_channels == 1U);
+            return Status(alone ? A::sample(&state_, table_, elapsed_us, &channel) : GTC_E_ARG);
         }
         /* Of any table: n_channels numbers, the temperature first; nullptr: nothing was read. */
         Status sample(uint_least32_t elapsed_us, const Number *channels) noexcept
         {
-            return Status(A::sample(&state_, elapsed_us, channels));
+            return Status(A::sample(&state_, table_, elapsed_us, channels));
         }
         Status bias(DegPerHour &bias) const noexcept
         {
             Number result = bias.value();
-            const Status status(A::bias(&state_, &result));
+            const Status status(A::bias(&state_, table_, &result));
             bias = DegPerHour(result);
             return status;
         }
         /* Correction, its uncertainty and more, as a filter takes them; the numbers as in gtc.h. */
-        Status snapshot(Snapshot &all) const noexcept { return Status(A::snapshot(&state_, &all)); }
+        Status snapshot(Snapshot &all) const noexcept { return Status(A::snapshot(&state_, table_, &all)); }
         /* After a rest of so many seconds: the mean of the compensated rate. 0 seconds take every re-zero back. */
         Status rezero(DegPerHour mean_rate, uint_least32_t seconds) noexcept
         {
-            return Status(A::rezero(&state_, mean_rate.value(), seconds));
+            return Status(A::rezero(&state_, table_, mean_rate.value(), seconds));
         }
         /* The state of gtc.h, to copy it or to hand it to C. */
         State &state() noexcept { return state_; }
         const State &state() const noexcept { return state_; }
-        Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, words)); }
+        Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, table_, words)); }
         Status restore(const Table &table, uint_least32_t period_us, const gtc_word_t (&words)[GTC_SAVE_WORDS],
                        uint_least32_t off_blocks) noexcept
         {
-            return Status(A::restore(&state_, &table, period_us, words, off_blocks));
+            table_ = &table;
+            return Status(A::restore(&state_, table_, period_us, words, off_blocks));
         }
 
     private:
         typename A::State state_;
+        const Table *table_;
     };
 
     /* Angle increments; owned by one task or interrupt. */
     class Increments {
     public:
         Increments() noexcept : sum_() {}
+        /* Adds to the increment, which is set to 0 when it was used. */
         Status angle(DegPerHour bias, Time dt, Angle &increment) noexcept
         {
             Number result = increment.value();

@@ -3,6 +3,7 @@
  * To change one, define it on the compiler's command line, or name a header of your own in
  * GTC_CONFIG_HEADER (for example -DGTC_CONFIG_HEADER='"my_gtc.h"'); it is read first. All
  * translation units of one program must see the same options: they set the size of the state.
+ * The files that `gyrotc emit` writes have no options: they are made for their tables.
  *
  * SPDX-License-Identifier: MIT
  */
@@ -13,6 +14,14 @@
 #include GTC_CONFIG_HEADER
 #endif
 
+/* Arithmetics: 1 is there, 0 is not declared. */
+#ifndef GTC_WITH_F32
+#define GTC_WITH_F32 1
+#endif
+#ifndef GTC_WITH_Q31
+#define GTC_WITH_Q31 1
+#endif
+
 /* Longest slope window in blocks. 20 blocks of 10 s are 200 s, the longest window that `fit`
  * chooses. Each block costs one number of RAM in the state; a table that needs more is refused. */
 #ifndef GTC_MAX_SLOPE_BLOCKS
@@ -20,29 +29,54 @@
 #endif
 
 /* Most extension terms of one table, and most auxiliary channels. Diagnosis ships at most three causes; four leaves
- * room for one that is known beforehand. Each costs 64 bytes of RAM in the state; 0 leaves the code of terms and
- * channels out. */
+ * room for one that is known beforehand. 0 leaves the code of terms and channels out. */
 #ifndef GTC_MAX_TERMS
 #define GTC_MAX_TERMS 4
 #endif
+#if GTC_MAX_TERMS > 0
+#define GTC_WITH_TERMS 1
+#else
+#define GTC_WITH_TERMS 0
+#endif
 
-/* 1: a table may hold several networks, chosen by temperature and slope (a model bank).
- * 0: such a table is refused, and the code of the hand-over is not compiled. One network over the
- * whole envelope is the default of the generator, hence 0. */
+/* Kinds of terms: 1 is there, 0 is not compiled, and a table that needs it is refused. */
+#ifndef GTC_WITH_MEMORY
+#define GTC_WITH_MEMORY GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_PLAY
+#define GTC_WITH_PLAY GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_WARM_UP
+#define GTC_WITH_WARM_UP GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_HARMONIC
+#define GTC_WITH_HARMONIC GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_AUXILIARY
+#define GTC_WITH_AUXILIARY GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_CURVE
+#define GTC_WITH_CURVE GTC_WITH_TERMS
+#endif
+#ifndef GTC_WITH_PRODUCT
+#define GTC_WITH_PRODUCT GTC_WITH_TERMS
+#endif
+
+/* Parts of the runtime: 1 is there, 0 is not compiled, and a table that needs it is refused. `gyrotc emit` writes a
+ * runtime that consists of what its tables need. */
+
+/* A table may hold several networks, chosen by temperature and slope (a model bank). One network over the whole
+ * envelope is the default of the generator, hence 0. */
 #ifndef GTC_WITH_BANK
 #define GTC_WITH_BANK 0
 #endif
 
-/* 1: gtc_<n>_open() accepts images that carry extension terms, which links every term's code.
- * 0: such an image is refused. A table compiled in links only the terms that it names, always. */
-#ifndef GTC_OPEN_TERMS
-#define GTC_OPEN_TERMS 0
+/* Fixed point: Gaussians narrower than about an eighth of the envelope's half range. */
+#ifndef GTC_WITH_NARROW
+#define GTC_WITH_NARROW 1
 #endif
 
-/* Parts of the runtime: 1 is there, 0 is not compiled, and a table that needs it is refused. `gyrotc emit` writes a
- * gtc_config.h with what a table needs, and what each of them costs. */
-
-/* The uncertainty of a correction: gtc_<n>_snapshot(), gtc_<n>_rezero(). Without it a table's words of it are not read. */
+/* The uncertainty of a correction: gtc_<n>_snapshot(). */
 #ifndef GTC_WITH_UNCERTAINTY
 #define GTC_WITH_UNCERTAINTY 1
 #endif
@@ -57,12 +91,12 @@
 #define GTC_WITH_COVERAGE 1
 #endif
 
-/* Known answers of a table in gtc_<n>_check(). Without it those of a table are not asked. */
+/* Known answers of a table in gtc_<n>_check(). */
 #ifndef GTC_WITH_PROBES
 #define GTC_WITH_PROBES 1
 #endif
 
-/* gtc_<n>_open(). */
+/* gtc_<n>_open() and gtc_<n>_check_words(). */
 #ifndef GTC_WITH_IMAGE
 #define GTC_WITH_IMAGE 1
 #endif
@@ -72,10 +106,42 @@
 #define GTC_WITH_SAVE 1
 #endif
 
-/* Any time in gtc_<n>_sample(). 0: only the sample period, GTC_E_ARG for another time; NULL is then one missed sample. */
+/* Any time in gtc_<n>_sample(). 0: only the sample period, GTC_E_ARG for another time; NULL is then one missed
+ * sample. */
 #ifndef GTC_WITH_TIME
 #define GTC_WITH_TIME 1
 #endif
+
+/* Fraction bits of a bias in fixed point: one number for a product, so that firmware decodes every table alike.
+ * gtc_q31_check() and gtc_q31_open() refuse a table in another unit. */
+#ifndef GTC_BIAS_FRAC_BITS
+#define GTC_BIAS_FRAC_BITS 24
+#endif
+
+/* What follows from the options above. */
+#define GTC_WITH_CHANNELS (GTC_WITH_AUXILIARY | GTC_WITH_CURVE | GTC_WITH_PRODUCT)
+#define GTC_WITH_RETAINED (GTC_WITH_MEMORY | GTC_WITH_PLAY) /* terms with a state */
+#define GTC_MAX_CHANNELS (1 + (GTC_MAX_TERMS * GTC_WITH_CHANNELS))
+
+/* Words of a saved state, see gtc_<n>_save(). */
+#define GTC_SAVE_WORDS                                                                                             \
+    (10 + (2 * GTC_WITH_TERMS) + GTC_MAX_SLOPE_BLOCKS + (GTC_MAX_CHANNELS * (13 + GTC_WITH_CHANNELS))              \
+     + (2 * GTC_MAX_TERMS * GTC_WITH_RETAINED) + (GTC_WITH_UNCERTAINTY * (9 + (5 * GTC_WITH_TERMS))))
+
+/* What of it sets the layout of a saved state. */
+#define GTC_SAVE_OPTIONS                                                                                           \
+    ((64UL * GTC_WITH_CHANNELS) + (128UL * GTC_WITH_UNCERTAINTY) + (256UL * GTC_MAX_TERMS)                         \
+     + (4096UL * GTC_WITH_RETAINED) + (65536UL * GTC_MAX_SLOPE_BLOCKS))
+
+/* What this runtime holds, in the bits of a table's `parts` (gtc_table.h). */
+#define GTC_PARTS                                                                                                  \
+    ((GTC_WITH_BANK * GTC_PART_BANK) | (GTC_WITH_MEMORY * GTC_PART_TERM(GTC_TERM_MEMORY))                          \
+     | (GTC_WITH_PLAY * GTC_PART_TERM(GTC_TERM_PLAY)) | (GTC_WITH_WARM_UP * GTC_PART_TERM(GTC_TERM_WARM_UP))       \
+     | (GTC_WITH_HARMONIC * GTC_PART_TERM(GTC_TERM_HARMONIC))                                                      \
+     | (GTC_WITH_AUXILIARY * GTC_PART_TERM(GTC_TERM_AUXILIARY)) | (GTC_WITH_CURVE * GTC_PART_TERM(GTC_TERM_CURVE)) \
+     | (GTC_WITH_PRODUCT * GTC_PART_TERM(GTC_TERM_PRODUCT)) | (GTC_WITH_COVERAGE * GTC_PART_COVERAGE)              \
+     | (GTC_WITH_UNCERTAINTY * GTC_PART_UNCERTAINTY) | (GTC_WITH_PROBES * GTC_PART_PROBES)                         \
+     | (GTC_WITH_NARROW * GTC_PART_NARROW) | (GTC_WITH_REZERO * GTC_PART_REZERO))
 
 /* 1: multiply 32 x 32 -> 64 bits in 16-bit halves. The bits are the same; it is faster on cores
  * without a long multiply (Cortex-M0, AVR) and slower on all others. */
@@ -87,31 +153,11 @@
 #endif
 #endif
 
-/* Fraction bits of a bias in fixed point that this firmware decodes: GTC_<ID>_Q31_BIAS_FRAC_BITS of the emitted header.
- * Where it is defined, gtc_q31_check() and gtc_q31_open() refuse a table in another unit. Else each table has its own. */
-#ifdef GTC_BIAS_FRAC_BITS
-#define GTC_FRAC_BITS_LEAST GTC_BIAS_FRAC_BITS
-#define GTC_FRAC_BITS_MOST GTC_BIAS_FRAC_BITS
-#else
-#define GTC_FRAC_BITS_LEAST 0
-#define GTC_FRAC_BITS_MOST 60
-#endif
-
-/* What an assertion of a precondition or of a number's range becomes; a test build gives it an abort(). The default is
- * nothing: with a table that gtc_<n>_check() or gtc_<n>_open() accepted, and a state that only the functions wrote, each
- * of them holds. */
+/* What an assertion of a precondition or of a number's range becomes; a test build gives it an abort(). The default
+ * is nothing: with a table that gtc_<n>_check() or gtc_<n>_open() accepted, and a state that only the functions
+ * wrote, each of them holds. */
 #ifndef GTC_ASSERT
 #define GTC_ASSERT(claim) ((void)0)
-#endif
-
-/* 1: two Gaussians in each turn of the loop of the fixed-point map. The bits are the same; it takes
- * 6 % fewer instructions and 90 bytes more. The default follows the compiler's -Os. */
-#ifndef GTC_UNROLL
-#if defined(__OPTIMIZE_SIZE__) || GTC_HALF_MULTIPLY
-#define GTC_UNROLL 0
-#else
-#define GTC_UNROLL 1
-#endif
 #endif
 
 /* A compiler warns where a status is not looked at. */
@@ -131,8 +177,8 @@
 #if GTC_WITH_REZERO && !GTC_WITH_UNCERTAINTY
 #error "GTC_WITH_REZERO needs GTC_WITH_UNCERTAINTY"
 #endif
-
-/* Places for terms in tables and states: C has no arrays without any. */
-#define GTC_TERM_SLOTS ((GTC_MAX_TERMS > 0) ? GTC_MAX_TERMS : 1)
+#if (GTC_MAX_TERMS == 0) && (GTC_WITH_MEMORY || GTC_WITH_PLAY || GTC_WITH_WARM_UP || GTC_WITH_HARMONIC || GTC_WITH_CHANNELS)
+#error "kinds of terms need GTC_MAX_TERMS"
+#endif
 
 #endif /* GTC_CONFIG_H_INCLUDED */

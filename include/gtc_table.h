@@ -1,4 +1,4 @@
-/* gtc_table.h - table layout 2: what an emitted table file holds.
+/* gtc_table.h - table layout 3: what an emitted table file holds.
  *
  * Tables are written by `gyrotc emit`, never by hand; docs/FORMAT.md gives every word. A table is
  * one axis of one gyro serial. The order of the members below is the order of the values in the
@@ -12,12 +12,10 @@
 #ifndef GTC_TABLE_H_INCLUDED
 #define GTC_TABLE_H_INCLUDED
 
-#include <stdint.h>
-
-#include "gtc_config.h"
+#include "gtc.h"
 
 /* A runtime reads exactly this layout; an emitted file refuses to compile against another. */
-#define GTC_TABLE_LAYOUT 2U
+#define GTC_TABLE_LAYOUT 3U
 
 /* First word of a binary image; reads 0x31435447 when the image has the other byte order. */
 #define GTC_IMAGE_MAGIC 0x47544331UL
@@ -26,28 +24,25 @@
 #define GTC_QUANTITY_BIAS 0U /* bias of angular rate */
 #define GTC_UNIT_DEG_PER_H 0U
 
-/* Kinds of extension terms (first word of a term record).
- * MISRA 2.5: for whoever reads a table; the runtime tells most of them by their place. */
+/* Kinds of extension terms (first word of a term record). */
 #define GTC_TERM_MEMORY 1U    /* first-order memory: cavity_lag (input) and thermal_gradient */
 #define GTC_TERM_PLAY 2U      /* play operator: hysteresis */
 #define GTC_TERM_WARM_UP 3U   /* exponential in the time since power-on */
 #define GTC_TERM_HARMONIC 4U  /* harmonic in T: path_length_periodicity */
-#define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel; kinds from here on read one */
+#define GTC_TERM_AUXILIARY 5U /* linear in an auxiliary channel */
 #define GTC_TERM_CURVE 6U     /* a line and two Gaussians in an auxiliary channel */
 #define GTC_TERM_PRODUCT 7U   /* a line in T times a line in an auxiliary channel */
 #define GTC_N_KINDS 7U
 
-#if (UINT_LEAST32_MAX != 4294967295U) || (INT_LEAST32_MIN + 1 != -2147483647)
-#error "gtc needs least-width 32-bit integers of just 32 bits, in two's complement"
-#endif
-
-/* One 32-bit word: an unsigned integer, a float32 value, or a signed integer.
- * MISRA 19.2 throughout: one array of words is table and flash image for both arithmetics. */
-typedef union {
-    uint_least32_t bits;
-    float value;
-    int_least32_t integer;
-} gtc_word_t;
+/* Parts of the runtime that a table needs, bits of `parts`: gtc_<n>_check(), _init() and _open() refuse a table if this
+ * runtime has not all of them. */
+#define GTC_PART_BANK 0x1UL             /* several networks */
+#define GTC_PART_TERM(kind) (1UL << (kind)) /* a kind of term: bits 1 ... 7 */
+#define GTC_PART_COVERAGE 0x100UL
+#define GTC_PART_UNCERTAINTY 0x200UL
+#define GTC_PART_PROBES 0x400UL         /* known answers */
+#define GTC_PART_NARROW 0x800UL         /* fixed point: narrow Gaussians */
+#define GTC_PART_REZERO 0x1000UL
 
 /* Sizes of the records in the arrays below, in words. */
 #define GTC_SERIAL_WORDS 16U /* the serial in ASCII, four characters a word, the first one lowest; then zeros */
@@ -58,11 +53,9 @@ typedef union {
 #define GTC_SIGMA_RULES 11U  /* words of `sigma` behind its two grids, before one for each term */
 #define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
-struct gtc_f32_term_code; /* the functions of one kind of term; private */
-struct gtc_q31_term_code;
-
+#if GTC_WITH_F32
 /* Table in float32. Gains are 1/width with sqrt(log2 e) folded in. */
-typedef struct {
+struct gtc_f32_table {
     uint_least32_t layout;         /* GTC_TABLE_LAYOUT */
     uint_least32_t quantity;       /* GTC_QUANTITY_... */
     uint_least32_t unit;           /* GTC_UNIT_... */
@@ -72,6 +65,7 @@ typedef struct {
     uint_least32_t slope_blocks;   /* window of the slope, 2 ... GTC_MAX_SLOPE_BLOCKS */
     uint_least32_t lead_blocks;    /* the map is evaluated at T + lead_blocks * slope; 0 or 1 */
     uint_least32_t bias_frac_bits; /* 0 in float32 */
+    uint_least32_t parts;          /* of the runtime that it needs: GTC_PART_... */
     gtc_word_t fallback;           /* deg/h: constant correction where the temperature is lost */
     gtc_word_t authority[2];       /* deg/h: smallest and largest correction that is ever given */
     gtc_word_t effect[2];          /* deg/h: smallest and largest that all terms together add */
@@ -96,11 +90,12 @@ typedef struct {
     const gtc_word_t *sigma;       /* [covered, uncovered][slope cell][T cell] deg/h, 1 sigma; rules; terms */
     const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
     uint_least32_t crc;            /* CRC-32 over all of the above */
-    const struct gtc_f32_term_code *const *term_code; /* [GTC_N_KINDS], by kind - 1; NULL where there are no terms */
-} gtc_f32_table_t;
+};
+#endif
 
+#if GTC_WITH_Q31
 /* Table in fixed point. Words are two's complement 32-bit integers in `bits`. */
-typedef struct {
+struct gtc_q31_table {
     uint_least32_t layout;
     uint_least32_t quantity;
     uint_least32_t unit;
@@ -110,6 +105,7 @@ typedef struct {
     uint_least32_t slope_blocks;
     uint_least32_t lead_blocks;
     uint_least32_t bias_frac_bits; /* bias = integer * 2^-bias_frac_bits deg/h */
+    uint_least32_t parts;
     int_least32_t fallback;        /* 2^-bias_frac_bits deg/h, and so are ... */
     int_least32_t authority[2];
     int_least32_t effect[2];
@@ -135,7 +131,7 @@ typedef struct {
     const gtc_word_t *sigma;
     const gtc_word_t *probes;
     uint_least32_t crc;
-    const struct gtc_q31_term_code *const *term_code;
-} gtc_q31_table_t;
+};
+#endif
 
 #endif /* GTC_TABLE_H_INCLUDED */

@@ -1,21 +1,25 @@
-/* gtc_front.inl - samples in, correction in force out, in the numbers included before.
+/* gtc_front.inl - samples in, correction in force out.
  *
- * docs/numerics.md, section 1, says every step; gen/gyrotc/mirror is its mirror.
+ * docs/numerics.md, section 1, gives every step; gen/gyrotc/mirror is its mirror. From a sample to a correction:
+ *
+ *   sample()       puts the call on a grid of periods; slots without a call are passed as missed
+ *     take_slot()    judges the readings: accepted, held, or the start of a new series
+ *     close_block()  at the end of a block: means -> slope window -> terms -> map -> correction in force
+ *   bias()         the correction in force
  *
  * SPDX-License-Identifier: MIT
  */
 
+#if GTC_WITH_TERMS
 /* Blocks since the start are counted no further than this: all warm-up is over then. */
 #define MAX_ELAPSED 0xFFFFFFUL
+#endif
 
 /* A float counts up to here exactly, and sums of words keep to 64 bits. */
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
 /* A block of samples may be off by this part of it. */
 #define PERIOD_PARTS 1000U
-
-/* Stamps that are so much earlier than the last one are of samples that come late, microseconds. */
-#define LATEST 0x10000000UL
 
 /* The longest time that is counted, microseconds. What was so long ago is forgotten. */
 #define MAX_US 0xFFFFFFFFUL
@@ -27,233 +31,296 @@
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
-/* Puts a correction in force, moved by the shift of the constant: the only place that writes one. */
-static void FN(set_correction)(STATE *state, WIDE bias, int_least32_t status)
+/* Puts a correction in force, moved by the shift of the constant: the only place that writes one, but for init. */
+static void put_in_force(STATE *state, const TABLE *table, WIDE bias, int_least32_t status)
 {
     int_least32_t remarks = status;
-    NUM limited = FN(within_authority)(state->table, bias, &remarks);
+    NUM limited = within_authority(table, bias, &remarks);
 
 #if GTC_WITH_UNCERTAINTY
     state->uncertainty.unshifted = limited;
     if ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO)) {
-        limited = FN(within_authority)(state->table, FN(add)(limited, state->shift), &remarks);
+        limited = within_authority(table, add(limited, state->shift), &remarks);
     }
 #endif
     state->bias = limited;
     state->status = remarks;
 }
 
+#if GTC_WITH_TERMS
 /* The temperature as the terms see it, which is as the map does: within the envelope. */
-static NUM FN(within_envelope)(const TABLE *table, NUM temp, int_least32_t *remarks)
+static NUM within_envelope(const TABLE *table, NUM temp, int_least32_t *remarks)
 {
-    return FN(saturate)(temp, MEMBER(table->envelope[0]), MEMBER(table->envelope[1]), remarks);
+    return saturate(temp, MEMBER(table->envelope[0]), MEMBER(table->envelope[1]), remarks);
 }
+#endif
 
-/* Lets every term take note that a block ends, of this temperature, which lies within the envelope. */
-static void FN(step_terms)(STATE *state, NUM temp)
+/* Makes the correction for an input and puts it in force. Where something wrote over the state, so that the input is no
+ * number, that is the fallback. */
+static void make_correction(STATE *state, const TABLE *table, NUM temp, NUM slope, int_least32_t remarks)
 {
-    uint_least32_t i;
-
-    for (i = 0U; i < FN(n_terms)(state->table); i++) {
-        FN(code_of)(state->table, i)->step(state, i, temp);
-    }
-    FN(uncertainty_step)(state, temp);
-}
-
-/* Makes the correction for an input and puts it in force; `within`: its temperature within the envelope. */
-static void FN(correct)(STATE *state, NUM temp, NUM within, NUM slope, int_least32_t remarks)
-{
-    const TABLE *const table = state->table;
-    EFFECT effect;
     NUM bias = NUM_ZERO;
     WIDE total;
-    uint_least32_t i;
     int status;
+#if GTC_WITH_TERMS
+    EFFECT effect;
+    uint_least32_t i;
 
     effect.temp = temp;
     effect.slope = slope;
     effect.added = NUM_ZERO;
-    effect.terms_known = FN(terms_known)(state);
-    effect.edge_effect = NUM_ZERO;
     effect.remarks = remarks;
-    for (i = 0U; i < FN(n_terms)(table); i++) {
-        FN(code_of)(table, i)->apply(state, i, within, &effect);
+#if GTC_WITH_UNCERTAINTY
+    effect.terms_known = state->uncertainty.terms_known;
+    effect.edge_effect = NUM_ZERO;
+#endif
+    {
+        const NUM within = within_envelope(table, temp, &effect.remarks);
+
+        for (i = 0U; i < table->n_terms; i++) {
+            apply_term(state, table, i, within, &effect);
+        }
     }
-    status = FN(map)(table, effect.temp, effect.slope, &bias);
-    FN(uncertainty_input)(state, &effect, slope);
+    status = map_value(table, effect.temp, effect.slope, &bias);
+#if GTC_WITH_UNCERTAINTY
+    state->uncertainty.terms_known = effect.terms_known;
+    state->uncertainty.edge_effect = effect.edge_effect;
+    uncertainty_input(state, table, effect.temp, effect.slope, slope, effect.remarks);
+#endif
     total = bias;
-    if (FN(n_terms)(table) != 0U) {
-        total = FN(add)(total, FN(saturate)(effect.added, MEMBER(table->effect[0]), MEMBER(table->effect[1]),
-                                            &effect.remarks));
+    if (table->n_terms != 0U) {
+        total = add(total, saturate(effect.added, MEMBER(table->effect[0]), MEMBER(table->effect[1]), &effect.remarks));
     }
-    FN(set_correction)(state, total, effect.remarks | (int_least32_t)status);
+    status = (status < 0) ? status : (status | (int)effect.remarks);
+#else
+    status = map_value(table, temp, slope, &bias);
+#if GTC_WITH_UNCERTAINTY
+    uncertainty_input(state, table, temp, slope, slope, remarks);
+#endif
+    total = bias;
+    status = (status < 0) ? status : (status | (int)remarks);
+#endif
+    if (status < 0) {
+        put_in_force(state, table, MEMBER(table->fallback), GTC_HELD | GTC_FALLBACK);
+    } else {
+        put_in_force(state, table, total, status);
+    }
 }
 
+#if GTC_WITH_RETAINED
 /* A term that was never begun. */
-static void FN(reset_term)(volatile STATE *state, uint_least32_t i)
+static void reset_term(STATE *state, uint_least32_t i)
 {
-    state->term[i][0] = FN(missing)();
-    state->term[i][1] = FN(missing)();
+    state->term[i][0] = missing_number();
+    state->term[i][1] = missing_number();
 }
 
-static void FN(reset_terms)(STATE *state)
+static void reset_terms(STATE *state)
 {
     uint_least32_t i;
 
-    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        FN(reset_term)(state, i);
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        reset_term(state, i);
     }
 }
+#endif
 
-/* Begins again at x: slope 0, nothing in the window; terms too, but for what the first start finds of a saved state. */
-static void FN(restart)(STATE *state, NUM x, int is_first)
+#if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
+/* The terms begin at x, the first temperature; what the first start finds of a saved state goes on. */
+static void begin_terms(STATE *state, const TABLE *table, NUM x, int nothing_before)
 {
-    const TABLE *const table = state->table;
-    int_least32_t remarks = GTC_WARMING;
-    const NUM within = FN(within_envelope)(table, x, &remarks);
+    int_least32_t ignored = GTC_OK;
+    const NUM within = within_envelope(table, x, &ignored);
+#if GTC_WITH_RETAINED
     uint_least32_t i;
 
+    if (nothing_before == 0) {
+        reset_terms(state);
+    }
+#else
+    (void)nothing_before;
+#endif
+#if GTC_WITH_UNCERTAINTY
+    uncertainty_terms_begin(state, table, within);
+#endif
+#if GTC_WITH_RETAINED
+    for (i = 0U; i < table->n_terms; i++) {
+        begin_term(state, table, i, within);
+    }
+#endif
+}
+
+/* Lets every term take note that a block ends, of this temperature. */
+static void step_terms(STATE *state, const TABLE *table, NUM temp)
+{
+    int_least32_t ignored = GTC_OK;
+    const NUM within = within_envelope(table, temp, &ignored);
+#if GTC_WITH_RETAINED
+    uint_least32_t i;
+
+    for (i = 0U; i < table->n_terms; i++) {
+        step_term(state, table, i, within);
+    }
+#endif
+#if GTC_WITH_UNCERTAINTY
+    uncertainty_step(state, within);
+#endif
+}
+#endif
+
+/* Begins again at x: slope 0, nothing in the window. `nothing_before`: the first start, or the first one after a
+ * loss. */
+static void restart(STATE *state, const TABLE *table, NUM x, int nothing_before)
+{
     state->filled = 0U;
     state->window_valid = 0U;
-    if (is_first == 0) {
-        FN(reset_terms)(state);
-    }
-    FN(uncertainty_begin)(state, x, within);
-    for (i = 0U; i < FN(n_terms)(table); i++) {
-        FN(code_of)(table, i)->begin(state, i, within);
-    }
-    FN(correct)(state, x, within, NUM_ZERO, remarks);
+#if GTC_WITH_UNCERTAINTY
+    state->uncertainty.first_temp = x;
+    state->uncertainty.missing = 0U;
+#endif
+#if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
+    begin_terms(state, table, x, nothing_before);
+#else
+    (void)nothing_before;
+#endif
+    make_correction(state, table, x, NUM_ZERO, GTC_WARMING);
 }
 
 /* ---- the window ---------------------------------------------------------------------------------- */
 
 /* Moves the window on by one block: its mean, or a hole. */
-static void FN(push)(STATE *state, uint_least32_t is_valid)
+static void push_block(STATE *state, const TABLE *table, uint_least32_t is_valid)
 {
-    volatile NUM *const window = state->window; /* no memmove() */
-    uint_least32_t i;
+    uint_least32_t age;
 
-    for (i = state->table->slope_blocks - 1U; i > 0U; i--) {
-        window[i] = window[i - 1U];
+    for (age = table->slope_blocks - 1U; age > 0U; age--) {
+        state->window[age] = state->window[age - 1U];
     }
     state->window[0] = state->input[0].mean;
-    state->window_valid = ((state->window_valid << 1) | is_valid) & 0xFFFFFFFFUL;
-    if (state->filled < state->table->slope_blocks) {
+    state->window_valid = (state->window_valid << 1) | is_valid;
+    if (state->filled < table->slope_blocks) {
         state->filled++;
     }
 }
 
-/* Least-squares slope over the valid blocks of the window, the newest of which is valid.
- * Returns GTC_OK, or GTC_WARMING (and slope 0) if the window is not full. Sums over the places k of the blocks begin
- * as those without holes; the newest block adds nothing to the sums over d, its differences from itself. */
-static int_least32_t FN(window_slope)(const STATE *state, NUM *slope)
+/* Slope of the temperature for each block: the least-squares line through the block means of the window.
+ *
+ * window[age] is the mean of the block that ended `age` blocks before the newest; bit `age` of window_valid is 0
+ * where that block had too few readings (a hole). The newest, age 0, is valid here: close_block() has just pushed
+ * it.
+ *
+ * With k = blocks - 1 - age, which grows with time, d = mean - newest mean, and every sum over the n valid blocks
+ * only:
+ *
+ *     slope = (n * sum(k d) - sum(k) * sum(d)) / (n * sum(k k) - sum(k)^2)
+ *
+ * The denominator is a whole number, at least 1 for two valid blocks. The order of the sums, oldest first, is part
+ * of the result.
+ *
+ * Returns GTC_OK, or GTC_WARMING with slope 0 until the window has been filled once, and while fewer than half of
+ * its blocks, or fewer than two, are valid. */
+static int_least32_t window_slope(const STATE *state, const TABLE *table, NUM *slope)
 {
-    const uint_least32_t blocks = state->table->slope_blocks;
-    const uint_least32_t last = blocks - 1U;
+    const uint_least32_t blocks = table->slope_blocks;
     const uint_least32_t half = (blocks + 1U) / 2U;
     const NUM newest = state->window[0];
-    uint_least32_t n = blocks;
-    uint_least32_t sum_k = (blocks * last) / 2U;
-    uint_least32_t sum_kk = (sum_k * (blocks + last)) / 3U;
+    uint_least32_t n = 0U;
+    uint_least32_t sum_k = 0U;
+    uint_least32_t sum_kk = 0U;
     WIDE sum_d = NUM_ZERO;
     WIDE sum_kd = NUM_ZERO;
-    uint_least32_t k = 0U;
-    uint_least32_t bit;
+    WIDE n_sum_kd;
+    WIDE sum_k_sum_d;
+    uint_least32_t k;
 
     *slope = NUM_ZERO;
     if (state->filled < blocks) {
         return GTC_WARMING;
     }
-    for (bit = (uint_least32_t)1U << last; bit > 1U; bit >>= 1) {
-        if ((state->window_valid & bit) != 0U) {
-            const WIDE d = FN(diff)(state->window[last - k], newest);
+    for (k = 0U; k < blocks; k++) {
+        const uint_least32_t age = (blocks - 1U) - k;
 
-            sum_d = FN(add)(sum_d, d);
-            sum_kd = FN(add)(sum_kd, FN(scaled)(k, d));
-        } else {
-            n--;
-            sum_k -= k;
-            sum_kk -= k * k;
+        if (((state->window_valid >> age) & 1U) != 0U) {
+            const WIDE d = diff(state->window[age], newest);
+
+            sum_d = add(sum_d, d);
+            sum_kd = add(sum_kd, scaled(k, d));
+            n++;
+            sum_k += k;
+            sum_kk += k * k;
         }
-        k++;
     }
     if ((n < 2U) || (n < half)) {
         return GTC_WARMING;
     }
-    sum_d = FN(scaled)(sum_k, sum_d);
-    sum_kd = FN(scaled)(n, sum_kd);
-    *slope = FN(quotient)(FN(diff)(sum_kd, sum_d), (n * sum_kk) - (sum_k * sum_k));
+    n_sum_kd = scaled(n, sum_kd);
+    sum_k_sum_d = scaled(sum_k, sum_d);
+    *slope = divide(diff(n_sum_kd, sum_k_sum_d), (n * sum_kk) - (sum_k * sum_k));
     return GTC_OK;
 }
 
 /* ---- what is accepted ---------------------------------------------------------------------------- */
 
-/* A time and another, microseconds, as far as can be counted. */
-static uint_least32_t FN(later)(uint_least32_t a, uint_least32_t b)
+/* The sum of two times, microseconds, as far as can be counted. */
+static uint_least32_t add_us(uint_least32_t a, uint_least32_t b)
 {
-    const uint_least32_t sum = (a + b) & MAX_US;
+    const uint_least32_t sum = a + b;
 
     return (sum >= a) ? sum : MAX_US;
 }
 
-/* Nothing of a channel was ever accepted, or not since it was lost. */
-static int FN(is_new)(const INPUT *in)
+/* Samples of `us` microseconds passed in which nothing was accepted. */
+static void add_gap(INPUT *in, uint_least32_t us)
 {
-    return (in->gap_us == 0U) ? 1 : 0;
-}
-
-/* `us` microseconds passed in which nothing was accepted. */
-static void FN(hold)(INPUT *in, uint_least32_t us)
-{
-    if (in->gap_us != 0U) {
-        in->gap_us = FN(later)(in->gap_us, us);
+    if (in->next_gap_us != 0U) {
+        in->next_gap_us = add_us(in->next_gap_us, us);
     }
-    in->series_us = FN(later)(in->series_us, us);
-    in->candidate_us = FN(later)(in->candidate_us, us);
+    in->series_us = add_us(in->series_us, us);
+    in->candidate_us = add_us(in->candidate_us, us);
 }
 
 /* 1 if x has been the same for too long. */
-static int FN(is_stuck)(INPUT *in, const gtc_word_t *guard, NUM x, uint_least32_t period_us)
+static int is_stuck(INPUT *in, const gtc_word_t *guard, NUM x, uint_least32_t period_us)
 {
-    const uint_least32_t bits = FN(bits)(x);
+    const uint_least32_t bits = bits_of(x);
     const uint_least32_t most = guard[GUARD_STUCK].bits;
 
     if (bits != in->received) {
         in->received = bits;
         in->same_us = 0U;
     } else if (in->same_us < most) {
-        in->same_us = FN(later)(in->same_us, period_us);
+        in->same_us = add_us(in->same_us, period_us);
     } else {
         /* counted far enough */
     }
     return ((most != 0U) && (in->same_us >= most)) ? 1 : 0;
 }
 
-/* 1 if x follows the last accepted reading. */
-static int FN(follows)(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
+/* 1 if x follows the last accepted reading. `near` is kept to save a product in each sample. */
+static int follows(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
 {
     int near = 0;
 
-    if (in->gap_us == state->period_us) {
-        near = FN(is_near)(x, in->last, in->near);
-    } else if (in->gap_us != 0U) {
-        near = FN(is_near)(x, in->last, FN(limit)(guard, in->gap_us));
+    if (in->next_gap_us == state->period_us) {
+        near = is_near(x, in->last, in->near);
+    } else if (in->next_gap_us != 0U) {
+        near = is_near(x, in->last, largest_change(guard, in->next_gap_us));
     } else {
         /* there is none */
     }
     return near;
 }
 
-/* 1 if x agrees with the candidate before it: as near as an accepted reading must be to the last one, and no later than a
- * channel is held. */
-static int FN(agrees)(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
+/* 1 if x agrees with the candidate before it: as near as an accepted reading must be to the last one, and no later
+ * than a channel is held. */
+static int agrees(const TABLE *table, const INPUT *in, const gtc_word_t *guard, NUM x)
 {
     const uint_least32_t us = in->candidate_us;
-    const uint_least32_t blocks = us / state->table->block_us;
+    const uint_least32_t blocks = us / table->block_us;
     int near = 0;
 
     if ((us < MAX_US) && (blocks <= guard[GUARD_MISSING].bits)) {
-        near = FN(is_near)(x, in->candidate, FN(limit)(guard, us));
+        near = is_near(x, in->candidate, largest_change(guard, us));
     }
     return near;
 }
@@ -264,7 +331,7 @@ static int FN(agrees)(const STATE *state, const INPUT *in, const gtc_word_t *gua
  *
  * The first reading of a series sets both of its times to 0, and from then on they grow alike; so series_us is larger
  * than candidate_us from the second reading on. Returns IS_HELD or IS_NEW_START. */
-static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+static int confirm_candidate(const TABLE *table, INPUT *in, const gtc_word_t *guard, NUM x)
 {
     const uint_least32_t least_us = guard[GUARD_AGREE].bits;
     int verdict = IS_HELD;
@@ -272,7 +339,7 @@ static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, N
     if (least_us == 0U) {
         verdict = IS_NEW_START;
     }
-    if (!FN(agrees)(state, in, guard, x)) {
+    if (!agrees(table, in, guard, x)) {
         in->series_us = 0U;
     } else if ((in->series_us > in->candidate_us) && (in->series_us >= least_us)) {
         verdict = IS_NEW_START;
@@ -285,197 +352,230 @@ static int FN(confirm)(const STATE *state, INPUT *in, const gtc_word_t *guard, N
 }
 
 /* Forgets the candidate, so that the next reading that does not follow begins a series. */
-static void FN(forget_candidate)(INPUT *in)
+static void forget_candidate(INPUT *in)
 {
     in->candidate_us = MAX_US;
 }
 
 /* Takes x into the running block. */
-static void FN(accept)(INPUT *in, NUM x, uint_least32_t period_us)
+static void accept_reading(INPUT *in, NUM x, uint_least32_t period_us)
 {
     if (in->valid == 0U) {
         in->base = x;
         in->sum = NUM_ZERO;
     }
-    in->sum = FN(add)(in->sum, FN(diff)(x, in->base));
+    in->sum = add(in->sum, diff(x, in->base));
     in->valid++;
     in->last = x;
-    in->gap_us = period_us;
-    FN(forget_candidate)(in);
+    in->next_gap_us = period_us;
+    forget_candidate(in);
 }
 
 /* One reading x within its range: held, accepted, or accepted as a new start, which is the mean until a block ends. */
-static int FN(judge)(const STATE *state, INPUT *in, const gtc_word_t *guard, NUM x)
+static int judge_reading(const STATE *state, const TABLE *table, INPUT *in, const gtc_word_t *guard, NUM x)
 {
     int verdict = IS_ACCEPTED;
 
-    if (!FN(follows)(state, in, guard, x)) {
-        verdict = FN(confirm)(state, in, guard, x);
+    if (!follows(state, in, guard, x)) {
+        verdict = confirm_candidate(table, in, guard, x);
     }
     if (verdict == IS_HELD) {
-        FN(hold)(in, state->period_us);
+        add_gap(in, state->period_us);
         return IS_HELD;
     }
     if (verdict == IS_NEW_START) {
         in->valid = 0U;
         in->held_blocks = 0U;
-        in->clamped = 0U;
         in->mean = x;
+#if GTC_WITH_CHANNELS
+        in->clamped = 0U;
+#endif
     }
-    FN(accept)(in, x, state->period_us);
+    accept_reading(in, x, state->period_us);
     return verdict;
 }
 
 /* A reading x that is missing or cannot be true. The latter speaks against the candidate before it. */
-static void FN(reject)(INPUT *in, NUM x, uint_least32_t us)
+static void miss_reading(INPUT *in, NUM x, uint_least32_t us)
 {
-    if (FN(is_missing)(x) == 0) {
-        FN(forget_candidate)(in);
+    if (is_missing(x) == 0) {
+        forget_candidate(in);
     }
-    FN(hold)(in, us);
+    add_gap(in, us);
 }
 
 /* One temperature. Returns GTC_OK or GTC_HELD. */
-static int FN(take_temperature)(STATE *state, NUM x)
+static int take_temperature(STATE *state, const TABLE *table, NUM x)
 {
     INPUT *const in = &state->input[0];
-    const gtc_word_t *const guard = state->table->guards;
-    const int is_first = FN(is_new)(in);
+    const gtc_word_t *const guard = table->guards;
+    const int nothing_before = (in->next_gap_us == 0U) ? 1 : 0;
     int verdict = IS_HELD;
 
-    if (FN(is_missing)(x) || FN(is_stuck)(in, guard, x, state->period_us)
+    if (is_missing(x) || is_stuck(in, guard, x, state->period_us)
         || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
-        FN(reject)(in, x, state->period_us);
+        miss_reading(in, x, state->period_us);
     } else {
-        verdict = FN(judge)(state, in, guard, x);
+        verdict = judge_reading(state, table, in, guard, x);
         if (verdict == IS_NEW_START) {
-            FN(restart)(state, x, is_first);
+            restart(state, table, x, nothing_before);
         }
     }
     return (verdict == IS_HELD) ? GTC_HELD : GTC_OK;
 }
 
+#if GTC_WITH_CHANNELS
 /* One reading of an auxiliary channel: beyond its range the edge. */
-static void FN(take_channel)(STATE *state, uint_least32_t channel, NUM reading)
+static void take_channel(STATE *state, const TABLE *table, uint_least32_t channel, NUM reading)
 {
     INPUT *const in = &state->input[channel];
-    const gtc_word_t *const guard = FN(guard)(state, channel);
+    const gtc_word_t *const guard = guard_of(table, channel);
     int_least32_t remarks = GTC_OK;
     NUM x;
     int verdict;
 
-    if (FN(is_missing)(reading) || FN(is_stuck)(in, guard, reading, state->period_us) != 0) {
-        FN(reject)(in, reading, state->period_us);
+    if (is_missing(reading) || is_stuck(in, guard, reading, state->period_us)) {
+        miss_reading(in, reading, state->period_us);
         return;
     }
-    x = FN(saturate)(reading, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH]), &remarks);
-    verdict = FN(judge)(state, in, guard, x);
+    x = saturate(reading, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH]), &remarks);
+    verdict = judge_reading(state, table, in, guard, x);
     if ((verdict != IS_HELD) && (remarks != GTC_OK)) {
         in->clamped |= (verdict == IS_NEW_START) ? (CLAMPED_NOW | CLAMPED_MEAN) : CLAMPED_NOW;
     }
 }
+#endif
 
 /* ---- blocks -------------------------------------------------------------------------------------- */
 
-/* Readings that make a mean: half of a block, or two, which agree, as each was accepted after the one before it. How far
- * the mean may lie from that of the whole block, its uncertainty says. */
-static int FN(is_enough)(const STATE *state, const INPUT *in)
+/* Two readings make a mean: they agree, as each was accepted after the one before it. One does where a block has one or
+ * two samples. How far the mean may be from that of the whole block, its uncertainty says. */
+static int has_enough_readings(const STATE *state, const INPUT *in)
 {
     return ((in->valid >= 2U) || ((2U * in->valid) >= state->samples_per_block)) ? 1 : 0;
 }
 
 /* The running block of a channel ends. Returns 1 if it has enough readings; then the mean is theirs. When it is
  * lost its last reading is forgotten, so that it must agree with itself before it is accepted again. */
-static int FN(end_block)(const STATE *state, INPUT *in, const gtc_word_t *guard)
+static int end_block(const STATE *state, INPUT *in, const gtc_word_t *guard)
 {
-    const int is_valid = FN(is_enough)(state, in);
+    const int is_valid = has_enough_readings(state, in);
 
     if (is_valid != 0) {
-        in->mean = FN(mean)(in->base, in->sum, in->valid);
+        in->mean = mean_of(in->base, in->sum, in->valid);
         in->held_blocks = 0U;
-        in->clamped = (in->clamped & CLAMPED_NOW) * CLAMPED_MEAN;
+#if GTC_WITH_CHANNELS
+        in->clamped = ((in->clamped & CLAMPED_NOW) != 0U) ? CLAMPED_MEAN : 0U;
+#endif
     } else {
+#if GTC_WITH_CHANNELS
         in->clamped &= CLAMPED_MEAN;
-        if (!FN(is_lost)(in, guard)) {
+#endif
+        if (!is_lost(in, guard)) {
             in->held_blocks++;
         }
-        if (FN(is_lost)(in, guard) != 0) {
-            in->gap_us = 0U;
+        if (is_lost(in, guard)) {
+            in->next_gap_us = 0U;
         }
     }
     in->valid = 0U;
     return is_valid;
 }
 
-static void FN(close_channels)(STATE *state)
+#if GTC_WITH_CHANNELS
+static void close_channels(STATE *state, const TABLE *table)
 {
     uint_least32_t c;
 
-    for (c = 1U; c < FN(n_channels)(state->table); c++) {
+    for (c = 1U; c < table->n_channels; c++) {
         INPUT *const in = &state->input[c];
-        const gtc_word_t *const guard = FN(guard)(state, c);
+        const gtc_word_t *const guard = guard_of(table, c);
 
-        if ((!FN(end_block)(state, in, guard)) && FN(is_lost)(in, guard)) {
+        if ((!end_block(state, in, guard)) && is_lost(in, guard)) {
             in->mean = ELEMENT(guard[GUARD_FALLBACK]);
             in->clamped = 0U;
         }
     }
 }
+#endif
 
 /* A block with too few valid samples: the last correction stays, but not for ever. */
-static void FN(bridge)(STATE *state)
+static void close_without_mean(STATE *state, const TABLE *table)
 {
-    if (FN(is_lost)(&state->input[0], state->table->guards) != 0) {
-        FN(reset_terms)(state);
-        FN(set_correction)(state, MEMBER(state->table->fallback), GTC_HELD | GTC_FALLBACK);
-    } else if (state->input[0].gap_us != 0U) {
-        int_least32_t ignored = GTC_OK;
-
-        FN(push)(state, 0U);
-        FN(step_terms)(state, FN(within_envelope)(state->table, state->input[0].mean, &ignored));
+    if (is_lost(&state->input[0], table->guards)) {
+#if GTC_WITH_RETAINED
+        reset_terms(state);
+#endif
+        put_in_force(state, table, MEMBER(table->fallback), GTC_HELD | GTC_FALLBACK);
+    } else if (state->input[0].next_gap_us != 0U) {
+        push_block(state, table, 0U);
+#if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
+        step_terms(state, table, state->input[0].mean);
+#endif
         state->status |= GTC_HELD;
     } else {
         /* nothing was ever accepted: no correction yet */
     }
 }
 
+#if GTC_WITH_TERMS
 /* Blocks that have passed since the start. */
-static void FN(pass)(STATE *state, uint_least32_t blocks)
+static void count_blocks(STATE *state, uint_least32_t blocks)
 {
     state->elapsed = ((MAX_ELAPSED - state->elapsed) > blocks) ? (state->elapsed + blocks) : MAX_ELAPSED;
 }
+#endif
 
 /* The running block is complete: its mean and slope make the next correction, which is in force for the next block:
  * so terms and map see where the slope brings the mean by then. */
-static void FN(close)(STATE *state)
+static void close_block(STATE *state, const TABLE *table)
 {
+#if GTC_WITH_UNCERTAINTY
     const uint_least32_t missing = state->samples_per_block - state->input[0].valid;
 
-    FN(pass)(state, 1U);
-    FN(close_channels)(state);
-    if (FN(end_block)(state, &state->input[0], state->table->guards) != 0) {
+#endif
+#if GTC_WITH_TERMS
+    count_blocks(state, 1U);
+#endif
+#if GTC_WITH_CHANNELS
+    close_channels(state, table);
+#endif
+    if (end_block(state, &state->input[0], table->guards)) {
         NUM temp;
-        NUM within;
         NUM slope;
         int_least32_t remarks;
 
-        FN(uncertainty_block)(state, missing);
-        FN(push)(state, 1U);
-        remarks = FN(window_slope)(state, &slope);
-        temp = FN(ahead)(state->input[0].mean, slope, state->table->lead_blocks);
-        within = FN(within_envelope)(state->table, temp, &remarks);
-        FN(step_terms)(state, within);
-        FN(correct)(state, temp, within, slope, remarks);
+#if GTC_WITH_UNCERTAINTY
+        state->uncertainty.missing = missing;
+#endif
+        push_block(state, table, 1U);
+        remarks = window_slope(state, table, &slope);
+        temp = ahead(state->input[0].mean, slope, table->lead_blocks);
+#if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
+        step_terms(state, table, temp);
+#endif
+        make_correction(state, table, temp, slope, remarks);
     } else {
-        FN(bridge)(state);
+        close_without_mean(state, table);
     }
     state->position = 0U;
 }
 
-/* ---- a state ------------------------------------------------------------------------------------- */
+/* ---- start --------------------------------------------------------------------------------------- */
+
+/* 1 if this runtime has what the table needs, and a state has room for it. The words of the table are those that
+ * gtc_<n>_check() or gtc_<n>_open() found sound. */
+static int fits_runtime(const TABLE *table)
+{
+    return ((table->layout == GTC_TABLE_LAYOUT) && ((table->parts & ~GTC_PARTS) == 0U)
+            && (table->bias_frac_bits == FRAC_BITS)
+            && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
+            && (table->n_terms <= (uint_least32_t)GTC_MAX_TERMS)
+            && (table->n_channels <= (uint_least32_t)GTC_MAX_CHANNELS)) ? 1 : 0;
+}
 
 /* Samples in a block of the table, if so many of this period make one to a thousandth of it; else 0. */
-static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t period_us)
+static uint_least32_t samples_in_block(const TABLE *table, uint_least32_t period_us)
 {
     const uint_least32_t rest = table->block_us % period_us;
     uint_least32_t n = table->block_us / period_us;
@@ -489,15 +589,15 @@ static uint_least32_t FN(samples_in_block)(const TABLE *table, uint_least32_t pe
 }
 
 /* GTC_OK, or why a state cannot be started. */
-static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t period_us)
+static int can_start(const STATE *state, const TABLE *table, uint_least32_t period_us)
 {
     int status = GTC_OK;
 
     if ((state == NULL) || (table == NULL) || (period_us == 0U)) {
         status = GTC_E_ARG;
-    } else if (!FN(fits_build)(table)) {
+    } else if (!fits_runtime(table)) {
         status = GTC_E_LAYOUT;
-    } else if (FN(samples_in_block)(table, period_us) == 0U) {
+    } else if (samples_in_block(table, period_us) == 0U) {
         status = GTC_E_PERIOD;
     } else {
         /* it can */
@@ -506,16 +606,18 @@ static int FN(can_start)(const STATE *state, const TABLE *table, uint_least32_t 
 }
 
 /* A channel that has not seen a reading yet. */
-static void FN(clear_input)(volatile INPUT *in)
+static void clear_input(INPUT *in)
 {
-    in->gap_us = 0U;
+    in->next_gap_us = 0U;
     in->series_us = MAX_US;
     in->candidate_us = MAX_US;
     in->same_us = 0U;
     in->received = NUM_MISSING_BITS;
     in->valid = 0U;
     in->held_blocks = 0U;
+#if GTC_WITH_CHANNELS
     in->clamped = 0U;
+#endif
     in->last = NUM_ZERO;
     in->candidate = NUM_ZERO;
     in->base = NUM_ZERO;
@@ -524,9 +626,8 @@ static void FN(clear_input)(volatile INPUT *in)
 }
 
 /* A front end that has not seen a sample yet. */
-static void FN(clear)(STATE *state)
+static void clear_front_end(STATE *state)
 {
-    volatile NUM *const window = state->window; /* no memset() */
     uint_least32_t i;
 
     state->position = 0U;
@@ -534,110 +635,151 @@ static void FN(clear)(STATE *state)
     state->window_valid = 0U;
     state->status = GTC_HELD;
     state->bias = NUM_ZERO;
+    state->phase_us = 0U;
+    state->repeated = 0U;
+#if GTC_WITH_TERMS
     state->elapsed = 0U;
     state->off_blocks = 0U;
-    state->late_us = 0U;
-    state->unused = 0U;
-    FN(uncertainty_clear)(state);
+#endif
+#if GTC_WITH_UNCERTAINTY
+    uncertainty_clear(state);
+#endif
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
-        window[i] = NUM_ZERO;
+        state->window[i] = NUM_ZERO;
     }
-    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
-        FN(clear_input)(&state->input[i]);
-        if ((i >= 1U) && (i < FN(n_channels)(state->table))) {
-            state->input[i].mean = ELEMENT(FN(guard)(state, i)[GUARD_FALLBACK]);
-        }
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
+        clear_input(&state->input[i]);
     }
 }
 
+#if GTC_WITH_CHANNELS
+/* Until its first reading the fallback is the mean of an auxiliary channel. */
+static void set_fallback_means(STATE *state, const TABLE *table)
+{
+    uint_least32_t c;
+
+    for (c = 1U; c < table->n_channels; c++) {
+        state->input[c].mean = ELEMENT(guard_of(table, c)[GUARD_FALLBACK]);
+    }
+}
+#endif
+
 /* All of a state that can be started. */
-static void FN(start)(STATE *state, const TABLE *table, uint_least32_t period_us)
+static void start_state(STATE *state, const TABLE *table, uint_least32_t period_us)
 {
     uint_least32_t i;
 
-    state->table = table;
+    state->table_crc = table->crc;
     state->period_us = period_us;
-    state->samples_per_block = FN(samples_in_block)(table, period_us);
-    FN(clear)(state);
-    FN(rezero_clear)(state);
-    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
+    state->samples_per_block = samples_in_block(table, period_us);
+    clear_front_end(state);
+#if GTC_WITH_CHANNELS
+    set_fallback_means(state, table);
+#endif
+#if GTC_WITH_UNCERTAINTY
+    rezero_clear(state, table);
+#endif
+#if GTC_WITH_RETAINED
+    reset_terms(state);
+#endif
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
         state->input[i].near = LIMIT_ZERO;
-        if (i < FN(n_channels)(table)) {
-            state->input[i].near = FN(limit)(FN(guard)(state, i), period_us);
+        if (i < table->n_channels) {
+            state->input[i].near = largest_change(guard_of(table, i), period_us);
         }
     }
-    FN(reset_terms)(state);
 }
 
-static int FN(run_init)(STATE *state, const TABLE *table, uint_least32_t period_us)
+int PUBLIC(init)(STATE *state, const TABLE *table, uint_least32_t period_us)
 {
-    const int status = FN(can_start)(state, table, period_us);
+    const int status = can_start(state, table, period_us);
 
     if (status == GTC_OK) {
-        FN(start)(state, table, period_us);
+        start_state(state, table, period_us);
     }
     return status;
 }
 
-/* The next sample of the grid. */
-static int FN(take)(STATE *state, const NUM *channels)
+/* GTC_OK for a state that was started with this table. One that was overwritten may have times that would divide by
+ * nothing, or that never pass. */
+static int is_started(const STATE *state, const TABLE *table)
 {
-    uint_least32_t c;
+    int status = GTC_OK;
+
+    if ((state == NULL) || (table == NULL) || (state->samples_per_block == 0U) || (state->period_us == 0U)) {
+        status = GTC_E_ARG;
+    } else if (state->table_crc != table->crc) {
+        status = GTC_E_ID;
+    } else {
+        /* it was */
+    }
+    return status;
+}
+
+/* ---- the grid of periods ------------------------------------------------------------------------- */
+
+/* The next sample of the grid. */
+static int take_slot(STATE *state, const TABLE *table, const NUM *channels)
+{
     int remark;
+#if GTC_WITH_CHANNELS
+    uint_least32_t c;
+#endif
 
     if (state->position >= state->samples_per_block) {
-        FN(close)(state);
+        close_block(state, table);
     }
     state->position++;
-    for (c = 1U; c < FN(n_channels)(state->table); c++) {
-        FN(take_channel)(state, c, channels[c]);
+#if GTC_WITH_CHANNELS
+    for (c = 1U; c < table->n_channels; c++) {
+        take_channel(state, table, c, channels[c]);
     }
-    remark = FN(take_temperature)(state, channels[0]);
+#endif
+    remark = take_temperature(state, table, channels[0]);
     return (int)state->status | remark;
 }
 
-/* 1 if a state was started: 0 for one that memory lost, whose times would divide by nothing or never pass. */
-static int FN(has_times)(const STATE *state)
-{
-    return ((state->table != NULL) && (state->samples_per_block != 0U) && (state->period_us != 0U)) ? 1 : 0;
-}
-
 #if GTC_WITH_TIME
+/* Stamps that are so much earlier than the last one are of samples that come late, microseconds. */
+#define LATEST 0x10000000UL
+
 /* 1 if every channel has been missing for so long that only time passes any more. */
-static int FN(all_lost)(const STATE *state)
+static int all_lost(const STATE *state, const TABLE *table)
 {
     int lost = 1;
     uint_least32_t c;
 
-    for (c = 0U; c < FN(n_channels)(state->table); c++) {
-        lost &= FN(is_lost)(&state->input[c], FN(guard)(state, c));
+    for (c = 0U; c < table->n_channels; c++) {
+        lost &= is_lost(&state->input[c], guard_of(table, c));
     }
     return lost;
 }
 
 /* `samples` samples passed in which nothing came. */
-static void FN(miss)(STATE *state, uint_least32_t samples)
+static void miss_slots(STATE *state, const TABLE *table, uint_least32_t samples)
 {
     uint_least32_t c;
 
-    for (c = 0U; c < FN(n_channels)(state->table); c++) {
-        FN(hold)(&state->input[c], samples * state->period_us);
+    for (c = 0U; c < table->n_channels; c++) {
+        add_gap(&state->input[c], samples * state->period_us);
     }
 }
 
 /* Whole blocks in which nothing can change but the times. Returns the samples that are left, at least one. */
-static uint_least32_t FN(skip)(STATE *state, uint_least32_t samples)
+static uint_least32_t skip_lost_blocks(STATE *state, const TABLE *table, uint_least32_t samples)
 {
     const uint_least32_t blocks = (samples - 1U) / state->samples_per_block;
     const uint_least32_t skipped = blocks * state->samples_per_block;
 
-    FN(pass)(state, blocks);
-    FN(miss)(state, skipped);
+#if GTC_WITH_TERMS
+    count_blocks(state, blocks);
+#endif
+    miss_slots(state, table, skipped);
     return samples - skipped;
 }
 
 /* `count` samples of the grid in which nothing came, the same bits as in `count` calls. */
-static int FN(pass_over)(STATE *state, uint_least32_t count)
+static int pass_slots(STATE *state, const TABLE *table, uint_least32_t count)
 {
     uint_least32_t rest = count;
 
@@ -645,94 +787,102 @@ static int FN(pass_over)(STATE *state, uint_least32_t count)
         uint_least32_t step;
 
         if (state->position >= state->samples_per_block) {
-            FN(close)(state);
+            close_block(state, table);
         }
-        if (FN(all_lost)(state) != 0) {
-            rest = FN(skip)(state, rest);
+        if (all_lost(state, table)) {
+            rest = skip_lost_blocks(state, table, rest);
         }
         step = state->samples_per_block - state->position;
         step = (step < rest) ? step : rest;
-        FN(miss)(state, step);
+        miss_slots(state, table, step);
         state->position += step;
         rest -= step;
     }
     return (int)state->status | GTC_HELD;
 }
 
-/* Sample periods in a time, rounded. */
-static uint_least32_t FN(slots)(const STATE *state, uint_least32_t us)
+/* Sample periods in a time, rounded. Most calls come after one period, which saves a division. */
+static uint_least32_t slots_in(const STATE *state, uint_least32_t us)
 {
-    const uint_least32_t rest = us % state->period_us;
-    const uint_least32_t n = us / state->period_us;
+    uint_least32_t n = 1U;
 
-    return n + ((rest >= (state->period_us - rest)) ? 1U : 0U);
+    if (us != state->period_us) {
+        const uint_least32_t rest = us % state->period_us;
+
+        n = (us / state->period_us) + ((rest >= (state->period_us - rest)) ? 1U : 0U);
+    }
+    return n;
 }
 
-/* A sample whose time has not moved on is not used. One or a few come of jitter, or of a caller that is faster than its
- * period. After as many in a row as make a block the clock has stopped: each of them is a period in which nothing came. */
-static int FN(not_used)(STATE *state)
+/* A call whose slot is already taken. One or a few come of jitter, or of a caller that is faster than its period.
+ * After as many in a row as make a block the clock has stopped: each of them is a period in which nothing came. */
+static int ignore_call(STATE *state, const TABLE *table)
 {
-    if (state->unused < state->samples_per_block) {
-        state->unused++;
+    if (state->repeated < state->samples_per_block) {
+        state->repeated++;
         return (int)state->status | GTC_HELD;
     }
-    return FN(pass_over)(state, 1U);
+    return pass_slots(state, table, 1U);
 }
 
 /* Times are put on a grid of sample periods, from the start on, so that no error of them adds up. */
-static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *channels)
+int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, const NUM *channels)
 {
-    uint_least32_t later_us;
-    uint_least32_t n = 1U;
+    const int started = is_started(state, table);
+    uint_least32_t since_slot_us;
+    uint_least32_t slots;
 
-    if ((state == NULL) || (FN(has_times)(state) == 0)) {
-        return GTC_E_ARG;
+    if (started != GTC_OK) {
+        return started;
     }
-    later_us = (state->late_us + elapsed_us) & MAX_US;
-    if (later_us != state->period_us) {
-        n = FN(slots)(state, later_us);
+    since_slot_us = state->phase_us + elapsed_us;
+    slots = slots_in(state, since_slot_us);
+    if ((slots == 0U) || (since_slot_us > (MAX_US - LATEST))) {
+        state->phase_us = since_slot_us;
+        return ignore_call(state, table);
     }
-    if ((n == 0U) || (later_us > (MAX_US - LATEST))) {
-        state->late_us = later_us;
-        return FN(not_used)(state);
-    }
-    state->unused = 0U;
-    state->late_us = (later_us - (n * state->period_us)) & MAX_US;
+    state->repeated = 0U;
+    state->phase_us = since_slot_us - (slots * state->period_us);
     if (channels == NULL) {
-        return FN(pass_over)(state, n);
+        return pass_slots(state, table, slots);
     }
-    (void)FN(pass_over)(state, n - 1U);
-    return FN(take)(state, channels);
+    (void)pass_slots(state, table, slots - 1U);
+    return take_slot(state, table, channels);
 }
-
 #else
 /* Samples come each period. */
-static int FN(run_sample)(STATE *state, uint_least32_t elapsed_us, const NUM *channels)
+int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, const NUM *channels)
 {
-    NUM missing[GTC_MAX_TERMS + 1];
+    const int started = is_started(state, table);
+    NUM nothing[GTC_MAX_CHANNELS];
     uint_least32_t c;
 
-    if ((state == NULL) || (FN(has_times)(state) == 0) || (elapsed_us != state->period_us)) {
+    if (started != GTC_OK) {
+        return started;
+    }
+    if (elapsed_us != state->period_us) {
         return GTC_E_ARG;
     }
     if (channels != NULL) {
-        return FN(take)(state, channels);
+        return take_slot(state, table, channels);
     }
-    for (c = 0U; c <= (uint_least32_t)GTC_MAX_TERMS; c++) {
-        missing[c] = FN(missing)();
+    for (c = 0U; c < (uint_least32_t)GTC_MAX_CHANNELS; c++) {
+        nothing[c] = missing_number();
     }
-    return FN(take)(state, missing);
+    return take_slot(state, table, nothing);
 }
 #endif
 
-static int FN(run_bias)(const STATE *state, NUM *bias)
+/* Limited once more, so that a state that was overwritten cannot leave the authority. */
+int PUBLIC(bias)(const STATE *state, const TABLE *table, NUM *bias)
 {
+    const int started = (bias == NULL) ? GTC_E_ARG : is_started(state, table);
     int_least32_t remarks;
 
-    if ((state == NULL) || (bias == NULL) || (state->table == NULL)) {
-        return GTC_E_ARG;
+    if (started != GTC_OK) {
+        return started;
     }
     remarks = state->status;
-    *bias = FN(within_authority)(state->table, state->bias, &remarks);
+    *bias = within_authority(table, state->bias, &remarks);
     return (int)remarks;
 }

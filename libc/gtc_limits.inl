@@ -1,7 +1,7 @@
-/* gtc_limits.inl - the legal range of every word of a table, in the numbers included before.
+/* gtc_limits.inl - the legal range of every word of a table.
  *
  * This is the one text of them. A table with a word outside of its range, or one that does not meet the
- * conditions of gtc_table.inl, is refused by gtc_<n>_open() and gtc_<n>_check(); with any other
+ * conditions of gtc_open.inl, is refused by gtc_<n>_open() and gtc_<n>_check_words(); with any other
  * table no function of the runtime meets a run-time error (docs/proof.md). The generator reads this file and
  * emits no other table; docs/FORMAT.md, section 3, says it to users. Units stand in gtc_table.h.
  *
@@ -10,45 +10,14 @@
  * SPDX-License-Identifier: MIT
  */
 
-#define N_WHOLE 18U    /* whole numbers of a table's header ... */
-#define FIRST_COUNT 8U /* ... of which the counts are the last */
-#define N_NUMBERS 13U  /* other numbers of the header */
-
-/* Whole numbers by name ... */
-#define WHOLE_QUANTITY 0U
-#define WHOLE_UNIT 1U
-#define WHOLE_ID 2U
-#define WHOLE_CALIBRATED 3U
-#define WHOLE_BLOCK_US 4U
-#define WHOLE_SLOPE_BLOCKS 5U
-#define WHOLE_LEAD_BLOCKS 6U
-#define WHOLE_BIAS_FRAC_BITS 7U
-#define WHOLE_NETWORKS 8U
-#define WHOLE_CENTERS 9U
-#define WHOLE_CHANNELS 10U
-#define WHOLE_TERMS 11U
-#define WHOLE_COVERAGE_TEMP 12U
-#define WHOLE_COVERAGE_SLOPE 13U
-#define WHOLE_SIGMA_TEMP 14U
-#define WHOLE_SIGMA_SLOPE 15U
-#define WHOLE_SIGMA_WORDS 16U
-#define WHOLE_PROBES 17U
-
-/* ... and the first of each kind of the others. */
-#define NUMBER_FALLBACK 0U
-#define NUMBER_AUTHORITY 1U
-#define NUMBER_EFFECT 3U
-#define NUMBER_REZERO 5U
-#define NUMBER_SCALE 6U
-#define NUMBER_ENVELOPE 9U
-
+#if GTC_WITH_IMAGE
 typedef struct {
     NUM least;
     NUM most;
-} FN(range_t);
+} range_t;
 
 /* Whole numbers, in the order of an image. */
-static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
+static const uint_least32_t whole_limits[N_WHOLE][2] = {
     /*    float32: least, most         fixed point: least, most */
     RANGE(GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS, GTC_QUANTITY_BIAS),     /* quantity */
     RANGE(GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H, GTC_UNIT_DEG_PER_H), /* unit */
@@ -57,10 +26,11 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
     RANGE(1U, 3600000000U,             1U, 3600000000U),             /* block_us */
     RANGE(2U, GTC_MAX_SLOPE_BLOCKS,    2U, GTC_MAX_SLOPE_BLOCKS),    /* slope_blocks */
     RANGE(0U, 1U,                      0U, 1U),                      /* lead_blocks */
-    RANGE(0U, 0U,                      GTC_FRAC_BITS_LEAST, GTC_FRAC_BITS_MOST), /* bias_frac_bits */
+    RANGE(0U, 0U,                      GTC_BIAS_FRAC_BITS, GTC_BIAS_FRAC_BITS), /* bias_frac_bits */
+    RANGE(0U, 8191U,                   0U, 8191U),                   /* parts */
     RANGE(1U, 16U,                     1U, 16U),                     /* n_networks */
     RANGE(0U, 512U,                    0U, 512U),                    /* n_centers */
-    RANGE(1U, GTC_MAX_TERMS + 1,       1U, GTC_MAX_TERMS + 1),       /* n_channels */
+    RANGE(1U, GTC_MAX_CHANNELS,        1U, GTC_MAX_CHANNELS),       /* n_channels */
     RANGE(0U, GTC_MAX_TERMS,           0U, GTC_MAX_TERMS),           /* n_terms */
     RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: T */
     RANGE(0U, 256U,                    0U, 256U),                    /* coverage_cells: slope */
@@ -71,7 +41,7 @@ static const uint_least32_t FN(whole_limits)[N_WHOLE][2] = {
 };
 
 /* Numbers between them. */
-static const FN(range_t) FN(number_limits)[N_NUMBERS] = {
+static const range_t number_limits[N_NUMBERS] = {
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* fallback */
     RANGE(-1.5e7F, 0.0F,               -2147483647, 0),              /* authority: smallest */
     RANGE(0.0F, 1.5e7F,                0, 2147483647),               /* authority: largest */
@@ -88,7 +58,7 @@ static const FN(range_t) FN(number_limits)[N_NUMBERS] = {
 };
 
 /* A network, behind its number of centers, which the conditions limit. */
-static const FN(range_t) FN(network_limits)[GTC_NETWORK_WORDS - 1U] = {
+static const range_t network_limits[GTC_NETWORK_WORDS - 1U] = {
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: w0 */
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: linear T */
     RANGE(-7.5e6F, 7.5e6F,             -1073741824, 1073741824),     /* network: linear slope */
@@ -98,7 +68,7 @@ static const FN(range_t) FN(network_limits)[GTC_NETWORK_WORDS - 1U] = {
     RANGE(-1.0e5F, 1.0e5F,             0, 65535),                    /* network: region slope1 */
 };
 
-static const FN(range_t) FN(center_limits)[GTC_CENTER_WORDS] = {
+static const range_t center_limits[GTC_CENTER_WORDS] = {
     RANGE(-1.0e9F, 1.0e9F,             0, 65535),                    /* center: T; q31: s of T */
     RANGE(0.0F, 1.0e4F,                -2147483647, 2147483647),     /* center: gain of T; q31: k of T */
     RANGE(-1.0e9F, 1.0e9F,             0, 65535),                    /* center: slope; q31: s of slope */
@@ -107,21 +77,22 @@ static const FN(range_t) FN(center_limits)[GTC_CENTER_WORDS] = {
 };
 
 /* A guard; the words between its numbers are whole. */
-static const FN(range_t) FN(guard_limits)[4] = {
+static const range_t guard_limits[4] = {
     RANGE(-1.0e9F, 1.0e9F,             -2147483647, 2147483647),     /* guard: low */
     RANGE(-1.0e9F, 1.0e9F,             -2147483647, 2147483647),     /* guard: high */
     RANGE(0.0F, 1.0e9F,                0, 2147483647),               /* guard: max_step */
     RANGE(0.0F, 1.0e9F,                0, 2147483647),               /* guard: max_rate */
 };
 
-static const uint_least32_t FN(guard_wholes)[3][2] = {
+static const uint_least32_t guard_wholes[3][2] = {
     RANGE(0U, 2147483647U,             0U, 2147483647U),             /* guard: agree_us */
     RANGE(0U, 2147483647U,             0U, 2147483647U),             /* guard: stuck_us */
     RANGE(1U, 100000U,                 1U, 100000U),                 /* guard: missing_blocks */
 };
 
+#if GTC_WITH_TERMS
 /* Parameters of the kinds of terms; kind - 1 is the row. What a kind does not use is 0. */
-static const FN(range_t) FN(term_limits)[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
+static const range_t term_limits[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
     {
         RANGE(0.0F, 1.0F,              0, 2147483647),               /* memory: gain */
         RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* memory: amplitude */
@@ -179,7 +150,9 @@ static const FN(range_t) FN(term_limits)[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
         RANGE(0.0F, 0.0F,              0, 0),
     },
 };
+#endif
 
-static const FN(range_t) FN(sigma_limits)[1] = {
+static const range_t sigma_limits[1] = {
     RANGE(0.0F, 7.5e6F,                0, 2147483647),               /* sigma */
 };
+#endif

@@ -1,4 +1,4 @@
-/* gtc_map.inl - the static map, in the numbers of the gtc_num_<n>.h included before.
+/* gtc_map.inl - the static map.
  *
  * docs/numerics.md, section 2.
  *
@@ -10,23 +10,22 @@
  * that it has by its distance from the nearest edge of its region; edges of the envelope do not count. */
 
 /* Weight of x in a region by one input: 0 outside; NUM share of the way from the nearest edge. */
-static SHARE FN(share_in)(NUM x, const gtc_word_t region[2], const NUM envelope[2])
+static SHARE share_in(NUM x, const gtc_word_t region[2], const NUM envelope[2])
 {
     const NUM low = ELEMENT(region[0]);
     const NUM high = ELEMENT(region[1]);
     SHARE share = FULL_SHARE;
 
     if (low > envelope[0]) {
-        share = FN(lesser)(share, FN(fraction)(low, x, high));
+        share = lesser(share, fraction(low, x, high));
     }
     if (high < envelope[1]) {
-        share = FN(lesser)(share, FN(fraction)(high, x, low));
+        share = lesser(share, fraction(high, x, low));
     }
     return share;
 }
 
-/* MISRA 8.7: external, so that the map of one network does not carry its stack. */
-NUM FN(blend)(const TABLE *table, const POINT *in)
+static NUM blend_networks(const TABLE *table, const POINT *in)
 {
     const gtc_word_t *center = table->centers;
     BLEND blend;
@@ -35,30 +34,30 @@ NUM FN(blend)(const TABLE *table, const POINT *in)
 
     blend.total = NUM_ZERO;
     blend.share = NUM_ZERO;
-    FN(edges)(table, edges);
+    get_edges(table, edges);
     for (i = 0U; i < table->n_networks; i++) {
         const gtc_word_t *const network = &table->networks[i * GTC_NETWORK_WORDS];
-        const SHARE share = FN(lesser)(FN(share_in)(IN_TEMP(in), &network[NETWORK_REGION_TEMP], &edges[ENVELOPE_TEMP]),
-                                       FN(share_in)(IN_SLOPE(in), &network[NETWORK_REGION_SLOPE], &edges[ENVELOPE_SLOPE]));
+        const SHARE share = lesser(share_in(IN_TEMP(in), &network[NETWORK_REGION_TEMP], &edges[ENVELOPE_TEMP]),
+                                       share_in(IN_SLOPE(in), &network[NETWORK_REGION_SLOPE], &edges[ENVELOPE_SLOPE]));
 
         if (share > NUM_ZERO) {
-            FN(mix)(&blend, share, FN(network)(table, network, center, in));
+            mix(&blend, share, network_value(table, network, center, in));
         }
         center = &center[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
     }
-    return FN(unmixed)(&blend, MEMBER(table->fallback));
+    return unmixed(&blend, MEMBER(table->fallback));
 }
 #endif
 
 /* A correction within the authority of the table. */
-static NUM FN(within_authority)(const TABLE *table, WIDE bias, int_least32_t *remarks)
+static NUM within_authority(const TABLE *table, WIDE bias, int_least32_t *remarks)
 {
-    return FN(saturate)(bias, MEMBER(table->authority[0]), MEMBER(table->authority[1]), remarks);
+    return saturate(bias, MEMBER(table->authority[0]), MEMBER(table->authority[1]), remarks);
 }
 
 #if GTC_WITH_COVERAGE
 /* 1 if there was training data where the inputs lie, or no map says where it was. */
-static int FN(is_covered)(const TABLE *table, const POINT *in)
+static int is_covered(const TABLE *table, const POINT *in)
 {
     uint_least32_t cell[2];
     uint_least32_t index;
@@ -67,7 +66,7 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
     if (table->coverage == NULL) {
         return 1;
     }
-    FN(cells)(table, in, table->coverage_cells, cell);
+    cells_of(table, in, table->coverage_cells, cell);
     index = (cell[1] * table->coverage_cells[0]) + cell[0];
     rest = table->coverage[index >> 5].bits >> (index & 31U);
     return ((rest & 1U) != 0U) ? 1 : 0;
@@ -75,35 +74,36 @@ static int FN(is_covered)(const TABLE *table, const POINT *in)
 
 #endif
 
-/* The network, or what several make together. */
-GTC_IN_LOOP NUM FN(result)(const TABLE *table, const POINT *in)
-{
-#if GTC_WITH_BANK
-    if (table->n_networks > 1U) {
-        return FN(blend)(table, in);
-    }
-#endif
-    return FN(network)(table, table->networks, table->centers, in);
-}
-
-/* Inlined, so that the public function costs no call of its own. */
-GTC_IN_LOOP int FN(run_map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
+/* The map at a temperature and a slope. Returns GTC_OK or remarks, or GTC_E_ARG if an input is no number: then *bias is
+ * not written. */
+static int map_value(const TABLE *table, NUM temp, NUM slope, NUM *bias)
 {
     POINT in;
-    int_least32_t remarks;
+    NUM value;
+    int_least32_t remarks = (int_least32_t)locate(table, temp, slope, &in);
 
-    if ((table == NULL) || (bias == NULL)) {
-        return GTC_E_ARG;
-    }
-    remarks = (int_least32_t)FN(locate)(table, temp, slope, &in);
     if (remarks < 0) {
         return GTC_E_ARG;
     }
 #if GTC_WITH_COVERAGE
-    if (!FN(is_covered)(table, &in)) {
+    if (!is_covered(table, &in)) {
         remarks |= GTC_UNCOVERED;
     }
 #endif
-    *bias = FN(within_authority)(table, FN(result)(table, &in), &remarks);
+#if GTC_WITH_BANK
+    if (table->n_networks > 1U) {
+        value = blend_networks(table, &in);
+    } else {
+        value = network_value(table, table->networks, table->centers, &in);
+    }
+#else
+    value = network_value(table, table->networks, table->centers, &in);
+#endif
+    *bias = within_authority(table, value, &remarks);
     return (int)remarks;
+}
+
+int PUBLIC(map)(const TABLE *table, NUM temp, NUM slope, NUM *bias)
+{
+    return ((table == NULL) || (bias == NULL)) ? GTC_E_ARG : map_value(table, temp, slope, bias);
 }

@@ -13,59 +13,64 @@
 #define GTC_NUM_F32_H_INCLUDED
 
 #include "gtc_private.h"
+#include "gtc_names_f32.h"
 
 #if defined(__FAST_MATH__)
 #error "the float32 runtime needs IEEE arithmetic: compile without -ffast-math"
 #endif
 
-/* MISRA 20.10: one text gives its names to both arithmetics. */
-#define FN(name) gtc_f32_##name
-
-#define TABLE gtc_f32_table_t
-#define STATE gtc_f32_state_t
-#define EFFECT gtc_f32_effect_t
-#define INPUT gtc_f32_input_t
-#define CODE struct gtc_f32_term_code
-#define NUM float
-#define WIDE float
-#define NUM_ZERO 0.0F
+#if GTC_WITH_SAVE
 #define NUM_MOST 0x1.fffffep+127F /* the largest number */
+#endif
 #define LIMIT_ZERO 0.0F
+#if GTC_WITH_SAVE
+#define NUM_COLDEST (-200.0F) /* C: no envelope goes beyond */
+#endif
+#if GTC_WITH_SAVE || GTC_WITH_MEMORY
+#define NUM_HOTTEST 400.0F
+#endif
+#if GTC_WITH_IMAGE
 #define NUM_PLAUSIBLE_MIN (-90.0F) /* C */
 #define NUM_PLAUSIBLE_MAX 200.0F
+#endif
 #define NUM_MISSING_BITS 0x7FC00000UL /* no finite number has these */
+#define FRAC_BITS 0U /* no unit but deg/h */
 #define ARITHMETIC 1U /* in the second word of an image */
+
+/* Behind the center of an input, in the words of a center: its gain. */
+#define CENTER_TEMP_GAIN 1U
+#define CENTER_SLOPE_GAIN 3U
+
+/* Parts of a table's scale. */
+#define SCALE_CENTER 0U
 #define SCALE_TEMP 1U
 #define SCALE_SLOPE 2U
 
-
-/* A table member as a number and as the word of an image; an array element as a number. */
-#define MEMBER(member) ((member).value)
-#define ELEMENT(word) ((word).value)
-
 #include "gtc_saturate.inl"
 
-static inline uint_least32_t FN(bits)(float x)
+static inline uint_least32_t bits_of(float x)
 {
     gtc_word_t word;
 
     word.value = x;
-    return word.bits & 0xFFFFFFFFUL;
+    return word.bits;
 }
 
 /* NaN or infinite, found by its exponent, so that no compiler option can argue it away. */
-static inline int FN(is_missing)(float x)
+static inline int is_missing(float x)
 {
-    return ((FN(bits)(x) & 0x7F800000UL) == 0x7F800000UL) ? 1 : 0;
+    return ((bits_of(x) & 0x7F800000UL) == 0x7F800000UL) ? 1 : 0;
 }
 
-static inline float FN(missing)(void)
+#if GTC_WITH_RETAINED || !GTC_WITH_TIME
+static inline float missing_number(void)
 {
     gtc_word_t word;
 
     word.bits = NUM_MISSING_BITS;
     return word.value;
 }
+#endif
 
 /* ---- the map ---------------------------------------------------------------------------- */
 
@@ -73,7 +78,20 @@ static inline float FN(missing)(void)
  * c 2^(-i/64), and i in the bits from which i is subtracted again with the exponent. */
 #define F32_H 0x1.71549ep+6F
 #define F32_G 0x1.0a69ccp+13F
-extern const uint_least32_t FN(exp2_table)[64];
+/* Bits of c * 2^(-i/64), with i * 2^17 added; docs/numerics.md, section 2, says how it is made. */
+static const uint_least32_t exp2_table[64] = {
+    0x3875FE11UL, 0x387557B6UL, 0x3874B8A9UL, 0x387420D7UL, 0x3873902CUL, 0x38730694UL,
+    0x387283FAUL, 0x3872084DUL, 0x38719379UL, 0x3871256BUL, 0x3870BE10UL, 0x38705D57UL,
+    0x3870032BUL, 0x386FAF7DUL, 0x386F6239UL, 0x386F1B4EUL, 0x386EDAABUL, 0x386EA03DUL,
+    0x386E6BF5UL, 0x386E3DC1UL, 0x386E1590UL, 0x386DF352UL, 0x386DD6F6UL, 0x386DC06CUL,
+    0x386DAFA5UL, 0x386DA48FUL, 0x386D9F1CUL, 0x386D9F3CUL, 0x386DA4E0UL, 0x386DAFF7UL,
+    0x386DC075UL, 0x386DD648UL, 0x386DF164UL, 0x386E11B8UL, 0x386E3737UL, 0x386E61D3UL,
+    0x386E917DUL, 0x386EC628UL, 0x386EFFC5UL, 0x386F3E47UL, 0x386F81A1UL, 0x386FC9C5UL,
+    0x387016A6UL, 0x38706837UL, 0x3870BE6BUL, 0x38711935UL, 0x38717889UL, 0x3871DC59UL,
+    0x3872449BUL, 0x3872B140UL, 0x3873223EUL, 0x38739789UL, 0x38741113UL, 0x38748ED3UL,
+    0x387510BBUL, 0x387596C2UL, 0x387620DAUL, 0x3876AEFAUL, 0x38774116UL, 0x3877D722UL,
+    0x38787115UL, 0x38781DC7UL, 0x38776105UL, 0x3876ABCFUL
+};
 
 /* 1.5 * 2^23: what is added to it is rounded to an integer, which then stands in the low bits. */
 #define F32_ROUND 12582912.0F
@@ -86,12 +104,11 @@ typedef struct {
     float slope;
     float z_temp;
     float z_slope;
-} FN(point_t);
-#define POINT FN(point_t)
+} point_t;
 
 /* Adding and subtracting 8 leaves a multiple of 2^-21; every center is one of 2^-20, so that
  * differences from centers are exact. */
-static inline float FN(on_grid)(float z)
+static inline float on_grid(float z)
 {
     float shifted;
 
@@ -101,31 +118,31 @@ static inline float FN(on_grid)(float z)
 }
 
 /* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
-static inline int FN(locate)(const TABLE *table, float temp, float slope, POINT *in)
+static inline int locate(const TABLE *table, float temp, float slope, POINT *in)
 {
     const gtc_word_t *const edge = table->envelope;
     int_least32_t remarks = GTC_OK;
     float z;
 
-    if (FN(is_missing)(temp) || FN(is_missing)(slope)) {
+    if (is_missing(temp) || is_missing(slope)) {
         in->temp = 0.0F;
         in->slope = 0.0F;
         in->z_temp = 0.0F;
         in->z_slope = 0.0F;
         return GTC_E_ARG;
     }
-    in->temp = FN(saturate)(temp, edge[ENVELOPE_TEMP].value, edge[ENVELOPE_TEMP + 1U].value, &remarks);
-    in->slope = FN(saturate)(slope, edge[ENVELOPE_SLOPE].value, edge[ENVELOPE_SLOPE + 1U].value, &remarks);
+    in->temp = saturate(temp, edge[ENVELOPE_TEMP].value, edge[ENVELOPE_TEMP + 1U].value, &remarks);
+    in->slope = saturate(slope, edge[ENVELOPE_SLOPE].value, edge[ENVELOPE_SLOPE + 1U].value, &remarks);
     z = in->temp - table->scale[SCALE_CENTER].value;
     z = z * table->scale[SCALE_TEMP].value;
-    in->z_temp = FN(on_grid)(z);
+    in->z_temp = on_grid(z);
     z = in->slope * table->scale[SCALE_SLOPE].value;
-    in->z_slope = FN(on_grid)(z);
+    in->z_slope = on_grid(z);
     return (int)remarks;
 }
 
 /* 2^(-u/64), u >= 0; 0 from 2048 on, and where u is not a number. */
-GTC_IN_LOOP float FN(exp2)(float u)
+static inline float exp2_of_minus(float u)
 {
     gtc_word_t whole;
     gtc_word_t e;
@@ -135,7 +152,7 @@ GTC_IN_LOOP float FN(exp2)(float u)
     if (whole.bits >= (F32_ROUND_BITS + F32_CUT)) {
         return 0.0F;
     }
-    e.bits = FN(exp2_table)[whole.bits & 63U] - ((whole.bits << 17) & 0xFFFFFFFFU);
+    e.bits = exp2_table[whole.bits & 63U] - (whole.bits << 17);
     f = whole.value - F32_ROUND;
     f = u - f;
     f = f - F32_H;
@@ -146,7 +163,7 @@ GTC_IN_LOOP float FN(exp2)(float u)
 }
 
 /* acc + weight * 2^(-u/64), u of the center's record. */
-GTC_IN_LOOP float FN(gaussian)(float acc, const gtc_word_t *center, const POINT *in)
+static inline float gaussian(float acc, const gtc_word_t *center, const POINT *in)
 {
     float u;
     float f;
@@ -158,14 +175,14 @@ GTC_IN_LOOP float FN(gaussian)(float acc, const gtc_word_t *center, const POINT 
     f = f * center[CENTER_SLOPE_GAIN].value;
     f = f * f;
     u = u + f;
-    f = FN(exp2)(u);
+    f = exp2_of_minus(u);
     f = center[CENTER_WEIGHT].value * f;
     f = acc + f;
     return f;
 }
 
 /* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
-GTC_IN_LOOP float FN(network)(const TABLE *table, const gtc_word_t *network,
+static inline float network_value(const TABLE *table, const gtc_word_t *network,
                               const gtc_word_t *centers, const POINT *in)
 {
     const gtc_word_t *center = centers;
@@ -178,25 +195,16 @@ GTC_IN_LOOP float FN(network)(const TABLE *table, const gtc_word_t *network,
     acc = acc + term;
     term = network[NETWORK_SLOPE].value * in->z_slope;
     acc = acc + term;
-#if GTC_UNROLL
-    if ((network[NETWORK_CENTERS].bits & 1U) != 0U) {
-        acc = FN(gaussian)(acc, center, in);
-        center = &center[GTC_CENTER_WORDS];
-    }
-#endif
     while (center != end) {
-        acc = FN(gaussian)(acc, center, in);
+        acc = gaussian(acc, center, in);
         center = &center[GTC_CENTER_WORDS];
-#if GTC_UNROLL
-        acc = FN(gaussian)(acc, center, in);
-        center = &center[GTC_CENTER_WORDS];
-#endif
     }
     return acc;
 }
 
+#if GTC_WITH_COVERAGE || GTC_WITH_UNCERTAINTY
 /* Cell of `x` among n equal ones over [low, high]; n >= 1. */
-static inline uint_least32_t FN(cell)(float x, const gtc_word_t *range, uint_least32_t n)
+static inline uint_least32_t cell_of(float x, const gtc_word_t *range, uint_least32_t n)
 {
     const float cells = (float)n;
     const uint_least32_t last = n - 1U;
@@ -215,17 +223,17 @@ static inline uint_least32_t FN(cell)(float x, const gtc_word_t *range, uint_lea
 }
 
 /* Cells of the inputs, T and slope, among n each. */
-static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_least32_t n[2],
+static inline void cells_of(const TABLE *table, const POINT *in, const uint_least32_t n[2],
                              uint_least32_t cell[2])
 {
-    cell[0] = FN(cell)(in->temp, &table->envelope[ENVELOPE_TEMP], n[0]);
-    cell[1] = FN(cell)(in->slope, &table->envelope[ENVELOPE_SLOPE], n[1]);
+    cell[0] = cell_of(in->temp, &table->envelope[ENVELOPE_TEMP], n[0]);
+    cell[1] = cell_of(in->slope, &table->envelope[ENVELOPE_SLOPE], n[1]);
 }
+#endif
 
 /* ---- the bank of networks --------------------------------------------------------------- */
 
 #if GTC_WITH_BANK
-#define SHARE float
 #define FULL_SHARE 1.0F
 #define IN_TEMP(in) ((in)->temp)
 #define IN_SLOPE(in) ((in)->slope)
@@ -234,29 +242,24 @@ static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_lea
 typedef struct {
     float total;
     float share;
-} FN(blend_t);
-#define BLEND FN(blend_t)
+} blend_t;
 
-/* Result of a table with several networks. */
-float FN(blend)(const TABLE *table, const POINT *in);
-
-static inline void FN(edges)(const TABLE *table, float edges[4])
+static inline void get_edges(const TABLE *table, float edges[4])
 {
-    const volatile gtc_word_t *const envelope = table->envelope; /* no memcpy() */
     uint_least32_t i;
 
     for (i = 0U; i < 4U; i++) {
-        edges[i] = envelope[i].value;
+        edges[i] = table->envelope[i].value;
     }
 }
 
-static inline float FN(lesser)(float a, float b)
+static inline float lesser(float a, float b)
 {
     return (a < b) ? a : b;
 }
 
 /* Where x is on the way between two different numbers; 0 before `from`. */
-static inline float FN(fraction)(float from, float x, float to)
+static inline float fraction(float from, float x, float to)
 {
     float way;
     float whole;
@@ -267,7 +270,7 @@ static inline float FN(fraction)(float from, float x, float to)
     return (way > 0.0F) ? way : 0.0F;
 }
 
-static inline void FN(mix)(BLEND *blend, float share, float bias)
+static inline void mix(BLEND *blend, float share, float bias)
 {
     float product;
 
@@ -276,7 +279,7 @@ static inline void FN(mix)(BLEND *blend, float share, float bias)
     blend->share = blend->share + share;
 }
 
-static inline float FN(unmixed)(const BLEND *blend, float otherwise)
+static inline float unmixed(const BLEND *blend, float otherwise)
 {
     float bias = otherwise;
 
@@ -290,7 +293,7 @@ static inline float FN(unmixed)(const BLEND *blend, float otherwise)
 /* ---- the front end ---------------------------------------------------------------------- */
 
 /* max_step + max_rate * time */
-static inline float FN(limit)(const gtc_word_t *guard, uint_least32_t us)
+static inline float largest_change(const gtc_word_t *guard, uint_least32_t us)
 {
     const float time = (float)us;
     float limit;
@@ -301,7 +304,7 @@ static inline float FN(limit)(const gtc_word_t *guard, uint_least32_t us)
 }
 
 /* |a - b| <= limit */
-static inline int FN(is_near)(float a, float b, float limit)
+static inline int is_near(float a, float b, float limit)
 {
     float distance;
 
@@ -313,7 +316,7 @@ static inline int FN(is_near)(float a, float b, float limit)
 }
 
 /* Where a temperature is after so many blocks. */
-static inline float FN(ahead)(float temp, float slope, uint_least32_t blocks)
+static inline float ahead(float temp, float slope, uint_least32_t blocks)
 {
     const float n = (float)blocks;
     float way;
@@ -323,7 +326,7 @@ static inline float FN(ahead)(float temp, float slope, uint_least32_t blocks)
     return way;
 }
 
-static inline float FN(add)(float sum, float d)
+static inline float add(float sum, float d)
 {
     float next;
 
@@ -331,7 +334,7 @@ static inline float FN(add)(float sum, float d)
     return next;
 }
 
-static inline float FN(diff)(float a, float b)
+static inline float diff(float a, float b)
 {
     float d;
 
@@ -339,7 +342,7 @@ static inline float FN(diff)(float a, float b)
     return d;
 }
 
-static inline float FN(scaled)(uint_least32_t k, float x)
+static inline float scaled(uint_least32_t k, float x)
 {
     const float factor = (float)k;
     float product;
@@ -349,7 +352,7 @@ static inline float FN(scaled)(uint_least32_t k, float x)
 }
 
 /* base + sum / n */
-static inline float FN(mean)(float base, float sum, uint_least32_t n)
+static inline float mean_of(float base, float sum, uint_least32_t n)
 {
     const float count = (float)n;
     float mean;
@@ -360,7 +363,7 @@ static inline float FN(mean)(float base, float sum, uint_least32_t n)
 }
 
 /* num / den */
-static inline float FN(quotient)(float num, uint_least32_t den)
+static inline float divide(float num, uint_least32_t den)
 {
     const float divisor = (float)den;
     float q;
@@ -369,22 +372,45 @@ static inline float FN(quotient)(float num, uint_least32_t den)
     return q;
 }
 
-/* ---- the terms -------------------------------------------------------------------------- */
+/* ---- terms and uncertainty ------------------------------------------------------------- */
 
-static inline float FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
+#if GTC_WITH_UNCERTAINTY || GTC_WITH_PLAY || GTC_WITH_CURVE || GTC_WITH_PRODUCT
+/* A factor: every number is one. */
+static inline float limit_factor(float x)
 {
-    return state->table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].value;
+    return x;
 }
+#endif
 
+#if GTC_WITH_UNCERTAINTY || GTC_WITH_RETAINED || GTC_WITH_CHANNELS
+/* factor (a - b) */
+static inline float scaled_difference(float a, float b, float factor)
+{
+    float d;
+
+    d = a - b;
+    d = factor * d;
+    return d;
+}
+#endif
+
+#if GTC_WITH_TERMS
+static inline float parameter(const TABLE *table, uint_least32_t term, uint_least32_t k)
+{
+    return table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].value;
+}
+#endif
+
+#if GTC_WITH_MEMORY
 /* First-order memory: z, and the number kept for more digits (here none). */
-static inline void FN(settle)(float z[2], float x)
+static inline void settle_memory(float z[2], float x)
 {
     z[0] = x;
     z[1] = 0.0F;
 }
 
 /* z + gain (x - z) */
-static inline void FN(follow)(float z[2], float x, float gain)
+static inline void follow_memory(float z[2], float x, float gain)
 {
     float d;
 
@@ -393,8 +419,8 @@ static inline void FN(follow)(float z[2], float x, float gain)
     z[0] = z[0] + d;
 }
 
-/* What is left of a difference after so many blocks, each of which takes the share `gain`. */
-static inline float FN(power)(float gain, uint_least32_t blocks)
+/* Share of a difference that is gone after so many blocks, each of which takes the share `gain` of what is left. */
+static inline float relaxed_share(float gain, uint_least32_t blocks)
 {
     uint_least32_t rest = blocks;
     float factor;
@@ -415,24 +441,30 @@ static inline float FN(power)(float gain, uint_least32_t blocks)
     return left;
 }
 
-/* factor (a - b) */
-static inline float FN(scaled_difference)(float a, float b, float factor)
-{
-    float d;
-
-    d = a - b;
-    d = factor * d;
-    return d;
-}
-
 /* rate (a - b), a slope. */
-static inline float FN(slope_of)(float a, float b, float rate)
+static inline float slope_of(float a, float b, float rate)
 {
-    return FN(scaled_difference)(a, b, rate);
+    return scaled_difference(a, b, rate);
 }
+#endif
 
+#if GTC_WITH_WARM_UP
+/* amplitude * exp(-blocks * gain) */
+static inline float warm_up_value(uint_least32_t blocks, float gain, float amplitude)
+{
+    const float n = (float)blocks;
+    float value;
+
+    value = n * gain;
+    value = exp2_of_minus(value);
+    value = amplitude * value;
+    return value;
+}
+#endif
+
+#if GTC_WITH_HARMONIC
 /* amplitude * cos(2 pi (x * frequency + phase)): the phase in turns, reduced to its fraction. */
-static inline float FN(wave)(float x, float frequency, float phase, float amplitude)
+static inline float harmonic_value(float x, float frequency, float phase, float amplitude)
 {
     float turns;
     float whole;
@@ -464,56 +496,40 @@ static inline float FN(wave)(float x, float frequency, float phase, float amplit
     h = amplitude * h;
     return h;
 }
+#endif
 
-/* amplitude * exp(-blocks * gain) */
-static inline float FN(fading)(uint_least32_t blocks, float gain, float amplitude)
-{
-    const float n = (float)blocks;
-    float value;
-
-    value = n * gain;
-    value = FN(exp2)(value);
-    value = amplitude * value;
-    return value;
-}
-
+#if GTC_WITH_CURVE
 /* weight * 2^(-((x - center) gain)^2 / 64); bell: center, weight */
-GTC_IN_LOOP float FN(gaussian_of_channel)(float x, float gain, const gtc_word_t *bell)
+static inline float gaussian_of_channel(float x, float gain, const gtc_word_t *bell)
 {
     float u;
 
     u = x - bell[0].value;
     u = u * gain;
     u = u * u;
-    u = FN(exp2)(u);
+    u = exp2_of_minus(u);
     u = bell[1].value * u;
     return u;
 }
 
 /* Two of one gain: gain; center, weight; center, weight. */
-static inline float FN(gaussians_of_channel)(float x, const gtc_word_t *bells)
+static inline float gaussians_of_channel(float x, const gtc_word_t *bells)
 {
-    const float first = FN(gaussian_of_channel)(x, bells[0].value, &bells[1]);
+    const float first = gaussian_of_channel(x, bells[0].value, &bells[1]);
     float sum;
 
-    sum = FN(gaussian_of_channel)(x, bells[0].value, &bells[3]);
+    sum = gaussian_of_channel(x, bells[0].value, &bells[3]);
     sum = first + sum;
     return sum;
 }
+#endif
 
 /* ---- the uncertainty -------------------------------------------------------------------- */
 
-#define SNAPSHOT gtc_f32_snapshot_t
-#define SQUARE float /* (deg/h)^2 */
+#if GTC_WITH_UNCERTAINTY
 #define NO_SQUARE 0.0F
 
-/* A factor: every number is one. */
-static inline float FN(factor)(float x)
-{
-    return x;
-}
-
-static inline float FN(squared)(float x)
+static inline float squared(float x)
 {
     float square;
 
@@ -521,55 +537,19 @@ static inline float FN(squared)(float x)
     return square;
 }
 
-static inline float FN(plus)(float a, float b)
+static inline float add_squares(float a, float b)
 {
-    return FN(add)(a, b);
+    return add(a, b);
 }
 
 /* A square, or what stands for it where a state was overwritten so that it is none; the sum of two is one */
-static inline float FN(square_or)(float square, float other)
+static inline float square_or(float square, float other)
 {
     return ((square >= 0.0F) && (square <= 1.0e38F)) ? square : other;
 }
 
-/* square / n */
-static inline float FN(shared_out)(float square, uint_least32_t n)
-{
-    const float count = (float)n;
-    float share;
-
-    share = square / count;
-    return share;
-}
-
-/* a / (a + b), 0 where both are */
-static inline float FN(share_of)(float a, float b)
-{
-    float whole;
-
-    whole = a + b;
-    if (!(whole > 0.0F)) {
-        return 0.0F;
-    }
-    whole = a / whole;
-    return (whole < 1.0F) ? whole : 1.0F;
-}
-
-static inline float FN(part)(float share, float x)
-{
-    float product;
-
-    product = share * x;
-    return product;
-}
-
-static inline float FN(part_of_square)(float share, float x)
-{
-    return FN(part)(share, x);
-}
-
 /* Square root, 0.6 units of the last place: half the exponent, then Newton's rule. x >= 0 */
-static inline float FN(root)(float x)
+static inline float square_root(float x)
 {
     gtc_word_t guess;
     float y;
@@ -590,20 +570,62 @@ static inline float FN(root)(float x)
     }
     return y;
 }
+#endif
 
+#if GTC_WITH_REZERO
+/* square / n */
+static inline float divide_square(float square, uint_least32_t n)
+{
+    const float count = (float)n;
+    float share;
+
+    share = square / count;
+    return share;
+}
+
+/* a / (a + b), 0 where both are */
+static inline float share_of(float a, float b)
+{
+    float whole;
+
+    whole = a + b;
+    if (!(whole > 0.0F)) {
+        return 0.0F;
+    }
+    whole = a / whole;
+    return (whole < 1.0F) ? whole : 1.0F;
+}
+
+static inline float share_of_number(float share, float x)
+{
+    float product;
+
+    product = share * x;
+    return product;
+}
+
+static inline float part_of_square(float share, float x)
+{
+    return share_of_number(share, x);
+}
+#endif
+
+#if GTC_WITH_UNCERTAINTY && GTC_WITH_MEMORY
 /* word (1 - gain)^blocks */
-static inline float FN(remaining)(float word, float gain, uint_least32_t blocks)
+static inline float remaining(float word, float gain, uint_least32_t blocks)
 {
     float left;
 
-    left = FN(power)(gain, blocks);
+    left = relaxed_share(gain, blocks);
     left = 1.0F - left;
     left = word * left;
     return left;
 }
+#endif
 
+#if GTC_WITH_UNCERTAINTY && GTC_WITH_PLAY
 /* word (2 width - (high - low)), 0 where that is negative; no number where low or high is none */
-static inline float FN(unsettled)(float width, float low, float high, float word)
+static inline float unsettled(float width, float low, float high, float word)
 {
     float range;
     float left;
@@ -614,5 +636,6 @@ static inline float FN(unsettled)(float width, float low, float high, float word
     left = word * left;
     return (left <= 0.0F) ? 0.0F : left;
 }
+#endif
 
 #endif /* GTC_NUM_F32_H_INCLUDED */

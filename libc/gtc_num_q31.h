@@ -11,33 +11,35 @@
 #define GTC_NUM_Q31_H_INCLUDED
 
 #include "gtc_private.h"
+#include "gtc_names_q31.h"
 #if defined(__ARM_FEATURE_SAT)
 #include <arm_acle.h>
 #endif
 
-/* MISRA 20.10: one text gives its names to both arithmetics. */
-#define FN(name) gtc_q31_##name
-
-#define TABLE gtc_q31_table_t
-#define STATE gtc_q31_state_t
-#define EFFECT gtc_q31_effect_t
-#define INPUT gtc_q31_input_t
-#define CODE struct gtc_q31_term_code
-#define NUM int_least32_t
-#define WIDE int_least64_t
-#define NUM_ZERO 0
+#if GTC_WITH_SAVE
 #define NUM_MOST 2147483647 /* the largest word */
+#endif
 #define LIMIT_ZERO 0U
+#if GTC_WITH_SAVE
+#define NUM_COLDEST (-200L * 65536L) /* 2^-16 C: no envelope goes beyond */
+#endif
+#if GTC_WITH_SAVE || GTC_WITH_MEMORY
+#define NUM_HOTTEST (400L * 65536L)
+#endif
+#if GTC_WITH_IMAGE
 #define NUM_PLAUSIBLE_MIN (-90L * 65536L) /* 2^-16 C */
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
+#endif
 #define NUM_MISSING_BITS 0x80000000UL
+#define FRAC_BITS GTC_BIAS_FRAC_BITS
 #define ARITHMETIC 2U /* in the second word of an image */
+
+/* Parts of a table's scale. */
 #define SCALE_TEMP 0U
 #define SCALE_SLOPE 1U
-
-/* A table member as a number and as the word of an image; an array element as a number. */
-#define MEMBER(member) (member)
-#define ELEMENT(word) ((word).integer)
+#if GTC_WITH_NARROW
+#define SCALE_NARROW 2U /* bits by which squares are in larger units */
+#endif
 
 #include "gtc_saturate.inl"
 
@@ -45,26 +47,43 @@
  * MISRA 2.5: for assertions, which most builds leave out. */
 #define IS_32_BITS(x) (((x) >= -2147483647) && ((x) <= 2147483647))
 
-static inline uint_least32_t FN(bits)(int_least32_t x)
+static inline uint_least32_t bits_of(int_least32_t x)
 {
-    return (uint_least32_t)x & 0xFFFFFFFFU;
+    return (uint_least32_t)x;
 }
 
-static inline int FN(is_missing)(int_least32_t x)
+static inline int is_missing(int_least32_t x)
 {
     return (x == GTC_TEMP_MISSING) ? 1 : 0;
 }
 
-static inline int_least32_t FN(missing)(void)
+#if GTC_WITH_RETAINED || !GTC_WITH_TIME
+static inline int_least32_t missing_number(void)
 {
     return GTC_TEMP_MISSING;
 }
+#endif
 
 /* With H, t in 2^-24 and G in 2^-16: ((H - t)^2 + G) table[i] = 2^(-(i + t)/64) (1 + 6.7e-9), 0 <= t < 1.
  * The table also makes up for the truncation of t: its errors go to both sides alike. */
 #define Q31_H 1557473452U
 #define Q31_G 558709134U
-extern const uint_least32_t FN(exp2_table)[65];
+
+/* round(2052389455 * 2^(-i/64)); docs/numerics.md,
+ * section 3, says how it is made. */
+static const uint_least32_t exp2_table[64] = {
+    0x7A54FA4FUL, 0x7903A1B7UL, 0x77B5EB65UL, 0x766BCD55UL, 0x75253D9BUL, 0x73E2326BUL,
+    0x72A2A211UL, 0x716682F3UL, 0x702DCB94UL, 0x6EF87291UL, 0x6DC66E9EUL, 0x6C97B68CUL,
+    0x6B6C4143UL, 0x6A4405C6UL, 0x691EFB2EUL, 0x67FD18B0UL, 0x66DE5597UL, 0x65C2A947UL,
+    0x64AA0B3AUL, 0x63947305UL, 0x6281D84FUL, 0x617232DCUL, 0x60657A82UL, 0x5F5BA730UL,
+    0x5E54B0EAUL, 0x5D508FCBUL, 0x5C4F3C03UL, 0x5B50ADD7UL, 0x5A54DDA4UL, 0x595BC3DAUL,
+    0x586558FCUL, 0x577195A6UL, 0x56807285UL, 0x5591E85CUL, 0x54A5F000UL, 0x53BC825CUL,
+    0x52D5986EUL, 0x51F12B46UL, 0x510F3408UL, 0x502FABEBUL, 0x4F528C39UL, 0x4E77CE4FUL,
+    0x4D9F6B99UL, 0x4CC95D9AUL, 0x4BF59DE3UL, 0x4B242619UL, 0x4A54EFF1UL, 0x4987F533UL,
+    0x48BD2FB7UL, 0x47F49966UL, 0x472E2C3AUL, 0x4669E23EUL, 0x45A7B58DUL, 0x44E7A051UL,
+    0x44299CC8UL, 0x436DA53BUL, 0x42B3B406UL, 0x41FBC393UL, 0x4145CE5DUL, 0x4091CEECUL,
+    0x3FDFBFDAUL, 0x3F2F9BCCUL, 0x3E815D7AUL, 0x3DD4FFA7UL
+};
 
 /* u in 2^-24, below 32; 2^-u is 0 in 2^-29. */
 #define Q31_LAST 0x1FFFFFFFU
@@ -74,14 +93,14 @@ extern const uint_least32_t FN(exp2_table)[65];
 #if GTC_HALF_MULTIPLY
 /* floor(x / 2^16).
  * MISRA 10.1: what >> does to a negative number is up to the compiler; the first half asks which it is. */
-static inline int_least32_t FN(upper)(int_least32_t x)
+static inline int_least32_t upper(int_least32_t x)
 {
-    return ((-1 >> 1) == -1) ? (x >> 16) : ((int_least32_t)((FN(bits)(x) ^ 0x80000000U) >> 16) - 32768);
+    return ((-1 >> 1) == -1) ? (x >> 16) : ((int_least32_t)((bits_of(x) ^ 0x80000000U) >> 16) - 32768);
 }
 #endif
 
 /* Upper word of a * b; a, b < 2^31. */
-GTC_IN_LOOP uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
+static inline uint_least32_t high_word(uint_least32_t a, uint_least32_t b)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t a0 = a & 0xFFFFU;
@@ -96,7 +115,7 @@ GTC_IN_LOOP uint_least32_t FN(high)(uint_least32_t a, uint_least32_t b)
 }
 
 /* Upper word of a^2; a < 2^31. */
-GTC_IN_LOOP uint_least32_t FN(high_of_square)(uint_least32_t a)
+static inline uint_least32_t high_of_square(uint_least32_t a)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t a0 = a & 0xFFFFU;
@@ -104,12 +123,12 @@ GTC_IN_LOOP uint_least32_t FN(high_of_square)(uint_least32_t a)
 
     return (a1 * a1) + (((a0 * a1) + ((a0 * a0) >> 17)) >> 15);
 #else
-    return FN(high)(a, a);
+    return high_word(a, a);
 #endif
 }
 
 /* Upper word of a^2 + b^2; |a|, |b| < 2^31. */
-GTC_IN_LOOP uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
+static inline uint_least32_t high_of_squares(int_least32_t a, int_least32_t b)
 {
 #if GTC_HALF_MULTIPLY
     const uint_least32_t p = (uint_least32_t)((a < 0) ? -a : a);
@@ -139,11 +158,11 @@ GTC_IN_LOOP uint_least32_t FN(high_of_squares)(int_least32_t a, int_least32_t b)
 typedef struct {
     uint_least32_t low;
     uint_least32_t high;
-} FN(sum_t);
+} sum_t;
 
-static inline FN(sum_t) FN(begun)(int_least32_t w0)
+static inline sum_t begun(int_least32_t w0)
 {
-    FN(sum_t) sum;
+    sum_t sum;
 
     (void)w0;
     sum.low = 0U;
@@ -151,15 +170,15 @@ static inline FN(sum_t) FN(begun)(int_least32_t w0)
     return sum;
 }
 
-GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
+static inline sum_t accumulate(sum_t sum, int_least32_t w, int_least32_t e)
 {
-    const uint_least32_t w0 = FN(bits)(w) & 0xFFFFU;
-    const int_least32_t w1 = FN(upper)(w);
-    const uint_least32_t e0 = FN(bits)(e) & 0xFFFFU;
-    const int_least32_t e1 = FN(upper)(e);
+    const uint_least32_t w0 = bits_of(w) & 0xFFFFU;
+    const int_least32_t w1 = upper(w);
+    const uint_least32_t e0 = bits_of(e) & 0xFFFFU;
+    const int_least32_t e1 = upper(e);
     const uint_least32_t carry = (w0 * e0) >> 16;
     const int_least32_t middle = (w1 * (int_least32_t)e0) + ((int_least32_t)w0 * e1) + (int_least32_t)carry;
-    const int_least32_t high = (w1 * e1) + FN(upper)(middle);
+    const int_least32_t high = (w1 * e1) + upper(middle);
     const uint_least32_t low = (uint_least32_t)w * (uint_least32_t)e;
 
     sum.high += (uint_least32_t)high;
@@ -168,50 +187,50 @@ GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32
     return sum;
 }
 
-static inline uint_least32_t FN(units)(FN(sum_t) sum)
+static inline uint_least32_t units(sum_t sum)
 {
     return (sum.high << 3) | (sum.low >> 29);
 }
 
-GTC_IN_LOOP uint_least32_t FN(ended)(FN(sum_t) sum, const gtc_word_t *network)
+static inline uint_least32_t ended(sum_t sum, const gtc_word_t *network)
 {
-    return network[NETWORK_CONSTANT].bits + FN(units)(sum);
+    return network[NETWORK_CONSTANT].bits + units(sum);
 }
 #else
-typedef int_least64_t FN(sum_t);
+typedef int_least64_t sum_t;
 
-static inline FN(sum_t) FN(begun)(int_least32_t w0)
+static inline sum_t begun(int_least32_t w0)
 {
     return (int_least64_t)w0 * 0x20000000;
 }
 
-GTC_IN_LOOP FN(sum_t) FN(accumulate)(FN(sum_t) sum, int_least32_t w, int_least32_t e)
+static inline sum_t accumulate(sum_t sum, int_least32_t w, int_least32_t e)
 {
     return sum + ((int_least64_t)w * e);
 }
 
 /* Its value in units of the result, rounded down, in two's complement. */
-static inline uint_least32_t FN(units)(FN(sum_t) sum)
+static inline uint_least32_t units(sum_t sum)
 {
     GTC_ASSERT((sum >= -0x1000000000000000LL) && (sum < 0x1000000000000000LL));
     return (uint_least32_t)(((uint_least64_t)sum >> 29) & 0xFFFFFFFFU);
 }
 
-GTC_IN_LOOP uint_least32_t FN(ended)(FN(sum_t) sum, const gtc_word_t *network)
+static inline uint_least32_t ended(sum_t sum, const gtc_word_t *network)
 {
     (void)network;
-    return FN(units)(sum);
+    return units(sum);
 }
 #endif
 
 /* ---- the map ---------------------------------------------------------------------------- */
 
-/* 2^-u in 2^-29, u in 2^-24, up to Q31_LAST; g is Q31_G. */
-GTC_IN_LOOP int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
+/* 2^-u in 2^-29, u in 2^-24, up to Q31_LAST. */
+static inline int_least32_t exp2_of_minus(uint_least32_t u)
 {
     const uint_least32_t v = Q31_H - ((u << 14) >> 8);
-    const uint_least32_t s = FN(high_of_square)(v) + g;
-    const uint_least32_t e = FN(high)(FN(exp2_table)[(u >> 18) & 63U], s) >> (u >> 24);
+    const uint_least32_t s = high_of_square(v) + Q31_G;
+    const uint_least32_t e = high_word(exp2_table[(u >> 18) & 63U], s) >> (u >> 24);
 
     GTC_ASSERT((u <= Q31_LAST) && (v <= Q31_H) && (s >= Q31_G));
     return (int_least32_t)e;
@@ -221,12 +240,11 @@ GTC_IN_LOOP int_least32_t FN(exp2)(uint_least32_t u, uint_least32_t g)
 typedef struct {
     uint_least32_t x_temp;
     uint_least32_t x_slope;
-} FN(point_t);
-#define POINT FN(point_t)
+} point_t;
 
 /* Position of an input in its range, clamped; gain in 2^-27. Returns GTC_OK, GTC_CLAMPED or, for the
  * mark of a missing number, which lies below every range, GTC_E_ARG. */
-static inline int FN(position)(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+static inline int position_of(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
                                uint_least32_t *position)
 {
     const uint_least32_t span = (uint_least32_t)range[1] - (uint_least32_t)range[0];
@@ -241,30 +259,32 @@ static inline int FN(position)(int_least32_t x, const int_least32_t range[2], in
             status = GTC_E_ARG;
         }
     }
-    *position = FN(high)(offset << 5, (uint_least32_t)gain);
+    *position = high_word(offset << 5, (uint_least32_t)gain);
     return status;
 }
 
 /* Where the inputs lie. Returns GTC_OK, GTC_CLAMPED or, for a missing one, GTC_E_ARG: then at some legal place. */
-static inline int FN(locate)(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
+static inline int locate(const TABLE *table, int_least32_t temp, int_least32_t slope, POINT *in)
 {
-    const int status = FN(position)(temp, &table->envelope[ENVELOPE_TEMP], table->scale[SCALE_TEMP], &in->x_temp);
-    const int other = FN(position)(slope, &table->envelope[ENVELOPE_SLOPE], table->scale[SCALE_SLOPE], &in->x_slope);
+    const int status = position_of(temp, &table->envelope[ENVELOPE_TEMP], table->scale[SCALE_TEMP], &in->x_temp);
+    const int other = position_of(slope, &table->envelope[ENVELOPE_SLOPE], table->scale[SCALE_SLOPE], &in->x_slope);
 
     return ((status < 0) || (other < 0)) ? GTC_E_ARG : (status | other);
 }
 
+#if GTC_WITH_COVERAGE || GTC_WITH_UNCERTAINTY
 /* Cells of the inputs, T and slope, among n each. */
-static inline void FN(cells)(const TABLE *table, const POINT *in, const uint_least32_t n[2],
+static inline void cells_of(const TABLE *table, const POINT *in, const uint_least32_t n[2],
                              uint_least32_t cell[2])
 {
     (void)table;
     cell[0] = (in->x_temp * n[0]) >> 16;
     cell[1] = (in->x_slope * n[1]) >> 16;
 }
+#endif
 
 /* The argument s x + k of one input; the product may wrap, their sum does not. */
-GTC_IN_LOOP int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t x)
+static inline int_least32_t argument_of(const gtc_word_t *center, uint_least32_t x)
 {
     gtc_word_t argument;
 
@@ -276,68 +296,78 @@ GTC_IN_LOOP int_least32_t FN(argument)(const gtc_word_t *center, uint_least32_t 
 }
 
 /* Takes weight * 2^-u into the sum. */
-GTC_IN_LOOP FN(sum_t) FN(weighted)(FN(sum_t) sum, int_least32_t weight, uint_least32_t u, uint_least32_t g)
+static inline sum_t weighted(sum_t sum, int_least32_t weight, uint_least32_t u)
 {
 #if defined(__ARM_FEATURE_SAT)
-    return FN(accumulate)(sum, weight, FN(exp2)(__usat((int_least32_t)u, 29), g));
+    return accumulate(sum, weight, exp2_of_minus(__usat((int_least32_t)u, 29)));
 #else
-    return (u <= Q31_LAST) ? FN(accumulate)(sum, weight, FN(exp2)(u, g)) : sum;
+    return (u <= Q31_LAST) ? accumulate(sum, weight, exp2_of_minus(u)) : sum;
 #endif
 }
 
 /* Takes one Gaussian into the sum. */
-GTC_IN_LOOP FN(sum_t) FN(gaussian)(FN(sum_t) sum, const gtc_word_t *center,
-                                          const POINT *in, uint_least32_t g)
+static inline sum_t gaussian(sum_t sum, const gtc_word_t *center,
+                                          const POINT *in)
 {
-    const uint_least32_t u = FN(high_of_squares)(FN(argument)(&center[CENTER_TEMP], in->x_temp),
-                                                 FN(argument)(&center[CENTER_SLOPE], in->x_slope));
+    const uint_least32_t u = high_of_squares(argument_of(&center[CENTER_TEMP], in->x_temp),
+                                                 argument_of(&center[CENTER_SLOPE], in->x_slope));
 
-    return FN(weighted)(sum, center[CENTER_WEIGHT].integer, u, g);
+    return weighted(sum, center[CENTER_WEIGHT].integer, u);
 }
 
-/* The same for all centers of a table with narrow widths, whose squares are in units 2^narrow times
- * larger. A file of its own, because few tables need it. */
-FN(sum_t) FN(narrow)(FN(sum_t) start, const gtc_word_t *centers, const gtc_word_t *end,
-                     uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow);
+#if GTC_WITH_NARROW
+/* The same for all centers of a table with narrow widths, whose arguments have fewer fraction bits: squares are in
+ * units 2^narrow times larger. */
+static sum_t narrow_sum(sum_t start, const gtc_word_t *centers, const gtc_word_t *end,
+                     uint_least32_t x_temp, uint_least32_t x_slope, uint_least32_t narrow)
+{
+    sum_t sum = start;
+    const gtc_word_t *center;
+
+    for (center = centers; center != end; center = &center[GTC_CENTER_WORDS]) {
+        const int_least64_t a = argument_of(&center[CENTER_TEMP], x_temp);
+        const int_least64_t b = argument_of(&center[CENTER_SLOPE], x_slope);
+        const int_least64_t p = a * a;
+        const int_least64_t q = b * b;
+        const uint_least64_t u = ((uint_least64_t)p + (uint_least64_t)q) >> (32U - narrow);
+
+        if (u <= Q31_LAST) {
+            sum = accumulate(sum, center[CENTER_WEIGHT].integer, exp2_of_minus((uint_least32_t)u));
+        }
+    }
+    return sum;
+}
+#endif
 
 /* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
-GTC_IN_LOOP int_least32_t FN(network)(const TABLE *table, const gtc_word_t *network,
+static inline int_least32_t network_value(const TABLE *table, const gtc_word_t *network,
                                       const gtc_word_t *centers, const POINT *in)
 {
     const gtc_word_t *center = centers;
     const gtc_word_t *const end = &centers[network[NETWORK_CENTERS].bits * GTC_CENTER_WORDS];
-    /* Volatile: gcc would take a constant that it knows apart into three additions, in the loop. */
-    const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64];
-    FN(sum_t) sum = FN(begun)(network[NETWORK_CONSTANT].integer);
+    sum_t sum = begun(network[NETWORK_CONSTANT].integer);
     gtc_word_t bias;
 
-    sum = FN(accumulate)(sum, network[NETWORK_TEMP].integer, (int_least32_t)(in->x_temp << 13));
-    sum = FN(accumulate)(sum, network[NETWORK_SLOPE].integer, (int_least32_t)(in->x_slope << 13));
+    sum = accumulate(sum, network[NETWORK_TEMP].integer, (int_least32_t)(in->x_temp << 13));
+    sum = accumulate(sum, network[NETWORK_SLOPE].integer, (int_least32_t)(in->x_slope << 13));
+#if GTC_WITH_NARROW
     if (table->scale[SCALE_NARROW] != 0) {
-        sum = FN(narrow)(sum, center, end, in->x_temp, in->x_slope,
-                         (uint_least32_t)table->scale[SCALE_NARROW]);
-    } else {
-#if GTC_UNROLL
-        if ((network[NETWORK_CENTERS].bits & 1U) != 0U) {
-            sum = FN(gaussian)(sum, center, in, g);
-            center = &center[GTC_CENTER_WORDS];
-        }
-#endif
-        while (center != end) {
-            sum = FN(gaussian)(sum, center, in, g);
-            center = &center[GTC_CENTER_WORDS];
-#if GTC_UNROLL
-            sum = FN(gaussian)(sum, center, in, g);
-            center = &center[GTC_CENTER_WORDS];
-#endif
-        }
+        sum = narrow_sum(sum, center, end, in->x_temp, in->x_slope, (uint_least32_t)table->scale[SCALE_NARROW]);
+        center = end;
     }
-    bias.bits = FN(ended)(sum, network);
+#else
+    (void)table;
+#endif
+    while (center != end) {
+        sum = gaussian(sum, center, in);
+        center = &center[GTC_CENTER_WORDS];
+    }
+    bias.bits = ended(sum, network);
     return bias.integer;
 }
 
 /* num / den, rounded to nearest, halves away from zero; den > 0. */
-static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
+static inline int_least64_t rounded_quotient(int_least64_t num, uint_least32_t den)
 {
     const uint_least64_t magnitude = (num < 0) ? (uint_least64_t)(-num) : (uint_least64_t)num;
     const uint_least64_t q = (magnitude + (den / 2U)) / den;
@@ -348,7 +378,6 @@ static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
 /* ---- the bank of networks --------------------------------------------------------------- */
 
 #if GTC_WITH_BANK
-#define SHARE int_least32_t
 #define FULL_SHARE 0x1000000 /* 1 in 2^-24 */
 #define IN_TEMP(in) ((int_least32_t)(in)->x_temp)
 #define IN_SLOPE(in) ((int_least32_t)(in)->x_slope)
@@ -357,14 +386,10 @@ static inline int_least64_t FN(divided)(int_least64_t num, uint_least32_t den)
 typedef struct {
     int_least64_t total;
     uint_least32_t share;
-} FN(blend_t);
-#define BLEND FN(blend_t)
-
-/* Result of a table with several networks. */
-int_least32_t FN(blend)(const TABLE *table, const POINT *in);
+} blend_t;
 
 /* Regions are in positions; so are the edges of the envelope. */
-static inline void FN(edges)(const TABLE *table, int_least32_t edges[4])
+static inline void get_edges(const TABLE *table, int_least32_t edges[4])
 {
     (void)table;
     edges[0] = 0;
@@ -373,13 +398,13 @@ static inline void FN(edges)(const TABLE *table, int_least32_t edges[4])
     edges[3] = 65535;
 }
 
-static inline int_least32_t FN(lesser)(int_least32_t a, int_least32_t b)
+static inline int_least32_t lesser(int_least32_t a, int_least32_t b)
 {
     return (a < b) ? a : b;
 }
 
 /* Where x is on the way between two different positions, in 2^-24; 0 before `from`, 1 behind `to`. */
-static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, int_least32_t to)
+static inline int_least32_t fraction(int_least32_t from, int_least32_t x, int_least32_t to)
 {
     int_least32_t way = x - from;
     int_least32_t whole = to - from;
@@ -394,22 +419,22 @@ static inline int_least32_t FN(fraction)(int_least32_t from, int_least32_t x, in
     return (way > 0) ? (int_least32_t)(((int_least64_t)way * FULL_SHARE) / whole) : 0;
 }
 
-static inline void FN(mix)(BLEND *blend, int_least32_t share, int_least32_t bias)
+static inline void mix(BLEND *blend, int_least32_t share, int_least32_t bias)
 {
     blend->total += (int_least64_t)share * bias;
     blend->share += (uint_least32_t)share;
 }
 
-static inline int_least32_t FN(unmixed)(const BLEND *blend, int_least32_t otherwise)
+static inline int_least32_t unmixed(const BLEND *blend, int_least32_t otherwise)
 {
-    return (blend->share != 0U) ? (int_least32_t)FN(divided)(blend->total, blend->share) : otherwise;
+    return (blend->share != 0U) ? (int_least32_t)rounded_quotient(blend->total, blend->share) : otherwise;
 }
 #endif
 
 /* ---- the front end ---------------------------------------------------------------------- */
 
 /* max_step + max_rate * time, or the largest number */
-static inline uint_least32_t FN(limit)(const gtc_word_t *guard, uint_least32_t us)
+static inline uint_least32_t largest_change(const gtc_word_t *guard, uint_least32_t us)
 {
     const uint_least64_t limit = guard[GUARD_STEP].bits + (((uint_least64_t)guard[GUARD_RATE].bits * us) >> 24);
 
@@ -417,7 +442,7 @@ static inline uint_least32_t FN(limit)(const gtc_word_t *guard, uint_least32_t u
 }
 
 /* |a - b| <= limit */
-static inline int FN(is_near)(int_least32_t a, int_least32_t b, uint_least32_t limit)
+static inline int is_near(int_least32_t a, int_least32_t b, uint_least32_t limit)
 {
     const uint_least32_t up = ((uint_least32_t)a - (uint_least32_t)b) & 0xFFFFFFFFU;
     const uint_least32_t distance = (a < b) ? ((0U - up) & 0xFFFFFFFFU) : up;
@@ -425,95 +450,111 @@ static inline int FN(is_near)(int_least32_t a, int_least32_t b, uint_least32_t l
     return (distance <= limit) ? 1 : 0;
 }
 
-static inline int_least64_t FN(add)(int_least64_t sum, int_least64_t d)
+static inline int_least64_t add(int_least64_t sum, int_least64_t d)
 {
     return sum + d;
 }
 
-static inline int_least64_t FN(diff)(int_least64_t a, int_least64_t b)
+static inline int_least64_t diff(int_least64_t a, int_least64_t b)
 {
     return a - b;
 }
 
-static inline int_least64_t FN(scaled)(uint_least32_t k, int_least64_t x)
+static inline int_least64_t scaled(uint_least32_t k, int_least64_t x)
 {
     return (int_least64_t)k * x;
 }
 
 /* base + sum / n */
-static inline int_least32_t FN(mean)(int_least32_t base, int_least64_t sum, uint_least32_t n)
+static inline int_least32_t mean_of(int_least32_t base, int_least64_t sum, uint_least32_t n)
 {
-    const int_least64_t mean = base + FN(divided)(sum, n);
+    const int_least64_t mean = base + rounded_quotient(sum, n);
 
     GTC_ASSERT(IS_32_BITS(mean));
     return (int_least32_t)mean;
 }
 
 /* num / den */
-static inline int_least32_t FN(quotient)(int_least64_t num, uint_least32_t den)
+static inline int_least32_t divide(int_least64_t num, uint_least32_t den)
 {
-    GTC_ASSERT(IS_32_BITS(FN(divided)(num, den)));
-    return (int_least32_t)FN(divided)(num, den);
+    GTC_ASSERT(IS_32_BITS(rounded_quotient(num, den)));
+    return (int_least32_t)rounded_quotient(num, den);
 }
 
 /* The nearest number of 32 bits, the mark of a missing one left out. */
-static inline int_least32_t FN(narrowed)(int_least64_t x)
+static inline int_least32_t narrowed(int_least64_t x)
 {
     int_least32_t ignored = GTC_OK;
 
-    return FN(saturate)(x, -2147483647, 2147483647, &ignored);
+    return saturate(x, -2147483647, 2147483647, &ignored);
 }
 
 /* Where a temperature is after so many blocks. */
-static inline int_least32_t FN(ahead)(int_least32_t temp, int_least32_t slope, uint_least32_t blocks)
+static inline int_least32_t ahead(int_least32_t temp, int_least32_t slope, uint_least32_t blocks)
 {
-    return FN(narrowed)(temp + ((int_least64_t)slope * (int_least64_t)blocks));
+    return narrowed(temp + ((int_least64_t)slope * (int_least64_t)blocks));
 }
 
-/* A factor: the nearest number of magnitude 2^30 at most, so that products of two keep to 63 bits with room for a sum. */
-static inline int_least64_t FN(factor)(int_least64_t x)
-{
-    int_least32_t ignored = GTC_OK;
+/* ---- terms and uncertainty ------------------------------------------------------------- */
 
-    return FN(saturate)(x, -1073741824, 1073741824, &ignored);
-}
-
-/* ---- the terms -------------------------------------------------------------------------- */
-
-static inline int_least32_t FN(parameter)(const STATE *state, uint_least32_t term, uint_least32_t k)
-{
-    return state->table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].integer;
-}
-
+#if GTC_WITH_TERMS || GTC_WITH_UNCERTAINTY
 /* floor(x / 2^n) */
-static inline int_least64_t FN(floored)(int_least64_t x, uint_least32_t n)
+static inline int_least64_t floored(int_least64_t x, uint_least32_t n)
 {
     const int_least64_t magnitude = (x >= 0) ? x : (-1 - x);
     const uint_least64_t whole = (uint_least64_t)magnitude >> n;
 
     return (x >= 0) ? (int_least64_t)whole : (-1 - (int_least64_t)whole);
 }
+#endif
 
+#if GTC_WITH_UNCERTAINTY || GTC_WITH_PLAY || GTC_WITH_CURVE || GTC_WITH_PRODUCT
+/* A factor: the nearest number of magnitude 2^30 at most, so that products of two keep to 63 bits with room for a
+ * sum. */
+static inline int_least64_t limit_factor(int_least64_t x)
+{
+    int_least32_t ignored = GTC_OK;
+
+    return saturate(x, -1073741824, 1073741824, &ignored);
+}
+#endif
+
+#if GTC_WITH_UNCERTAINTY || GTC_WITH_RETAINED || GTC_WITH_CHANNELS
+/* factor (a - b), factor in units of the bias for each C */
+static inline int_least64_t scaled_difference(int_least32_t a, int_least32_t b, int_least32_t factor)
+{
+    return floored(((int_least64_t)a - b) * factor, 16U);
+}
+#endif
+
+#if GTC_WITH_TERMS
+static inline int_least32_t parameter(const TABLE *table, uint_least32_t term, uint_least32_t k)
+{
+    return table->terms[(term * GTC_TERM_WORDS) + TERM_PARAMETERS + k].integer;
+}
+#endif
+
+#if GTC_WITH_MEMORY
 /* First-order memory: z in 2^-16 C, and its fraction in 2^-32 C. */
-static inline void FN(settle)(int_least32_t z[2], int_least32_t x)
+static inline void settle_memory(int_least32_t z[2], int_least32_t x)
 {
     z[0] = x;
     z[1] = 0;
 }
 
 /* z + gain (x - z), gain in 2^-31 */
-static inline void FN(follow)(int_least32_t z[2], int_least32_t x, int_least32_t gain)
+static inline void follow_memory(int_least32_t z[2], int_least32_t x, int_least32_t gain)
 {
     int_least64_t fine = ((int_least64_t)z[0] * 65536) + z[1];
     const int_least64_t d = ((int_least64_t)x * 65536) - fine;
 
-    fine += FN(floored)(FN(floored)(d, 10U) * gain, 21U);
-    z[0] = (int_least32_t)FN(floored)(fine, 16U);
+    fine += floored(floored(d, 10U) * gain, 21U);
+    z[0] = (int_least32_t)floored(fine, 16U);
     z[1] = (int_least32_t)(fine - ((int_least64_t)z[0] * 65536));
 }
 
-/* What is left of a difference after so many blocks, each of which takes the share `gain`. */
-static inline int_least32_t FN(power)(int_least32_t gain, uint_least32_t blocks)
+/* Share of a difference that is gone after so many blocks, each of which takes the share `gain` of what is left. */
+static inline int_least32_t relaxed_share(int_least32_t gain, uint_least32_t blocks)
 {
     uint_least32_t factor = 0x7FFFFFFFU - (uint_least32_t)gain;
     uint_least32_t left = 0x7FFFFFFFU;
@@ -528,53 +569,52 @@ static inline int_least32_t FN(power)(int_least32_t gain, uint_least32_t blocks)
     return 0x7FFFFFFF - (int_least32_t)left;
 }
 
-/* factor (a - b), factor in units of the bias for each C */
-static inline int_least64_t FN(scaled_difference)(int_least32_t a, int_least32_t b, int_least32_t factor)
-{
-    return FN(floored)(((int_least64_t)a - b) * factor, 16U);
-}
-
 /* rate (a - b), a slope; rate in 2^-24 */
-static inline int_least32_t FN(slope_of)(int_least32_t a, int_least32_t b, int_least32_t rate)
+static inline int_least32_t slope_of(int_least32_t a, int_least32_t b, int_least32_t rate)
 {
-    return FN(narrowed)(FN(floored)(((int_least64_t)a - b) * rate, 24U));
+    return narrowed(floored(((int_least64_t)a - b) * rate, 24U));
 }
+#endif
 
+#if GTC_WITH_WARM_UP
 /* amplitude * exp(-blocks * gain), gain in 2^-28 of a factor 1/2 */
-static inline int_least64_t FN(fading)(uint_least32_t blocks, int_least32_t gain, int_least32_t amplitude)
+static inline int_least64_t warm_up_value(uint_least32_t blocks, int_least32_t gain, int_least32_t amplitude)
 {
     const uint_least64_t u = ((uint_least64_t)blocks * (uint_least32_t)gain) >> 4;
 
     if (u > Q31_LAST) {
         return 0;
     }
-    return FN(floored)((int_least64_t)amplitude * FN(exp2)((uint_least32_t)u, Q31_G), 29U);
+    return floored((int_least64_t)amplitude * exp2_of_minus((uint_least32_t)u), 29U);
 }
+#endif
 
+#if GTC_WITH_HARMONIC
 /* amplitude * cos(2 pi (x * frequency + phase)); frequency in 2^-32 turns for each C, phase in 2^-32. */
-static inline int_least64_t FN(wave)(int_least32_t x, int_least32_t frequency, int_least32_t phase,
+static inline int_least64_t harmonic_value(int_least32_t x, int_least32_t frequency, int_least32_t phase,
                                      int_least32_t amplitude)
 {
-    const int_least64_t turns = FN(floored)((int_least64_t)x * frequency, 16U) + phase;
+    const int_least64_t turns = floored((int_least64_t)x * frequency, 16U) + phase;
     const uint_least32_t part = (uint_least32_t)((uint_least64_t)turns & 0xFFFFFFFFU);
     /* A quarter turn less the distance from the nearest whole turn. */
     const uint_least32_t back = (0U - part) & 0xFFFFFFFFU;
     const int_least64_t t = 1073741824 - (int_least64_t)((part > 0x80000000U) ? back : part);
-    const int_least64_t s = FN(floored)(t * t, 30U);
+    const int_least64_t s = floored(t * t, 30U);
     int_least64_t h = 161942;
 
-    h = FN(floored)(h * s, 30U) - 5016767;
-    h = FN(floored)(h * s, 30U) + 85564854;
-    h = FN(floored)(h * s, 30U) - 693597876;
-    h = FN(floored)(h * s, 30U) + 1686629674;
-    h = FN(floored)(h * t, 30U);
-    return FN(floored)(amplitude * h, 30U);
+    h = floored(h * s, 30U) - 5016767;
+    h = floored(h * s, 30U) + 85564854;
+    h = floored(h * s, 30U) - 693597876;
+    h = floored(h * s, 30U) + 1686629674;
+    h = floored(h * t, 30U);
+    return floored(amplitude * h, 30U);
 }
+#endif
 
+#if GTC_WITH_CURVE
 /* Takes weight * 2^-((x - center) gain)^2 into the sum; bell: center, weight. gain in 2^-24 for each unit of x;
  * |x| <= 2^30, |center| < 2^30, gain >= 0. From 6 on it is 0, as the square is then 36 octaves. */
-GTC_IN_LOOP FN(sum_t) FN(gaussian_of_channel)(FN(sum_t) sum, int_least32_t x, int_least32_t gain, const gtc_word_t *bell,
-                                  uint_least32_t g)
+static inline sum_t gaussian_of_channel(sum_t sum, int_least32_t x, int_least32_t gain, const gtc_word_t *bell)
 {
     const int_least32_t d = x - bell[0].integer;
     const int_least64_t product = (int_least64_t)d * gain;
@@ -587,38 +627,37 @@ GTC_IN_LOOP FN(sum_t) FN(gaussian_of_channel)(FN(sum_t) sum, int_least32_t x, in
         return sum;
     }
     argument.bits = ((whole << 20) & 0xFFFFFFFFU) | ((uint_least32_t)(way & 0xFFFFFFFFU) >> 12);
-    return FN(weighted)(sum, bell[1].integer, FN(high_of_squares)(argument.integer, 0), g);
+    return weighted(sum, bell[1].integer, high_of_squares(argument.integer, 0));
 }
 
 /* Two of one gain: gain; center, weight; center, weight. |weight| <= 2^29 */
-static inline int_least64_t FN(gaussians_of_channel)(int_least32_t x, const gtc_word_t *bells)
+static inline int_least64_t gaussians_of_channel(int_least32_t x, const gtc_word_t *bells)
 {
-    const uint_least32_t g = *(const volatile uint_least32_t *)&FN(exp2_table)[64]; /* as for the map */
-    FN(sum_t) sum = FN(begun)(0);
+    sum_t sum = begun(0);
     gtc_word_t total;
 
-    sum = FN(gaussian_of_channel)(sum, x, bells[0].integer, &bells[1], g);
-    sum = FN(gaussian_of_channel)(sum, x, bells[0].integer, &bells[3], g);
-    total.bits = FN(units)(sum);
+    sum = gaussian_of_channel(sum, x, bells[0].integer, &bells[1]);
+    sum = gaussian_of_channel(sum, x, bells[0].integer, &bells[3]);
+    total.bits = units(sum);
     return total.integer;
 }
+#endif
 
 /* ---- the uncertainty -------------------------------------------------------------------- */
 
-#define SNAPSHOT gtc_q31_snapshot_t
-#define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
+#if GTC_WITH_UNCERTAINTY
 #define NO_SQUARE 0U
 
-static inline uint_least64_t FN(squared)(int_least64_t x)
+static inline uint_least64_t squared(int_least64_t x)
 {
-    const int_least64_t y = FN(factor)(x);
+    const int_least64_t y = limit_factor(x);
     const int_least64_t square = y * y;
 
     return (uint_least64_t)square;
 }
 
 /* All ones where the sum carries beyond 64 bits. */
-static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
+static inline uint_least64_t add_squares(uint_least64_t a, uint_least64_t b)
 {
     const uint_least64_t sum = a + b;
     const uint_least64_t carry = ((a & b) | ((a | b) & ~sum)) >> 63;
@@ -627,47 +666,14 @@ static inline uint_least64_t FN(plus)(uint_least64_t a, uint_least64_t b)
 }
 
 /* Every number of a state has a square */
-static inline uint_least64_t FN(square_or)(uint_least64_t square, uint_least64_t other)
+static inline uint_least64_t square_or(uint_least64_t square, uint_least64_t other)
 {
     (void)other;
     return square;
 }
 
-/* square / n */
-static inline uint_least64_t FN(shared_out)(uint_least64_t square, uint_least32_t n)
-{
-    return square / n;
-}
-
-/* a / (a + b), 0 where both are */
-static inline uint_least64_t FN(share_of)(uint_least64_t a, uint_least64_t b)
-{
-    uint_least64_t part = a;
-    uint_least64_t whole = a + b;
-
-    while (whole > 0xFFFFFFFFU) {
-        part >>= 1;
-        whole >>= 1;
-    }
-    if (whole == 0U) {
-        return 0U;
-    }
-    part = (part << 31) / whole;
-    return (part > 0x80000000U) ? 0x80000000U : part;
-}
-
-static inline int_least64_t FN(part)(uint_least64_t share, int_least32_t x)
-{
-    return FN(floored)((int_least64_t)share * x, 31U);
-}
-
-static inline uint_least64_t FN(part_of_square)(uint_least64_t share, uint_least64_t x)
-{
-    return ((x >> 31) * share) + (((x & 0x7FFFFFFFU) * share) >> 31);
-}
-
 /* Square root, rounded down; 2^31 - 1 at most. */
-static inline int_least32_t FN(root)(uint_least64_t x)
+static inline int_least32_t square_root(uint_least64_t x)
 {
     uint_least64_t rest = x;
     uint_least64_t root = 0U;
@@ -684,21 +690,61 @@ static inline int_least32_t FN(root)(uint_least64_t x)
     }
     return (root > 0x7FFFFFFFU) ? 0x7FFFFFFF : (int_least32_t)root;
 }
+#endif
 
-/* word (1 - gain)^blocks */
-static inline int_least64_t FN(remaining)(int_least32_t word, int_least32_t gain, uint_least32_t blocks)
+#if GTC_WITH_REZERO
+/* square / n */
+static inline uint_least64_t divide_square(uint_least64_t square, uint_least32_t n)
 {
-    const int_least32_t left = 0x7FFFFFFF - FN(power)(gain, blocks);
-
-    return FN(floored)((int_least64_t)word * left, 31U);
+    return square / n;
 }
 
+/* a / (a + b), 0 where both are */
+static inline uint_least64_t share_of(uint_least64_t a, uint_least64_t b)
+{
+    uint_least64_t part = a;
+    uint_least64_t whole = a + b;
+
+    while (whole > 0xFFFFFFFFU) {
+        part >>= 1;
+        whole >>= 1;
+    }
+    if (whole == 0U) {
+        return 0U;
+    }
+    part = (part << 31) / whole;
+    return (part > 0x80000000U) ? 0x80000000U : part;
+}
+
+static inline int_least64_t share_of_number(uint_least64_t share, int_least32_t x)
+{
+    return floored((int_least64_t)share * x, 31U);
+}
+
+static inline uint_least64_t part_of_square(uint_least64_t share, uint_least64_t x)
+{
+    return ((x >> 31) * share) + (((x & 0x7FFFFFFFU) * share) >> 31);
+}
+#endif
+
+#if GTC_WITH_UNCERTAINTY && GTC_WITH_MEMORY
+/* word (1 - gain)^blocks */
+static inline int_least64_t remaining(int_least32_t word, int_least32_t gain, uint_least32_t blocks)
+{
+    const int_least32_t left = 0x7FFFFFFF - relaxed_share(gain, blocks);
+
+    return floored((int_least64_t)word * left, 31U);
+}
+#endif
+
+#if GTC_WITH_UNCERTAINTY && GTC_WITH_PLAY
 /* word (2 width - (high - low)), 0 where that is negative */
-static inline int_least64_t FN(unsettled)(int_least32_t width, int_least32_t low, int_least32_t high, int_least32_t word)
+static inline int_least64_t unsettled(int_least32_t width, int_least32_t low, int_least32_t high, int_least32_t word)
 {
     const int_least64_t left = (2 * (int_least64_t)width) - ((int_least64_t)high - low);
 
-    return (left > 0) ? FN(floored)(FN(factor)(left) * word, 16U) : 0;
+    return (left > 0) ? floored(limit_factor(left) * word, 16U) : 0;
 }
+#endif
 
 #endif /* GTC_NUM_Q31_H_INCLUDED */

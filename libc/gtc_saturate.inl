@@ -3,8 +3,9 @@
  * SPDX-License-Identifier: MIT
  */
 
-/* The nearest number in a range; GTC_CLAMPED joins the remarks if it is another one. The least for what is no number. */
-static inline NUM FN(saturate)(WIDE x, NUM least, NUM most, int_least32_t *remarks)
+/* The nearest number in a range; GTC_CLAMPED joins the remarks if it is another one. The least for what is no
+ * number. */
+static inline NUM saturate(WIDE x, NUM least, NUM most, int_least32_t *remarks)
 {
     NUM nearest = least;
 

@@ -1,4 +1,4 @@
-/* gtc_save.inl - a state over power cycles, in the numbers included before.
+/* gtc_save.inl - a state over power cycles.
  *
  * docs/numerics.md, section 7, gives the words. One text serves both directions, so that they cannot
  * drift apart.
@@ -8,25 +8,21 @@
 
 #if GTC_WITH_SAVE
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545336UL
-
-/* What another build may have otherwise. */
-#define SAVE_OPTIONS \
-    (ARITHMETIC + (128UL * (uint_least32_t)GTC_WITH_UNCERTAINTY) + (256UL * (uint_least32_t)GTC_MAX_TERMS) + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
+#define SAVE_MAGIC 0x47545337UL
 
 /* Words before the state: magic, options, CRC of the table. */
 #define SAVE_HEAD 3U
 #define CRC_AT (GTC_SAVE_WORDS - 1)
 
 /* Where the next word goes to, or, if that is NULL, comes from; whether every word so far is one that a call can have
- * left, as far as no function of the state meets a run-time error. Volatile: no memcpy(). */
+ * left, as far as no function of the state meets a run-time error. */
 typedef struct {
-    volatile gtc_word_t *to;
-    const volatile gtc_word_t *from;
+    gtc_word_t *to;
+    const gtc_word_t *from;
     int is_sound;
-} FN(cursor_t);
+} cursor_t;
 
-static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
+static void carry_bits(cursor_t *at, uint_least32_t *bits)
 {
     if (at->to != NULL) {
         at->to[0].bits = *bits;
@@ -37,201 +33,210 @@ static void FN(carry_bits)(FN(cursor_t) *at, uint_least32_t *bits)
     }
 }
 
-static void FN(carry_count)(FN(cursor_t) *at, uint_least32_t *count, uint_least32_t most)
+static void carry_count(cursor_t *at, uint_least32_t *count, uint_least32_t most)
 {
-    FN(carry_bits)(at, count);
+    carry_bits(at, count);
     at->is_sound &= (*count <= most) ? 1 : 0;
 }
 
 /* The bits of a number, whatever it is. */
-static void FN(carry_any)(FN(cursor_t) *at, NUM *x)
+static void carry_any(cursor_t *at, NUM *x)
 {
     gtc_word_t word;
 
     ELEMENT(word) = *x;
-    FN(carry_bits)(at, &word.bits);
+    carry_bits(at, &word.bits);
     if (at->to == NULL) {
         *x = ELEMENT(word);
     }
 }
 
-static void FN(carry)(FN(cursor_t) *at, NUM *x, NUM least, NUM most)
+static void carry_within(cursor_t *at, NUM *x, NUM least, NUM most)
 {
-    FN(carry_any)(at, x);
+    carry_any(at, x);
     at->is_sound &= ((*x >= least) && (*x <= most)) ? 1 : 0;
 }
 
 /* A temperature of the window, or of a term, which an envelope may have moved. */
-static void FN(carry_temp)(FN(cursor_t) *at, NUM *x)
+static void carry_temp(cursor_t *at, NUM *x)
 {
-    FN(carry)(at, x, FN(number_limits)[NUMBER_ENVELOPE].least, FN(number_limits)[NUMBER_ENVELOPE].most);
+    carry_within(at, x, NUM_COLDEST, NUM_HOTTEST);
 }
 
-static void FN(carry_number)(FN(cursor_t) *at, NUM *x)
+static void carry_number(cursor_t *at, NUM *x)
 {
-    FN(carry)(at, x, -NUM_MOST, NUM_MOST);
+    carry_within(at, x, -NUM_MOST, NUM_MOST);
 }
 
-static void FN(carry_wide)(FN(cursor_t) *at, WIDE *x)
+static void carry_wide(cursor_t *at, WIDE *x)
 {
     gtc_word_t words[2];
 
-    FN(to_words)(*x, words);
-    FN(carry_bits)(at, &words[0].bits);
-    FN(carry_bits)(at, &words[1].bits);
+    to_words(*x, words);
+    carry_bits(at, &words[0].bits);
+    carry_bits(at, &words[1].bits);
     if (at->to == NULL) {
-        *x = FN(from_words)(words);
+        *x = from_words(words);
     }
 }
 
 /* One channel: numbers within its range (0 before the first reading), counts within the block. */
-static void FN(carry_input)(FN(cursor_t) *at, INPUT *in, const gtc_word_t *guard, uint_least32_t position)
+static void carry_input(cursor_t *at, INPUT *in, const gtc_word_t *guard, uint_least32_t position)
 {
     const NUM low = ELEMENT(guard[GUARD_LOW]);
     const NUM high = ELEMENT(guard[GUARD_HIGH]);
     const NUM least = (low < NUM_ZERO) ? low : NUM_ZERO;
     const NUM most = (high > NUM_ZERO) ? high : NUM_ZERO;
 
-    FN(carry_bits)(at, &in->gap_us);
-    FN(carry_bits)(at, &in->series_us);
-    FN(carry_bits)(at, &in->candidate_us);
-    FN(carry_bits)(at, &in->same_us);
-    FN(carry_bits)(at, &in->received);
-    FN(carry_count)(at, &in->valid, position);
-    FN(carry_count)(at, &in->held_blocks, guard[GUARD_MISSING].bits + 1U);
-    FN(carry_count)(at, &in->clamped, CLAMPED_NOW | CLAMPED_MEAN);
-    FN(carry)(at, &in->last, least, most);
-    FN(carry)(at, &in->candidate, least, most);
-    FN(carry)(at, &in->base, least, most);
-    FN(carry)(at, &in->mean, least, most);
-    FN(carry_wide)(at, &in->sum);
+    carry_bits(at, &in->next_gap_us);
+    carry_bits(at, &in->series_us);
+    carry_bits(at, &in->candidate_us);
+    carry_bits(at, &in->same_us);
+    carry_bits(at, &in->received);
+    carry_count(at, &in->valid, position);
+    carry_count(at, &in->held_blocks, guard[GUARD_MISSING].bits + 1U);
+#if GTC_WITH_CHANNELS
+    carry_count(at, &in->clamped, CLAMPED_NOW | CLAMPED_MEAN);
+#endif
+    carry_within(at, &in->last, least, most);
+    carry_within(at, &in->candidate, least, most);
+    carry_within(at, &in->base, least, most);
+    carry_within(at, &in->mean, least, most);
+    carry_wide(at, &in->sum);
     /* The sum last: its bounds are products of what was tested before. */
     if (at->is_sound != 0) {
-        at->is_sound = FN(sum_fits)(in, low, high);
+        at->is_sound = sum_fits(in, low, high);
     }
 }
 
 /* The front end: everything that the running block and the next correction depend on. */
-static void FN(carry_front)(FN(cursor_t) *at, STATE *state)
+static void carry_front(cursor_t *at, STATE *state, const TABLE *table)
 {
     gtc_word_t status;
     uint_least32_t i;
 
     status.integer = state->status;
-    FN(carry_count)(at, &status.bits, (2U * (uint_least32_t)GTC_CHANNEL_LOST) - 1U);
+    carry_count(at, &status.bits, (2U * (uint_least32_t)GTC_CHANNEL_LOST) - 1U);
     if (at->to == NULL) {
         state->status = status.integer;
     }
-    FN(carry_bits)(at, &state->period_us);
-    FN(carry_count)(at, &state->position, MAX_SAMPLES_PER_BLOCK);
-    FN(carry_count)(at, &state->filled, state->table->slope_blocks);
-    FN(carry_bits)(at, &state->window_valid);
-    FN(carry_count)(at, &state->elapsed, MAX_ELAPSED);
-    FN(carry_bits)(at, &state->off_blocks);
-    FN(carry_number)(at, &state->bias);
+    carry_bits(at, &state->period_us);
+    carry_count(at, &state->position, MAX_SAMPLES_PER_BLOCK);
+    carry_count(at, &state->filled, table->slope_blocks);
+    carry_bits(at, &state->window_valid);
+#if GTC_WITH_TERMS
+    carry_count(at, &state->elapsed, MAX_ELAPSED);
+    carry_bits(at, &state->off_blocks);
+#endif
+    carry_number(at, &state->bias);
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
-        FN(carry_temp)(at, &state->window[i]);
+        carry_temp(at, &state->window[i]);
     }
-    for (i = 0U; i <= (uint_least32_t)GTC_MAX_TERMS; i++) {
-        const uint_least32_t channel = (i < FN(n_channels)(state->table)) ? i : 0U;
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
+        const uint_least32_t channel = (i < table->n_channels) ? i : 0U;
 
-        FN(carry_input)(at, &state->input[i], FN(guard)(state, channel), state->position);
+        carry_input(at, &state->input[i], guard_of(table, channel), state->position);
     }
 }
 
-/* 1 if a term has a memory that goes on over a time without power. */
-static int FN(is_retained)(const TABLE *table, uint_least32_t i)
-{
-    return ((i < FN(n_terms)(table)) && (FN(code_of)(table, i)->is_retained != 0U)) ? 1 : 0;
-}
-
+#if GTC_WITH_RETAINED
 /* The state of a term; nothing of it is known where it never began, or has none. */
-static void FN(carry_term)(FN(cursor_t) *at, STATE *state, uint_least32_t i)
+static void carry_term(cursor_t *at, STATE *state, const TABLE *table, uint_least32_t i)
 {
     NUM *const z = state->term[i];
 
-    FN(carry_any)(at, &z[0]);
-    FN(carry_any)(at, &z[1]);
-    if (FN(is_missing)(z[0]) != 0) {
-        at->is_sound &= ((state->input[0].gap_us == 0U) || (FN(is_retained)(state->table, i) == 0)) ? 1 : 0;
+    carry_any(at, &z[0]);
+    carry_any(at, &z[1]);
+    if (is_missing(z[0]) != 0) {
+        at->is_sound &= ((state->input[0].next_gap_us == 0U) || (is_retained_term(table, i) == 0)) ? 1 : 0;
     } else {
-        at->is_sound &= ((z[0] >= FN(number_limits)[NUMBER_ENVELOPE].least)
-                         && (z[0] <= FN(number_limits)[NUMBER_ENVELOPE].most) && FN(is_fraction)(z[1])) ? 1 : 0;
+        at->is_sound &= ((z[0] >= NUM_COLDEST)
+                         && (z[0] <= NUM_HOTTEST) && is_fraction(z[1])) ? 1 : 0;
     }
 }
 
+#endif
+
 #if GTC_WITH_UNCERTAINTY
 /* What the uncertainty is computed from, and the shift of the constant. */
-static void FN(carry_uncertainty)(FN(cursor_t) *at, STATE *state)
+static void carry_uncertainty(cursor_t *at, STATE *state, const TABLE *table)
 {
-    const NUM most = MEMBER(state->table->rezero);
+    const NUM most = MEMBER(table->rezero);
 
-    FN(carry_number)(at, &state->uncertainty.input[0]);
-    FN(carry_number)(at, &state->uncertainty.input[1]);
-    FN(carry_number)(at, &state->uncertainty.slope);
-    FN(carry_temp)(at, &state->uncertainty.first_temp);
-    FN(carry_temp)(at, &state->uncertainty.lowest);
-    FN(carry_temp)(at, &state->uncertainty.highest);
-    FN(carry_number)(at, &state->uncertainty.unshifted);
-    FN(carry_number)(at, &state->uncertainty.edge_effect);
-    FN(carry_bits)(at, &state->uncertainty.terms_since);
-    FN(carry_bits)(at, &state->uncertainty.terms_known);
-    FN(carry_bits)(at, &state->uncertainty.slope_known);
-    FN(carry_count)(at, &state->uncertainty.missing, MAX_SAMPLES_PER_BLOCK);
-    FN(carry)(at, &state->shift, -most, most);
-    FN(carry_number)(at, &state->shift_sigma);
+    carry_number(at, &state->uncertainty.input[0]);
+    carry_number(at, &state->uncertainty.input[1]);
+    carry_number(at, &state->uncertainty.slope);
+    carry_temp(at, &state->uncertainty.first_temp);
+    carry_number(at, &state->uncertainty.unshifted);
+    carry_bits(at, &state->uncertainty.slope_known);
+    carry_count(at, &state->uncertainty.missing, MAX_SAMPLES_PER_BLOCK);
+#if GTC_WITH_TERMS
+    carry_temp(at, &state->uncertainty.lowest);
+    carry_temp(at, &state->uncertainty.highest);
+    carry_number(at, &state->uncertainty.edge_effect);
+    carry_bits(at, &state->uncertainty.terms_since);
+    carry_bits(at, &state->uncertainty.terms_known);
+#endif
+    carry_within(at, &state->shift, -most, most);
+    carry_number(at, &state->shift_sigma);
 }
 
 #endif
 
 /* All of a state but what init() makes of table and period_us, and the clock; with `to`, nothing of it is written.
  * Returns 1 if it is sound. */
-static int FN(carry_state)(STATE *state, gtc_word_t *to, const gtc_word_t *from)
+static int carry_state(STATE *state, const TABLE *table, gtc_word_t *to, const gtc_word_t *from)
 {
-    FN(cursor_t) at;
+    cursor_t at;
+#if GTC_WITH_RETAINED
     uint_least32_t i;
+#endif
 
     at.to = to;
     at.from = from;
     at.is_sound = 1;
-    FN(carry_front)(&at, state);
-    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        FN(carry_term)(&at, state, i);
+    carry_front(&at, state, table);
+#if GTC_WITH_RETAINED
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        carry_term(&at, state, table, i);
     }
+#endif
 #if GTC_WITH_UNCERTAINTY
-    FN(carry_uncertainty)(&at, state);
+    carry_uncertainty(&at, state, table);
 #endif
     return at.is_sound;
 }
 
-static uint_least32_t FN(save_crc)(const gtc_word_t words[GTC_SAVE_WORDS])
+static uint_least32_t save_crc(const gtc_word_t words[GTC_SAVE_WORDS])
 {
-    return gtc_crc_words(GTC_CRC_START, words, CRC_AT) ^ GTC_CRC_FINAL;
+    return crc_words(CRC_START, words, CRC_AT) ^ CRC_FINAL;
 }
 
-static int FN(run_save)(const STATE *state, gtc_word_t words[GTC_SAVE_WORDS])
+int PUBLIC(save)(const STATE *state, const TABLE *table, gtc_word_t words[GTC_SAVE_WORDS])
 {
-    if ((state == NULL) || (words == NULL) || (state->table == NULL)) {
-        return GTC_E_ARG;
+    const int status = (words == NULL) ? GTC_E_ARG : is_started(state, table);
+
+    if (status != GTC_OK) {
+        return status;
     }
     words[0].bits = SAVE_MAGIC;
-    words[1].bits = SAVE_OPTIONS;
-    words[2].bits = state->table->crc;
+    words[1].bits = ARITHMETIC + GTC_SAVE_OPTIONS;
+    words[2].bits = state->table_crc;
     /* MISRA 11.8: one text carries both ways; this way the state is only read. */
-    (void)FN(carry_state)((STATE *)state, &words[SAVE_HEAD], words);
-    words[CRC_AT].bits = FN(save_crc)(words);
+    (void)carry_state((STATE *)state, table, &words[SAVE_HEAD], words);
+    words[CRC_AT].bits = save_crc(words);
     return GTC_OK;
 }
 
 /* Whether the words are a whole state of this table, saved by a build like this one. */
-static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS])
+static int inspect_saved(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS])
 {
     int status = GTC_OK;
 
     if ((words[0].bits != SAVE_MAGIC)
-        || (words[CRC_AT].bits != FN(save_crc)(words))) {
+        || (words[CRC_AT].bits != save_crc(words))) {
         status = GTC_E_IMAGE;
-    } else if (words[1].bits != SAVE_OPTIONS) {
+    } else if (words[1].bits != (ARITHMETIC + GTC_SAVE_OPTIONS)) {
         status = GTC_E_LAYOUT;
     } else if (words[2].bits != table->crc) {
         status = GTC_E_ID;
@@ -243,53 +248,72 @@ static int FN(inspect)(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS
 
 /* Of a state that was read, what is retained over a time without power: terms. If it had not begun when it was saved,
  * it had itself been without power before. */
-static void FN(retain)(STATE *state, uint_least32_t off_blocks)
+static void retain(STATE *state, const TABLE *table, uint_least32_t off_blocks)
 {
-    const uint_least32_t before = (state->input[0].gap_us == 0U) ? state->off_blocks : 0U;
-    const uint_least32_t room = 0xFFFFFFFFUL - before;
+#if GTC_WITH_TERMS
+    const uint_least32_t before = (state->input[0].next_gap_us == 0U) ? state->off_blocks : 0U;
+#endif
+#if GTC_WITH_RETAINED
     uint_least32_t i;
+#endif
 
-    FN(clear)(state);
-    state->off_blocks = before + ((off_blocks < room) ? off_blocks : room);
+    clear_front_end(state);
+#if GTC_WITH_CHANNELS
+    set_fallback_means(state, table);
+#endif
+#if GTC_WITH_UNCERTAINTY
     if (off_blocks != 0U) {
-        FN(rezero_clear)(state);
+        rezero_clear(state, table);
     }
-    for (i = 0U; i < (uint_least32_t)GTC_TERM_SLOTS; i++) {
-        if (FN(is_retained)(state->table, i) == 0) {
-            FN(reset_term)(state, i);
+#endif
+#if GTC_WITH_TERMS
+    state->off_blocks = add_us(before, off_blocks);
+#endif
+#if GTC_WITH_RETAINED
+    for (i = 0U; i < (uint_least32_t)GTC_MAX_TERMS; i++) {
+        if (is_retained_term(table, i) == 0) {
+            reset_term(state, i);
         }
     }
+#endif
+#if !GTC_WITH_RETAINED && !GTC_WITH_CHANNELS && !GTC_WITH_UNCERTAINTY
+    (void)table;
+#endif
+#if !GTC_WITH_TERMS && !GTC_WITH_UNCERTAINTY
+    (void)off_blocks;
+#endif
 }
 
-/* The state that the words hold, after so many blocks without power. Returns 1 if it is one that calls could have left. */
-static int FN(take_over)(STATE *state, const TABLE *table, uint_least32_t period_us, const gtc_word_t *words,
+/* The state that the words hold, after so many blocks without power. Returns 1 if it is one that calls could have
+ * left. */
+static int take_over(STATE *state, const TABLE *table, uint_least32_t period_us, const gtc_word_t *words,
                          uint_least32_t off_blocks)
 {
     int is_sound;
 
-    FN(start)(state, table, period_us);
-    is_sound = FN(carry_state)(state, NULL, &words[SAVE_HEAD]);
+    start_state(state, table, period_us);
+    is_sound = carry_state(state, table, NULL, &words[SAVE_HEAD]);
     if ((off_blocks != 0U) || (state->period_us != period_us)) {
         state->period_us = period_us;
-        FN(retain)(state, off_blocks);
+        retain(state, table, off_blocks);
     }
     return ((is_sound != 0) && (state->position <= state->samples_per_block)) ? 1 : 0;
 }
 
-static int FN(run_restore)(STATE *state, const TABLE *table, uint_least32_t period_us,
-                           const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
+int PUBLIC(restore)(STATE *state, const TABLE *table, uint_least32_t period_us,
+                    const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
 {
-    int status = (words == NULL) ? GTC_E_ARG : FN(can_start)(state, table, period_us);
+    int status = (words == NULL) ? GTC_E_ARG : can_start(state, table, period_us);
     STATE read;
 
     if (status == GTC_OK) {
-        status = FN(inspect)(table, words);
+        status = inspect_saved(table, words);
     }
-    if ((status == GTC_OK) && (FN(take_over)(&read, table, period_us, words, off_blocks) == 0)) {
+    if ((status == GTC_OK) && (take_over(&read, table, period_us, words, off_blocks) == 0)) {
         status = GTC_E_IMAGE;
     }
     if (status == GTC_OK) {
-        (void)FN(take_over)(state, table, period_us, words, off_blocks);
+        *state = read;
     }
     return status;
 }

@@ -16,7 +16,7 @@
 #define N_SHAPES 8U /* ... for so many sums of products, as the runtime has them */
 
 /* a, b, c and then a + b, a - b, a * b, a / b, a * b + c, c - a * b */
-static const uint_least32_t FN(vectors)[N_ARITHMETIC][9] = {
+static const uint_least32_t vectors[N_ARITHMETIC][9] = {
     /* product and sum: 0; fused: 2^-24 */
     {0x3F800800UL, 0x3F800800UL, 0xBF801000UL, 0x40000800UL, 0x00000000UL,
      0x3F801000UL, 0x3F800000UL, 0x00000000UL, 0xC0001000UL},
@@ -57,7 +57,7 @@ static const uint_least32_t FN(vectors)[N_ARITHMETIC][9] = {
 
 /* a, b, c, d and then what join() makes of them. In two of the rows at least, each is another number where any
  * product is not rounded before it is added, or sums are taken in another order. */
-static const uint_least32_t FN(joined)[N_JOINED][4U + N_SHAPES] = {
+static const uint_least32_t joined[N_JOINED][4U + N_SHAPES] = {
     {0x3FA389A8UL, 0xBFE3689FUL, 0xBFCA780BUL, 0xBFEACCBAUL,
      0xC07681EAUL, 0xBF30277EUL, 0x3F30277EUL, 0x3F21B700UL,
      0x40993DA6UL, 0xBDBDFCADUL, 0xC01145E4UL, 0x3E8E26A0UL},
@@ -70,7 +70,7 @@ static const uint_least32_t FN(joined)[N_JOINED][4U + N_SHAPES] = {
 };
 
 /* The number with these bits, read where the compiler cannot foresee it. */
-static inline float FN(load)(const volatile uint_least32_t *bits)
+static inline float load(const volatile uint_least32_t *bits)
 {
     gtc_word_t word;
 
@@ -78,16 +78,16 @@ static inline float FN(load)(const volatile uint_least32_t *bits)
     return word.value;
 }
 
-static inline int FN(is_expected)(float x, uint_least32_t row, uint_least32_t column)
+static inline int is_expected(float x, uint_least32_t row, uint_least32_t column)
 {
-    return (FN(bits)(x) == FN(vectors)[row][column]) ? 1 : 0;
+    return (bits_of(x) == vectors[row][column]) ? 1 : 0;
 }
 
-static inline int FN(row_works)(uint_least32_t row)
+static inline int row_works(uint_least32_t row)
 {
-    const float a = FN(load)(&FN(vectors)[row][0]);
-    const float b = FN(load)(&FN(vectors)[row][1]);
-    const float c = FN(load)(&FN(vectors)[row][2]);
+    const float a = load(&vectors[row][0]);
+    const float b = load(&vectors[row][1]);
+    const float c = load(&vectors[row][2]);
     float sum;
     float difference;
     float product;
@@ -101,58 +101,58 @@ static inline int FN(row_works)(uint_least32_t row)
     quotient = a / b;
     added = product + c;
     taken = c - product;
-    return FN(is_expected)(sum, row, 3U) & FN(is_expected)(difference, row, 4U)
-           & FN(is_expected)(product, row, 5U) & FN(is_expected)(quotient, row, 6U)
-           & FN(is_expected)(added, row, 7U) & FN(is_expected)(taken, row, 8U);
+    return is_expected(sum, row, 3U) & is_expected(difference, row, 4U)
+           & is_expected(product, row, 5U) & is_expected(quotient, row, 6U)
+           & is_expected(added, row, 7U) & is_expected(taken, row, 8U);
 }
 
 /* The results that the runtime's sums of products have, in the shapes in which it has them. */
-static inline void FN(join)(const volatile uint_least32_t *row, float results[N_SHAPES])
+static inline void join(const volatile uint_least32_t *row, float results[N_SHAPES])
 {
     float a;
     float b;
 
-    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b + c */
-    results[0] = a + FN(load)(&row[2]);
-    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b - c */
-    results[1] = a - FN(load)(&row[2]);
-    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* c - a b */
-    results[2] = FN(load)(&row[2]) - a;
-    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* a b + c d */
-    b = FN(load)(&row[2]) * FN(load)(&row[3]);
+    a = load(&row[0]) * load(&row[1]); /* a b + c */
+    results[0] = a + load(&row[2]);
+    a = load(&row[0]) * load(&row[1]); /* a b - c */
+    results[1] = a - load(&row[2]);
+    a = load(&row[0]) * load(&row[1]); /* c - a b */
+    results[2] = load(&row[2]) - a;
+    a = load(&row[0]) * load(&row[1]); /* a b + c d */
+    b = load(&row[2]) * load(&row[3]);
     results[3] = a + b;
-    a = FN(load)(&row[0]); /* a^2 + b^2 */
-    b = FN(load)(&row[1]);
+    a = load(&row[0]); /* a^2 + b^2 */
+    b = load(&row[1]);
     a = a * a;
     b = b * b;
     results[4] = a + b;
-    a = FN(load)(&row[0]); /* (a^2 + c) d */
+    a = load(&row[0]); /* (a^2 + c) d */
     a = a * a;
-    a = a + FN(load)(&row[2]);
-    results[5] = FN(load)(&row[3]) * a;
-    a = FN(load)(&row[0]) * FN(load)(&row[1]); /* (a b + 8) - 8 */
+    a = a + load(&row[2]);
+    results[5] = load(&row[3]) * a;
+    a = load(&row[0]) * load(&row[1]); /* (a b + 8) - 8 */
     a = a + 8.0F;
     results[6] = a - 8.0F;
-    a = FN(load)(&row[0]) + F32_ROUND; /* a - ((a + 1.5 2^23) - 1.5 2^23) */
+    a = load(&row[0]) + F32_ROUND; /* a - ((a + 1.5 2^23) - 1.5 2^23) */
     a = a - F32_ROUND;
-    results[7] = FN(load)(&row[0]) - a;
+    results[7] = load(&row[0]) - a;
 }
 
-static inline int FN(joined_works)(uint_least32_t row)
+static inline int joined_works(uint_least32_t row)
 {
     float results[N_SHAPES];
     uint_least32_t i;
     int works = 1;
 
-    FN(join)(FN(joined)[row], results);
+    join(joined[row], results);
     for (i = 0U; i < N_SHAPES; i++) {
-        works &= (FN(bits)(results[i]) == FN(joined)[row][4U + i]) ? 1 : 0;
+        works &= (bits_of(results[i]) == joined[row][4U + i]) ? 1 : 0;
     }
     return works;
 }
 
 /* Conversions: to float rounds to nearest even, to integer cuts off. */
-static inline int FN(conversions_work)(void)
+static inline int conversions_work(void)
 {
     static const uint_least32_t integers[2] = {16777217UL, 16777219UL};
     static const uint_least32_t reals[2] = {0x44FFFFFFUL, 0x3F7FFFFFUL};
@@ -163,26 +163,26 @@ static inline int FN(conversions_work)(void)
 
     n = integer[0];
     x = (float)n;
-    works &= (FN(bits)(x) == 0x4B800000UL) ? 1 : 0;
+    works &= (bits_of(x) == 0x4B800000UL) ? 1 : 0;
     n = integer[1];
     x = (float)n;
-    works &= (FN(bits)(x) == 0x4B800002UL) ? 1 : 0;
-    works &= ((int_least32_t)FN(load)(&reals[0]) == 2047) ? 1 : 0;
-    works &= ((int_least32_t)FN(load)(&reals[1]) == 0) ? 1 : 0;
+    works &= (bits_of(x) == 0x4B800002UL) ? 1 : 0;
+    works &= ((int_least32_t)load(&reals[0]) == 2047) ? 1 : 0;
+    works &= ((int_least32_t)load(&reals[1]) == 0) ? 1 : 0;
     return works;
 }
 
 /* 1 if the arithmetic of this build is IEEE float32, one rounding for each operation. */
-static int FN(primitives_work)(void)
+static int arithmetic_works(void)
 {
     uint_least32_t row;
-    int works = FN(conversions_work)();
+    int works = conversions_work();
 
     for (row = 0U; row < N_ARITHMETIC; row++) {
-        works &= FN(row_works)(row);
+        works &= row_works(row);
     }
     for (row = 0U; row < N_JOINED; row++) {
-        works &= FN(joined_works)(row);
+        works &= joined_works(row);
     }
     return works;
 }

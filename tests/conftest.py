@@ -225,7 +225,7 @@ def _read_by(command: list[str]) -> str:
 def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What this process compiles twice from the same bytes with the same command is compiled once.
 
-    Builds of different gyros have the same `gtc.c`, at which a compiler works for a second.
+    Builds of different gyros have the same `gtc_f32.c`, at which a compiler works for a second.
     """
     from gyrotc.verify import toolchain
 

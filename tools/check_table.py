@@ -29,12 +29,11 @@ MAGIC = 0x47544331
 ARITHMETIC = {1: "f32", 2: "q31"}
 HEAD = [
     "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits",
-    "fallback", "authority:2", "effect:2", "rezero", "scale:3", "envelope:4", "n_networks", "n_centers",
+    "parts", "fallback", "authority:2", "effect:2", "rezero", "scale:3", "envelope:4", "n_networks", "n_centers",
     "n_channels", "n_terms", "coverage_cells:2", "sigma_cells:2", "n_sigma", "n_probes",
 ]  # fmt: skip
 NUMBERS = {"fallback", "authority", "effect", "rezero", "scale", "envelope"}
 ARRAYS = ("serial", "networks", "centers", "guards", "terms", "coverage", "sigma", "probes")
-TERM_CODES = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary", 6: "curve", 7: "product"}
 CLAMPED, UNCOVERED = 2, 4
 MARGIN = 0.25  # of the range of corrections, granted at either end: the header says so
 LARGEST_BOUND = 0.01  # of the noise floor, beyond which a format is refused: docs/numerics.md, section 4
@@ -186,8 +185,8 @@ class Image:
     """A table: its words, and the equation that they stand for, in float64."""
 
     def __init__(self, words: list[int], where: str) -> None:
-        if len(words) < 30 or words[0] != MAGIC or words[2] != len(words) or words[1] & 0xFFFF != 2:
-            raise Unreadable(f"{where}: not an image of layout 2")
+        if len(words) < 30 or words[0] != MAGIC or words[2] != len(words) or words[1] & 0xFFFF != 3:
+            raise Unreadable(f"{where}: not an image of layout 3")
         self.where, self.words = where, words
         self.numeric = ARITHMETIC[words[1] >> 16]
         rest = iter(words[3:-1])
@@ -340,12 +339,14 @@ def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
         yield "the CRC-32 is not that of the words"
     text = (folder / f"gtc_{name}.c").read_text(encoding="ascii")
     kinds = set(image.array["terms"][::8])
-    codes = re.search(rf"{image.numeric}_codes\[GTC_N_KINDS\] = \{{\s+(.*?),\s+\}}", text)
-    wanted = ", ".join(
-        f"&gtc_{image.numeric}_term_{name}" if kind in kinds else "NULL" for kind, name in TERM_CODES.items()
+    parts = sum(1 << kind for kind in kinds)
+    parts |= 0x1 * (image.one("n_networks") - len({w >> 16 for w in image.array["terms"][1::8]} - {0}) > 1)
+    parts |= (
+        0x100 * bool(image.array["coverage"]) + 0x200 * bool(image.array["sigma"]) + 0x400 * bool(image.array["probes"])
     )
-    if (codes[1] if codes else None) != (wanted if kinds else None):
-        yield f"the code of the terms is {codes and codes[1]}, their kinds are {sorted(kinds)}"
+    parts |= 0x800 * (image.numeric == "q31" and image.member["scale"][2] != 0) + 0x1000 * (image.one("rezero") != 0)
+    if parts != image.one("parts"):
+        yield f"the parts are {image.one('parts'):#x}, what the table holds makes {parts:#x}"
     source = source_words(text, image.numeric)
     if source != image.words:
         wrong = [k for k, pair in enumerate(zip(source, image.words, strict=False)) if pair[0] != pair[1]]
@@ -485,8 +486,8 @@ def check_header(model: Model, image: Image, name: str, header: str) -> Iterator
         "ID": zlib.crc32(name.encode("ascii")), "BLOCK_US": block, "PERIOD_MIN_US": max(1, -(-block // 2**20)),
         "PERIOD_MAX_US": block + block // 1000, "STUCK_US": round(model.raw["stuck_s"] * 1e6),
         "N_CHANNELS": 1 + len(model.channels()),
-        # 9 pointers, number of fallback models, code of 7 kinds of terms; neither magic nor arithmetic and length
-        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + (15 if image.array["terms"] else 8)),
+        # 8 pointers and the number of fallback models; neither magic nor length
+        f"{image.numeric.upper()}_TABLE_BYTES": 4 * (len(image.words) + 7),
     }  # fmt: skip
     if image.numeric == "q31":
         whole["Q31_BIAS_FRAC_BITS"] = image.one("bias_frac_bits")

@@ -35,11 +35,11 @@ _C_PART = re.compile(
 
 
 def c_page() -> str:
-    """Every function of gtc.h and gtc_angle.h with its comment."""
-    header = "".join((ROOT / "include" / name).read_text("ascii") for name in ("gtc.h", "gtc_angle.h"))
+    """Every function of gtc.h with its comment."""
+    header = re.sub(r"^#.*\n", "", (ROOT / "include" / "gtc.h").read_text("ascii"), flags=re.MULTILINE)
     parts = [
         "# C reference\n",
-        "Made from `include/gtc.h` and `include/gtc_angle.h` by `tools/reference.py`; there stand the types, too.\n",
+        "Made from `include/gtc.h` by `tools/reference.py`; there stand the types, too.\n",
     ]
     for part in _C_PART.finditer(header):
         names = re.findall(r"int gtc_f32_(\w+)\(", part["code"])

@@ -8,7 +8,6 @@ from typing import Any
 from ..campaigns import Settings
 from ..page import Figure, ResultsTable, figures_table
 from ..records import Record
-from . import options
 from .instructions import CORES, instructions
 from .sizes import sizes
 
@@ -18,15 +17,13 @@ inputs, each core with the level of the compiler that serves it best. Flash is e
 {centers} Gaussians in float32 that holds uncertainties, coverage and known answers.
 """
 _PROGRAMS = "Cortex-M4F -Os"
-_AIMS = {"init, sample, bias": 4096, "every function, default options": 12288}
+_AIMS = {"init, sample, bias": 4096, "every function, whole runtime": 12288}
 _M3, _M4, _M7 = "cortex-m3", "cortex-m4f", "cortex-m7"
 
 
 def measure(settings: Settings) -> Record:
-    """Count, link, and renew what `emit` prints about the cost of each option."""
+    """Count instructions and link programs."""
     record: Record = instructions(quick=settings.quick) | {"sizes": sizes()}
-    if not settings.quick:
-        options.write()
     return record
 
 

@@ -139,11 +139,13 @@ def _costs(job: Job, core: str, level: str, n: int) -> Iterator[dict[str, Any]]:
 
 def _sizes(job: Job, target: Target) -> dict[str, dict[str, int]]:
     """Bytes of the map's function and of its lookup table, by arithmetic."""
-    with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
-        objects = compile_objects(target, [job.c_folder / "gtc.c"], Path(work), include=job.c_folder)
-        # Public names carry the options that the runtime was compiled with.
-        size = {s.name.partition("_20blocks")[0]: s.size for s in symbols(target, *objects)}
-    return {n: {"map_bytes": size[f"gtc_{n}_map"], "lookup_bytes": size[f"gtc_{n}_exp2_table"]} for n in job.tables}
+    found = {}
+    for numeric in job.tables:
+        with tempfile.TemporaryDirectory(prefix="gyrotc-") as work:
+            objects = compile_objects(target, [job.c_folder / f"gtc_{numeric}.c"], Path(work), include=job.c_folder)
+            size = {s.name: s.size for s in symbols(target, *objects)}
+        found[numeric] = {"map_bytes": size[f"gtc_{numeric}_map"], "lookup_bytes": size["exp2_table"]}
+    return found
 
 
 def _errors(job: Job, n: int) -> Iterator[dict[str, Any]]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gyrotc.model import load_model
-from gyrotc.tables import SWITCHES, emit_texts, quantise_all
+from gyrotc.tables import NUMERICS, SWITCHES, emit_texts, needs_of, quantise_all, runtime_texts
 
 from ..records import ROOT
 
@@ -39,11 +39,7 @@ LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
 
 _MAIN = """#include "gtc_{id}.h"
 gtc_f32_state_t state;
-gtc_f32_snapshot_t snapshot;
-gtc_word_t saved[GTC_SAVE_WORDS];
-gtc_f32_table_t opened;
-gtc_f32_angle_t angle;
-const gtc_word_t *volatile image; /* wherever it lies: no constant of the program */
+{objects}
 volatile float in;
 volatile float out;
 volatile int status;
@@ -55,20 +51,26 @@ int main(void)
 {calls}
     for (;;) {{
         c = in;
-        status = gtc_f32_sample(&state, 1000000UL, &c);
-        status = gtc_f32_bias(&state, &b);
+        status = gtc_f32_sample(&state, &gtc_{symbol}_f32, 1000000UL, &c);
+        status = gtc_f32_bias(&state, &gtc_{symbol}_f32, &b);
         out = b;
     }}
 }}
 """
 _CALLS = {
     "check": "gtc_f32_check(&gtc_{symbol}_f32)",
-    "snapshot": "gtc_f32_snapshot(&state, &snapshot)",
-    "rezero": "gtc_f32_rezero(&state, c, 60UL)",
-    "save": "gtc_f32_save(&state, saved)",
+    "snapshot": "gtc_f32_snapshot(&state, &gtc_{symbol}_f32, &snapshot)",
+    "rezero": "gtc_f32_rezero(&state, &gtc_{symbol}_f32, c, 60UL)",
+    "save": "gtc_f32_save(&state, &gtc_{symbol}_f32, saved)",
     "restore": "gtc_f32_restore(&state, &gtc_{symbol}_f32, 1000000UL, saved, 0UL)",
     "open": "gtc_f32_open(&opened, image, 64UL, 1UL)",
     "angle": "gtc_f32_angle(&angle, b, 0.5F, &c)",
+}
+_OBJECTS = {
+    "snapshot": "gtc_f32_snapshot_t snapshot;",
+    "save": "gtc_word_t saved[GTC_SAVE_WORDS];",
+    "open": "gtc_f32_table_t opened;\nconst gtc_word_t *volatile image; /* no constant of the program */",
+    "angle": "gtc_f32_angle_t angle;",
 }
 #: Block means of a minute's samples, least-squares slope over ten of them, four Gaussians; nothing is tested.
 _MAP = """/* 2^-u by a cubic of its fraction, 1e-4 */
@@ -122,8 +124,9 @@ int main(void)
 
 @dataclass(frozen=True)
 class Program:
-    """Functions that are called beside init, sample and bias; options: as the table needs, or the defaults.
+    """Functions that are called beside init, sample and bias.
 
+    `is_fitted`: the runtime has what the table needs, else everything.
     `is_least`: table and runtime without the parts that a product may leave out.
     """
 
@@ -135,16 +138,19 @@ class Program:
 
 
 PROGRAMS = (
-    Program("init, sample, bias; default options", is_fitted=False),
+    Program("init, sample, bias; whole runtime", is_fitted=False),
     Program("init, sample, bias"),
     Program("init, sample, bias; all else left out", is_least=True),
     Program("with check", ("check",)),
     Program("with check and snapshot", ("check", "snapshot")),
     Program("with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")),
-    Program("every function, default options", tuple(_CALLS), is_fitted=False),
+    Program("every function, whole runtime", tuple(_CALLS), is_fitted=False),
     Program("by hand: mean, slope, four Gaussians", text=_MAP),
     Program("by hand: a cubic of each sample", text=_CUBIC),
 )
+
+
+_WHOLE = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4}
 
 
 def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, int]:
@@ -159,16 +165,19 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
     for name, data in emit_texts(model, quantise_all(model, None)).items():
         (folder / name).write_bytes(data)
     if not program.is_fitted:
-        (folder / "gtc_config.h").write_text("")
+        whole = {name: max(value, 1) for name, value in needs_of(model).items()} | _WHOLE
+        for name, data in runtime_texts(whole, NUMERICS).items():
+            (folder / name).write_bytes(data)
     (folder / "program.c").write_text(_text(program), encoding="ascii")
-    sources = ["program.c", *(("gtc.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
+    sources = ["program.c", *(("gtc_f32.c", f"gtc_{model.id}.c") if program.text is _MAIN else ())]
     return _linked(sources, core, level, folder)
 
 
 def _text(program: Program) -> str:
     model = load_model(MODEL)
     calls = "\n".join(f"    status = {_CALLS[name].format(symbol=model.symbol)};" for name in program.calls)
-    return program.text.format(id=model.id, symbol=model.symbol, calls=calls)
+    objects = "\n".join(text for name, text in _OBJECTS.items() if name in program.calls)
+    return program.text.format(id=model.id, symbol=model.symbol, calls=calls, objects=objects)
 
 
 def _linked(sources: Sequence[str], core: str, level: str, folder: Path) -> tuple[int, int]:

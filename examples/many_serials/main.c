@@ -64,10 +64,10 @@ int main(int argc, char **argv)
         status = gtc_f32_init(&state, &table, PERIOD_US);
     }
     for (k = 0; (k < 3) && (status >= 0); k++) {
-        status = gtc_f32_sample(&state, PERIOD_US, &temperature);
+        status = gtc_f32_sample(&state, &table, PERIOD_US, &temperature);
     }
     if (status >= 0) {
-        status = gtc_f32_bias(&state, &bias);
+        status = gtc_f32_bias(&state, &table, &bias);
     }
     if (status < 0) {
         printf("do not navigate: %d\n", status);

@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_rlg_0042.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 10) || (GTC_MAX_TERMS < 0)
-#error "gtc_rlg_0042.c needs -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_rlg_0042.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -72,7 +68,7 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_rlg_0042_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xcf4eb7abUL,
@@ -81,6 +77,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .slope_blocks = 10UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x00000500UL,
     .fallback = V(0.00726183504F),
     .authority = { V(0.0F), V(0.00946229789F) },
     .effect = { V(0.0F), V(0.0F) },
@@ -104,8 +101,7 @@ const gtc_f32_table_t gtc_rlg_0042_f32 = {
     .coverage = f32_coverage,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xd2514b2cUL,
-    .term_code = NULL,
+    .crc = 0x172b6cefUL,
 };
 
 /* ---- fixed point ---- */
@@ -119,21 +115,21 @@ static const gtc_word_t q31_serial[16] = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0xaUL), B(0x01d842ffUL), B(0xffba6aa3UL), B(0x0048e26eUL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0xaUL), B(0x0001d843UL), B(0xffffba6bUL), B(0x000048e2UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[50] = {
-    B(0x00007598UL), B(0xf9e0d0bcUL), B(0x000005a0UL), B(0xfcfb14f4UL), B(0xffa99b2fUL), /* -27.57 C, +0.173 C/min; widths 0.082, 1.708; -1.318e-03 deg/h */
-    B(0x00007ed2UL), B(0xec393afeUL), B(0x00000730UL), B(0xfcc76deaUL), B(0xffa47e70UL), /* -17.10 C, -0.244 C/min; widths 0.076, 1.337; -1.396e-03 deg/h */
-    B(0x00008d82UL), B(0xda45a923UL), B(0x00000576UL), B(0xfe0b8f60UL), B(0xff96ece9UL), /* -5.94 C, -0.669 C/min; widths 0.068, 1.760; -1.603e-03 deg/h */
-    B(0x0000696eUL), B(0xd290f974UL), B(0x00000489UL), B(0xfe112f51UL), B(0x00dc6ef0UL), /* 10.63 C, -0.348 C/min; widths 0.091, 2.119; +3.363e-03 deg/h */
-    B(0x00004114UL), B(0xe3c9bc49UL), B(0x000004f8UL), B(0xfdf46286UL), B(0xff0331c7UL), /* 10.89 C, -0.416 C/min; widths 0.148, 1.933; -3.857e-03 deg/h */
-    B(0x00008c63UL), B(0xacf4da54UL), B(0x00000267UL), B(0xfe2b60aaUL), B(0xffac5067UL), /* 26.83 C, +1.235 C/min; widths 0.068, 4.001; -1.277e-03 deg/h */
-    B(0x00006f86UL), B(0xb1283f7aUL), B(0x00000334UL), B(0xfed941c7UL), B(0xff11fde1UL), /* 38.47 C, -0.662 C/min; widths 0.086, 3.001; -3.632e-03 deg/h */
-    B(0x00004d2dUL), B(0xc89dfd49UL), B(0x000003b0UL), B(0xfeebfd6dUL), B(0x00e34097UL), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
-    B(0x00008631UL), B(0x8b5a5cccUL), B(0x000005afUL), B(0xfdb72986UL), B(0x007580f9UL), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
-    B(0x000061c1UL), B(0xa1020e4eUL), B(0x00000677UL), B(0xfd66e7deUL), B(0x00781399UL), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
+    B(0x00007598UL), B(0xf9e0d0bcUL), B(0x000005a0UL), B(0xfcfb14f4UL), B(0xffffa99bUL), /* -27.57 C, +0.173 C/min; widths 0.082, 1.708; -1.318e-03 deg/h */
+    B(0x00007ed2UL), B(0xec393afeUL), B(0x00000730UL), B(0xfcc76deaUL), B(0xffffa47eUL), /* -17.10 C, -0.244 C/min; widths 0.076, 1.337; -1.396e-03 deg/h */
+    B(0x00008d82UL), B(0xda45a923UL), B(0x00000576UL), B(0xfe0b8f60UL), B(0xffff96edUL), /* -5.94 C, -0.669 C/min; widths 0.068, 1.760; -1.603e-03 deg/h */
+    B(0x0000696eUL), B(0xd290f974UL), B(0x00000489UL), B(0xfe112f51UL), B(0x0000dc6fUL), /* 10.63 C, -0.348 C/min; widths 0.091, 2.119; +3.363e-03 deg/h */
+    B(0x00004114UL), B(0xe3c9bc49UL), B(0x000004f8UL), B(0xfdf46286UL), B(0xffff0332UL), /* 10.89 C, -0.416 C/min; widths 0.148, 1.933; -3.857e-03 deg/h */
+    B(0x00008c63UL), B(0xacf4da54UL), B(0x00000267UL), B(0xfe2b60aaUL), B(0xffffac50UL), /* 26.83 C, +1.235 C/min; widths 0.068, 4.001; -1.277e-03 deg/h */
+    B(0x00006f86UL), B(0xb1283f7aUL), B(0x00000334UL), B(0xfed941c7UL), B(0xffff11feUL), /* 38.47 C, -0.662 C/min; widths 0.086, 3.001; -3.632e-03 deg/h */
+    B(0x00004d2dUL), B(0xc89dfd49UL), B(0x000003b0UL), B(0xfeebfd6dUL), B(0x0000e341UL), /* 39.54 C, -0.979 C/min; widths 0.125, 2.605; +3.468e-03 deg/h */
+    B(0x00008631UL), B(0x8b5a5cccUL), B(0x000005afUL), B(0xfdb72986UL), B(0x00007581UL), /* 54.83 C, -0.462 C/min; widths 0.072, 1.690; +1.793e-03 deg/h */
+    B(0x000061c1UL), B(0xa1020e4eUL), B(0x00000677UL), B(0xfd66e7deUL), B(0x00007814UL), /* 65.17 C, -0.463 C/min; widths 0.098, 1.487; +1.832e-03 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -149,18 +145,18 @@ static const gtc_word_t q31_coverage[12] = {
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002b4beeUL), B(0x00000e0aUL), B(0x02215450UL), B(0x4UL),
-    B(0x00129446UL), B(0xffffb78bUL), B(0x01789d91UL), B(0x0UL),
-    B(0xfff9dc9fUL), B(0x00002a21UL), B(0x019f0e03UL), B(0x0UL),
-    B(0xffe124f7UL), B(0xffffd3a1UL), B(0x01c17546UL), B(0x4UL),
-    B(0x002d4395UL), B(0x00004637UL), B(0x02204fa2UL), B(0x4UL),
-    B(0x00148beeUL), B(0xffffefb7UL), B(0x01a21b9cUL), B(0x4UL),
-    B(0xffc5f7beUL), B(0xffff692fUL), B(0x01ccc88bUL), B(0x6UL),
-    B(0x005d3927UL), B(0x000096cfUL), B(0x0208b9f1UL), B(0x6UL),
+    B(0x002b4beeUL), B(0x00000e0aUL), B(0x00022154UL), B(0x4UL),
+    B(0x00129446UL), B(0xffffb78bUL), B(0x0001789dUL), B(0x0UL),
+    B(0xfff9dc9fUL), B(0x00002a21UL), B(0x00019f0dUL), B(0x0UL),
+    B(0xffe124f7UL), B(0xffffd3a1UL), B(0x0001c175UL), B(0x4UL),
+    B(0x002d4395UL), B(0x00004637UL), B(0x0002204fUL), B(0x4UL),
+    B(0x00148beeUL), B(0xffffefb7UL), B(0x0001a21bUL), B(0x4UL),
+    B(0xffc5f7beUL), B(0xffff692fUL), B(0x0001ccc8UL), B(0x6UL),
+    B(0x005d3927UL), B(0x000096cfUL), B(0x000208baUL), B(0x6UL),
 };
 
 const gtc_q31_table_t gtc_rlg_0042_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xcf4eb7abUL,
@@ -168,9 +164,10 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .block_us = 10000000UL,
     .slope_blocks = 10UL,
     .lead_blocks = 0UL,
-    .bias_frac_bits = 32UL,
-    .fallback = 31189344L,
-    .authority = { 0L, 40640494L },
+    .bias_frac_bits = 24UL,
+    .parts = 0x00000d00UL,
+    .fallback = 121833L,
+    .authority = { 0L, 158751L },
     .effect = { 0L, 0L },
     .rezero = 0L,
     .scale = { 1331036L, 170870916L, 4L },
@@ -192,7 +189,6 @@ const gtc_q31_table_t gtc_rlg_0042_q31 = {
     .coverage = q31_coverage,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0x0b9fb6e3UL,
-    .term_code = NULL,
+    .crc = 0x1b79a30dUL,
 };
 

@@ -14,11 +14,11 @@ int main(void)
         return 1; /* do not navigate with this build or table */
     }
     for (k = 0; k < 101; k++) { /* a start must agree with itself for a while before it is accepted */
-        if (gtc_f32_sample(&state, 10000UL, channels) < 0) {
+        if (gtc_f32_sample(&state, &gtc_rlg_0042_f32, 10000UL, channels) < 0) {
             return 1;
         }
     }
-    if (gtc_f32_bias(&state, &bias_dph) < 0) {
+    if (gtc_f32_bias(&state, &gtc_rlg_0042_f32, &bias_dph) < 0) {
         return 1;
     }
     printf("bias at %.2f C: %.6f deg/h\n", (double) channels[0], (double) bias_dph); /* rate - bias */

@@ -37,12 +37,12 @@ int main(void)
     }
     while (scanf("%ld %ld %ld", &word, &truth, &measured) == 3) {
         const float temperature = (float)word / 128.0F;
-        const int taken = gtc_f32_sample(&state, PERIOD_US, (word == -32768L) ? NULL : &temperature);
+        const int taken = gtc_f32_sample(&state, &gtc_sim_0003_f32, PERIOD_US, (word == -32768L) ? NULL : &temperature);
         gtc_f32_snapshot_t now;
         float rate;
         double error;
 
-        if ((taken < 0) || (gtc_f32_snapshot(&state, &now) < 0)) {
+        if ((taken < 0) || (gtc_f32_snapshot(&state, &gtc_sim_0003_f32, &now) < 0)) {
             return 1;
         }
         rate = ((float)measured * 1e-9F) - now.bias;

@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_sim_0003.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 10) || (GTC_MAX_TERMS < 0)
-#error "gtc_sim_0003.c needs -DGTC_MAX_SLOPE_BLOCKS=10 -DGTC_MAX_TERMS=0 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_sim_0003.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -82,7 +78,7 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_sim_0003_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xe32c4e66UL,
@@ -91,6 +87,7 @@ const gtc_f32_table_t gtc_sim_0003_f32 = {
     .slope_blocks = 10UL,
     .lead_blocks = 1UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x00000700UL,
     .fallback = V(0.00756233465F),
     .authority = { V(0.0F), V(0.0088728182F) },
     .effect = { V(0.0F), V(0.0F) },
@@ -114,7 +111,6 @@ const gtc_f32_table_t gtc_sim_0003_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x2ae71cf8UL,
-    .term_code = NULL,
+    .crc = 0xf24c6c8cUL,
 };
 

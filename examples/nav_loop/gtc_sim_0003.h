@@ -10,7 +10,7 @@
  * Valid:       -32.75 ... 67.98 C, -2.360 ... 2.355 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         920 bytes of read-only data, 104 of them parameters; |error| <= 1.23e-08 deg/h against the model (terms excluded)
- * Options:     gtc_config.h: the smallest runtime that holds it
+ * Runtime:     gtc.h and gtc_<n>.c beside it, the smallest that holds it
  *
  * Make again:  gyrotc emit model.json --out . --numeric f32
  * Model:       sha256 7d7f521155691e1ad07a89071ee00c9c1df2362b8a2ea0efb56daf7212558c21

@@ -19,9 +19,9 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const float temperature = (float)word * 0.0078125F;
-    const int taken = gtc_f32_sample(&state, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
+    const int taken = gtc_f32_sample(&state, &gtc_rlg_0042_f32, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
     float bias = 0.0F;
-    const int status = gtc_f32_bias(&state, &bias);
+    const int status = gtc_f32_bias(&state, &gtc_rlg_0042_f32, &bias);
     bias_dph = bias;
     return (taken < 0) ? taken : status;
 }

@@ -19,9 +19,9 @@ int nav_start(void)
 int nav_temperature(int_least32_t word)
 {
     const int_least32_t temperature = word * 512L; /* 2^-16 C */
-    const int taken = gtc_q31_sample(&state, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
+    const int taken = gtc_q31_sample(&state, &gtc_rlg_0042_q31, PERIOD_US, (word == NAV_NO_READING) ? NULL : &temperature);
     int_least32_t now = 0;
-    const int status = gtc_q31_bias(&state, &now);
+    const int status = gtc_q31_bias(&state, &gtc_rlg_0042_q31, &now);
     bias = now;
     return (taken < 0) ? taken : status;
 }

@@ -44,10 +44,10 @@ static int correct(const float temperature[N_AXES], float rate[N_AXES])
 
     for (axis = 0; axis < N_AXES; axis++) {
         float bias = 0.0F;
-        int status = gtc_f32_sample(&states[axis], PERIOD_US, &temperature[axis]);
+        int status = gtc_f32_sample(&states[axis], tables[axis], PERIOD_US, &temperature[axis]);
 
         if (status >= 0) {
-            status |= gtc_f32_bias(&states[axis], &bias);
+            status |= gtc_f32_bias(&states[axis], tables[axis], &bias);
         }
         if (status < 0) {
             return status;

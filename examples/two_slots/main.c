@@ -59,7 +59,7 @@ static int state_at(int save, gtc_f32_state_t *state)
     for (i = 0; (i < (37 * save)) && (status >= 0); i++) {
         const float temp = 20.0F + (0.0625F * (float)i);
 
-        status = gtc_f32_sample(state, PERIOD_US, &temp);
+        status = gtc_f32_sample(state, TABLE, PERIOD_US, &temp);
     }
     return status;
 }
@@ -76,11 +76,11 @@ static int loaded(void)
     if (slots_load(&state, TABLE, PERIOD_US, 0U) != GTC_OK) {
         return 0;
     }
-    if (gtc_f32_save(&state, found_words) != GTC_OK) {
+    if (gtc_f32_save(&state, TABLE, found_words) != GTC_OK) {
         return -1;
     }
     for (save = 1; save <= SAVES; save++) {
-        if ((state_at(save, &expected) >= 0) && (gtc_f32_save(&expected, words) == GTC_OK)
+        if ((state_at(save, &expected) >= 0) && (gtc_f32_save(&expected, TABLE, words) == GTC_OK)
             && (memcmp(words, found_words, sizeof words) == 0)) {
             return save;
         }

@@ -48,7 +48,7 @@ int slots_save(const gtc_f32_state_t *state, const gtc_f32_table_t *table)
     int keep = higher(); /* the newest whole one must outlive this save */
     int slot;
     int i;
-    const int status = gtc_f32_save(state, words);
+    const int status = gtc_f32_save(state, table, words);
 
     if (status != GTC_OK) {
         return status;

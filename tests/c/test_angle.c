@@ -75,6 +75,27 @@ TEST(over_24_hours_the_sum_is_bias_times_time)
     sums_to_bias_times_time(&step, 1, 24L * 3600L * 20L);
 }
 
+/* A task that comes late reads what several interrupts have added. */
+TEST(increments_that_are_not_read_yet_add_up)
+{
+    const num_t bias = some_bias();
+    angle_t one = ANGLE_0;
+    angle_t other = ANGLE_0;
+    num_t read_each = 0;
+    num_t read_once = 0;
+    int k;
+
+    for (k = 0; k < 1000; k++) {
+        num_t angle = 0;
+
+        CHECK_INT(GTC_OK, FN(angle)(&one, bias, 7 * MS, &angle));
+        read_each += angle;
+        CHECK_INT(GTC_OK, FN(angle)(&other, bias, 7 * MS, &read_once));
+    }
+    CHECK(same(read_each, read_once));
+    CHECK(read_once != 0);
+}
+
 TEST(bad_arguments_write_nothing)
 {
     const num_t bias = some_bias();
@@ -104,8 +125,11 @@ TEST(an_angle_beyond_32_bits_is_refused)
     /* 2147484 units a second are too many for 1000 s, and just not for 999.999 s. */
     CHECK_INT(GTC_E_ARG, FN(angle)(&sum, 2147484, LONGEST, &angle));
     CHECK_INT(7, angle);
+    angle = 0;
     CHECK_INT(GTC_OK, FN(angle)(&sum, 2147484, 999999000, &angle));
     CHECK_INT(2147481853L, angle);
+    CHECK_INT(GTC_E_ARG, FN(angle)(&sum, 2147484, 999999000, &angle));
+    angle = 0;
     CHECK_INT(GTC_E_ARG, FN(angle)(&sum, -2147484, LONGEST, &angle));
     CHECK_INT(GTC_OK, FN(angle)(&sum, -2147484, 999999000, &angle));
 }
@@ -143,6 +167,10 @@ TEST(an_angle_that_is_no_number_is_refused_and_leaves_no_trace)
     CHECK_INT(GTC_E_ARG, FN(angle)(&sum, 3.0e38F, 1000.0F, &angle));
     CHECK_INT(GTC_E_ARG, FN(angle)(&sum, 3.0e38F, 0.001F, &angle));
     CHECK(same(angle, 7.0F));
+    angle = 3.4e38F;
+    CHECK_INT(GTC_E_ARG, FN(angle)(&sum, 3.0e34F, 1000.0F, &angle));
+    CHECK(same(angle, 3.4e38F));
+    angle = 7.0F;
     CHECK(same(sum.rest[0], 0.25F) && same(sum.rest[1], 0.0F));
 }
 #endif
@@ -151,6 +179,7 @@ int main(void)
 {
     RUN(the_sum_stays_within_a_unit);
     RUN(over_24_hours_the_sum_is_bias_times_time);
+    RUN(increments_that_are_not_read_yet_add_up);
     RUN(bad_arguments_write_nothing);
 #if TEST_Q31
     RUN(an_angle_beyond_32_bits_is_refused);

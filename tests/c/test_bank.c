@@ -70,7 +70,7 @@ TEST(a_bank_is_refused_by_a_build_without_it)
 {
     state_t state;
 
-    CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, FN(init)(&state, &BANK, PERIOD));
+    CHECK_INT(GTC_WITH_BANK ? GTC_OK : GTC_E_LAYOUT, init(&state, &BANK, PERIOD));
 }
 
 TEST(networks_that_do_not_share_out_the_centers_are_refused)

@@ -60,9 +60,14 @@ TEST(changed_members_are_found)
     FOUND(table.calibrated ^= 1U);
     FOUND(table.block_us ^= 1U);
     FOUND(table.lead_blocks ^= 1U);
-    FOUND(table.bias_frac_bits ^= 1U);
     FOUND(table.crc ^= 1U);
 #undef FOUND
+    table = TABLE;
+    table.bias_frac_bits ^= 1U; /* the unit of another product */
+    CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
+    table = TABLE;
+    table.parts |= 0x2000U; /* what no runtime has */
+    CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
 }
 
 /* Counts of arrays whose end nothing can check are left out: in an image its length checks them. */

@@ -28,7 +28,7 @@ static void walk(state_t *state, int from, int to)
 static void saved(const state_t *state, gtc_word_t words[WORDS])
 {
     memset(words, 0x5A, WORDS * sizeof words[0]);
-    CHECK_INT(GTC_OK, FN(save)(state, words));
+    CHECK_INT(GTC_OK, save(state, words));
 }
 
 /* Restores; an error must leave the state unwritten. */
@@ -39,7 +39,7 @@ static int restored(state_t *state, const gtc_word_t words[WORDS], uint_least32_
 
     memset(state, 0xA5, sizeof *state);
     memcpy(&before, state, sizeof before);
-    status = FN(restore)(state, &TABLE, PERIOD, words, off_blocks);
+    status = restore(state, &TABLE, PERIOD, words, off_blocks);
     CHECK(status <= 0);
     CHECK((status == GTC_OK) || (memcmp(state, &before, sizeof before) == 0));
     return status;
@@ -108,7 +108,7 @@ TEST(another_sample_rate_starts_the_window_again)
 
     walk(&state, 0, 47);
     saved(&state, words);
-    CHECK_INT(GTC_OK, FN(restore)(&state, &TABLE, 2UL * PERIOD, words, 0U));
+    CHECK_INT(GTC_OK, restore(&state, &TABLE, 2UL * PERIOD, words, 0U));
     CHECK_INT(GTC_HELD, status_of(&state));
     CHECK_INT(GTC_WARMING, feed(&state, C(15), 1));
 }
@@ -164,8 +164,8 @@ TEST(a_state_of_another_table_is_refused)
 
     saved(&state, words);
     other.crc ^= 1U;
-    CHECK_INT(GTC_E_ID, FN(restore)(&state, &other, PERIOD, words, 0U));
-    CHECK(state.table == &TABLE);
+    CHECK_INT(GTC_E_ID, restore(&state, &other, PERIOD, words, 0U));
+    CHECK(state.table_crc == TABLE.crc);
 }
 
 TEST(erased_memory_is_refused)
@@ -187,12 +187,12 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
     gtc_f32_state_t other;
 
     CHECK_INT(GTC_OK, gtc_f32_init(&other, &gtc_test_1_f32, PERIOD));
-    CHECK_INT(GTC_OK, gtc_f32_save(&other, words));
+    CHECK_INT(GTC_OK, gtc_f32_save(&other, &gtc_test_1_f32, words));
 #else
     gtc_q31_state_t other;
 
     CHECK_INT(GTC_OK, gtc_q31_init(&other, &gtc_test_1_q31, PERIOD));
-    CHECK_INT(GTC_OK, gtc_q31_save(&other, words));
+    CHECK_INT(GTC_OK, gtc_q31_save(&other, &gtc_test_1_q31, words));
 #endif
     CHECK_INT(GTC_E_LAYOUT, restored(&state, words, 0U));
 }
@@ -207,7 +207,7 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
 #define TERM_AT (INPUT_AT + (14 * (GTC_MAX_TERMS + 1)))
 #define UNCERTAINTY_AT (TERM_AT + (2 * GTC_MAX_TERMS))
-#define SHIFT_AT (UNCERTAINTY_AT + 11)
+#define SHIFT_AT (UNCERTAINTY_AT + 12)
 
 /* CRC of a saved state, bit by bit: over all words before it. */
 static void resealed(gtc_word_t words[WORDS])
@@ -277,19 +277,19 @@ TEST(a_state_of_a_range_below_0_is_restored)
     memcpy(guard, TABLE.guards, sizeof guard);
     NUMBER(guard[1]) = C(-1.0);
     table.guards = guard;
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
-    CHECK_INT(GTC_OK, FN(save)(&state, words));
-    CHECK_INT(GTC_OK, FN(restore)(&state, &table, PERIOD, words, 0U));
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, save(&state, words));
+    CHECK_INT(GTC_OK, restore(&state, &table, PERIOD, words, 0U));
     CHECK_INT(GTC_WARMING, feed(&state, C(-2.0), 9));
-    CHECK_INT(GTC_OK, FN(save)(&state, words));
-    CHECK_INT(GTC_OK, FN(restore)(&state, &table, PERIOD, words, 0U));
+    CHECK_INT(GTC_OK, save(&state, words));
+    CHECK_INT(GTC_OK, restore(&state, &table, PERIOD, words, 0U));
 }
 
 /* What the uncertainty is computed from must be numbers and temperatures, the shift what the table grants. */
 TEST(uncertainties_that_no_call_leaves_are_refused_with_a_right_crc)
 {
     static const int at[11] = {
-        UNCERTAINTY_AT, UNCERTAINTY_AT + 1, UNCERTAINTY_AT + 2, UNCERTAINTY_AT + 3, UNCERTAINTY_AT + 4, UNCERTAINTY_AT + 5, UNCERTAINTY_AT + 6, UNCERTAINTY_AT + 7,
+        UNCERTAINTY_AT, UNCERTAINTY_AT + 1, UNCERTAINTY_AT + 2, UNCERTAINTY_AT + 3, UNCERTAINTY_AT + 7, UNCERTAINTY_AT + 8, UNCERTAINTY_AT + 4, UNCERTAINTY_AT + 9,
         SHIFT_AT, SHIFT_AT, SHIFT_AT + 1,
     };
     static const uint_least32_t to[11] = {
@@ -322,16 +322,16 @@ TEST(bad_arguments_are_refused)
     table_t unusable = TABLE;
 
     saved(&state, words);
-    none.table = NULL;
+    none.samples_per_block = 0U;
     unusable.layout = 1U;
-    CHECK_INT(GTC_E_ARG, FN(save)(NULL, words));
-    CHECK_INT(GTC_E_ARG, FN(save)(&state, NULL));
-    CHECK_INT(GTC_E_ARG, FN(save)(&none, words));
-    CHECK_INT(GTC_E_ARG, FN(restore)(NULL, &TABLE, PERIOD, words, 0U));
-    CHECK_INT(GTC_E_ARG, FN(restore)(&state, NULL, PERIOD, words, 0U));
-    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, PERIOD, NULL, 0U));
-    CHECK_INT(GTC_E_ARG, FN(restore)(&state, &TABLE, 0U, words, 0U));
-    CHECK_INT(GTC_E_LAYOUT, FN(restore)(&state, &unusable, PERIOD, words, 0U));
+    CHECK_INT(GTC_E_ARG, save(NULL, words));
+    CHECK_INT(GTC_E_ARG, save(&state, NULL));
+    CHECK_INT(GTC_E_ARG, save(&none, words));
+    CHECK_INT(GTC_E_ARG, restore(NULL, &TABLE, PERIOD, words, 0U));
+    CHECK_INT(GTC_E_ARG, restore(&state, NULL, PERIOD, words, 0U));
+    CHECK_INT(GTC_E_ARG, restore(&state, &TABLE, PERIOD, NULL, 0U));
+    CHECK_INT(GTC_E_ARG, restore(&state, &TABLE, 0U, words, 0U));
+    CHECK_INT(GTC_E_LAYOUT, restore(&state, &unusable, PERIOD, words, 0U));
 }
 
 int main(void)

@@ -2,14 +2,12 @@
 #include "test_image.h"
 
 #if TEST_Q31
-typedef gtc_q31_snapshot_t snapshot_t;
 #define DPH(x) ((int_least32_t)((x) * (double)(1L << TABLE.bias_frac_bits)))
 #define MUCH 2147483647L
 #define INFINITE (-MUCH)
 #define HIGHEST 2147483647L
 #define VALUE(member) (member)
 #else
-typedef gtc_f32_snapshot_t snapshot_t;
 #define DPH(x) ((float)(x))
 #define MUCH 1.0e30F
 #define INFINITE (MUCH * MUCH)
@@ -23,7 +21,7 @@ static snapshot_t snapshot_of(const state_t *state)
 {
     snapshot_t snapshot = nothing;
 
-    CHECK(FN(snapshot)(state, &snapshot) >= 0);
+    CHECK(get_snapshot(state, &snapshot) >= 0);
     return snapshot;
 }
 
@@ -45,16 +43,16 @@ TEST(bad_arguments_are_refused_and_nothing_is_written)
     snapshot_t snapshot = nothing;
 
     rest(&state, C(15), 60);
-    CHECK_INT(GTC_E_ARG, FN(snapshot)(NULL, &snapshot));
-    CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, NULL));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(NULL, DPH(0.01), 600U));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, MISSING, 600U));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(NULL, 0, 0U));
+    CHECK_INT(GTC_E_ARG, get_snapshot(NULL, &snapshot));
+    CHECK_INT(GTC_E_ARG, get_snapshot(&state, NULL));
+    CHECK_INT(GTC_E_ARG, rezero(NULL, DPH(0.01), 600U));
+    CHECK_INT(GTC_E_ARG, rezero(&state, MISSING, 600U));
+    CHECK_INT(GTC_E_ARG, rezero(NULL, 0, 0U));
     CHECK(same(bias_of(&state), map_of(C(15), 0)));
     memset(&state, 0, sizeof state);
-    CHECK_INT(GTC_E_ARG, FN(snapshot)(&state, &snapshot));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, DPH(0.01), 600U));
-    CHECK_INT(GTC_E_ARG, FN(rezero)(&state, MISSING, 0U));
+    CHECK_INT(GTC_E_ARG, get_snapshot(&state, &snapshot));
+    CHECK_INT(GTC_E_ARG, rezero(&state, DPH(0.01), 600U));
+    CHECK_INT(GTC_E_ARG, rezero(&state, MISSING, 0U));
     CHECK(memcmp(&snapshot, &nothing, sizeof snapshot) == 0);
 }
 
@@ -127,14 +125,14 @@ TEST(a_rest_moves_the_constant_and_one_call_takes_it_back)
     rest(&state, C(15), 100);
     before = bias_of(&state);
     sigma = snapshot_of(&state).sigma;
-    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 3600U));
+    CHECK_INT(GTC_OK, rezero(&state, DPH(0.004), 3600U));
     moved = (num_t)(bias_of(&state) - before);
     CHECK((moved > 0) && (moved <= DPH(0.004)));
     CHECK(snapshot_of(&state).sigma < sigma);
     CHECK(same(bias_of(&state), snapshot_of(&state).bias));
     rest(&state, C(15), 100);
     CHECK(same(bias_of(&state), (num_t)(before + moved)));
-    CHECK_INT(GTC_OK, FN(rezero)(&state, MISSING, 0U));
+    CHECK_INT(GTC_OK, rezero(&state, MISSING, 0U));
     CHECK(same(bias_of(&state), before));
     CHECK(same(snapshot_of(&state).sigma, sigma));
 }
@@ -158,7 +156,7 @@ TEST(the_bound_holds_for_any_rate_and_any_number_of_calls)
     rest(&state, C(15), 100);
     plain = bias_of(&state);
     for (i = 0; i < 240; i++) {
-        const int status = FN(rezero)(&state, rates[(i * 7) % 6], seconds[(i / 6) % 4]);
+        const int status = rezero(&state, rates[(i * 7) % 6], seconds[(i / 6) % 4]);
         const num_t shift = (num_t)(bias_of(&state) - plain);
 
         CHECK((status == GTC_OK) || (status == GTC_CLAMPED) || (status == GTC_E_ARG) || (status == GTC_E_REST));
@@ -167,7 +165,7 @@ TEST(the_bound_holds_for_any_rate_and_any_number_of_calls)
         CHECK(snapshot_of(&state).sigma > 0);
     }
     CHECK(clamped > 0);
-    CHECK_INT(GTC_OK, FN(rezero)(&state, MISSING, 0U));
+    CHECK_INT(GTC_OK, rezero(&state, MISSING, 0U));
     CHECK(same(bias_of(&state), plain));
 }
 
@@ -184,7 +182,7 @@ TEST(a_rest_that_is_none_is_refused_and_changes_nothing)
     before = bias_of(&state);
     sigma = snapshot_of(&state).sigma;
     for (k = 0; k < 3; k++) {
-        CHECK_INT(GTC_E_REST, FN(rezero)(&state, DPH(wrong[k]), 3600U));
+        CHECK_INT(GTC_E_REST, rezero(&state, DPH(wrong[k]), 3600U));
         CHECK(same(bias_of(&state), before));
         CHECK(same(snapshot_of(&state).sigma, sigma));
     }
@@ -198,10 +196,10 @@ TEST(many_rests_leave_no_less_uncertainty_than_the_map_has)
     int k;
 
     rest(&state, C(15), 100);
-    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.004), 0xFFFFFFFFUL));
+    CHECK_INT(GTC_OK, rezero(&state, DPH(0.004), 0xFFFFFFFFUL));
     once = snapshot_of(&state).sigma;
     for (k = 0; k < 100; k++) {
-        CHECK_INT(GTC_OK, FN(rezero)(&state, 0, 0xFFFFFFFFUL));
+        CHECK_INT(GTC_OK, rezero(&state, 0, 0xFFFFFFFFUL));
     }
     CHECK((snapshot_of(&state).sigma >= (num_t)(once - (once / 100))) && (snapshot_of(&state).sigma <= once));
 }
@@ -217,12 +215,12 @@ TEST(a_shift_is_kept_without_a_pause_of_power_and_dropped_with_one)
     rest(&fresh, C(15), 100);
     for (k = 0; k < 2; k++) {
         rest(&state, C(15), 100);
-        CHECK_INT(GTC_OK, FN(rezero)(&state, (k == 0) ? DPH(0.004) : -DPH(0.004), 3600U));
-        CHECK_INT(GTC_OK, FN(save)(&state, words));
-        CHECK_INT(GTC_OK, FN(restore)(&other, &TABLE, PERIOD, words, 0U));
+        CHECK_INT(GTC_OK, rezero(&state, (k == 0) ? DPH(0.004) : -DPH(0.004), 3600U));
+        CHECK_INT(GTC_OK, save(&state, words));
+        CHECK_INT(GTC_OK, restore(&other, &TABLE, PERIOD, words, 0U));
         CHECK(same(bias_of(&state), bias_of(&other)));
         CHECK(same(snapshot_of(&state).sigma, snapshot_of(&other).sigma));
-        CHECK_INT(GTC_OK, FN(restore)(&other, &TABLE, PERIOD, words, 100U));
+        CHECK_INT(GTC_OK, restore(&other, &TABLE, PERIOD, words, 100U));
         rest(&other, C(15), 100);
         CHECK(same(bias_of(&fresh), bias_of(&other)));
         CHECK(same(snapshot_of(&fresh).sigma, snapshot_of(&other).sigma));
@@ -241,10 +239,10 @@ TEST(a_table_that_grants_no_shift_keeps_its_constant)
 #else
     table.rezero.value = 0.0F;
 #endif
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
     rest(&state, C(15), 100);
     before = bias_of(&state);
-    CHECK_INT(GTC_E_ABSENT, FN(rezero)(&state, DPH(0.01), 3600U));
+    CHECK_INT(GTC_E_ABSENT, rezero(&state, DPH(0.01), 3600U));
     CHECK(same(bias_of(&state), before));
 }
 
@@ -300,7 +298,7 @@ TEST(terms_whose_past_is_not_known_say_so_until_they_have_forgotten_it)
     num_t rested;
     num_t moved;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &TERMS, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &TERMS, PERIOD));
     terms_ramp(&state, &temp, 0, C(12), 20); /* the window is full */
     CHECK_INT(0, status_of(&state) & GTC_WARMING);
     begun = snapshot_of(&state).sigma;
@@ -325,7 +323,7 @@ TEST(a_channel_beyond_its_range_or_held_is_not_sure)
     num_t temp = C(15);
     int k;
 
-    CHECK_INT(GTC_OK, FN(init)(&right, &TERMS, PERIOD));
+    CHECK_INT(GTC_OK, init(&right, &TERMS, PERIOD));
     terms_ramp(&right, &temp, 0, C(12), 4000);
     for (k = 0; k < 3; k++) {
         const num_t reading = (k == 0) ? C(300) : ((k == 1) ? -C(300) : MISSING);
@@ -346,11 +344,11 @@ TEST(terms_that_go_on_from_where_they_were_are_sure)
     state_t fresh;
     num_t temp = C(15);
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &TERMS, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &TERMS, PERIOD));
     terms_ramp(&state, &temp, 0, C(12), 4000);
-    CHECK_INT(GTC_OK, FN(save)(&state, words));
-    CHECK_INT(GTC_OK, FN(restore)(&other, &TERMS, PERIOD, words, 1U));
-    CHECK_INT(GTC_OK, FN(init)(&fresh, &TERMS, PERIOD));
+    CHECK_INT(GTC_OK, save(&state, words));
+    CHECK_INT(GTC_OK, restore(&other, &TERMS, PERIOD, words, 1U));
+    CHECK_INT(GTC_OK, init(&fresh, &TERMS, PERIOD));
     terms_ramp(&other, &temp, 0, C(12), 20);
     terms_ramp(&fresh, &temp, 0, C(12), 20);
     CHECK(snapshot_of(&other).sigma < snapshot_of(&fresh).sigma);
@@ -361,10 +359,10 @@ TEST(a_table_without_uncertainties_gives_neither_snapshot_nor_shift)
     state_t state;
     snapshot_t snapshot = nothing;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &NARROW, PERIOD));
-    CHECK_INT(GTC_E_ABSENT, FN(snapshot)(&state, &snapshot));
+    CHECK_INT(GTC_OK, init(&state, &NARROW, PERIOD));
+    CHECK_INT(GTC_E_ABSENT, get_snapshot(&state, &snapshot));
     CHECK(memcmp(&snapshot, &nothing, sizeof snapshot) == 0);
-    CHECK_INT(GTC_E_ABSENT, FN(rezero)(&state, DPH(0.01), 3600U));
+    CHECK_INT(GTC_E_ABSENT, rezero(&state, DPH(0.01), 3600U));
 }
 
 TEST(words_of_uncertainty_are_all_there_or_none)
@@ -400,7 +398,7 @@ TEST(the_largest_words_give_a_sigma)
 #endif
     }
     table.sigma = words;
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
     feed(&state, temp, 3);
     CHECK(missed(&state, 2U * N) >= 0);
     CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
@@ -409,7 +407,7 @@ TEST(the_largest_words_give_a_sigma)
         CHECK(missed(&state, 2U * N) >= 0);
         CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
     }
-    CHECK(FN(rezero)(&state, DPH(0.001), 1U) >= 0);
+    CHECK(rezero(&state, DPH(0.001), 1U) >= 0);
     shift = (num_t)(bias_of(&state) - state.uncertainty.unshifted);
     CHECK((shift >= -VALUE(TABLE.rezero)) && (shift <= VALUE(TABLE.rezero)));
 }
@@ -458,7 +456,7 @@ TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
         constant.shift_sigma = none[k];
         before = snapshot_of(&constant).sigma;
         CHECK(before >= snapshot_of(&rested).sigma);
-        CHECK(FN(rezero)(&constant, DPH(0.004), 3600U) >= 0);
+        CHECK(rezero(&constant, DPH(0.004), 3600U) >= 0);
         CHECK(snapshot_of(&constant).sigma > 0);
         CHECK(snapshot_of(&constant).sigma <= before);
     }
@@ -484,7 +482,7 @@ TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
     num_t sure;
     int k;
 
-    CHECK_INT(GTC_OK, FN(init)(&whole, &TERMS, PERIOD));
+    CHECK_INT(GTC_OK, init(&whole, &TERMS, PERIOD));
     terms_ramp(&whole, &temp, C(1) / 64, C(12), 10);
     CHECK(missed(&whole, 2U * N) >= 0);
     sure = NUMBER(TERMS.sigma[(2U * TERMS.sigma_cells[0] * TERMS.sigma_cells[1]) + 8U]); /* of the constant alone */
@@ -494,7 +492,7 @@ TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
 
         *number_of(&state, k / 4) = wrong[k % 4];
         CHECK((snapshot_of(&state).sigma > sure) && (snapshot_of(&state).sigma <= HIGHEST));
-        CHECK(FN(rezero)(&state, DPH(0.001), 60U) >= 0);
+        CHECK(rezero(&state, DPH(0.001), 60U) >= 0);
         CHECK((snapshot_of(&state).sigma > 0) && (snapshot_of(&state).sigma <= HIGHEST));
         shift = state.shift;
         CHECK((shift >= -VALUE(TERMS.rezero)) && (shift <= VALUE(TERMS.rezero)));
@@ -514,11 +512,11 @@ TEST(a_table_that_is_sure_of_everything_takes_no_rest)
         words[i].bits = 0U;
     }
     table.sigma = words;
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
     rest(&state, C(15), 100);
     before = bias_of(&state);
-    CHECK_INT(GTC_E_REST, FN(rezero)(&state, DPH(0.004), 3600U));
-    CHECK_INT(GTC_OK, FN(rezero)(&state, 0, 3600U));
+    CHECK_INT(GTC_E_REST, rezero(&state, DPH(0.004), 3600U));
+    CHECK_INT(GTC_OK, rezero(&state, 0, 3600U));
     CHECK(same(bias_of(&state), before));
     CHECK(snapshot_of(&state).sigma == 0);
 }
@@ -539,11 +537,11 @@ TEST(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest)
     i = (2U * TABLE.sigma_cells[0] * TABLE.sigma_cells[1]) + 8U; /* from power-on to power-on */
     words[i] = TABLE.sigma[i];
     table.sigma = words;
-    CHECK_INT(GTC_OK, FN(init)(&state, &table, PERIOD));
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
     rest(&state, C(15), 100);
     before = bias_of(&state);
     CHECK(snapshot_of(&state).sigma > 0);
-    CHECK_INT(GTC_OK, FN(rezero)(&state, DPH(0.001), 3600U));
+    CHECK_INT(GTC_OK, rezero(&state, DPH(0.001), 3600U));
     moved = (num_t)(bias_of(&state) - before);
     CHECK((moved >= DPH(0.00099)) && (moved <= DPH(0.00101)));
     CHECK(snapshot_of(&state).sigma == 0);
@@ -555,9 +553,9 @@ TEST(a_state_without_uncertainties_is_kept_over_a_time_without_power)
     gtc_word_t words[GTC_SAVE_WORDS];
     state_t state;
 
-    CHECK_INT(GTC_OK, FN(init)(&state, &NARROW, PERIOD));
-    CHECK_INT(GTC_OK, FN(save)(&state, words));
-    CHECK_INT(GTC_OK, FN(restore)(&state, &NARROW, PERIOD, words, 100U));
+    CHECK_INT(GTC_OK, init(&state, &NARROW, PERIOD));
+    CHECK_INT(GTC_OK, save(&state, words));
+    CHECK_INT(GTC_OK, restore(&state, &NARROW, PERIOD, words, 100U));
     CHECK_INT(GTC_HELD, status_of(&state));
 }
 
@@ -570,13 +568,13 @@ TEST(blocks_with_few_readings_count_with_their_uncertainty)
     num_t sigma = 0;
     int k;
 
-    CHECK_INT(GTC_OK, FN(init)(&whole, &TABLE, 100000UL));
-    CHECK_INT(GTC_OK, FN(init)(&lossy, &TABLE, 100000UL));
+    CHECK_INT(GTC_OK, init(&whole, &TABLE, 100000UL));
+    CHECK_INT(GTC_OK, init(&lossy, &TABLE, 100000UL));
     for (k = 0; k < 1201; k++) {
         const num_t temp = C(15.0) + ((num_t)(k / 4) * C(0.0078125));
 
         CHECK(feed_one(&whole, &temp) >= 0);
-        CHECK(FN(sample)(&lossy, 100000UL, (arrives[k % 10] != 0) ? &temp : NULL) >= 0);
+        CHECK(sample(&lossy, 100000UL, (arrives[k % 10] != 0) ? &temp : NULL) >= 0);
         if (k > 500) {
             CHECK_INT(GTC_OK, status_of(&lossy));
         }
@@ -589,7 +587,7 @@ TEST(blocks_with_few_readings_count_with_their_uncertainty)
     for (k = 0; k < 201; k++) {
         const num_t temp = C(17.34375);
 
-        CHECK(FN(sample)(&lossy, 100000UL, (((k % 100) == 3) || ((k % 200) == 4)) ? &temp : NULL) >= 0);
+        CHECK(sample(&lossy, 100000UL, (((k % 100) == 3) || ((k % 200) == 4)) ? &temp : NULL) >= 0);
         if (k == 100) {
             CHECK_INT(97, lossy.uncertainty.missing); /* with the one that was read above */
         }
@@ -601,8 +599,8 @@ TEST(blocks_with_few_readings_count_with_their_uncertainty)
     {
         snapshot_t none;
 
-        CHECK_INT(GTC_E_ARG, FN(snapshot)(&lossy, &none));
-        CHECK_INT(GTC_E_ARG, FN(rezero)(&lossy, 0, 60U));
+        CHECK_INT(GTC_E_ARG, get_snapshot(&lossy, &none));
+        CHECK_INT(GTC_E_ARG, rezero(&lossy, 0, 60U));
     }
 }
 

@@ -14,6 +14,11 @@ TEST(a_table_in_another_unit_is_refused)
 
     CHECK(TABLE.bias_frac_bits != GTC_BIAS_FRAC_BITS);
     CHECK_INT(GTC_E_LAYOUT, FN(check)(&TABLE));
+    {
+        state_t state;
+
+        CHECK_INT(GTC_E_LAYOUT, FN(init)(&state, &TABLE, PERIOD));
+    }
     n = image_of(&TABLE, image);
     CHECK_INT(GTC_E_LAYOUT, FN(open)(&found, image, n, TABLE.id));
 }

@@ -46,7 +46,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     (void)image_of(&table, after);
     if ((table.layout == from->layout) && (memcmp(before, after, n * sizeof before[0]) == 0)) {
-        CLAIM(FN(check)(&table) == GTC_OK);
+        CLAIM((FN(check)(&table) == GTC_OK) && (FN(check_words)(&table) == GTC_OK));
     } else {
         CLAIM(FN(check)(&table) < 0);
     }

@@ -6,7 +6,7 @@
 
 #define WORDS GTC_SAVE_WORDS
 
-static void walked(uint_least32_t samples, state_t *state)
+static void walked(uint_least32_t samples, state_t *state, const table_t *table)
 {
     uint_least32_t i;
 
@@ -15,8 +15,8 @@ static void walked(uint_least32_t samples, state_t *state)
         num_t bias = 0;
 
         channels[0] = C(10) + ((C(1) / 64) * (num_t)i);
-        CLAIM(FN(sample)(state, state->period_us, channels) >= 0);
-        CLAIM((FN(bias)(state, &bias) >= 0) && is_within_authority(state->table, bias));
+        CLAIM(FN(sample)(state, table, state->period_us, channels) >= 0);
+        CLAIM((FN(bias)(state, table, &bias) >= 0) && is_within_authority(table, bias));
     }
 }
 
@@ -39,8 +39,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int status;
 
     CLAIM(FN(init)(&state, table, PERIOD) == GTC_OK);
-    walked(next_byte(&in), &state);
-    CLAIM(FN(save)(&state, words) == GTC_OK);
+    walked(next_byte(&in), &state, table);
+    CLAIM(FN(save)(&state, table, words) == GTC_OK);
     memcpy(spoiled, words, sizeof words);
     spoil(&in, spoiled, WORDS);
     if (kind == 1U) {
@@ -54,8 +54,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         CLAIM((status == GTC_E_IMAGE) || (status == GTC_E_LAYOUT) || (status == GTC_E_ID));
     } else {
         CLAIM((status == GTC_OK) && ((kind == 1U) || (memcmp(words, spoiled, sizeof words) == 0)));
-        walked(40U, &state);
-        CLAIM(FN(save)(&state, words) == GTC_OK);
+        walked(40U, &state, table);
+        CLAIM(FN(save)(&state, table, words) == GTC_OK);
     }
     return 0;
 }

@@ -10,18 +10,18 @@ static void check_status(int status)
     CLAIM((status >= 0) && ((status & ~REMARKS) == 0));
 }
 
-static void save_and_restore(state_t *state)
+static void save_and_restore(state_t *state, const table_t *table)
 {
     gtc_word_t words[GTC_SAVE_WORDS];
     gtc_word_t again[GTC_SAVE_WORDS];
 
-    CLAIM(FN(save)(state, words) == GTC_OK);
-    CLAIM(FN(restore)(state, state->table, state->period_us, words, 0U) == GTC_OK);
-    CLAIM(FN(save)(state, again) == GTC_OK);
+    CLAIM(FN(save)(state, table, words) == GTC_OK);
+    CLAIM(FN(restore)(state, table, state->period_us, words, 0U) == GTC_OK);
+    CLAIM(FN(save)(state, table, again) == GTC_OK);
     CLAIM(memcmp(words, again, sizeof words) == 0);
 }
 
-static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
+static void step(stream_t *in, state_t *state, const table_t *table, FN(angle_t) *sum)
 {
     num_t bias = 0;
     num_t channels[3] = {0, 0, 0};
@@ -30,34 +30,34 @@ static void step(stream_t *in, state_t *state, FN(angle_t) *sum)
 
     switch (next_byte(in) % 9U) {
     case 0:
-        check_status(FN(sample)(state, next_word(in), NULL));
+        check_status(FN(sample)(state, table, next_word(in), NULL));
         break;
     case 1:
-        CLAIM(FN(bias)(state, &bias) >= 0);
+        CLAIM(FN(bias)(state, table, &bias) >= 0);
         status = FN(angle)(sum, bias, next_number(in), &result);
         CLAIM((status == GTC_E_ARG) ? same(result, C(77)) : is_number(result));
         break;
     case 2:
-        save_and_restore(state);
+        save_and_restore(state, table);
         break;
     case 3: /* anything at all */
         channels[0] = next_number(in);
         channels[1] = next_number(in);
-        check_status(FN(sample)(state, state->period_us, channels));
+        check_status(FN(sample)(state, table, state->period_us, channels));
         break;
     case 4: /* at any time */
         channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
         channels[1] = next_number(in);
-        check_status(FN(sample)(state, next_word(in), channels));
+        check_status(FN(sample)(state, table, next_word(in), channels));
         break;
     default: /* something plausible */
         channels[0] = (num_t)C(0.5) * (num_t)((int)next_byte(in) - 100);
         channels[1] = channels[0];
-        check_status(FN(sample)(state, state->period_us, channels));
+        check_status(FN(sample)(state, table, state->period_us, channels));
         break;
     }
-    check_status(FN(bias)(state, &result));
-    CLAIM(is_number(result) && is_within_authority(state->table, result));
+    check_status(FN(bias)(state, table, &result));
+    CLAIM(is_number(result) && is_within_authority(table, result));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -80,7 +80,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     CLAIM(FN(init)(&state, table, table->block_us / n) == GTC_OK);
     while (in.left > 0U) {
-        step(&in, &state, &sum);
+        step(&in, &state, table, &sum);
     }
     return 0;
 }

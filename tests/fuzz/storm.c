@@ -2,8 +2,7 @@
  *
  *     storm_image_q31 [executions [seed]]
  *
- * Without counters of coverage, and with the CRC of a table of octets instead of the runtime's bit by bit, which
- * every other target goes through. The same seed gives the same inputs.
+ * Without counters of coverage. The same seed gives the same inputs.
  *
  * SPDX-License-Identifier: MIT
  */
@@ -11,7 +10,6 @@
 #include <stdlib.h>
 
 #include "fuzz.h"
-#include "gtc_private.h"
 
 #define LENGTH 192
 
@@ -28,44 +26,6 @@ static uint64_t next_random(void)
     return state * 2685821657736338717ULL;
 }
 
-/* CRC-32 as libc/gtc_crc.c has it, by octets. */
-static uint_least32_t octets[256];
-
-uint_least32_t gtc_crc_word(uint_least32_t crc, uint_least32_t word)
-{
-    uint_least32_t rest = crc ^ word;
-    int k;
-
-    for (k = 0; k < 4; k++) {
-        rest = octets[rest & 0xFFU] ^ (rest >> 8);
-    }
-    return rest;
-}
-
-uint_least32_t gtc_crc_words(uint_least32_t crc, const gtc_word_t *words, uint_least32_t n)
-{
-    uint_least32_t rest = crc;
-    uint_least32_t i;
-
-    for (i = 0U; i < n; i++) {
-        rest = gtc_crc_word(rest, words[i].bits);
-    }
-    return rest;
-}
-
-static void make_octets(void)
-{
-    uint_least32_t i;
-    int k;
-
-    for (i = 0U; i < 256U; i++) {
-        octets[i] = i;
-        for (k = 0; k < 8; k++) {
-            octets[i] = ((octets[i] & 1U) != 0U) ? ((octets[i] >> 1) ^ 0xEDB88320UL) : (octets[i] >> 1);
-        }
-    }
-}
-
 int main(int argc, char **argv)
 {
     const unsigned long executions = (argc > 1) ? strtoul(argv[1], NULL, 10) : 100000UL;
@@ -75,7 +35,6 @@ int main(int argc, char **argv)
 
     (void)setvbuf(stdout, NULL, _IONBF, 0U); /* a claim that fails ends the program at once */
     printf("seed %lu\n", seed);
-    make_octets();
     state = (seed * 0x9E3779B97F4A7C15ULL) | 1U;
     for (i = 0UL; i < executions; i++) {
         int k;

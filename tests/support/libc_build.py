@@ -17,21 +17,13 @@ _WARNINGS = "all extra conversion sign-conversion double-promotion undef missing
 FLAGS = ["-std=c99", "-pedantic", "-ffp-contract=off", *(f"-W{name}" for name in _WARNINGS.split())]
 
 
-TERMS = {1: "memory", 2: "play", 3: "warm_up", 4: "harmonic", 5: "auxiliary", 6: "curve", 7: "product"}
-#: GCC takes the branch of another compiler, whose pragma it does not know: without it no flag lets it fuse operations.
-UNGUARDED = ("-D__clang__", "-Wno-unknown-pragmas")
-ALL = ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1")
-
-
-def linked(name: str) -> str:
-    """What the linker calls a function, with the default options."""
-    return f"{name}_20blocks_4terms" if name.endswith(("_init", "_restore")) else name
+ALL = ("-DGTC_WITH_BANK=1",)
 
 
 def _table_struct() -> type[ctypes.Structure]:
     """The layout of gtc_<n>_table_t, the same for both arithmetics."""
     u32, pointer = ctypes.c_uint32, ctypes.c_void_p
-    integers = "layout quantity unit id calibrated block_us slope_blocks lead_blocks bias_frac_bits fallback"
+    integers = "layout quantity unit id calibrated block_us slope_blocks lead_blocks bias_frac_bits parts fallback"
     fields: list[Any] = [(name, u32) for name in integers.split()]
     fields += [("authority", u32 * 2), ("effect", u32 * 2), ("rezero", u32)]
     fields += [("scale", u32 * 3), ("envelope", u32 * 4)]
@@ -44,7 +36,7 @@ def _table_struct() -> type[ctypes.Structure]:
         ("n_fallback_models", u32),
     ]
     fields += [(name, pointer) for name in ARRAYS]
-    fields += [("crc", u32), ("term_code", pointer)]
+    fields += [("crc", u32)]
     return type("TableStruct", (ctypes.Structure,), {"_fields_": fields})
 
 
@@ -57,6 +49,10 @@ class Runtime:
     def check(self, table: Table) -> int:
         struct, _keep = self.struct(table)
         return int(self._function(table, "check")(ctypes.byref(struct)))
+
+    def check_words(self, table: Table) -> int:
+        struct, _keep = self.struct(table)
+        return int(self._function(table, "check_words")(ctypes.byref(struct)))
 
     def maps(self, table: Table, inputs: Words) -> tuple[np.ndarray, Words]:
         """Statuses and bits of the biases for the bits of inputs, shape (n, 2)."""
@@ -139,6 +135,7 @@ class Runtime:
         status = np.zeros((len(channels), statuses), np.int32)
         self._shim(table, shim)(
             state,
+            ctypes.byref(struct),
             _address(channels),
             ctypes.c_long(channels.shape[1]),
             _address(missed),
@@ -156,7 +153,7 @@ class Runtime:
         """The C struct of a table, and what must be kept alive with it."""
         struct = _table_struct()()
         struct.layout, struct.crc = LAYOUT, table.crc
-        for name in ("id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits"):
+        for name in ("id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits", "parts"):
             setattr(struct, name, getattr(table, name))
         struct.n_channels, struct.n_sigma = table.n_channels, table.sigma.size
         for name in ("fallback", "rezero"):
@@ -171,16 +168,11 @@ class Runtime:
             if width and name != "guards":
                 setattr(struct, f"n_{name}", words.size // width)
         struct.n_networks, struct.n_fallback_models = table.n_networks, table.n_stand_ins
-        codes = (ctypes.c_void_p * len(TERMS))()
-        for kind, name in TERMS.items():
-            code = ctypes.c_char.in_dll(self.library, f"gtc_{table.numeric}_term_{name}")
-            codes[kind - 1] = ctypes.addressof(code)
-        struct.term_code = ctypes.addressof(codes)
-        return struct, [*keep, codes]
+        return struct, keep
 
     def function(self, numeric: str, name: str) -> Any:
         """A public function of the runtime."""
-        return getattr(self.library, linked(f"gtc_{numeric}_{name}"))
+        return getattr(self.library, f"gtc_{numeric}_{name}")
 
     def _function(self, table: Table, name: str) -> Any:
         return self.function(table.numeric, name)

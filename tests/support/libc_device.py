@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import re
+import subprocess
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,18 +15,15 @@ from gyrotc.model import Model
 from libc_build import Runtime
 from models import bank_of, random_channels, random_history, random_model, random_terms
 
-OPTIONS = {"GTC_MAX_SLOPE_BLOCKS": 20, "GTC_MAX_TERMS": 4, "GTC_TERM_SLOTS": 4, "GTC_WITH_UNCERTAINTY": 1}
-
 
 def _save_words() -> int:
     """GTC_SAVE_WORDS with default options."""
-    match = re.search(r"#define GTC_SAVE_WORDS \((.*)\)", (ROOT / "include" / "gtc.h").read_text())
-    assert match is not None
-    expression = match[1]
-    for name, value in OPTIONS.items():
-        expression = expression.replace(name, str(value))
-    terms = [t.strip(" ()").split("*") for t in expression.split("+")]
-    return sum(int(np.prod([int(factor) for factor in term])) for term in terms)
+    command = ["gcc", "-E", "-P", f"-I{ROOT / 'include'}", "-x", "c", "-"]
+    text = '#include "gtc.h"\nGTC_SAVE_WORDS\n'
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+    return int(
+        eval(done.stdout.partition("\n(10 ")[2].join(["(10 ", ""]), {"__builtins__": {}})
+    )  # numbers and operators
 
 
 SAVE_WORDS = _save_words()
@@ -78,7 +75,7 @@ class Device:
 
     def save(self, state: Any) -> Words:
         words = np.full(SAVE_WORDS + 1, 0x5A5A5A5A, dtype=np.uint32)
-        assert self.function("save")(state, _pointer(words)) == 0
+        assert self.function("save")(state, ctypes.byref(self.struct), _pointer(words)) == 0
         assert words[-1] == 0x5A5A5A5A
         return words[:-1].copy()
 
@@ -102,6 +99,7 @@ class Device:
         channels, missed = np.ascontiguousarray(channels), np.ascontiguousarray(missed, dtype=np.uint32)
         getattr(self.runtime.library, f"shim_{self.table.numeric}_steps")(
             state,
+            ctypes.byref(self.struct),
             _pointer(channels),
             ctypes.c_long(channels.shape[1]),
             _pointer(missed),

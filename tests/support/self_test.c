@@ -81,9 +81,9 @@ static void history(const subject_t *subject)
             channels[c] = (float)between(10000, 4000) * 0x1p-10F;
         }
         channels[0] = (float)t * 0x1p-9F;
-        status = ((k % 37) == 36) ? gtc_f32_sample(&state, 2U * state.period_us, NULL) : gtc_f32_sample(&state, state.period_us, channels);
+        status = ((k % 37) == 36) ? gtc_f32_sample(&state, subject->table, 2U * state.period_us, NULL) : gtc_f32_sample(&state, subject->table, state.period_us, channels);
         take_word((uint_least32_t)status);
-        status = gtc_f32_bias(&state, &bias);
+        status = gtc_f32_bias(&state, subject->table, &bias);
         take_result(status, bias);
         status = gtc_f32_angle(&sum, bias, 0x1.47ae14p-7F, &angle);
         take_result(status, angle);

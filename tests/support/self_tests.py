@@ -10,7 +10,7 @@ from pathlib import Path
 
 import gyrotc
 from gyrotc.model import Model
-from gyrotc.tables import config_text, emit_texts, joint_needs, needs_of, quantise_all
+from gyrotc.tables import emit_texts, joint_needs, needs_of, quantise_all, runtime_texts
 from gyrotc.verify import Target, link, run_to_end
 from models import random_model, random_terms
 
@@ -45,11 +45,12 @@ def models(n: int = TABLES) -> list[Model]:
 def write_sources(folder: Path, n: int = TABLES) -> list[Path]:
     """Runtime, float32 tables and program in `folder`; the C files."""
     includes, rows = [], []
-    (folder / "gtc_config.h").write_bytes(config_text(joint_needs(map(needs_of, models(n)))))
+    for name, data in runtime_texts(joint_needs(map(needs_of, models(n))), ["f32"]).items():
+        (folder / name).write_bytes(data)
     for model in models(n):
         texts = emit_texts(model, quantise_all(model, ["f32"]))
         (t0, t1), r = model.envelope.temperature_c, model.envelope.slope_c_per_min[1] * model.block_s / 60.0
-        for name in ("gtc.h", "gtc.c", f"gtc_{model.id}.h", f"gtc_{model.id}.c"):
+        for name in (f"gtc_{model.id}.h", f"gtc_{model.id}.c"):
             (folder / name).write_bytes(texts[name])
         t_span, s_low = round((t1 - t0 + 2.0) * 512), round(-1.1 * r * 16384)
         includes.append(f'#include "gtc_{model.id}.h"\n')
@@ -58,7 +59,7 @@ def write_sources(folder: Path, n: int = TABLES) -> list[Path]:
         )
     (folder / "tables.h").write_text("".join(includes) + "#define TABLES \\\n" + " \\\n".join(rows) + "\n")
     shutil.copy(HERE / "self_test.c", folder)
-    return [folder / "self_test.c", folder / "gtc.c", *sorted(folder.glob("gtc_st_*.c"))]
+    return [folder / "self_test.c", folder / "gtc_f32.c", *sorted(folder.glob("gtc_st_*.c"))]
 
 
 def native(compiler: str, flags: tuple[str, ...], sources: list[Path], work: Path) -> Verdict | None:

@@ -29,8 +29,8 @@ static void *task(void *unused)
         gtc_word_t words[GTC_SAVE_WORDS];
         float bias = 0.0F;
 
-        if ((gtc_f32_sample(&state, state.period_us, &temperature) < 0) || (gtc_f32_bias(&state, &bias) < 0)
-            || (((i % 100) == 0) && (gtc_f32_save(&state, words) < 0))) {
+        if ((gtc_f32_sample(&state, &gtc_rlg_0042_f32, state.period_us, &temperature) < 0) || (gtc_f32_bias(&state, &gtc_rlg_0042_f32, &bias) < 0)
+            || (((i % 100) == 0) && (gtc_f32_save(&state, &gtc_rlg_0042_f32, words) < 0))) {
             fail();
         }
         __atomic_store(&bias_in_force, &bias, __ATOMIC_RELAXED);
@@ -50,7 +50,7 @@ static void *interrupt(void *unused)
 
         __atomic_load(&bias_in_force, &bias, __ATOMIC_RELAXED);
 #ifdef BREAK_THE_RULE
-        if (gtc_f32_bias(&state, &bias) < 0) {
+        if (gtc_f32_bias(&state, &gtc_rlg_0042_f32, &bias) < 0) {
             fail();
         }
 #endif

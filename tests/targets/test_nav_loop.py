@@ -23,7 +23,7 @@ def _printed(name: str, numeric: str, folder: Path, work: Path) -> list[str]:
     target = all_targets()[name]
     work.mkdir()
     c = folder / "c"
-    sources = [EXAMPLE / "main.c", EXAMPLE / f"nav_{numeric}.c", c / "gtc.c", c / "gtc_rlg_0042.c"]
+    sources = [EXAMPLE / "main.c", EXAMPLE / f"nav_{numeric}.c", c / f"gtc_{numeric}.c", c / "gtc_rlg_0042.c"]
     compile_c(target, sources, work / "nav_loop", include=c)
     done = run_program(target, work / "nav_loop", data=[(EXAMPLE / "sequence.txt").read_bytes()])
     assert done.returncode == 0, done.stderr

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 from emitted import with_flags
-from libc_build import UNGUARDED
 from results import Results
 from self_tests import OK, RIGHT, Verdict, native, on_target, write_sources
 
 FLAGS = (
     ("-mfma",),
     ("-mfma", "-ffp-contract=fast"),
-    ("-mfma", "-ffp-contract=fast", *UNGUARDED),
+    ("-mfma", "-ffp-contract=fast"),
     ("-ffast-math", "-U__FAST_MATH__"),
     ("-mfma", "-ffast-math", "-U__FAST_MATH__"),
     ("-funsafe-math-optimizations",),
@@ -25,7 +24,7 @@ HOST = [(c, (o, *f)) for c, o, f in product(("gcc", "clang"), ("-O1", "-O2", "-O
 TARGETS = ("cortex-m4f", "aarch64", "s390x", "rv32imafc")
 FUSED = ("-std=gnu99", "-ffp-contract=fast")
 TARGET_FLAGS = (
-    (*FUSED, *UNGUARDED),
+    FUSED,
     ("-ffast-math", "-U__FAST_MATH__"),
     ("-funsafe-math-optimizations",),
 )

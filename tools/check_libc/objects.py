@@ -18,8 +18,8 @@ WARNINGS = (
 )  # fmt: skip
 OPTIONS = {
     "default options": (),
-    "every option": ("-DGTC_WITH_BANK=1", "-DGTC_OPEN_TERMS=1", "-DGTC_HALF_MULTIPLY=0"),
-    "products in halves": ("-DGTC_HALF_MULTIPLY=1", "-DGTC_UNROLL=1", "-DGTC_MAX_TERMS=1"),
+    "every option": ("-DGTC_WITH_BANK=1", "-DGTC_HALF_MULTIPLY=0"),
+    "products in halves": ("-DGTC_HALF_MULTIPLY=1", "-DGTC_MAX_TERMS=1"),
 }
 M0 = ("arm-none-eabi-gcc", "-mthumb", "-mcpu=cortex-m0", "-O2", "-ffreestanding")
 M4F = (
@@ -43,8 +43,8 @@ M7 = (
 HOST = ("gcc", "-O2", "-fno-pic")
 AVR = ("avr-gcc", "-mmcu=atmega1284p", "-O2")
 COMPILERS = {"gcc": HOST, "clang": ("clang", "-O2"), "Cortex-M0": M0, "Cortex-M4F": M4F, "AVR": AVR}
-#: Functions of the compiler's own library; none that clears or copies memory, which is the C library's.
-HELPERS = re.compile(r"__aeabi_(?!mem)\w+|__gnu_thumb1_case_\w+|__(?:u?div|mul)[sd]i3")
+#: Functions of the compiler's own library, and the four of the C library that compilers call of their own accord.
+HELPERS = re.compile(r"mem(?:cpy|set|move|cmp)|__aeabi_\w+|__gnu_thumb1_case_\w+|__(?:u?div|mul)[sd]i3")
 FUSING = {
     "x86-64 with FMA": ("gcc", "-O3", "-march=haswell"),
     "x86-64 with FMA, clang": ("clang", "-O3", "-march=haswell"),
@@ -78,21 +78,25 @@ def first_lines(text: str) -> str:
     return "\n    ".join(text.strip().splitlines()[:6])
 
 
-def amalgamated(root: Path, folder: Path) -> Path:
-    """gtc.h and gtc.c, as they are emitted."""
+def emitted(root: Path, folder: Path) -> list[Path]:
+    """Sources of the runtime as they are emitted for tables that need everything; their header is beside them."""
     script = (
-        "import sys; from pathlib import Path; from gyrotc.tables.text import amalgamate\n"
+        "import sys; from pathlib import Path; from gyrotc.tables.runtime import runtime_texts, stated_names\n"
+        "from gyrotc.common import inputs\n"
         "root, out = map(Path, sys.argv[1:])\n"
-        "for name, text in zip(('gtc.h', 'gtc.c'), amalgamate(root / 'include', root / 'libc')):\n"
-        "    (out / name).write_text(text, encoding='ascii')\n"
-        "(out / 'gtc_config.h').touch()\n"  # every option at its default
+        "inputs.runtime_folders = lambda: (root / 'include', root / 'libc')\n"
+        "import gyrotc.tables.runtime as made; made.runtime_folders = inputs.runtime_folders\n"
+        "sizes = {'GTC_MAX_SLOPE_BLOCKS': 20, 'GTC_MAX_TERMS': 4, 'GTC_BIAS_FRAC_BITS': 24}\n"
+        "options = {name: 1 for name in stated_names()} | sizes\n"
+        "for name, text in runtime_texts(options, ('f32', 'q31')).items():\n"
+        "    (out / name).write_bytes(text)\n"
     )
     subprocess.run([sys.executable, "-c", script, str(root), str(folder)], check=True)
-    return folder / "gtc.c"
+    return sorted(folder.glob("gtc_???.c"))
 
 
 def warnings(root: Path) -> Iterator[str]:
-    """Every file, and the one file that is emitted, under every compiler with every option."""
+    """Every file, and what is emitted of them, under every compiler with every option."""
     for name, compiler in COMPILERS.items():
         yield from present(compiler[0])
         if shutil.which(compiler[0]) is None:
@@ -100,8 +104,8 @@ def warnings(root: Path) -> Iterator[str]:
         for what, options in OPTIONS.items():
             with tempfile.TemporaryDirectory() as work:
                 flags = [*compiler, *DOCUMENTED, *WARNINGS, *options]
-                one = amalgamated(root, Path(work))
-                for files, include in ((sources(root), root / "include"), ([one], work)):
+                made = emitted(root, Path(work))
+                for files, include in ((sources(root), root / "include"), (made, work)):
                     done = run([*flags, f"-I{include}", "-c", *files], Path(work))
                     if done.returncode != 0:
                         yield f"{name}, {what}: {first_lines(done.stderr)}"
@@ -125,7 +129,7 @@ def cplusplus(root: Path) -> Iterator[str]:
 
 def _compiled(root: Path, compiler: Sequence[str], work: Path, *options: str) -> list[Path]:
     """Objects of the runtime with every option on, by the documented flags."""
-    flags = [*compiler, *DOCUMENTED, *OPTIONS["every option"][:2], *options, f"-I{root / 'include'}"]
+    flags = [*compiler, *DOCUMENTED, *OPTIONS["every option"][:1], *options, f"-I{root / 'include'}"]
     done = run([*flags, "-c", *sources(root)], work)
     if done.returncode != 0:
         raise RuntimeError(first_lines(done.stderr))
@@ -146,7 +150,7 @@ def _symbols(root: Path, compiler: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def symbols(root: Path) -> Iterator[str]:
-    """No symbol from outside but compiler helpers; no public name that does not begin with gtc_."""
+    """No symbol from outside but helpers and memory functions of compilers; public names begin with gtc_."""
     for name, compiler in (("x86-64", HOST), ("Cortex-M0", M0), ("Cortex-M4F", M4F)):
         found = _symbols(root, compiler)
         own = {symbol for kind, symbol in found if kind.isupper() and kind != "U"}
@@ -193,16 +197,12 @@ def fused(root: Path) -> Iterator[str]:
 
 
 def _contractible(root: Path) -> Iterator[str]:
-    """Expressions with a product and a sum in one: clang marks them where it may contract within expressions.
-
-    As another compiler than clang it passes over the pragma that forbids it to.
-    """
+    """Expressions with a product and a sum in one: clang marks them where it may contract within expressions."""
     yield from present("clang")
     with tempfile.TemporaryDirectory() as work:
         flags = [
             "-std=c99",
             "-O0",
-            "-U__clang__",
             "-ffp-contract=on",
             *OPTIONS["every option"],
             f"-I{root / 'include'}",

@@ -60,7 +60,7 @@ C_COMMENT = re.compile(r"(?:(?!\*/|/\*|\?\?|\\)[ -~])*")
 _NUMBER = r"-?[0-9]{1,10}(?:\.[0-9]{1,12})?(?:e[+-][0-9]{1,3})?"
 _CELL = (
     rf"(?:V\({_NUMBER}F\)|B\(0x[0-9a-f]{{1,8}}UL\)|0x[0-9a-f]{{8}}UL|{_NUMBER}(?:UL|L|F)?|\(-2147483647L - 1L\)"
-    r"|NULL|&gtc_(?:f32|q31)_term_[a-z_]{1,16}|(?:f32|q31)_[a-z]{1,10})"
+    r"|NULL|(?:f32|q31)_[a-z]{1,10})"
 )
 #: What initialises a member or a row of a table: numbers, and the names that a table refers to.
 C_INITIALISER = re.compile(rf"{_CELL}(?:, {_CELL})*|\{{ {_CELL}(?:, {_CELL})* \}}")

@@ -15,7 +15,7 @@ from ..results.folder import scratch_folder
 from ..results.release import JointVerification, Verification
 from ..tables.emission import emitted_tables
 from ..tables.record import RECORD, joint_record_text
-from ..tables.runtime import joint_needs, needs_of, runtime_texts
+from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts
 from ..tables.text import ARITHMETICS, example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.toolchain import all_targets, compile_c, run_program
@@ -142,7 +142,8 @@ def _run_together(c: Path, ids: Sequence[str]) -> None:
     target = all_targets()[_HOST]
     with scratch_folder() as work:
         program = work / "main"
-        compile_c(target, [c / n for n in ("main.c", "gtc.c", *(f"gtc_{i}.c" for i in ids))], program, include=c)
+        sources = ["main.c", *(name for name in RUNTIME_FILES if name.endswith(".c") and (c / name).is_file())]
+        compile_c(target, [c / n for n in (*sources, *(f"gtc_{i}.c" for i in ids))], program, include=c)
         done = run_program(target, program)
     if done.returncode != 0:
         raise CheckFailed(f"the image of all axes ended with status {done.returncode}")

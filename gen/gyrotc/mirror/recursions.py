@@ -103,7 +103,7 @@ class TableKind(IntEnum):
     @property
     def reads_channel(self) -> bool:
         """Whether it reads an auxiliary channel."""
-        return self >= TableKind.AUXILIARY
+        return self in (TableKind.AUXILIARY, TableKind.CURVE, TableKind.PRODUCT)
 
 
 @dataclass(frozen=True, slots=True)

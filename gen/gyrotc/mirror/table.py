@@ -1,4 +1,4 @@
-"""Table layout 2 as Python data: the words of one table, in the order of its binary image.
+"""Table layout 3 as Python data: the words of one table, in the order of its binary image.
 
 Between the model and everything that prints, compares or runs it. docs/FORMAT.md, section 3, gives
 every word; this package computes with a `Table`, `tables` makes one and prints it. The status bits are those of
@@ -7,6 +7,7 @@ every word; this package computes with a `Table`, `tables` makes one and prints 
 
 from __future__ import annotations
 
+import functools
 import zlib
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-LAYOUT = 2  # docs/FORMAT.md, section 3
+LAYOUT = 3  # docs/FORMAT.md, section 3
 MAGIC = 0x47544331  # "GTC1" in ASCII
 MISSING_Q31 = -(2**31)  # the word that fixed point has for no value (docs/FORMAT.md)
 _ARITHMETIC = {"f32": 1, "q31": 2}  # docs/FORMAT.md, section 3
@@ -23,6 +24,11 @@ _INPUT_BITS = 16  # q31: temperatures in 2^-16 C
 #: Arrays of a table in the order of the image, with the words of one record (0: not in records).
 ARRAYS = {
     "serial": 0, "networks": 8, "centers": 5, "guards": 8, "terms": 8, "coverage": 0, "sigma": 0, "probes": 4,
+}  # fmt: skip
+#: Parts of the runtime that a table may need, as bits of its word `parts` (GTC_PART_... of gtc_table.h).
+PARTS = {
+    "bank": 0x1, "memory": 0x2, "play": 0x4, "warm_up": 0x8, "harmonic": 0x10, "auxiliary": 0x20, "curve": 0x40,
+    "product": 0x80, "coverage": 0x100, "uncertainty": 0x200, "probes": 0x400, "narrow": 0x800, "rezero": 0x1000,
 }  # fmt: skip
 SERIAL_WORDS = 16  # 64 characters, as many as a serial may have
 
@@ -116,6 +122,20 @@ class Table:
         return self.guards.size // ARRAYS["guards"]
 
     @property
+    def parts(self) -> int:
+        """Parts of the runtime that the table needs, one bit each."""
+        parts = functools.reduce(lambda found, kind: found | 1 << int(kind), self.records("terms")[:, 0], 0)
+        needed = {
+            "bank": self.n_networks > 1,
+            "coverage": self.coverage.size > 0,
+            "uncertainty": self.sigma.size > 0,
+            "probes": self.probes.size > 0,
+            "narrow": self.numeric == "q31" and self.scale[2] != 0,
+            "rezero": self.rezero != 0,
+        }
+        return parts | sum(PARTS[part] for part, is_needed in needed.items() if is_needed)
+
+    @property
     def block_s(self) -> float:
         return self.block_us * 1e-6
 
@@ -125,7 +145,7 @@ class Table:
         counts = [getattr(self, a).size // ARRAYS[a] for a in ("networks", "centers")]
         members = [
             0, 0, self.id, self.calibrated, self.block_us, self.slope_blocks, self.lead_blocks, self.bias_frac_bits,
-            self.fallback, *self.authority, *self.effect, self.rezero, *self.scale, *self.envelope,
+            self.parts, self.fallback, *self.authority, *self.effect, self.rezero, *self.scale, *self.envelope,
             *counts, self.n_channels, self.terms.size // ARRAYS["terms"],
             *self.coverage_cells, *self.sigma_cells, self.sigma.size, self.probes.size // ARRAYS["probes"],
         ]  # fmt: skip
@@ -158,12 +178,10 @@ class Table:
 
     @property
     def read_only_bytes(self) -> int:
-        """Bytes of constants of an emitted table where pointers have 32 bits and options are the defaults."""
-        kinds = 7 if self.terms.size else 0  # code of terms by kind
-        pointers = len(ARRAYS) + 1 + kinds
+        """Bytes of constants of an emitted table where pointers have 32 bits."""
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
         # The header without its length, and CRC and number of fallback models
-        return 4 * (len(self.header) - 1 + pointers + 2 + arrays)
+        return 4 * (len(self.header) - 1 + len(ARRAYS) + 2 + arrays)
 
     def encode_inputs(self, values: ArrayLike) -> Words:
         """Bits of temperatures (C) or slopes (C per block) as the arithmetic takes them; NaN is missing."""

@@ -16,10 +16,8 @@ from .quantisation import quantise as quantise
 from .quantisation import rms_growth as rms_growth
 from .record import RECORD as RECORD
 from .record import read_options as read_options
-from .runtime import COSTS as COSTS
 from .runtime import SWITCHES as SWITCHES
-from .runtime import config_text as config_text
 from .runtime import joint_needs as joint_needs
 from .runtime import needs_of as needs_of
-from .text import amalgamate as amalgamate
+from .runtime import runtime_texts as runtime_texts
 from .vectors import make_vectors as make_vectors

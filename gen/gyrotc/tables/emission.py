@@ -231,7 +231,7 @@ def _from_templates(
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(model, emission)),
-        "needs": needs_of(model),
+        "has_time": "time" not in model.left_out,
         "runtime": options.runtime,
         "left_out": ", ".join(part.replace("_", " ") for part in model.left_out),
         "macros": list(_macros(model, emission)),
@@ -245,7 +245,13 @@ def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> b
     """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
     template = c_environment().get_template("board_test.c.j2")
     text = template.render(
-        id=model.id, symbol=model.symbol, numerics=numerics, n_channels=n_channels, missing=MISSING_READING
+        id=model.id,
+        symbol=model.symbol,
+        numerics=numerics,
+        n_channels=n_channels,
+        missing=MISSING_READING,
+        has_time="time" not in model.left_out,
+        has_uncertainty="uncertainty" not in model.left_out,
     )
     return text.encode("ascii")
 

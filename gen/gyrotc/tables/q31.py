@@ -156,9 +156,9 @@ def surface_of(network: Network, scale: Scale, per_block: float, inputs: Inputs)
 
 _MAX_SPAN = 2**26  # 1024 C in 2^-16 C: an offset times 32 then fits 32 bits
 _FINEST = 28  # largest number of fraction bits of an argument
-# 2^-32 deg/h is 2e-7 of the noise floor of a good laser gyro (1e-3 deg/h) and holds 0.25 deg/h
-_USUAL_BITS = 32
-_STEP_BITS = 4  # a unit 16 times as large: that gyros of one type lie on both sides of a step is rare
+# Fraction bits of a bias where the product states none (GTC_BIAS_FRAC_BITS of gtc_config.h): the same for every gyro
+# and calibration, so that firmware decodes all tables alike. The unit is 6e-8 deg/h; sums of weights go up to 64 deg/h.
+DEFAULT_BITS = 24
 _LARGEST_SIZE = 2**30 - 1024  # so that a sum stays below 2^30 after the rounding of 512 weights
 _COARSEST = 12  # smallest; the sum of squares is shifted by 2 fraction - 24 bits
 _LARGEST_ARGUMENT = 2**31 - 1  # a signed 32-bit word
@@ -325,16 +325,18 @@ def _size(surface: Surface) -> float:
 
 
 def _frac_bits(size: float, stated: int | None) -> int:
-    """Fraction bits of a bias: those of the product, else the usual ones, else the most of their steps that fit.
+    """Return the fraction bits of a bias: those that the product states, or the default.
 
-    Tables of gyros of one type then have one unit, whatever their weights are.
+    Raises:
+        CheckFailed: The weights, terms and re-zero of this gyro do not fit.
     """
-    steps = range(_USUAL_BITS, -1, -_STEP_BITS) if stated is None else (stated,)
-    for bits in steps:
-        if size * 2.0**bits <= _LARGEST_SIZE:
-            return bits
-    unit = "" if stated is None else f" in the product's unit of 2^-{stated} deg/h (q31_bias_frac_bits)"
-    raise CheckFailed(f"q31: weights, terms and re-zero of {size:.3g} deg/h in all leave the range of 32 bits{unit}")
+    bits = DEFAULT_BITS if stated is None else stated
+    if size * 2.0**bits > _LARGEST_SIZE:
+        raise CheckFailed(
+            f"q31: weights, terms and re-zero of {size:.3g} deg/h in all leave the range of 32 bits in the product's "
+            f"unit of 2^-{bits} deg/h: state a smaller q31_bias_frac_bits in the limits file, for all of its gyros"
+        )
+    return bits
 
 
 def _whole(surface: Surface, frac_bits: int) -> NDArray[np.int64]:

@@ -44,7 +44,7 @@ __all__ = ["NUMERICS", "N_PROBES", "Table", "outside", "quantise", "rms_growth",
 _ROW = re.compile(r"RANGE\((.*?)\),(?:\s*/\* ([^*]*?) \*/)?$")
 _NAME = re.compile(r"^#define (GTC_\w+) (\d+)U?\b", re.MULTILINE)
 # Words of a table before its arrays, and the first of them that counts records: docs/FORMAT.md, section 3
-_N_WHOLE, _N_NUMBERS, _FIRST_COUNT = 18, 13, 8
+_N_WHOLE, _N_NUMBERS, _FIRST_COUNT = 19, 13, 9
 _REACH = np.float32(8.0)  # half ranges to which a normalised input may go
 _WIDTH = np.float32(2.0**-100)  # narrowest range: what is divided by it stays finite
 _SUM = 2**30  # of the magnitudes of weights, so that no sum overflows: docs/numerics.md, section 3
@@ -57,13 +57,17 @@ _LARGEST = 2**31 - 1  # a signed 32-bit word
 WordLimits = list[tuple[str, float, float]]  # of words in order: name, least, most
 
 
-def outside(table: Table) -> str | None:
-    """The first word or condition that the runtime refuses, in words; None if it takes the table."""
-    return next(_refused(table), None)
+def outside(table: Table, frac_bits: int = q31.DEFAULT_BITS) -> str | None:
+    """Return the first word or condition that the runtime refuses, in words; None if it takes the table.
+
+    Args:
+        frac_bits: Fraction bits of a bias in fixed point that the runtime decodes.
+    """
+    return next(_refused(table, frac_bits), None)
 
 
-def _refused(table: Table) -> Iterator[str]:
-    limits = _limits(table.numeric)
+def _refused(table: Table, frac_bits: int) -> Iterator[str]:
+    limits = _limits(table.numeric, frac_bits)
     whole, numbers, network, center, guard, guard_whole, term, sigma = limits
     header, ends = table.header[2:], _FIRST_COUNT + _N_NUMBERS
     yield from _beyond(header[:_FIRST_COUNT] + header[ends:], whole)
@@ -172,11 +176,15 @@ def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
 
 
 @functools.cache
-def _limits(numeric: str) -> tuple[WordLimits, ...]:
-    """Rows of libc/gtc_limits.inl for one arithmetic: whole numbers, numbers, network, center, guard, terms, sigma."""
+def _limits(numeric: str, frac_bits: int) -> tuple[WordLimits, ...]:
+    """Rows of libc/gtc_limits.inl for one arithmetic and the unit of its runtime.
+
+    They are those of whole numbers, numbers, network, center, guard, terms, sigma.
+    """
     include, libc = runtime_folders()
     headers = [(include / name).read_text(encoding="ascii") for name in ("gtc_config.h", "gtc_table.h")]
     names = dict(_NAME.findall("".join(headers)))
+    names |= {"GTC_BIAS_FRAC_BITS": str(frac_bits), "GTC_MAX_CHANNELS": str(1 + int(names["GTC_MAX_TERMS"]))}
     first = 0 if numeric == "f32" else 2
     rows: WordLimits = []
     for line in (libc / "gtc_limits.inl").read_text(encoding="ascii").splitlines():
@@ -284,7 +292,7 @@ def _quantised(known: _Known, numeric: str) -> Table:
             rounded = with_authority(model, _MAKERS[numeric](model))
     except (FloatingPointError, ZeroDivisionError, OverflowError) as error:
         raise CheckFailed(f"{numeric}: a number of the model leaves the range of this arithmetic ({error})") from error
-    refused = outside(rounded)
+    refused = outside(rounded, rounded.bias_frac_bits)
     if refused is not None:
         raise CheckFailed(f"{numeric}: the runtime would refuse the table: {refused}")
     return rounded if "known_answers" in model.left_out else with_probes(model, rounded)

@@ -60,7 +60,7 @@ class EmissionRecord(Numbered):
     )
     zero_at_c: float | None = Field(default=None, description="`--zero-at`, C, or null")
     runtime: str | None = Field(
-        default=None, description="folder of `gtc.c`, `gtc.h` and `gtc_config.h`, from here; null: they are here"
+        default=None, description="folder of `gtc.h`, `gtc_f32.c` and `gtc_q31.c`, from here; null: they are here"
     )
     axes: dict[str, str] = Field(
         default={}, description="where several axes stand in one folder: hash of each axis's model"

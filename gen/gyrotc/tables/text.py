@@ -1,22 +1,19 @@
-"""C text: a table with named members, the numbers of the example, and the runtime as one header and one source."""
+"""C text: a table with named members, and the numbers of the example."""
 
 from __future__ import annotations
 
-import functools
 import math
-import re
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ..common.texts import CText, c_code
 from ..mirror.front_end import period_us
-from ..mirror.recursions import TableKind
 from ..mirror.table import LAYOUT, SERIAL_WORDS, Table
 from ..model import Model
 from .rounding import channel_names, guard_of
+
+ARITHMETICS = ("f32", "q31")
 
 _EXAMPLE_US = 10000  # 100 samples a second
 
@@ -46,7 +43,7 @@ def example_period_us(model: Model) -> int:
 
 
 _INTEGERS = (
-    "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits",
+    "quantity", "unit", "id", "calibrated", "block_us", "slope_blocks", "lead_blocks", "bias_frac_bits", "parts",
 )  # fmt: skip
 # Numbers of a member: docs/FORMAT.md, section 3
 _NUMBERS = {"fallback": 1, "authority": 2, "effect": 2, "rezero": 1, "scale": 3, "envelope": 4}
@@ -98,8 +95,6 @@ class TableText:
     title: str
     members: tuple[_Member, ...]
     arrays: tuple[_Array, ...]
-    term_codes: tuple[str, ...]
-    code_of_kinds: CText
 
 
 def table_text(table: Table, model: Model) -> TableText:
@@ -110,7 +105,7 @@ def table_text(table: Table, model: Model) -> TableText:
     members = [_member("layout", str(LAYOUT))]
     for name in _INTEGERS:
         word = next(words)
-        members.append(_member(name, f"0x{word:08x}UL" if name == "id" else f"{word}UL"))
+        members.append(_member(name, f"0x{word:08x}UL" if name in ("id", "parts") else f"{word}UL"))
     for name, size in _NUMBERS.items():
         group = [_number(table.numeric, next(words)) for _ in range(size)]
         members.append(_member(name, f"{{ {', '.join(group)} }}" if size > 1 else group[0]))
@@ -121,24 +116,17 @@ def table_text(table: Table, model: Model) -> TableText:
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
     members.append(_member("n_fallback_models", f"{table.n_stand_ins}UL"))
     arrays = []
-    kinds: list[int] = []
     for name, length in _array_lengths(counts).items():
         body = [next(words) for _ in range(length)]
-        if name == "terms":
-            kinds = body[:: _RECORDS["terms"]]
         if length:
             arrays.append(_array(table.numeric, name, body, counts, comments.get(name, [])))
         members.append(_member(name, f"{table.numeric}_{name}" if length else "NULL"))
     members.append(_member("crc", f"0x{next(words):08x}UL"))
-    codes = {k: f"gtc_{table.numeric}_term_{TableKind(k).name.lower()}" for k in dict.fromkeys(kinds)}
-    members.append(_member("term_code", f"{table.numeric}_codes" if codes else "NULL"))
     return TableText(
         table.numeric,
         _TITLES[table.numeric],
         tuple(members),
         tuple(arrays),
-        tuple(codes.values()),
-        c_code(", ".join(f"&{codes[k]}" if k in codes else "NULL" for k in TableKind)),
     )
 
 
@@ -216,78 +204,3 @@ def float_text(word: int) -> str:
     value = struct.unpack("<f", struct.pack("<I", word))[0]
     text = f"{value:.9g}"
     return (text if any(c in text for c in ".en") else text + ".0") + "F"
-
-
-_HEADERS = ("gtc_config.h", "gtc_table.h", "gtc_private_state.h", "gtc_angle.h", "gtc.h")
-ARITHMETICS = ("f32", "q31")
-_INCLUDE = re.compile(r'^#include "(?P<name>gtc[a-z0-9_.]*)"$')
-_DEFINE = re.compile(r"^#define (?P<name>[A-Z][A-Z0-9_]*)")
-_CONFIG = "#include GTC_CONFIG_HEADER\n#endif\n"
-# REUSE-IgnoreStart
-_LICENCE = " * SPDX-License-Identifier: MIT"
-# REUSE-IgnoreEnd
-
-
-@functools.cache
-def amalgamate(include_dir: Path, libc_dir: Path, *, numerics: tuple[str, ...] = ARITHMETICS) -> tuple[str, str]:
-    """Texts of `gtc.h` and `gtc.c`. Depends on the files alone, which are read once in a process.
-
-    `gtc.h` includes a `gtc_config.h` beside it, with the options of the tables (`tables.emit`).
-
-    Args:
-        include_dir, libc_dir: As `common.inputs.runtime_folders` gives them.
-        numerics: The arithmetics that `gtc.c` holds; `gtc.h` declares all.
-    """
-    header = "\n".join(_without_includes(include_dir / name) for name in _HEADERS)
-    header = header.replace(_CONFIG, _CONFIG + '#include "gtc_config.h"\n', 1)
-    seen: set[str] = set()
-    parts = [_banner(), '#include "gtc.h"\n\n#include <stddef.h>\n']
-    parts.append("".join(_expanded(libc_dir / "gtc_crc.c", libc_dir, seen)))
-    for arithmetic in ARITHMETICS:
-        if arithmetic in numerics:
-            text = "".join(_expanded(libc_dir / f"gtc_{arithmetic}.c", libc_dir, set(seen)))
-            parts.append(text + _undefined(text))
-    return _one_licence(header), _one_licence("\n".join(p for p in parts if p))
-
-
-def _banner() -> str:
-    return (
-        "/* gtc.c - the gyrotc runtime in one file; gtc.h is its manual.\n"
-        " *\n"
-        " * Made from the files of libc/ by gyrotc; do not edit. Compile it as C99; float32 needs\n"
-        " * -std=c99 -ffp-contract=off, and -ffunction-sections -fdata-sections with --gc-sections leave\n"
-        " * only what is used.\n"
-        " *\n"
-        f"{_LICENCE}\n"
-        " */\n"
-    )
-
-
-def _without_includes(path: Path) -> str:
-    lines = path.read_text(encoding="ascii").splitlines()
-    return "\n".join(line for line in lines if not _INCLUDE.match(line)) + "\n"
-
-
-def _expanded(path: Path, libc_dir: Path, seen: set[str]) -> Iterator[str]:
-    """Lines of a file, its own includes expanded where they first occur."""
-    for line in path.read_text(encoding="ascii").splitlines():
-        match = _INCLUDE.match(line)
-        if match is None:
-            if line != "#include <stddef.h>":
-                yield line + "\n"
-        elif match["name"] != "gtc.h" and match["name"] not in seen:
-            seen.add(match["name"])
-            yield from _expanded(libc_dir / match["name"], libc_dir, seen)
-
-
-def _undefined(text: str) -> str:
-    """#undef of every macro that a group defines, but not of include guards and options."""
-    names = [m["name"] for line in text.splitlines() if (m := _DEFINE.match(line))]
-    own = dict.fromkeys(n for n in names if not n.startswith("GTC_"))
-    return "".join(f"#undef {name}\n" for name in own)
-
-
-def _one_licence(text: str) -> str:
-    """The licence's line once, at the top."""
-    first, mark, rest = text.partition(_LICENCE)
-    return first + mark + rest.replace(f" *\n{_LICENCE}\n", "")

@@ -22,7 +22,7 @@ from ..common.inputs import read_input
 from ..mirror.history import answers
 from ..results.files import write_own
 from ..results.folder import scratch_folder
-from ..results.release import CallCost, FunctionCost, LogPart, ReadLog, VerifiedTarget
+from ..results.release import CallCost, LogPart, ReadLog, VerifiedTarget
 from ..tables.vectors import Vectors
 from .emitted import Job, board_files, checked_sources, table_files
 from .sizes import function_costs
@@ -265,21 +265,18 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
 
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
-    """Compiles runtime and table once, and a test program for each arithmetic."""
-    shared: _Shared | CheckFailed
-    functions: dict[str, dict[str, FunctionCost]] = {}
-    files = table_files(job.model)
+    """Compiles runtime, table and a test program for each arithmetic."""
+    n_channels = next(iter(job.tables.values())).n_channels
+    files = table_files(job.c_folder, job.model, tuple(job.tables))
     if not job.board_test:
-        files = board_files(job.model, tuple(job.tables), next(iter(job.tables.values())).n_channels)
+        files = board_files(job.c_folder, job.model, tuple(job.tables), n_channels)
+    c: Path | CheckFailed
     try:
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
         for name, data in job.board_test.items():
             write_own(c / name, data)
-        runtime = runtime_object(target, c, work, fresh=job.trusted)
-        shared = _shared(job, target, c, work, runtime)
-        functions = function_costs(runtime)
     except CheckFailed as error:
-        shared = error
+        c = error
     for numeric in numerics:
         entry = partial(
             VerifiedTarget,
@@ -289,18 +286,22 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             flags=" ".join(target.all_flags),
             table_bytes=job.tables[numeric].table_bytes,
         )
-        extra: dict[str, Any] = {"functions": functions[numeric]} if numeric in functions else {}
+        extra: dict[str, Any] = {}
         try:
-            if isinstance(shared, CheckFailed):
-                raise shared
+            if isinstance(c, CheckFailed):
+                raise c
+            runtime = runtime_object(target, c, numeric, work, fresh=job.trusted)
+            if functions := function_costs(runtime, numeric):
+                extra = {"functions": functions}
+            shared = _shared(job, target, c, work, runtime)
             yield entry(**_ran(job, target, numeric, shared, work, c), **extra)
         except CheckFailed as error:
-            yield entry(status="fail", error=str(error))
+            yield entry(status="fail", error=str(error), **extra)
 
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """Objects of runtime and table, which the programs of all arithmetics have: symbols, writable static data."""
+    """Objects of runtime and table: symbols, writable static data."""
 
     objects: tuple[Path, ...]
     symbols: tuple[Symbol, ...]

@@ -10,6 +10,7 @@ the names it knows, and comments. Whether the numbers are right is not asked her
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import re
@@ -22,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
-from ..common.inputs import runtime_folders
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
 from ..model import SERIAL, Model
@@ -31,14 +31,14 @@ from ..results.marker import MARKER
 from ..results.release import VerifiedFile
 from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
-from ..tables.runtime import CONFIG, RUNTIME_FILES, joint_needs, needs_of, runtime_texts
-from ..tables.text import ARITHMETICS, amalgamate
+from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts, stated_needs
+from ..tables.text import ARITHMETICS
 
 EXAMPLE = "main.c"
 """The example is the user's to edit; all else is written by gyrotc alone."""
 _SHOWN = 160  # characters of a line
-_MAX_CONFIG = 2**16  # bytes of gtc_config.h, which has 3,000
-_OPTION = re.compile(r"^#define (GTC_[A-Z_]+) ([0-9]{1,2})$", re.MULTILINE)
+_MAX_OPTION = 60  # of the options that a header states
+_MAX_HEADER = 2**18  # bytes of gtc.h, which has 40,000
 _BEYOND = 2**16  # bytes that are read of a file beyond its right length
 
 
@@ -109,14 +109,11 @@ def runtime_place(c_folder: Path) -> Path:
 def shared_runtime_entries(c_folder: Path, model: Model, shared: str) -> Iterator[VerifiedFile]:
     """One entry for each file of the runtime that a gyro shares with its fleet.
 
-    The options in `gtc_config.h` may be larger than this gyro needs, as other gyros of the fleet may need more.
+    The options that `gtc.h` states may be larger than this gyro needs, as other gyros of the fleet may need more.
     """
     place = c_folder / shared
-    config = _content(place / CONFIG, _MAX_CONFIG) or b""
-    stated = {name: int(value) for name, value in _OPTION.findall(config.decode("latin-1"))}
-    needs = needs_of(model)
-    options = joint_needs([needs, {name: value for name, value in stated.items() if name in needs}])
-    for name, data in runtime_texts(options, ARITHMETICS).items():
+    header = _content(place / "gtc.h", _MAX_HEADER) or b""
+    for name, data in runtime_texts(_needs_beside(header, model), ARITHMETICS).items():
         found = _content(place / name, len(data))
         if found is None:
             yield VerifiedFile(file=f"{shared}/{name}", verdict="missing", status="fail", mismatches=1)
@@ -124,6 +121,13 @@ def shared_runtime_entries(c_folder: Path, model: Model, shared: str) -> Iterato
             yield VerifiedFile(file=f"{shared}/{name}", verdict="equal", status="pass", mismatches=0)
         else:
             yield _differing(f"{shared}/{name}", found, data, allowed=False)
+
+
+def _needs_beside(header: bytes, model: Model) -> dict[str, int]:
+    """Return what a model and the other tables of its runtime need, as the runtime's header states it."""
+    needs = needs_of(model)
+    stated = stated_needs(header.decode("latin-1"))
+    return joint_needs([needs, {name: min(value, _MAX_OPTION) for name, value in stated.items() if name in needs}])
 
 
 def file_entries(c_folder: Path, texts: Mapping[str, bytes]) -> Iterator[VerifiedFile]:
@@ -211,21 +215,14 @@ _TABLE_C = (
     "#include <stddef.h>",
     "#if GTC_TABLE_LAYOUT != [0-9]{{1,3}}",
     r'#error "gtc_{id}\.c was written for table layout [0-9]{{1,3}}: emit it again with the gyrotc of this runtime"',
-    r"#if \(GTC_MAX_SLOPE_BLOCKS < [0-9]{{1,2}}\) \|\| \(GTC_MAX_TERMS < [0-9]\)",
-    r'#error "gtc_{id}\.c needs -DGTC_MAX_SLOPE_BLOCKS=[0-9]{{1,2}} -DGTC_MAX_TERMS=[0-9]'
-    '(?: -DGTC_WITH_BANK=1)? or more"',
     r"#define V\(x\) \{{ \.value = \(x\) \}} /\* a float32 number \*/",
     r"#define B\(x\) \{{ \.bits = \(x\) \}}  /\* an integer \*/",
     r"static const gtc_word_t <n>_[a-z]{{1,10}}\[[0-9]{{1,6}}\] = \{{",
     "    (?:<cells>),<note>",
-    r"extern const struct gtc_<n>_term_code gtc_\1_term_[a-z_]{{1,16}};",
-    r"static const struct gtc_<n>_term_code \*const \1_codes\[GTC_N_KINDS\] = \{{",
-    "    (?:(?:, )?(?:NULL|&gtc_(?:f32|q31)_term_[a-z_]{{1,16}})){{7}},",
     r"const gtc_<n>_table_t gtc_{symbol}_\1 = \{{",
     r"    \.[a-z_]{{1,20}} = (?:<cells>),<note>",
     r"\}};",
 )
-_CONFIG_H = ("#ifndef GTC_[A-Z_]{{1,32}}", "#define GTC_[A-Z_]{{1,32}}(?: [0-9]{{1,2}})?")
 _TABLE_H = (
     "#(?:ifndef|define) GTC_{SYMBOL}_H_INCLUDED",
     '#include "gtc.h"',
@@ -253,21 +250,22 @@ _VECTORS_H = (
 _ANY = ("", "#endif", r"/\* <text> \*/")
 
 
-def table_files(model: Model) -> dict[str, Check]:
-    """Runtime and table of a model, each with what it must be."""
+def table_files(c_folder: Path, model: Model, numerics: Sequence[str]) -> dict[str, Check]:
+    """Runtime and table of a model in these arithmetics, each with what it must be."""
+    header = _content(runtime_place(c_folder) / "gtc.h", _MAX_HEADER) or b""
+    needs = _needs_beside(header, model)
+    runtime = [name for name in RUNTIME_FILES if name == "gtc.h" or any(name == f"gtc_{n}.c" for n in numerics)]
     return {
-        "gtc.h": lambda data: _runtime(data, 0),
-        "gtc.c": lambda data: _runtime(data, 1),
-        "gtc_config.h": _grammar(_CONFIG_H, model),
+        **{name: functools.partial(_runtime, name, needs) for name in runtime},
         f"gtc_{model.id}.h": _grammar(_TABLE_H, model),
         f"gtc_{model.id}.c": _grammar(_TABLE_C, model),
     }
 
 
-def board_files(model: Model, numerics: Sequence[str], n_channels: int) -> dict[str, Check]:
+def board_files(c_folder: Path, model: Model, numerics: Sequence[str], n_channels: int) -> dict[str, Check]:
     """The board test of a model with its vectors, beside runtime and table."""
     board = board_test_text(model, numerics, n_channels)
-    return table_files(model) | {
+    return table_files(c_folder, model, numerics) | {
         f"vectors_{model.id}.h": _grammar(_VECTORS_H, model),
         "board_test.c": lambda data: None if data == board else "is not the board test of this gyrotc",
     }
@@ -301,11 +299,12 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
     return work
 
 
-def _runtime(data: bytes, part: int) -> str | None:
-    """Part: 0 for `gtc.h`, 1 for `gtc.c`."""
-    held = (ARITHMETICS, *((n,) for n in ARITHMETICS))
-    ours = {amalgamate(*runtime_folders(), numerics=numerics)[part].encode("ascii") for numerics in held}
-    return None if data in ours else "is not the runtime of this gyrotc"
+def _runtime(name: str, needs: Mapping[str, int], data: bytes) -> str | None:
+    """Test a file of the runtime: it is what this gyrotc makes with the options that the file's header states."""
+    for numerics in (ARITHMETICS, *((n,) for n in ARITHMETICS)):
+        if runtime_texts(needs, numerics).get(name) == data:
+            return None
+    return "is not the runtime of this gyrotc"
 
 
 def _grammar(lines: Sequence[str], model: Model) -> Check:

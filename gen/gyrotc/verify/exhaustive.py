@@ -88,8 +88,8 @@ def _host() -> Target:
 
 
 def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trusted: bool) -> Path:
-    c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-    runtime = runtime_object(target, c, work, fresh=trusted).put(work / "gtc.o")
+    c = checked_sources(c_folder, work, table_files(c_folder, model, ("q31",)), trusted=trusted)
+    runtime = runtime_object(target, c, "q31", work, fresh=trusted).put(work / "gtc.o")
     emitted = [runtime, *compile_objects(target, [c / f"gtc_{model.id}.c"], work, include=c)]
     # The program itself is no code for targets: it may use what the host has.
     loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})

@@ -127,14 +127,20 @@ def replay_program(
     text = (
         c_environment()
         .get_template("replay.c.j2")
-        .render(id=model.id, symbol=model.symbol, n=table.numeric, n_channels=table.n_channels)
+        .render(
+            id=model.id,
+            symbol=model.symbol,
+            n=table.numeric,
+            n_channels=table.n_channels,
+            has_time="time" not in model.left_out,
+        )
     )
     with scratch_folder() as work:
         source = work / "replay.c"
         write_own(source, text)
         program = work / "replay"
-        c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-        runtime = runtime_object(target, c, work, fresh=trusted)
+        c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)), trusted=trusted)
+        runtime = runtime_object(target, c, table.numeric, work, fresh=trusted)
         objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
         link(target, [runtime.put(work / "gtc.o"), *objects], program)
         yield program

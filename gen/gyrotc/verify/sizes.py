@@ -1,14 +1,13 @@
 """Bytes of code, data and stack: of each public function, and of table and runtime as a program links them.
 
-gcc writes the graph of calls with the stack of each function (`-fcallgraph-info=su`). A call through a pointer goes to
-a hook of a term; the deepest of them all counts, whichever terms a table has. Functions of the compiler's own library
+gcc writes the graph of calls with the stack of each function (`-fcallgraph-info=su`). No function is called through a
+pointer. Functions of the compiler's own library
 (64-bit division and the like) stand in no graph: they are named, not counted.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -62,8 +61,8 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
     with scratch_folder() as work:
         source = work / "footprint.c"
         write_own(source, text)
-        c = checked_sources(c_folder, work, table_files(model), trusted=trusted)
-        runtime = runtime_object(target, c, work, fresh=trusted)
+        c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)), trusted=trusted)
+        runtime = runtime_object(target, c, table.numeric, work, fresh=trusted)
         objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
         link(target, [runtime.put(work / "gtc.o"), *objects], work / "footprint")
         own = {symbol.name for symbol in (*runtime.symbols, *symbols(target, objects[1]))}
@@ -73,7 +72,7 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
 
 
 PUBLIC = (
-    "check", "open", "map", "init", "sample", "bias", "snapshot", "rezero", "angle", "save", "restore",
+    "check", "check_words", "open", "map", "init", "sample", "bias", "snapshot", "rezero", "angle", "save", "restore",
 )  # fmt: skip
 """Every function that gtc.h and what it includes declare, without its prefix."""
 _NODE = re.compile(
@@ -82,9 +81,6 @@ _NODE = re.compile(
 _EDGE = re.compile(
     r'^edge: \{ sourcename: "(?:[^":]*:)?(?P<caller>[\w.]+)" targetname: "(?:[^":]*:)?(?P<callee>[\w.]+)"'
 )
-_INDIRECT = "__indirect_call"
-_CODES = "memory|play|warm_up|harmonic|auxiliary|curve|product"  # of terms in gtc_terms.inl
-_HOOK = re.compile(rf"gtc_(?:f32|q31)_(?:nothing|(?:{_CODES})_(?:begin|take|step|apply))$")
 
 
 @dataclass(slots=True)
@@ -95,17 +91,8 @@ class Graph:
     calls: dict[str, set[str]] = field(default_factory=dict)
 
     def callees(self, name: str) -> set[str]:
-        """Whom a function calls, pointers to hooks of its arithmetic resolved."""
-        found = {self._folded(callee) for callee in self.calls.get(name, set())}
-        if _INDIRECT not in found:
-            return found
-        hooks = {n for n in self.stack if _HOOK.match(n) and n[:8] == name[:8]}
-        return (found - {_INDIRECT}) | hooks
-
-    def _folded(self, name: str) -> str:
-        """Functions that are the same in both arithmetics are one, which has one of the two names."""
-        twin = name.replace("_q31_", "_f32_") if "_q31_" in name else name.replace("_f32_", "_q31_")
-        return twin if name not in self.stack and twin in self.stack else name
+        """Whom a function calls."""
+        return self.calls.get(name, set())
 
     def reached(self, name: str) -> set[str]:
         """The function and all that it calls on the way."""
@@ -146,8 +133,8 @@ def parse_graph(text: str) -> Graph:
     return graph
 
 
-def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
-    """Costs by arithmetic and public function; empty without a gcc that tells.
+def function_costs(runtime: Object, numeric: str) -> dict[str, FunctionCost]:
+    """Costs by public function of one arithmetic; empty without a gcc that tells.
 
     Raises:
         CheckFailed: A stack has no bound.
@@ -156,23 +143,13 @@ def function_costs(runtime: Object) -> dict[str, dict[str, FunctionCost]]:
         return {}
     graph = parse_graph(runtime.graph)
     sizes = {s.name: s.size for s in runtime.symbols}
-    return {n: _costs(graph, sizes, n) for n in ("f32", "q31") if any(s.startswith(f"gtc_{n}_") for s in sizes)}
-
-
-def _linked_name(names: Iterable[str], numeric: str, function: str) -> str | None:
-    """The name by which a public function is linked; None where it is not among them."""
-    linked = re.compile(rf"gtc_{numeric}_{function}(?:_\d+blocks_\d+terms(?:_plain)?)?$")
-    return next(filter(linked.match, names), None)
-
-
-def _costs(graph: Graph, sizes: Mapping[str, int], numeric: str) -> dict[str, FunctionCost]:
-    costs: dict[str, FunctionCost] = {}
-    for function in PUBLIC:
-        name = _linked_name(sizes, numeric, function)
-        if name is not None:
-            costs[function] = FunctionCost(
-                code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),
-                stack_bytes=graph.deepest(name),
-                helpers=tuple(sorted(graph.helpers(name))),
-            )
-    return costs
+    names = {function: f"gtc_{numeric}_{function}" for function in PUBLIC}
+    return {
+        function: FunctionCost(
+            code_bytes=sum(sizes.get(n, 0) for n in graph.reached(name)),
+            stack_bytes=graph.deepest(name),
+            helpers=tuple(sorted(graph.helpers(name))),
+        )
+        for function, name in names.items()
+        if name in sizes
+    }

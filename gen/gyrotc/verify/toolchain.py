@@ -261,12 +261,12 @@ _GRAPH = ("-fstack-usage", "-fcallgraph-info=su")
 _made: dict[str, Object] = {}  # by name, of this process
 
 
-def runtime_object(target: Target, c_folder: Path, work: Path, *, fresh: bool = False) -> Object:
-    """Return the runtime, with its graph of calls if the compiler writes one; as `shared_object`."""
+def runtime_object(target: Target, c_folder: Path, numeric: str, work: Path, *, fresh: bool = False) -> Object:
+    """Return the runtime of one arithmetic, with its graph of calls if the compiler writes one; as `shared_object`."""
     counted = target.compiler.endswith("-gcc") and target.counts == "instructions"
     flags = (*target.flags, *_GRAPH) if counted else target.flags
     return shared_object(
-        target.model_copy(update={"flags": flags}), c_folder / "gtc.c", work, include=c_folder, fresh=fresh
+        target.model_copy(update={"flags": flags}), c_folder / f"gtc_{numeric}.c", work, include=c_folder, fresh=fresh
     )
 
 

@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_test_1.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 0)
-#error "gtc_test_1.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=0 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_test_1.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -76,7 +72,7 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_test_1_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x362c9816UL,
@@ -85,6 +81,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x00001700UL,
     .fallback = V(0.375F),
     .authority = { V(-2.01713252F), V(1.63987398F) },
     .effect = { V(0.0F), V(0.0F) },
@@ -108,8 +105,7 @@ const gtc_f32_table_t gtc_test_1_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x491e93a7UL,
-    .term_code = NULL,
+    .crc = 0x9c286abeUL,
 };
 
 /* ---- fixed point ---- */
@@ -123,14 +119,14 @@ static const gtc_word_t q31_serial[16] = {
 
 /* centers, w0, linear in T and slope, region: T min, max, slope min, max */
 static const gtc_word_t q31_networks[8] = {
-    B(0x3UL), B(0xfe003539UL), B(0x0ffff02fUL), B(0xf7fff535UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
+    B(0x3UL), B(0xffe00354UL), B(0x00ffff03UL), B(0xff7fff53UL), B(0x00000000UL), B(0x0000ffffUL), B(0x00000000UL), B(0x0000ffffUL),
 };
 
 /* T: center, gain; slope: center, gain; weight */
 static const gtc_word_t q31_centers[15] = {
-    B(0x0000801fUL), B(0xeffc6070UL), B(0x00002670UL), B(0xe994133bUL), B(0x0bfffedeUL), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
-    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xebffeaedUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
-    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x04fff6daUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
+    B(0x0000801fUL), B(0xeffc6070UL), B(0x00002670UL), B(0xe994133bUL), B(0x00bfffeeUL), /* -10.00 C, +0.500 C/min; widths 0.300, 1.000; +7.500e-01 deg/h */
+    B(0x0000400fUL), B(0xdff8a0c8UL), B(0x00000000UL), B(0x00000000UL), B(0xfebffeafUL), /* 20.00 C, +0.000 C/min; widths 0.600, infinite; -1.250e+00 deg/h */
+    B(0x00000000UL), B(0x00000000UL), B(0x000036e9UL), B(0xf245db76UL), B(0x004fff6eUL), /* 45.00 C, -1.500 C/min; widths infinite, 0.700; +3.125e-01 deg/h */
 };
 
 /* low, high, max_step, max_rate, agree_us, stuck_us, missing_blocks, fallback */
@@ -145,30 +141,30 @@ static const gtc_word_t q31_coverage[1] = {
 
 /* 1 sigma of the compensated bias, a row for each cell of slope */
 static const gtc_word_t q31_sigma[15] = {
-    B(0x0020c49cUL), B(0x004e258eUL),
-    B(0x007865b7UL), B(0x00a1fc7fUL),
-    B(0x00041893UL), B(0x000068dcUL),
-    B(0x0049ba5eUL), B(0x0010624eUL),
-    B(0x00083127UL), B(0x007ae148UL),
-    B(0x00cccccdUL), B(0x02666666UL),
-    B(0x00189375UL), B(0x00f5c28fUL),
+    B(0x00020c4aUL), B(0x0004e259UL),
+    B(0x0007865bUL), B(0x000a1fc8UL),
+    B(0x00004189UL), B(0x0000068eUL),
+    B(0x00049ba6UL), B(0x00010625UL),
+    B(0x00008312UL), B(0x0007ae14UL),
+    B(0x000ccccdUL), B(0x00266666UL),
+    B(0x00018937UL), B(0x000f5c29UL),
     B(0x00000384UL),
 };
 
 /* known answers: T, slope, bias, status */
 static const gtc_word_t q31_probes[32] = {
-    B(0x002863e5UL), B(0x000011e1UL), B(0xfdf88d36UL), B(0x0UL),
-    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xf5983c3bUL), B(0x4UL),
-    B(0x00012bafUL), B(0x000035a3UL), B(0xf7608d0dUL), B(0x0UL),
-    B(0xffed8f94UL), B(0xffffc784UL), B(0x048f9df0UL), B(0x0UL),
-    B(0x0029f379UL), B(0x00005965UL), B(0xfb331273UL), B(0x0UL),
-    B(0x0016575eUL), B(0xffffeb46UL), B(0xf345cfdaUL), B(0x0UL),
-    B(0xffd80000UL), B(0xffff4000UL), B(0x014b881cUL), B(0x2UL),
-    B(0x00500000UL), B(0x0000c000UL), B(0x04cea1a2UL), B(0x2UL),
+    B(0x002863e5UL), B(0x000011e1UL), B(0xffdf88d3UL), B(0x0UL),
+    B(0x0014c7caUL), B(0xffffa3c2UL), B(0xff5983c4UL), B(0x4UL),
+    B(0x00012bafUL), B(0x000035a3UL), B(0xff7608d1UL), B(0x0UL),
+    B(0xffed8f94UL), B(0xffffc784UL), B(0x0048f9dfUL), B(0x0UL),
+    B(0x0029f379UL), B(0x00005965UL), B(0xffb33127UL), B(0x0UL),
+    B(0x0016575eUL), B(0xffffeb46UL), B(0xff345cfeUL), B(0x0UL),
+    B(0xffd80000UL), B(0xffff4000UL), B(0x0014b882UL), B(0x2UL),
+    B(0x00500000UL), B(0x0000c000UL), B(0x004cea1aUL), B(0x2UL),
 };
 
 const gtc_q31_table_t gtc_test_1_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x362c9816UL,
@@ -176,11 +172,12 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .block_us = 10000000UL,
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
-    .bias_frac_bits = 28UL,
-    .fallback = 100663296L,
-    .authority = { -541465826L, 440198562L },
+    .bias_frac_bits = 24UL,
+    .parts = 0x00001700UL,
+    .fallback = 6291456L,
+    .authority = { -33841614L, 27512410L },
     .effect = { 0L, 0L },
-    .rezero = 8053064L,
+    .rezero = 503316L,
     .scale = { 1677721L, 134217727L, 0L },
     .envelope = { -1310720L, 3932160L, -32768L, 32768L },
     .n_networks = 1UL,
@@ -200,7 +197,6 @@ const gtc_q31_table_t gtc_test_1_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x0cb0b457UL,
-    .term_code = NULL,
+    .crc = 0x93594c3cUL,
 };
 

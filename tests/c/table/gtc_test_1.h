@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         552 bytes of read-only data, 84 of them parameters; |error| <= 5.94e-06 deg/h against the model (terms excluded)
  * q31:         552 bytes of read-only data, 84 of them parameters; |error| <= 9.72e-05 deg/h against the model (terms excluded)
- * Options:     gtc_config.h: the smallest runtime that holds it
+ * Runtime:     gtc.h and gtc_<n>.c beside it, the smallest that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 1b449dd90d9843007d772275ca4f61d4dabfde0f854247f2db208404e9715e4f
@@ -37,7 +37,7 @@ extern "C" {
 #define GTC_TEST_1_N_CHANNELS 1 /* numbers of a sample */
 #define GTC_TEST_1_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_TEST_1_F32_TABLE_BYTES 552UL /* read-only data, with pointers of 32 bits */
-#define GTC_TEST_1_Q31_BIAS_FRAC_BITS 28 /* bias in 2^-this deg/h */
+#define GTC_TEST_1_Q31_BIAS_FRAC_BITS 24 /* bias in 2^-this deg/h */
 #define GTC_TEST_1_Q31_TABLE_BYTES 552UL /* read-only data, with pointers of 32 bits */
 
 extern const gtc_f32_table_t gtc_test_1_f32;

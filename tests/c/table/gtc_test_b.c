@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_test_b.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 0)
-#error "gtc_test_b.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=0 -DGTC_WITH_BANK=1 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_test_b.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -81,7 +77,7 @@ static const gtc_word_t f32_probes[32] = {
 };
 
 const gtc_f32_table_t gtc_test_b_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xc44e9858UL,
@@ -90,6 +86,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x00001701UL,
     .fallback = V(0.375F),
     .authority = { V(-4.31671858F), V(6.18734455F) },
     .effect = { V(0.0F), V(0.0F) },
@@ -113,8 +110,7 @@ const gtc_f32_table_t gtc_test_b_f32 = {
     .coverage = f32_coverage,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0xaec5889dUL,
-    .term_code = NULL,
+    .crc = 0x79c750b7UL,
 };
 
 /* ---- fixed point ---- */
@@ -178,7 +174,7 @@ static const gtc_word_t q31_probes[32] = {
 };
 
 const gtc_q31_table_t gtc_test_b_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xc44e9858UL,
@@ -187,6 +183,7 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
+    .parts = 0x00001701UL,
     .fallback = 6291456L,
     .authority = { -72422852L, 103806347L },
     .effect = { 0L, 0L },
@@ -210,7 +207,6 @@ const gtc_q31_table_t gtc_test_b_q31 = {
     .coverage = q31_coverage,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0x2687e6a0UL,
-    .term_code = NULL,
+    .crc = 0x93a4a6a5UL,
 };
 

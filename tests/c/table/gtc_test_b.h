@@ -7,7 +7,7 @@
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
  * f32:         676 bytes of read-only data, 168 of them parameters; |error| <= 1.72e-05 deg/h against the model (terms excluded)
  * q31:         676 bytes of read-only data, 168 of them parameters; |error| <= 1.33e-03 deg/h against the model (terms excluded)
- * Options:     gtc_config.h: the smallest runtime that holds it
+ * Runtime:     gtc.h and gtc_<n>.c beside it, the smallest that holds it
  *
  * Make again:  gyrotc emit model.json --out .
  * Model:       sha256 f5d6b8c8dd72ef0d4317fc40534deed61797bf0d6e2268a4588ebc5adfdfb741

@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_test_c.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 2)
-#error "gtc_test_c.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_test_c.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -78,17 +74,8 @@ static const gtc_word_t f32_probes[32] = {
     V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
 };
 
-extern const struct gtc_f32_term_code gtc_f32_term_curve;
-
-extern const struct gtc_f32_term_code gtc_f32_term_product;
-
-/* by kind - 1 */
-static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
-    NULL, NULL, NULL, NULL, NULL, &gtc_f32_term_curve, &gtc_f32_term_product,
-};
-
 const gtc_f32_table_t gtc_test_c_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xb349a8ceUL,
@@ -97,6 +84,7 @@ const gtc_f32_table_t gtc_test_c_f32 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x000016c0UL,
     .fallback = V(0.375F),
     .authority = { V(-9.18306351F), V(9.26056099F) },
     .effect = { V(-7.18750048F), V(7.62500048F) },
@@ -120,8 +108,7 @@ const gtc_f32_table_t gtc_test_c_f32 = {
     .coverage = NULL,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0x68adc95cUL,
-    .term_code = f32_codes,
+    .crc = 0x562dd0d9UL,
 };
 
 /* ---- fixed point ---- */
@@ -182,17 +169,8 @@ static const gtc_word_t q31_probes[32] = {
     B(0x00500000UL), B(0x0000c000UL), B(0x004cea12UL), B(0x2UL),
 };
 
-extern const struct gtc_q31_term_code gtc_q31_term_curve;
-
-extern const struct gtc_q31_term_code gtc_q31_term_product;
-
-/* by kind - 1 */
-static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
-    NULL, NULL, NULL, NULL, NULL, &gtc_q31_term_curve, &gtc_q31_term_product,
-};
-
 const gtc_q31_table_t gtc_test_c_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0xb349a8ceUL,
@@ -201,6 +179,7 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
+    .parts = 0x000016c0UL,
     .fallback = 6291456L,
     .authority = { -154065983L, 155366313L },
     .effect = { -120586240L, 127926272L },
@@ -224,7 +203,6 @@ const gtc_q31_table_t gtc_test_c_q31 = {
     .coverage = NULL,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0xef5aaee4UL,
-    .term_code = q31_codes,
+    .crc = 0xbc730659UL,
 };
 

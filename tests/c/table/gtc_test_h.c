@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_test_h.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 2)
-#error "gtc_test_h.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=2 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_test_h.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -63,17 +59,8 @@ static const gtc_word_t f32_probes[32] = {
     V(80.0F), V(0.75F), V(0.297279328F), B(0x2UL),
 };
 
-extern const struct gtc_f32_term_code gtc_f32_term_harmonic;
-
-extern const struct gtc_f32_term_code gtc_f32_term_memory;
-
-/* by kind - 1 */
-static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
-    &gtc_f32_term_memory, NULL, NULL, &gtc_f32_term_harmonic, NULL, NULL, NULL,
-};
-
 const gtc_f32_table_t gtc_test_h_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x249b7146UL,
@@ -82,6 +69,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x00000412UL,
     .fallback = V(0.375F),
     .authority = { V(-70.3042145F), V(69.7087097F) },
     .effect = { V(-68.3639145F), V(68.3639145F) },
@@ -105,8 +93,7 @@ const gtc_f32_table_t gtc_test_h_f32 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = f32_probes,
-    .crc = 0xf72b950dUL,
-    .term_code = f32_codes,
+    .crc = 0x9e012742UL,
 };
 
 /* ---- fixed point ---- */
@@ -152,17 +139,8 @@ static const gtc_word_t q31_probes[32] = {
     B(0x00500000UL), B(0x0000c000UL), B(0x004c18a9UL), B(0x2UL),
 };
 
-extern const struct gtc_q31_term_code gtc_q31_term_harmonic;
-
-extern const struct gtc_q31_term_code gtc_q31_term_memory;
-
-/* by kind - 1 */
-static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
-    &gtc_q31_term_memory, NULL, NULL, &gtc_q31_term_harmonic, NULL, NULL, NULL,
-};
-
 const gtc_q31_table_t gtc_test_h_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x249b7146UL,
@@ -171,6 +149,7 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
+    .parts = 0x00000c12UL,
     .fallback = 6291456L,
     .authority = { -1179508867L, 1169517243L },
     .effect = { -1146956038L, 1146956038L },
@@ -194,7 +173,6 @@ const gtc_q31_table_t gtc_test_h_q31 = {
     .coverage = NULL,
     .sigma = NULL,
     .probes = q31_probes,
-    .crc = 0xce3674daUL,
-    .term_code = q31_codes,
+    .crc = 0x1522bd06UL,
 };
 

@@ -9,12 +9,8 @@
 
 #include <stddef.h>
 
-#if GTC_TABLE_LAYOUT != 2
-#error "gtc_test_t.c was written for table layout 2: emit it again with the gyrotc of this runtime"
-#endif
-
-#if (GTC_MAX_SLOPE_BLOCKS < 4) || (GTC_MAX_TERMS < 4)
-#error "gtc_test_t.c needs -DGTC_MAX_SLOPE_BLOCKS=4 -DGTC_MAX_TERMS=4 or more"
+#if GTC_TABLE_LAYOUT != 3
+#error "gtc_test_t.c was written for table layout 3: emit it again with the gyrotc of this runtime"
 #endif
 
 #define V(x) { .value = (x) } /* a float32 number */
@@ -83,21 +79,8 @@ static const gtc_word_t f32_probes[32] = {
     V(80.0F), V(0.75F), V(0.300446272F), B(0x2UL),
 };
 
-extern const struct gtc_f32_term_code gtc_f32_term_memory;
-
-extern const struct gtc_f32_term_code gtc_f32_term_play;
-
-extern const struct gtc_f32_term_code gtc_f32_term_warm_up;
-
-extern const struct gtc_f32_term_code gtc_f32_term_auxiliary;
-
-/* by kind - 1 */
-static const struct gtc_f32_term_code *const f32_codes[GTC_N_KINDS] = {
-    &gtc_f32_term_memory, &gtc_f32_term_play, &gtc_f32_term_warm_up, NULL, &gtc_f32_term_auxiliary, NULL, NULL,
-};
-
 const gtc_f32_table_t gtc_test_t_f32 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x309a2d09UL,
@@ -106,6 +89,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 0UL,
+    .parts = 0x0000162eUL,
     .fallback = V(0.375F),
     .authority = { V(-4.02148485F), V(3.66148233F) },
     .effect = { V(-2.0259223F), V(2.0259223F) },
@@ -129,8 +113,7 @@ const gtc_f32_table_t gtc_test_t_f32 = {
     .coverage = NULL,
     .sigma = f32_sigma,
     .probes = f32_probes,
-    .crc = 0xaf383b86UL,
-    .term_code = f32_codes,
+    .crc = 0x36644630UL,
 };
 
 /* ---- fixed point ---- */
@@ -196,21 +179,8 @@ static const gtc_word_t q31_probes[32] = {
     B(0x00500000UL), B(0x0000c000UL), B(0x004cea12UL), B(0x2UL),
 };
 
-extern const struct gtc_q31_term_code gtc_q31_term_memory;
-
-extern const struct gtc_q31_term_code gtc_q31_term_play;
-
-extern const struct gtc_q31_term_code gtc_q31_term_warm_up;
-
-extern const struct gtc_q31_term_code gtc_q31_term_auxiliary;
-
-/* by kind - 1 */
-static const struct gtc_q31_term_code *const q31_codes[GTC_N_KINDS] = {
-    &gtc_q31_term_memory, &gtc_q31_term_play, &gtc_q31_term_warm_up, NULL, &gtc_q31_term_auxiliary, NULL, NULL,
-};
-
 const gtc_q31_table_t gtc_test_t_q31 = {
-    .layout = 2,
+    .layout = 3,
     .quantity = 0UL,
     .unit = 0UL,
     .id = 0x309a2d09UL,
@@ -219,6 +189,7 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .slope_blocks = 4UL,
     .lead_blocks = 0UL,
     .bias_frac_bits = 24UL,
+    .parts = 0x0000162eUL,
     .fallback = 6291456L,
     .authority = { -67469075L, 61429373L },
     .effect = { -33989333L, 33989333L },
@@ -242,7 +213,6 @@ const gtc_q31_table_t gtc_test_t_q31 = {
     .coverage = NULL,
     .sigma = q31_sigma,
     .probes = q31_probes,
-    .crc = 0xdfb784b2UL,
-    .term_code = q31_codes,
+    .crc = 0xec85fac5UL,
 };
 

@@ -182,7 +182,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     changes = json.loads((tmp_path / "two" / "changes.json").read_text())
     assert changes["map"]["mean_dph"] == pytest.approx(0.01, rel=1e-3)
     assert changes["recordings"]["other_bytes"] == ["run-01.csv"]
-    assert "c/gtc_rlg_1.c" in changes["files"]["other_bytes"] and "c/gtc.c" not in changes["files"]["other_bytes"]
+    assert "c/gtc_rlg_1.c" in changes["files"]["other_bytes"]
     assert "maps 0.0100 deg/h RMS difference" in done.stdout
     assert "V(-55.0F), V(85.0F), " in (tmp_path / "two" / "c" / "gtc_rlg_1.c").read_text()
     assert json.loads((tmp_path / "two" / "model.json").read_text())["q31_bias_frac_bits"] == 30
@@ -190,7 +190,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert json.loads((tmp_path / "two" / "model.json").read_text())["left_out"] == [
         "uncertainty", "rezero", "image"
     ]  # fmt: skip
-    assert "#define GTC_WITH_IMAGE 0" in (tmp_path / "two" / "c" / "gtc_config.h").read_text()
+    assert "gtc_f32_open" not in (tmp_path / "two" / "c" / "gtc_f32.c").read_text()
     found = changes["as_found"]
     assert found["judged_on"] == "train" and found["limits"]["met"] is True
     assert found["figures"]["after"]["mean_dph"] == pytest.approx(0.01, rel=0.05), "the old map on new rows"

@@ -43,7 +43,7 @@ from gyrotc.pages import Panel, drawing, report
 from gyrotc.pages import write_diagnosis_page as write_page
 from gyrotc.recordings import Problems, dataset_toml, load, parse_description
 from gyrotc.results import Diagnosed, Estimate, FleetEntry, VerifiedTarget, checked_result
-from gyrotc.tables import emit_texts, quantise_all
+from gyrotc.tables import NUMERICS, emit_texts, quantise_all
 from gyrotc.verify import checked_sources, table_files, verify
 from hostile import hostile_strings
 
@@ -106,8 +106,8 @@ def test_no_field_of_a_model_reaches_the_compiler(model_dict: dict[str, Any], tm
             assert name.endswith((".bin", ".h", ".c")) or content.isascii()
         work = tmp_path / "work"
         work.mkdir(exist_ok=True)
-        checked_sources(c, work, table_files(model))  # the grammar of what is compiled accepts it
-        sources = [str(c / n) for n in texts if n.endswith(".c") and n != "gtc.c"]
+        checked_sources(c, work, table_files(c, model, NUMERICS))  # the grammar of what is compiled accepts it
+        sources = [str(c / n) for n in texts if n.endswith(".c") and n not in ("gtc_f32.c", "gtc_q31.c")]
         done = subprocess.run([*GCC, *sources], cwd=c, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:2000]
         code = re.sub(r"/\*.*?\*/", "", texts["gtc_rlg_0042.h"].decode("ascii"), flags=re.DOTALL)
@@ -589,7 +589,7 @@ def test_columns_of_a_recording_are_reported_as_they_are(tmp_path: Path, model_d
     texts = emit_texts(model, quantise_all(model, ["f32"]))
     for name, content in texts.items():
         (tmp_path / name).write_bytes(content)
-    assert checked_sources(tmp_path, tmp_path, table_files(model)) == tmp_path
+    assert checked_sources(tmp_path, tmp_path, table_files(tmp_path, model, NUMERICS)) == tmp_path
 
 
 # ---- file names and terminals ----

@@ -24,7 +24,7 @@ from gyrotc.mirror import (
 from gyrotc.mirror import table as layout
 from gyrotc.model import Term
 from gyrotc.tables.quantisation import NUMERICS, _limits, outside, quantise
-from libc_build import ROOT, UNGUARDED, runtime
+from libc_build import ROOT, runtime
 from models import bank_of, bank_with_channels, random_history, random_model, random_terms
 
 COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
@@ -76,9 +76,9 @@ def test_a_play_of_one_strength_is_what_it_was(numeric: str) -> None:
         outcome = TermOutcome(x, np.zeros_like(x), np.zeros_like(x), np.zeros(5, dtype=np.int32))
         recursions_of_table(table)[0].apply(Course(x, np.arange(5) > 0, np.arange(5)), None, outcome)
         added.append(outcome.added * unit)
-    assert added[1][[2, 4]] == pytest.approx(added[0][[2, 4]]), "at the reference"
-    assert added[1][1] == pytest.approx(added[0][1] * (1e-3 + 8.0 * 2e-5) / 1e-3, rel=1e-4)
-    assert added[1][3] == pytest.approx(added[0][3] * (1e-3 - 8.0 * 2e-5) / 1e-3, rel=1e-4)
+    assert added[1][[2, 4]] == pytest.approx(added[0][[2, 4]], abs=2e-6), "at the reference"
+    assert added[1][1] == pytest.approx(added[0][1] * (1e-3 + 8.0 * 2e-5) / 1e-3, rel=1e-4, abs=2e-6)
+    assert added[1][3] == pytest.approx(added[0][3] * (1e-3 - 8.0 * 2e-5) / 1e-3, rel=1e-4, abs=2e-6)
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
@@ -143,13 +143,8 @@ def test_self_test_finds_a_changed_weight_by_its_checksum_and_a_changed_probe_by
     assert c.check(replace(table, probes=probes)) == -3
 
 
-def test_the_sources_forbid_fused_multiply_add_whatever_the_flags() -> None:
-    fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma"))
-    assert fused.check(quantise(random_model(0), "f32")) == 0
-
-
 def test_self_test_finds_fused_multiply_add() -> None:
-    fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma", *UNGUARDED))
+    fused = runtime("gcc", ("-O2", "-ffp-contract=fast", "-mfma"))
     assert fused.check(quantise(random_model(0), "f32")) == -3
 
 
@@ -204,12 +199,12 @@ def test_generator_and_runtime_refuse_the_same_tables(numeric: str) -> None:
     for model in _models():
         table = quantise(model, numeric)
         assert outside(table) is None
-        assert runtime().check(table) == 0
+        assert runtime().check_words(table) == 0
         for _ in range(500):
             spoiled = _spoiled(rng, table)
-            reason, status = outside(spoiled), runtime().check(spoiled)
+            reason, status = outside(spoiled), runtime().check_words(spoiled)
             assert (status == LAYOUT) == (reason is not None), (reason, status, spoiled)
-            assert status in (0, LAYOUT, SELF_TEST)
+            assert status in (0, LAYOUT)
             refused, taken = refused + (reason is not None), taken + (reason is None)
     assert min(refused, taken) > 100
 
@@ -233,7 +228,7 @@ def test_every_range_stands_in_the_documentation() -> None:
 
 
 def _flat(numeric: str) -> list[tuple[str, float, float]]:
-    return [row for part in _limits(numeric) for row in part]
+    return [row for part in _limits(numeric, 24) for row in part]
 
 
 def _range(least: float, most: float) -> str:

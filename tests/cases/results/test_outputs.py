@@ -442,7 +442,7 @@ def test_emit_writes_into_a_folder_of_its_own(made: Path, tmp_path: Path, gyrotc
     out = tmp_path / "gyro"
     for _ in range(2):
         assert gyrotc("emit", made / "result", "--out", out, "--numeric", "f32").returncode == 0
-    assert (out / "c" / "gtc.c").is_file()
+    assert (out / "c" / "gtc_f32.c").is_file()
     (out / "c" / "main.c").write_text("edited")
     refused(gyrotc, tmp_path, "emit", made / "result", "--out", out, reported="c/main.c")
 

@@ -144,11 +144,11 @@ def shifts(numeric: str, between: float, offsets: np.ndarray, seed: int) -> np.n
         device.steps(state, channels, np.zeros(len(channels)))
         rate = offset + noise * rng.normal()
         given = number(rate if numeric == "f32" else round(rate * unit))
-        assert device.function("rezero")(state, given, ctypes.c_uint32(REST_S)) >= 0
+        assert device.function("rezero")(state, ctypes.byref(device.struct), given, ctypes.c_uint32(REST_S)) >= 0
         moved = [number(), number()]
-        assert device.function("bias")(state, ctypes.byref(moved[0])) >= 0
-        assert device.function("rezero")(state, number(), ctypes.c_uint32(0)) == 0
-        assert device.function("bias")(state, ctypes.byref(moved[1])) >= 0
+        assert device.function("bias")(state, ctypes.byref(device.struct), ctypes.byref(moved[0])) >= 0
+        assert device.function("rezero")(state, ctypes.byref(device.struct), number(), ctypes.c_uint32(0)) == 0
+        assert device.function("bias")(state, ctypes.byref(device.struct), ctypes.byref(moved[1])) >= 0
         found.append((moved[0].value - moved[1].value) / unit)
     return np.array(found)
 

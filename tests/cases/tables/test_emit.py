@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 import subprocess
 import sys
@@ -18,10 +17,7 @@ from gyrotc.common import CheckFailed, InputError
 from gyrotc.mirror import MAGIC, Table, evaluate_map, gauss
 from gyrotc.model import Guard, Model, Term, load_model
 from gyrotc.tables import (
-    COSTS,
     NUMERICS,
-    SWITCHES,
-    config_text,
     emit,
     emit_texts,
     joint_needs,
@@ -29,11 +25,12 @@ from gyrotc.tables import (
     quantise,
     quantise_all,
     rms_growth,
+    runtime_texts,
 )
 from models import random_model
 
 # The runtime beside the tables is a copy of libc/, which its own tests hold.
-RUNTIME = {"gtc.h", "gtc.c", "emission.json"}  # the record has the hashes of the other two
+RUNTIME = {"gtc.h", "gtc_f32.c", "gtc_q31.c", "emission.json"}  # the record has the hashes of the others
 
 
 def _golden_texts() -> dict[str, bytes]:
@@ -85,7 +82,7 @@ def test_main_compiles_as_it_stands_and_prints_the_bias_of_the_model(tmp_path: P
     emit(model, tmp_path)
     c = tmp_path / "c"
     program = tmp_path / "main"
-    sources = [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"]
+    sources = [c / "main.c", c / "gtc_f32.c", c / f"gtc_{model.id}.c"]
     flags = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror"]
     subprocess.run(["gcc", *flags, "-o", program, *sources], check=True)
     printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
@@ -123,7 +120,7 @@ def test_main_prints_no_wild_correction_whatever_a_channel_reads(reading: str, t
     longer, turns = re.subn(r"k < \d+;", "k < 2100;", fed)  # two blocks of 10 s
     assert turns == 1
     (c / "main.c").write_text(longer, "ascii")
-    sources = [c / "main.c", c / "gtc.c", c / f"gtc_{model.id}.c"]
+    sources = [c / "main.c", c / "gtc_f32.c", c / f"gtc_{model.id}.c"]
     subprocess.run(["gcc", "-std=c99", "-ffp-contract=off", "-w", "-o", tmp_path / "main", *sources], check=True)
     printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
     temperature, bias = float(printed.split()[2]), float(printed.split()[4])
@@ -167,10 +164,11 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
     model.save(tmp_path / "model.json")
     out = tmp_path / "result"
     assert gyrotc("emit", tmp_path / "model.json", "--out", out).returncode == 0
-    config = (out / "c" / "gtc_config.h").read_text()
-    for part in LEFT_OUT:
-        assert f"#define {SWITCHES[part]} 0\n" in config, part
-    assert f"#define GTC_MAX_SLOPE_BLOCKS {model.slope_blocks}\n" in config
+    runtime = "".join((out / "c" / name).read_text() for name in ("gtc.h", "gtc_f32.c", "gtc_q31.c"))
+    code = re.sub(r"/\*.*?\*/", "", runtime, flags=re.DOTALL)
+    for absent in ("_snapshot(", "_rezero(", "_open(", "_save(", "_restore(", "UNCOVERED;", "probes_agree"):
+        assert absent not in code, absent
+    assert f"#define GTC_MAX_SLOPE_BLOCKS {model.slope_blocks}\n" in runtime
     header = (out / "c" / "gtc_sim_0003.h").read_text()
     assert " * Left out:    uncertainty, rezero, coverage, known answers, image, saved state, time" in header
     done = gyrotc("verify", out, "--target", "host-gcc-O2")
@@ -181,22 +179,12 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
     assert checked.returncode == 0, checked.stdout
 
 
-def test_the_options_of_several_tables_are_those_of_all(tmp_path: Path) -> None:
+def test_the_runtime_of_several_tables_has_what_each_needs() -> None:
     one, other = random_model(3), random_model(4).model_copy(update={"left_out": ("image", "time")})
-    both = config_text(joint_needs([needs_of(one), needs_of(other)])).decode()
-    assert "#define GTC_WITH_IMAGE 1\n" in both
-    assert f"#define GTC_MAX_SLOPE_BLOCKS {max(one.slope_blocks, other.slope_blocks)}\n" in both
-    assert "#define GTC_WITH_TIME 0\n" in config_text(needs_of(other)).decode()
-
-
-def test_the_costs_of_options_are_those_of_all_three_cores() -> None:
-    """Flash, RAM and stack of every option, for M0, M4F and M7 at -Os and -O2: `make bench ONLY=runtime`."""
-    costs = json.loads(COSTS.read_text())
-    assert costs["columns"] == [f"M{core} {level}" for core in ("0", "4F", "7") for level in ("-Os", "-O2")]
-    assert {"GTC_MAX_SLOPE_BLOCKS", "GTC_MAX_TERMS", "GTC_WITH_BANK", *SWITCHES.values()} == {
-        row["option"] for row in costs["rows"]
-    }
-    assert all(len(row["cells"]) == 6 and row["cells"][0][1] >= 0 for row in costs["rows"])
+    both = runtime_texts(joint_needs([needs_of(one), needs_of(other)]), NUMERICS)
+    assert b"gtc_f32_open(" in both["gtc.h"] and b"gtc_q31_open(" in both["gtc_q31.c"]
+    assert f"#define GTC_MAX_SLOPE_BLOCKS {max(one.slope_blocks, other.slope_blocks)}\n".encode() in both["gtc.h"]
+    assert b"gtc_f32_open(" not in runtime_texts(needs_of(other), NUMERICS)["gtc.h"]
 
 
 def test_a_serial_cannot_break_out_of_its_comment(model_dict: dict[str, Any]) -> None:
@@ -259,12 +247,12 @@ def test_an_unknown_arithmetic_is_refused() -> None:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_the_words_are_those_of_layout_2(numeric: str) -> None:
+def test_the_words_are_those_of_layout_3(numeric: str) -> None:
     model = random_model(4)
     table = quantise(model, numeric)
     words = table.words
     assert words[0] == MAGIC
-    assert words[1] == 2 + 65536 * {"f32": 1, "q31": 2}[numeric]
+    assert words[1] == 3 + 65536 * {"f32": 1, "q31": 2}[numeric]
     assert words[2] == len(words)
     assert words[5] == table.id == zlib.crc32(b"rlg_4")
     assert words[-1] == zlib.crc32(np.array(words[1:-1], dtype="<u4").tobytes())
@@ -288,16 +276,18 @@ def _scaled(model_dict: dict[str, Any], factor: float, **fields: Any) -> Model:
 
 
 def test_the_unit_of_fixed_point_does_not_follow_the_weights(model_dict: dict[str, Any]) -> None:
-    """A calibration whose weights differ by a third has the unit of the one before: 2^-32 deg/h, where that holds."""
-    found = [quantise(_scaled(model_dict, k), "q31").bias_frac_bits for k in (0.4, 0.5, 0.75, 1.0, 1.33)]
-    assert found == [32] * 5
+    """Every calibration of a product has the unit of the one before, or none that another firmware would take."""
+    found = [quantise(_scaled(model_dict, k), "q31").bias_frac_bits for k in (0.4, 1.0, 1.33, 20.0)]
+    assert found == [24] * 4
+    with pytest.raises(CheckFailed, match="state a smaller q31_bias_frac_bits"):
+        quantise(_scaled(model_dict, 1e4), "q31")
 
 
 def test_there_is_room_for_a_re_zero_in_fixed_point(model_dict: dict[str, Any]) -> None:
-    """The largest shift counts in the choice of the unit: no table is left out because of it."""
     table = quantise(_scaled(model_dict, 1.0, rezero_dph=0.9), "q31")
-    assert table.bias_frac_bits == 28
-    assert table.decode_bias([table.rezero])[0] == pytest.approx(0.9, abs=1e-8)
+    assert table.decode_bias([table.rezero])[0] == pytest.approx(0.9, abs=1e-7)
+    with pytest.raises(CheckFailed, match="re-zero"):
+        quantise(_scaled(model_dict, 1.0, rezero_dph=64.0), "q31")
 
 
 def test_the_unit_that_a_product_states_is_the_table_s(model_dict: dict[str, Any]) -> None:

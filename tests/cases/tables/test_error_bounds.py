@@ -136,7 +136,7 @@ def _added(recursion: Recursion, mean: NDArray[Any], t: NDArray[Any]) -> Array:
 
 def _two(overlap: float, *, first: float = 0.0, last: float = 1.0, step: float = 1.0) -> Model:
     """Two constants `step` deg/h, whose regions overlap by a part of the envelope; edges as parts of it."""
-    model = random_model(3, coverage=None)
+    model = random_model(3, coverage=None, q31_bias_frac_bits=20)
     t0, t1 = model.envelope.temperature_c
 
     def part(low: float, high: float, w0: float) -> Network:

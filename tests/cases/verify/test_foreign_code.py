@@ -70,7 +70,7 @@ PLANTED = {
     "code in the header": ("gtc_rlg_0042.h", r'#include "gtc.h"', '#include "gtc.h"\n' + CALL.strip()),
     "code in the vectors": ("vectors_rlg_0042.h", r"#include <stdint.h>", "#include <stdint.h>\n" + CALL.strip()),
     "a call as a vector": ("vectors_rlg_0042.h", r"(?m)^(    \{ 0x[0-9a-f]*UL)", r"\1 + system(0)"),
-    "code in the runtime": ("gtc.c", r"\Z", CALL),
+    "code in the runtime": ("gtc_f32.c", r"\Z", CALL),
     "code in the runtime's header": ("gtc.h", r"\Z", CALL),
     "code in the board test": (
         "board_test.c",
@@ -121,17 +121,17 @@ def test_what_the_emitter_writes_is_accepted(tmp_path: Path) -> None:
             n_channels = next(iter(emission.tables.values())).n_channels
             work = folder / "work"
             work.mkdir()
-            files = board_files(model, tuple(emission.tables), n_channels)
+            files = board_files(folder / "c", model, tuple(emission.tables), n_channels)
             assert checked_sources(folder / "c", work, files) == work
             assert {p.name for p in work.iterdir()} == set(files)
 
 
 def test_a_caller_in_python_may_trust_code(whole: Path, tmp_path: Path, gyrotc: Command) -> None:
     copy = Path(shutil.copytree(whole, tmp_path / "copy"))
-    with (copy / "c" / "gtc.c").open("a") as file:
+    with (copy / "c" / "gtc_f32.c").open("a") as file:
         file.write("/* ported to our compiler */\n")
     refused = gyrotc("verify", copy, "--target", FAST)
-    assert refused.returncode == 1 and "gtc.c is not what gyrotc makes" in refused.stdout
+    assert refused.returncode == 1 and "gtc_f32.c is not what gyrotc makes" in refused.stdout
     trusted = verify(copy, targets=[FAST], trust_code=True)
     assert trusted.failed == 1 and {entry.status for entry in trusted.targets} == {"pass"}
 

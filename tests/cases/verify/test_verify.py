@@ -102,7 +102,8 @@ def test_a_program_that_stops_half_way_is_no_pass(copy: Path) -> None:
 
 
 def test_code_that_does_not_compile_is_no_pass(copy: Path) -> None:
-    spoil(copy / "c" / "gtc.c", r"\bGTC_E_LAYOUT;", "GTC_E_LAYOUT + nonsense;")
+    for numeric in ("f32", "q31"):
+        spoil(copy / "c" / f"gtc_{numeric}.c", r"\bGTC_E_LAYOUT;", "GTC_E_LAYOUT + nonsense;")
     for entry in entries(copy, FAST).values():
         assert entry["status"] == "fail" and "nonsense" in entry["error"]
 
@@ -129,7 +130,8 @@ def test_recordings_are_streamed_to_every_target_that_reads(copy: Path, tmp_path
     for entry in verify(copy, targets=names, dataset=dataset).content()["targets"]:
         assert entry["status"] == "pass"
         assert entry["replayed"] == {"runs": 2, "rows": 1714, "mismatches": 0, "first_mismatches": []}
-    spoil(copy / "c" / "gtc.c", r"#define GUARD_AGREE 4U", "#define GUARD_AGREE 5U", count=0)
+    for numeric in ("f32", "q31"):
+        spoil(copy / "c" / f"gtc_{numeric}.c", r"#define GUARD_AGREE 4U", "#define GUARD_AGREE 5U")
     for entry in verify(copy, targets=[FAST], dataset=dataset, trust_code=True).content()["targets"]:
         assert entry["status"] == "fail" and entry["mismatches"] > 0
 
@@ -167,7 +169,7 @@ def _board_output(folder: Path, *defines: str) -> str:
     work = folder / "work"
     work.mkdir(exist_ok=True)
     c = folder / "c"
-    sources = [c / "board_test.c", c / "gtc.c", c / "gtc_rlg_0042.c"]
+    sources = [c / "board_test.c", c / "gtc_f32.c", c / "gtc_q31.c", c / "gtc_rlg_0042.c"]
     compile_c(target, sources, work / "board", include=c, defines=defines)
     return run_program(target, work / "board").stdout.decode("ascii")
 
@@ -273,7 +275,7 @@ def _hex_with_another_weight(c: Path) -> None:
 def _at_start(function: str, statement: str) -> Spoil:
     """A statement put at the start of a function of the runtime."""
     head = rf"(int gtc_f32_{function}\([^;{{]*\{{\n)"
-    return lambda c: spoil(c / "gtc.c", head, rf"\1    {statement}\n")
+    return lambda c: spoil(c / "gtc_f32.c", head, rf"\1    {statement}\n")
 
 
 def _id_in_header(c: Path) -> None:
@@ -289,12 +291,12 @@ TAMPERED: dict[str, tuple[str, Spoil]] = {
     "bound in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", r"<= 1\.\d+e-0", "<= 1.00e-1")),
     "serial in table": ("gtc_rlg_0042.c", lambda c: spoil(c / "gtc_rlg_0042.c", "0x32343030UL", "0x33343030UL")),
     "vectors made fewer": ("vectors_rlg_0042.h", lambda c: spoil(c / "vectors_rlg_0042.h", "20000UL", "2UL")),
-    "open accepts anything": ("gtc.c", _at_start("open", "return GTC_OK;")),
-    "blind check": ("gtc.c", _at_start("check", "return GTC_OK;")),
-    "restore takes foreign states": ("gtc.c", _at_start("restore", "return GTC_OK;")),
+    "open accepts anything": ("gtc_f32.c", _at_start("open", "return GTC_OK;")),
+    "blind check": ("gtc_f32.c", _at_start("check", "return GTC_OK;")),
+    "restore takes foreign states": ("gtc_f32.c", _at_start("restore", "return GTC_OK;")),
     "angle loses its remainder": (
-        "gtc.c",
-        lambda c: spoil(c / "gtc.c", r"(int gtc_q31_angle\([^;{]*\{\n)", r"\1    return GTC_OK;\n"),
+        "gtc_q31.c",
+        lambda c: spoil(c / "gtc_q31.c", r"(int gtc_q31_angle\([^;{]*\{\n)", r"\1    return GTC_OK;\n"),
     ),
     "manual of the runtime": ("gtc.h", lambda c: spoil(c / "gtc.h", "GTC_CLAMPED", "GTC_CLAMPED ")),
     "options in the record": (

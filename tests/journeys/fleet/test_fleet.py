@@ -19,8 +19,10 @@ import pytest
 from conftest import Command
 from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet, write_summary
 from gyrotc.results import FleetEntry, Marker, result_faults, write_marker
+from gyrotc.tables import needs_of
 from gyrotc.train import FitOptions
 from gyrotc.verify import verify
+from models import random_model
 from recordings import columns, toml, write_csv
 
 HEAD = 'schema = 1\nserial = "{}"\nearth_rate = "none"'
@@ -87,8 +89,12 @@ def test_a_gyro_takes_80_kilobytes_beside_one_runtime_for_all(fleet: Path) -> No
         files = [path for path in (fleet / name).rglob("*") if path.is_file()]
         assert sum(path.stat().st_size for path in files) <= 80_000
         names = [path.name for path in files]
-        assert not [name for name in names if name.startswith(("gtc.", "vectors_")) or name.endswith((".html", ".hex"))]
-    assert sorted(path.name for path in (fleet / "runtime").glob("gtc*")) == ["gtc.c", "gtc.h", "gtc_config.h"]
+        assert not [
+            name
+            for name in names
+            if name.startswith(("gtc.", "gtc_f32.", "gtc_q31.", "vectors_")) or name.endswith((".html", ".hex"))
+        ]
+    assert sorted(path.name for path in (fleet / "runtime").glob("gtc*")) == ["gtc.h", "gtc_f32.c", "gtc_q31.c"]
     assert result_faults(fleet / "runtime") == []
 
 
@@ -97,7 +103,7 @@ def test_a_gyro_of_a_fleet_is_verified_with_the_shared_runtime(fleet: Path, gyro
     assert done.returncode == 0, done.stdout + done.stderr
     verified = json.loads((fleet / "RLG-1" / "verify.json").read_text())
     assert {entry["status"] for entry in verified["targets"]} == {"pass"}
-    assert {"../../runtime/gtc.c", "../../runtime/gtc.h", "../../runtime/gtc_config.h"} < {
+    assert {"../../runtime/gtc.h", "../../runtime/gtc_f32.c", "../../runtime/gtc_q31.c"} < {
         entry["file"] for entry in verified["emitted"]
     }
 
@@ -105,9 +111,9 @@ def test_a_gyro_of_a_fleet_is_verified_with_the_shared_runtime(fleet: Path, gyro
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("gtc.c", b"gtc_f32_map(", b"gtc_f32_Map("),
-        ("gtc_config.h", b"GTC_MAX_SLOPE_BLOCKS ", b"GTC_MAX_SLOPE_BLOCKS 0"),
-        ("gtc_config.h", b"#endif", b"#endif\nint x;"),
+        ("gtc_f32.c", b"gtc_f32_map(", b"gtc_f32_Map("),
+        ("gtc.h", b"GTC_MAX_SLOPE_BLOCKS ", b"GTC_MAX_SLOPE_BLOCKS 0"),
+        ("gtc.h", b"#endif", b"#endif\nint x;"),
     ],
 )
 def test_a_changed_runtime_fails_the_gyros_that_share_it(
@@ -126,7 +132,7 @@ def test_a_folder_that_was_taken_out_of_its_fleet_lacks_the_runtime(
 ) -> None:
     shutil.copytree(fleet / "RLG-1", tmp_path / "elsewhere" / "RLG-1")
     done = gyrotc("verify", tmp_path / "elsewhere" / "RLG-1", "--target", "host-gcc-O2")
-    assert done.returncode == 1 and "../../runtime/gtc.c: missing" in done.stdout
+    assert done.returncode == 1 and "../../runtime/gtc_f32.c: missing" in done.stdout
     emitted = gyrotc("emit", fleet / "RLG-1" / "model.json", "--out", tmp_path / "complete")
     assert emitted.returncode == 0, emitted.stderr
     done = gyrotc("verify", tmp_path / "complete", "--target", "host-gcc-O2")
@@ -134,13 +140,14 @@ def test_a_folder_that_was_taken_out_of_its_fleet_lacks_the_runtime(
 
 
 def test_the_options_of_the_shared_runtime_hold_every_gyro(tmp_path: Path) -> None:
-    needs = ({"GTC_MAX_TERMS": 0, "GTC_WITH_BANK": 1}, {"GTC_MAX_TERMS": 2, "GTC_WITH_BANK": 0})
+    least = dict.fromkeys(needs_of(random_model(1)), 0) | {"GTC_MAX_SLOPE_BLOCKS": 10, "GTC_BIAS_FRAC_BITS": 24}
+    needs = (least | {"GTC_WITH_BANK": 1}, least | {"GTC_MAX_TERMS": 2, "GTC_WITH_PLAY": 1})
     write_summary(
         tmp_path,
         [FleetEntry(name=f"u{k}", axis=None, status="done", runtime_options=one) for k, one in enumerate(needs)],
     )
-    config = (tmp_path / "runtime" / "gtc_config.h").read_text()
-    assert "#define GTC_MAX_TERMS 2\n" in config and "#define GTC_WITH_BANK 1\n" in config
+    header = (tmp_path / "runtime" / "gtc.h").read_text()
+    assert "#define GTC_MAX_TERMS 2\n" in header and "bank, play" in header
 
 
 def test_the_page_of_a_gyro_is_drawn_when_it_is_asked_for(fleet: Path, gyrotc: Command) -> None:
