@@ -76,7 +76,6 @@ class Judged:
         split: Which.
         axis: Of its sensor.
         method: What was emitted.
-        t: Of the gain over a constant, over pieces of history; 0 where there is none.
         rms_dph: What it leaves on the part left out, deg/h.
         trivial_dph: What the trivial corrections leave there, deg/h.
         verdict: Of the diagnosis; the name of an exception where it ended in one.
@@ -86,7 +85,6 @@ class Judged:
     split: Split
     axis: str
     method: str
-    t: float
     rms_dph: float
     trivial_dph: dict[str, float]
     verdict: str
@@ -180,10 +178,9 @@ def judged(split: Split) -> Iterator[Judged]:
         trivial = {}
         for name in TRIVIAL:
             trivial[name] = _rms(exam, of_trivial(train, name, exam))
-        t = next((row.t or 0.0 for row in fitted.training.candidates if row.chosen), 0.0)
         model = fitted.model
         left = _rms(exam, model.map_dph(exam.temperature_c, exam.slope_c_per_min))
-        yield Judged(split, axis, model.method, t, left, trivial, *extended(dataset))
+        yield Judged(split, axis, model.method, left, trivial, *extended(dataset))
 
 
 def extended(dataset: Dataset) -> tuple[str, tuple[float, float] | None]:
@@ -265,7 +262,6 @@ def measure(settings: Settings) -> Record:
             "left_out": row.split.left_out,
             "axis": row.axis,
             "method": row.method,
-            "t": row.t,
             "rms_dph": row.rms_dph,
             "trivial_dph": row.trivial_dph,
             "verdict": row.verdict,

@@ -22,7 +22,7 @@ from gyrotc.assess import evaluate
 from gyrotc.common import average_rows
 from gyrotc.recordings import axes_of, load
 from gyrotc.tables import emit
-from gyrotc.train import FitOptions, fit_dataset, front_end, samples_of, training_spans
+from gyrotc.train import FitOptions, fit_dataset, folds, front_end, samples_of
 from matplotlib.figure import Figure
 
 from ..paper.experiment import AFTER, BEFORE, png
@@ -85,15 +85,16 @@ def _spans_out(source: Path, work: Path) -> Iterator[Case]:
     _described(plain, source.name, [data], ['power_on_s = "unknown"'])
     runs = load(plain, axis=axes_of(plain)[0]).runs
     front = front_end(runs, BLOCK_S)
-    spans = training_spans(runs, samples_of(front.blocks(runs[0]), front.block_s, 0))
-    for k, span in enumerate(spans):
+    pieces = folds(samples_of(front.blocks(runs[0]), front.block_s, 0))
+    for k, fold in enumerate(pieces):
+        [span] = fold.spans
         folder = work / f"{source.name}-data-{k}"
         before, after = f"to_s = {span.from_s!r}", f"from_s = {span.to_s!r}"
         held = f'from_s = {span.from_s!r}\nto_s = {span.to_s!r}\nrole = "exam"'
-        parts = [*([before] if k else []), held, *([after] if k + 1 < len(spans) else [])]
+        parts = [*([before] if k else []), held, *([after] if k + 1 < len(pieces) else [])]
         _described(folder, source.name, [data] * len(parts), parts)
-        label = f"{span.kind} {span.from_s:.0f} ... {span.to_s:.0f} s"
-        yield Case(source.name, label, folder, source.name in PLOTTED and k + 1 == len(spans))
+        label = f"{fold.kind} {span.from_s:.0f} ... {span.to_s:.0f} s"
+        yield Case(source.name, label, folder, source.name in PLOTTED and k + 1 == len(pieces))
 
 
 def _runs_out(source: Path, work: Path) -> Iterator[Case]:

@@ -7,10 +7,8 @@
 
 #include <memory>
 
-#include "evidence.hpp"
 #include "equal_gaussians.hpp"
 #include "kohonen.hpp"
-#include "mixed.hpp"
 #include "ols.hpp"
 #include "posteriors.hpp"
 #include "varpro.hpp"
@@ -26,18 +24,6 @@ namespace {
 void same_length(std::initializer_list<Eigen::Index> sizes) {
     for (const Eigen::Index n : sizes)
         if (n != *sizes.begin()) throw nb::value_error("arrays differ in length");
-}
-
-Bins bins(VectorXd t, VectorXd r, VectorXd count, VectorXd mean, double within, double samples) {
-    same_length({t.size(), r.size(), count.size(), mean.size()});
-    return {std::move(t), std::move(r), std::move(count), std::move(mean), within, samples};
-}
-
-MixedMeans mixed_means(const MatrixXd &columns, VectorXd y, VectorXd count, VectorXd time_s, const Eigen::VectorXi &power_on,
-                       const Eigen::VectorXi &group) {
-    same_length({columns.rows(), y.size(), count.size(), time_s.size(), power_on.size(), group.size()});
-    if (columns.cols() != kMixedColumns) throw nb::value_error("columns: five are wanted");
-    return {columns, std::move(y), std::move(count), std::move(time_s), power_on, group};
 }
 
 Samples samples(VectorXd t, VectorXd r, VectorXd y, VectorXd weight) {
@@ -63,7 +49,7 @@ nb::ndarray<nb::numpy, T, nb::ndim<1>> array_of(std::vector<T> numbers) {
 }  // namespace
 
 NB_MODULE(_core, m) {
-    m.doc() = "C++ core of gyrotc: Kohonen network, evidence model, variable projection.";
+    m.doc() = "C++ core of gyrotc: Kohonen network, orthogonal least squares, variable projection.";
 #if defined(__clang__)
     m.attr("compiler") = __VERSION__;
 #elif defined(__GNUC__)
@@ -84,48 +70,6 @@ NB_MODULE(_core, m) {
         },
         "samples"_a, "nodes"_a, nb::kw_only(), "max_epochs"_a = 30, "rate_first"_a = 0.5, "rate_last"_a = 0.005,
         "tolerance"_a = 1e-4, "neighbourhood"_a = 0.0, "seed"_a = 0);
-
-    nb::class_<EvidenceModel>(m, "EvidenceModel")
-        .def(
-            "__init__",
-            [](EvidenceModel *self, VectorXd t, VectorXd r, VectorXd count, VectorXd mean, double within,
-               double samples, double least_sigma) {
-                new (self) EvidenceModel(bins(std::move(t), std::move(r), std::move(count), std::move(mean), within,
-                                              samples),
-                                         least_sigma);
-            },
-            "t"_a, "r"_a, "count"_a, "mean"_a, "within"_a, "samples"_a, "least_sigma"_a = 0.0)
-        .def("objective",
-             [](const EvidenceModel &self, const EvidenceParameters &p) {
-                 EvidenceParameters gradient;
-                 const double value = self.objective(p, &gradient);
-                 return std::make_tuple(value, gradient);
-             })
-        .def("optimise", [](EvidenceModel &self) { self.optimise(); })
-        .def("optimise_from", [](EvidenceModel &self, const EvidenceParameters &start) { self.optimise(&start); })
-        .def("condition", &EvidenceModel::condition)
-        .def("mean", &EvidenceModel::mean, "t"_a, "r"_a)
-        .def("variance", &EvidenceModel::variance, "t"_a, "r"_a)
-        .def_prop_ro("log_parameters", [](const EvidenceModel &self) { return self.log_parameters(); })
-        .def_prop_ro("sigma", &EvidenceModel::sigma)
-        .def_prop_ro("freedom", &EvidenceModel::freedom)
-        .def_prop_ro("value", &EvidenceModel::value)
-        .def_prop_ro("evaluations", &EvidenceModel::evaluations);
-
-    nb::class_<MixedModel>(m, "MixedModel")
-        .def(
-            "__init__",
-            [](MixedModel *self, const MatrixXd &columns, VectorXd y, VectorXd count, VectorXd time_s,
-               const Eigen::VectorXi &power_on, const Eigen::VectorXi &group, double white, double length_s) {
-                new (self) MixedModel(
-                    mixed_means(columns, std::move(y), std::move(count), std::move(time_s), power_on, group), white,
-                    length_s);
-            },
-            "columns"_a, "y"_a, "count"_a, "time_s"_a, "power_on"_a, "group"_a, nb::kw_only(), "white"_a, "length_s"_a)
-        .def("objective", &MixedModel::objective)
-        .def("optimise", &MixedModel::optimise)
-        .def("weights", &MixedModel::weights, "kept"_a)
-        .def_prop_ro("log_parameters", [](const MixedModel &self) { return self.log_parameters(); });
 
     nb::class_<Network>(m, "Network")
         .def_ro("shapes", &Network::shapes)

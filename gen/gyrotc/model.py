@@ -132,7 +132,9 @@ class Rules(_Frozen):
         beyond_dph_per_c, beyond_dph_per_c_per_min: For each C and C/min beyond the envelope.
         fallback_dph: About the constant correction.
         none_dph: Of the bias itself, before any reading is accepted.
-        between_dph: Of the constant from power-on to power-on; part of every cell.
+        between_dph: Of the constant of the next power-on, 1 sigma by Student's t; part of every cell.
+        turn_on_dph: Standard deviation of the same; None: the repeatability of power-ons is not known.
+        turn_on_freedom: Its degrees of freedom; None: many.
         noise_deg_per_sqrt_h: Angle random walk of the rate.
         correlation_s: Correlation time of the error of the compensated bias, s.
         terms: Of what each term does not know of the time before it began, deg/h (`hysteresis`: deg/h/C).
@@ -147,6 +149,8 @@ class Rules(_Frozen):
     fallback_dph: BiasAmount
     none_dph: BiasAmount
     between_dph: BiasAmount
+    turn_on_dph: BiasAmount | None = None
+    turn_on_freedom: Annotated[int, Field(ge=0)] | None = None
     noise_deg_per_sqrt_h: BiasAmount
     correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)]
     terms: tuple[BiasAmount, ...] = ()

@@ -82,9 +82,10 @@ def random_uncertainty(seed: int, n_terms: int = 0) -> Uncertainty:
     def grid() -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(amounts(cells[0])) for _ in range(cells[1]))
 
-    names = [name for name in Rules.model_fields if name not in ("correlation_s", "terms")]
+    names = [name for name in Rules.model_fields if name not in ("turn_on_freedom", "correlation_s", "terms")]
     rules = Rules(
         **dict(zip(names, amounts(len(names)), strict=True)),
+        turn_on_freedom=int(rng.integers(0, 9)),
         correlation_s=float(rng.uniform(1.0, 1e5)),
         terms=tuple(amounts(n_terms)),
     )

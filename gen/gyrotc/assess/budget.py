@@ -27,7 +27,7 @@ from .. import __version__
 from ..common.arrays import FloatArray
 from ..common.metrics import FIRST_S, HALF_HOUR_S, HOUR_S, Averages
 from ..common.statistics import coverage_factor
-from ..model import Model
+from ..model import Model, Rules
 from ..recordings.fit_options import SIMPLE
 from ..results.evaluation import PARTS, Calibration, Changes, EvaluatedRun, Evaluation, FigureUncertainty
 from ..results.release import Budget, Contribution, Instrument, Verification
@@ -270,32 +270,33 @@ def _of_recordings(model: Model, training: Training, evaluation: Evaluation) -> 
         yield "fit of the map and power-on scatter: this method states no uncertainty of its map"
     else:
         rules = model.uncertainty_dph.rules if model.uncertainty_dph else None
-        runs = sum(run.role == "train" for run in evaluation.runs)
-        yield from _of_map(total, of_noise, rules.between_dph if rules else 0.0, runs)
+        yield from _of_map(total, of_noise, rules)
     yield _unseen(evaluation, training, total if total is not None else of_noise)
 
 
-def _of_map(total: float, of_noise: float, between: float, runs: int) -> Iterator[Contribution | str]:
+def _of_map(total: float, of_noise: float, rules: Rules | None) -> Iterator[Contribution | str]:
+    between = rules.between_dph if rules else 0.0
     rest = math.sqrt(max(0.0, total**2 - between**2 - of_noise**2))
     yield part(
         "fit",
         "departure of the map from the bias, beyond noise",
         rest,
-        "evidence of the training runs, scaled by runs left out in turn",
+        "posterior of the map over the training runs",
         freedom=_FIT_FREEDOM,
         statistical=True,
     )
-    if runs < 2:
-        yield "scatter from power-on to power-on: a single run cannot tell it"
-    else:
-        yield part(
-            "turn_on",
-            "constant from power-on to power-on",
-            between,
-            f"{runs} runs" + ("" if between else ", which do not differ by more than their noise"),
-            freedom=float(runs - 1),
-            statistical=True,
-        )
+    if rules is None or rules.turn_on_dph is None:
+        yield "constant from power-on to power-on: a single power-on cannot tell it"
+        return
+    freedom = rules.turn_on_freedom
+    yield part(
+        "turn_on",
+        "constant from power-on to power-on",
+        rules.turn_on_dph,
+        "units of the lot" if freedom is None else f"{freedom + 1} power-ons",
+        freedom=None if freedom is None else float(freedom),
+        statistical=True,
+    )
 
 
 def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Contribution | str:

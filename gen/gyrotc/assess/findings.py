@@ -26,7 +26,7 @@ from ..recordings.records import Dataset
 from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.training import Training
-from ..train.evidence import robust_sigma
+from ..train.noise import robust_sigma
 
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
 _SIGMAS = 4.0  # of each figure's distribution: one clean residual in ten thousand
@@ -138,7 +138,7 @@ _OUTLIER_SIGMAS = 6.0  # once in 5e8 normal runs
 _OUTLIER_SCATTER = 3.0  # times that of the others; chosen so that chance in short runs is not reported
 _LEAST_RUNS = 4  # fewer runs do not say what a usual run is
 _OF_TRAINING = ("does_not_generalise", "map_refused", "map_beyond_data", "not_of_its_lot", "prior_does_not_hold")
-_POLYNOMIALS = ("cubic", "cubic_slope", "mixed")
+_POLYNOMIALS = ("cubic", "cubic_slope")
 
 
 def findings_of(

@@ -30,7 +30,7 @@ from ..results.diagnosed import (
 )
 from ..results.training import Training
 from ..train.channels import StandIn
-from ..train.data import TrainingData, training_spans
+from ..train.data import TrainingData
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, model_of, training_of
 from ..train.plausibility import channel_guard, readings_of, stuck_after_s
 from ..train.uncertainty import start_sigma
@@ -198,9 +198,8 @@ def _extended_model(
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
     stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
     entries = _entries(extension.shipped, stand_ins)
-    left_out = extension.after if extension.measured_on == "left out" else None
-    spans = training_spans(runs, extension.samples)
-    training = training_of(dataset, extension.samples, extension.extended, front, options, spans, left_out)
+    left_out = extension.after if extension.measured_on == "left out" else ()
+    training = training_of(dataset, extension.samples, extension.extended, front, options, left_out)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
     low, high = added_range(played, extension.shipped)

@@ -22,7 +22,7 @@ from ..recordings.records import Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emission import quantise_all
-from ..train.evidence import steps_of, stretches
+from ..train.noise import steps_of, stretches
 from ..verify.replay import replay_inputs
 from .blocks import Records
 

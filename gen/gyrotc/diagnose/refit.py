@@ -26,10 +26,11 @@ from ..recordings.records import Dataset, Run
 from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_target
 from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned_samples, joined, scaling_of
 from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_basis
-from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import FrontEnd, samples_of
+from ..train.gaussian import TrainingFailed
 from ..train.methods import fit
 from ..train.plausibility import longest_same_s
+from ..train.process import fit_process
 from ..train.result import Fit, predict
 from ..train.simple import without_rate
 from .candidates import searched

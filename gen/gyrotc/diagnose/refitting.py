@@ -17,8 +17,9 @@ from ..common.metrics import Averages
 from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset
-from ..train.data import TrainingData, joined, training_spans
+from ..train.data import TrainingData, joined
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
+from ..train.folds import folds
 from ..train.result import Fit
 from .attribution import choose
 from .blocks import Records
@@ -176,7 +177,4 @@ def held_out_masks(refitting: Refitting) -> list[list[BoolArray]]:
     if len(refitting.train) >= FOLDS:
         return [[np.full(n, k % FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)] for fold in range(FOLDS)]
     data = joined([run.data for run in refitting.train])
-    return [
-        [span.contains(run.data.run, run.data.time_s) for run in refitting.train]
-        for span in training_spans(refitting.runs, data)
-    ]
+    return [[fold.held(run.data) for run in refitting.train] for fold in folds(data, power_ons(refitting.runs))]

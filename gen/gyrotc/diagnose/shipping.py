@@ -12,23 +12,23 @@ certain is shipped for any gain, what is as likely as all else only for one that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
 from ..results.diagnosed import ShippingTrial
+from ..train.candidates import CandidateComparison, compare_candidates
 from ..train.channels import MOST_TERMS
+from ..train.choice import gain_over_pieces
 from ..train.data import cleaned_samples, scaling_of
-from ..train.evidence import TrainingFailed, fit_process
 from ..train.fitting import power_ons
-from ..train.selection import CandidateScores, compare_candidates
 from .refit import Effect
 from .refitting import Refitting
 
-# Share of RMS below which a difference decides nothing, however well pieces agree: two pieces agree by chance.
-_LEAST = 0.02
+# Share of a piece that must be at temperatures that the rest has covered.
+_MIN_COVERED = 0.5
 _MOST_ODDS = 1e6  # what is certain needs a gain all the same
 _LEVEL = 0.975  # one-sided, of the limit above which a gain is not
 
@@ -39,7 +39,7 @@ class PieceGain:
 
     Attributes:
         mean: Over the pieces.
-        doubt: Of the mean: standard error over the pieces, and `_LEAST`.
+        doubt: Of the mean, as model selection has it (`train.choice`).
         upper: Upper limit of the mean, at 95 % of both limits; infinite with one piece.
     """
 
@@ -54,9 +54,8 @@ class PieceGain:
         if len(gains) < 2:
             return None
         error = float(gains.std(ddof=1)) / float(np.sqrt(len(gains)))
-        mean = float(gains.mean())
-        upper = mean + float(stdtrit(len(gains) - 1, _LEVEL)) * error
-        return PieceGain(mean, float(np.hypot(error, _LEAST)), upper)
+        mean, doubt = gain_over_pieces(gains)
+        return PieceGain(mean, doubt, mean + float(stdtrit(len(gains) - 1, _LEVEL)) * error)
 
     def ships(self, probability: float) -> bool:
         """Test whether it is worth a term, whose cause has this probability."""
@@ -112,20 +111,21 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
         probabilities: Of each cause in its place; none of a single cycle, whose states are tried together.
     """
     best = _comparison(refitting, [], effects)
-    candidate = best.chosen()
-    before, after = best.rms_covered(candidate), None
+    candidate = best.choice.chosen
+    scores = _covered_scores(best, candidate)
+    before, after = _rms_of(scores), None
     able = [k for k, effect in enumerate(effects) if effect.term.table is not None][:MOST_TERMS]
     shipped: list[Effect] = []
     refuted: list[int] = []
     reason = "" if effects else "no cause was named that a map can be refitted beside"
     if effects and not able:
         reason = "no table holds what is named"
-    name, scores = candidate, best
     for numbers in [able] if not probabilities and able else [[k] for k in able]:
         tried = [*shipped, *(effects[k] for k in numbers)]
         beside = _comparison(refitting, tried, effects)
-        after = beside.rms_covered("mrbf")
-        gain = PieceGain.of(scores.covered_scores(name), beside.covered_scores("mrbf"))
+        new_scores = _covered_scores(beside, "mrbf")
+        after = _rms_of(new_scores)
+        gain = PieceGain.of(scores, new_scores)
         if gain is None:
             reason = "fewer than two pieces of the training history can be left out and judged"
         elif gain.refutes:
@@ -134,27 +134,47 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
         elif not probabilities:
             reason = "a single cycle cannot tell whether states hold on the next one: record it again at another rate"
         elif gain.ships(probabilities[numbers[0]]):
-            shipped, name, scores = tried, "mrbf", beside
+            shipped, scores = tried, new_scores
         else:
             reason = (
                 f"on pieces of the training history that were left out it changes RMS by {np.expm1(-gain.mean):+.1%} "
                 f"with a doubt of {gain.doubt:.1%}{_in_words(before, after)}, which is not enough for a cause with a "
                 f"probability of {probabilities[numbers[0]]:.0%}"
             )
-    return Shipping(shipped, refuted, candidate, best.stretches(), before, after, "" if shipped else reason)
+    return Shipping(shipped, refuted, candidate, [best.pieces()], before, after, "" if shipped else reason)
 
 
 def _in_words(before: float | None, after: float | None) -> str:
     return "" if before is None or after is None else f" (RMS {before:.3g} -> {after:.3g} deg/h)"
 
 
-def _comparison(refitting: Refitting, effects: Sequence[Effect], every: Sequence[Effect]) -> CandidateScores:
-    """Fit every candidate beside the effects without each piece of history, on samples that `every` effect knows."""
+def _comparison(refitting: Refitting, effects: Sequence[Effect], every: Sequence[Effect]) -> CandidateComparison:
+    """Judge every candidate beside the effects on pieces of history, on samples that `every` effect knows."""
     data = cleaned_samples(refitting.samples_beside(effects, every))
-    scaling = scaling_of(data)
-    try:
-        process = fit_process(data, scaling)
-    except TrainingFailed:
-        process = None
-    rate = not (effects and refitting.single_cycle)
-    return compare_candidates(data, scaling, process, power_ons(refitting.runs), refitting.average_s, rate=rate)
+    if effects and refitting.single_cycle:
+        data = replace(data, slope_c_per_min=np.zeros(len(data)))
+    return compare_candidates(data, scaling_of(data), power_ons(refitting.runs), refitting.average_s)
+
+
+def _covered_scores(comparison: CandidateComparison, name: str) -> FloatArray:
+    """Return the log RMS that a candidate leaves on each piece at temperatures that the rest has covered.
+
+    The noise is added: differences below it decide nothing. Whole runs are judged about their means. A piece of which
+    less than half is covered has none (nan): there the ends of the map would be judged.
+    """
+    history = comparison.history
+    if name not in comparison.maps:
+        return np.full(len(history.folds), np.nan)
+    found = []
+    for fold, means in zip(history.folds, comparison.left_out(name), strict=True):
+        rest = history.means.temperature_c[~fold.near(history.means)]
+        covered = (means.temperature_c >= rest.min()) & (means.temperature_c <= rest.max())
+        left = means.after_dph[covered]
+        about = left.mean() if left.size and fold.kind in ("run", "power-on") else 0.0
+        enough = np.mean(covered) >= _MIN_COVERED
+        found.append(0.5 * np.log(np.mean((left - about) ** 2) + comparison.noise_dph**2) if enough else np.nan)
+    return np.array(found)
+
+
+def _rms_of(scores: FloatArray) -> float | None:
+    return float(np.sqrt(np.nanmean(np.exp(2.0 * scores)))) if np.isfinite(scores).any() else None

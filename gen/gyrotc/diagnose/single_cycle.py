@@ -26,7 +26,7 @@ from .. import causes
 from ..causes.base import Reach, SingleCycle
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, TOLERANCE, orthonormal
-from ..train.data import turning_points
+from ..train.folds import turning_points
 from .attribution import Attribution
 from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, price_of, searched, shape_parameter

@@ -22,8 +22,9 @@ from ..quality.judgement import judge
 from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.records import Dataset, Run
 from ..results.evaluation import Comparison, Group, Method, Pooled
-from ..train.data import TrainingData, joined, training_spans
-from ..train.fitting import front_end, samples_of
+from ..train.data import TrainingData, joined
+from ..train.fitting import front_end, power_ons, samples_of
+from ..train.folds import folds
 from ..train.methods import fit
 from ..train.result import Fit, predict
 from ..train.samples import Blocks
@@ -113,19 +114,20 @@ def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, lis
 def _left_out(
     training: Sequence[Run], data: TrainingData, parts: Sequence[TrainingData], blocks: Sequence[Blocks]
 ) -> list[_Held]:
-    """Spans of the training runs, or whole runs where these are too short for spans."""
-    spans = training_spans(training, data)
-    if not spans:
-        return [
-            _Held(run.environment or run.file, parts[k], data.run != k, blocks[k].begins_s)
-            for k, run in enumerate(training)
-        ]
-    masks = [(training[s.run].environment or str(s), s.contains(data.run, data.time_s), s) for s in spans]
-    return [
-        _Held(name, data.select(mask), ~s.contains(data.run, data.time_s, guard=True))
-        for name, mask, s in masks
-        if mask.any()
-    ]
+    """Return the pieces of the training runs that are left out in turn."""
+    found = []
+    for fold in folds(data, power_ons(training)):
+        seen = ~fold.near(data)
+        if fold.kind in ("run", "power-on"):
+            found += [
+                _Held(training[k].environment or training[k].file, parts[k], seen, blocks[k].begins_s)
+                for k in (span.run for span in fold.spans)
+            ]
+            continue
+        [span] = fold.spans
+        name = f"{training[span.run].file} {span.from_s:g} ... {span.to_s:g} s ({fold.kind})"
+        found.append(_Held(training[span.run].environment or name, data.select(fold.held(data)), seen))
+    return found
 
 
 def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: BuildOptions) -> Method:

@@ -17,10 +17,10 @@ from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotClust
 from ..results.json_text import digest_of
 from ..results.marker import check_intact
 from ..results.training import Training
-from ..train.evidence import MEAN_S
 from ..train.prior.learn import LEAST_UNITS, Envelope, Learned, fold_count, learn_prior
 from ..train.prior.unit_means import UnitMeans, means_of
 from ..train.prior.use import file_numbers, prior_of, process_result
+from ..train.process import MEAN_S
 
 _CELLS = (33, 13)  # of the occupancy: as fine as the coverage of a table; odd, so that rest has cells of its own
 _CURVE = 21  # points of the lot to be read

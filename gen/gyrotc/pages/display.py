@@ -99,12 +99,10 @@ _LIMITS = {
 }
 
 _CANDIDATES = {
-    "nothing": "no correction",
     "constant": "a constant",
     "linear": "a plane in T and dT/dt",
     "cubic": "a cubic in T",
     "cubic_slope": "a cubic in T and dT/dt",
-    "mixed": "the same, shrunk by how much power-ons differ",
     "mrbf_t": "the network over T",
     "mrbf": "the network over T and dT/dt",
 }

@@ -13,7 +13,7 @@ from ..results.diagnosed import Diagnosed
 from ..results.evaluation import PARTS, Changes, Evaluation
 from ..results.release import VERDICTS, Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.rows import LeftOutRows
-from ..results.training import CandidateModel, Manifest, Training
+from ..results.training import Manifest, Training
 from .display import limit_words, plain, with_uncertainty, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
@@ -155,12 +155,6 @@ class UnitResults:
         """RMS over noise floor."""
         floor, rms = self.evaluation.noise_floor_dph, self.judged.after.rms_dph if self.judged else None
         return rms / floor if floor and rms is not None else None
-
-    def against_constant(self, candidate: CandidateModel) -> float | None:
-        """How many times what this correction leaves a constant leaves."""
-        candidates = self.training.candidates if self.training else ()
-        constant = next((r.left_out_rms_dph for r in candidates if r.id == "constant"), None)
-        return constant / candidate.left_out_rms_dph if constant and candidate.left_out_rms_dph else None
 
     @property
     def who(self) -> list[tuple[str, str]]:

@@ -28,7 +28,7 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
 """Corrections without a search: powers of (z_T, z_r) of each."""
 COMPARED = ("mlr", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
 """Methods that `gyrotc compare` shows side by side."""
-METHODS = (*SIMPLE, "mixed", "mrbf_t", *COMPARED)
+METHODS = (*SIMPLE, "mrbf_t", *COMPARED)
 """All methods."""
 AUTO = "auto"
 """Model selection: the simplest correction that does on unseen history what the best one does."""

@@ -101,10 +101,10 @@ class SpanLeftOut(Part):
     file: str = Field(description="as in `dataset.toml`")
     from_s: float = Field(description="its start, s")
     to_s: float = Field(description="its end, s")
-    kind: Literal["branch", "part", "run"] = Field(
-        description="a branch of a cycle, a part of a run without branches, or a whole run"
+    kind: Literal["branch", "part", "run", "power-on"] = Field(
+        description="a branch of a cycle, a part of a run without branches, a whole run, or a run of a whole power-on"
     )
-    guard_s: Amount = Field(description="what was left out on either side of it besides, s")
+    guard_s: Amount = Field(description="what was not trained on at either side of it besides, s")
 
 
 class AllanPoint(Part):
@@ -147,12 +147,19 @@ class CandidateModel(Part):
     """A correction that was tried."""
 
     id: str = Field(description="method")
-    left_out_rms_dph: Figure = Field(description="RMS on thermal history left out in turn, deg/h")
-    standard_error_dph: Figure = Field(description="of this RMS, deg/h")
-    beats_constant: bool = Field(description="whether it was shown to leave less than a constant does")
-    t: Figure = Field(default=None, description="Student's t of its gain over a constant, over pieces left out")
-    chosen: bool = Field(description="whether it was taken")
-    refused: str | None = Field(default=None, description="why it could not be taken, where it was the best")
+    left_out_rms_dph: Figure = Field(
+        description="RMS on thermal history left out in turn, all pieces counting alike, deg/h; null if not known"
+    )
+    loss: float | None = Field(
+        default=None,
+        description="mean logarithm of the RMS on pieces of history left out, less that of the best candidate; null if "
+        "not known",
+    )
+    doubt: Figure = Field(
+        default=None, description="standard error of this difference over the pieces; null of the best candidate"
+    )
+    chosen: bool = Field(description="true of the candidate that is emitted")
+    refused: str | None = Field(default=None, description="why it must not be used; null if it may")
 
 
 class ChannelTried(Part):
@@ -207,9 +214,13 @@ class Training(UnitResult):
     )
     prediction_withheld: str | None = Field(description="why there is none")
     noise_floor_dph: Figure = Field(description="estimated, of means over `average_s`, deg/h")
-    spans: tuple[SpanLeftOut, ...] = Field(description="where there are fewer than three training runs")
-    left_out: Pooled | None = Field(description="all of them, each judged by a fit without it")
-    left_out_spans: tuple[Pooled, ...] = Field(description="each of them")
+    spans: tuple[SpanLeftOut, ...] = Field(
+        description="pieces of history that were left out in turn; empty of a named method"
+    )
+    left_out: Pooled | None = Field(
+        description="what the correction leaves on them without having seen them; null of a named method"
+    )
+    left_out_spans: tuple[Pooled, ...] = Field(description="the same of each piece")
     noise: NoiseTerms = Field(description="of the compensated training runs")
     sensitivity: BiasPlane = Field(description="of the bias before compensation")
     candidates: tuple[CandidateModel, ...] = Field(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.metrics import LEAST_SPAN_C
 from .data import Scaling, TrainingData
@@ -21,11 +22,20 @@ _HOLD_SHARE = 0.1
 _MIN_SAMPLES = 100
 
 
-def fit_bank(data: TrainingData, scaling: Scaling, *, seed: int, centers: int | None, average_s: float) -> Outcome:
+def fit_bank(
+    data: TrainingData,
+    scaling: Scaling,
+    *,
+    seed: int,
+    centers: int | None,
+    average_s: float,
+    power_on: NDArray[np.int64] | None = None,
+) -> Outcome:
     """Train up to three networks; one without a region if the samples do not allow three.
 
     `centers` counts for each network. Arguments and errors are those of `fit_mrbf`.
     """
+    arguments: dict[str, Any] = {"seed": seed, "centers": centers, "average_s": average_s, "power_on": power_on}
     edge = _HOLD_SHARE * scaling.half_range_c_per_min
     low, high = scaling.slope_c_per_min
     regions = {
@@ -35,11 +45,11 @@ def fit_bank(data: TrainingData, scaling: Scaling, *, seed: int, centers: int | 
     }
     parts = {name: _part(data, region) for name, region in regions.items()}
     if not all(map(_suffices, parts.values())):
-        return fit_mrbf(data, scaling, seed=seed, centers=centers, average_s=average_s)
+        return fit_mrbf(data, scaling, **arguments)
     networks: list[dict[str, Any]] = []
     curves: dict[str, Any] = {}
     for name, region in regions.items():
-        outcome = fit_mrbf(parts[name], scaling, seed=seed, centers=centers, average_s=average_s)
+        outcome = fit_mrbf(parts[name], scaling, **arguments)
         bounds = {"temperature_c": list(scaling.temperature_c), "slope_c_per_min": list(region)}
         networks.append({**outcome.networks[0], "region": bounds})
         curves[name] = outcome.curves

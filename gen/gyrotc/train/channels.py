@@ -3,7 +3,7 @@
 A table holds functions of up to four channels: straight lines, and where cross-validation shows it bent ones or a slope
 that depends on the temperature. Candidates are the recorded channels as they are, and of thermometers their
 differences: to the gyro's own, and between any two of them, for what one thermometer shows the map holds already. Of a
-difference the firmware passes the difference. `parts` chooses.
+difference the firmware passes the difference. `regressors` chooses.
 
 A shape is the record of one term, whose columns at fixed centers and width are linear in their weights. The centers lie
 at a quarter and three quarters of what training showed, 0.9 of its half range wide: of squares, cubes, saturations and
@@ -38,14 +38,13 @@ from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
 from ..results.training import ChannelTried
 from .data import Scaling, TrainingData, scaling_of
-from .evidence import Process, TrainingFailed, conditioned, fit_process
+from .gaussian import TrainingFailed
 from .methods import fit
 from .networks import rescaled, snapped
-from .parts import Parts, PartsTrial, bent_parts, chosen_parts
 from .plausibility import channel_guard
+from .regressors import Beside, RegressorChoice, Regressors, choose_regressors, enrich
 from .result import predict
 from .samples import Blocks
-from .uncertainty import next_run_variance
 
 ShapeId = Literal["line", "product", "curve"]
 
@@ -175,12 +174,14 @@ def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> Stan
 
 
 def _next_rms(left: FloatArray, run: NDArray[np.int64]) -> float:
-    """RMS to expect at the next power-on: spread within the runs, and of their means as few runs show it."""
+    """Return the RMS to expect at the next power-on: spread within the runs, and of their means as few runs show it."""
     _, index, count = np.unique(run, return_inverse=True, return_counts=True)
     mean = np.bincount(index, left) / count
     within = float(np.mean((left - mean[index]) ** 2))
     n = len(count)
-    between = float(np.var(mean, ddof=1)) * (1.0 + 1.0 / n) * next_run_variance(n) if n > 1 else float(mean[0] ** 2)
+    # A run more has the variance of Student's t with n - 1 degrees of freedom about a mean of n.
+    few = (1.0 + 1.0 / n) * (n - 1.0) / max(n - 3.0, 1.0)
+    between = float(np.var(mean, ddof=1)) * few if n > 1 else float(mean[0] ** 2)
     return float(np.sqrt(within + between))
 
 
@@ -206,7 +207,7 @@ class ChannelChoice:
         rows: Every candidate and every channel that is none.
     """
 
-    trial: PartsTrial
+    trial: RegressorChoice
     shapes: Mapping[str, ChannelShape]
     added: FloatArray
     effects: Mapping[str, FloatArray]
@@ -252,39 +253,44 @@ def _names(dataset: Dataset) -> list[str]:
 
 
 def chosen_channels(
-    dataset: Dataset, samples: TrainingData, columns: Mapping[str, FloatArray], average_s: float
+    dataset: Dataset,
+    samples: TrainingData,
+    power_on: NDArray[np.int64] | None,
+    columns: Mapping[str, FloatArray],
+    average_s: float,
 ) -> ChannelChoice | None:
-    """Chooses channels; None where there is none, or no map beside which to judge them.
+    """Choose channels; None if there is none, or no map beside which to judge them.
 
     Args:
         dataset: The recordings.
         samples: Training samples in order.
+        power_on: Number of the power-on of each run, by its index; None: each run is one.
         columns: Of every candidate at these samples, shape (n,) each.
         average_s: Averaging of what is judged, s.
     """
     if not columns:
         return None
     scaling = scaling_of(samples)
-    try:
-        process = fit_process(samples, scaling)
-    except TrainingFailed:
-        return None
     against = {n: _objection(dataset, n, v, samples, scaling) for n, v in columns.items()}
     able = {n: v for n, v in columns.items() if not against[n]}
     known = np.all([np.isfinite(v) for v in able.values()], axis=0) if able else np.ones(len(samples), bool)
     references = {n: float(v[known].mean()) for n, v in able.items()}
     lines = {n: shape_of("line", v, references[n], samples) for n, v in able.items()}
     seen, of = {n: line.columns[known] for n, line in lines.items()}, samples.select(known)
-    alike = _alike(seen, of, process, scaling)
-    part = Parts(seen, rivals={n: frozenset(others) for n, others in alike.items()})
-    trial = chosen_parts(of, scaling, part, average_s, MOST_TERMS)
-    trial, shapes = _bent(trial, {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}, of, known,
-                          scaling, average_s)  # fmt: skip
-    parts = {n: shapes[n].columns @ trial.weights[n] for n in trial.chosen}
+    arguments = of, scaling, power_on
+    try:
+        alike = _alike(Beside.of(*arguments, Regressors(seen), {}, average_s))
+        regressors = Regressors(seen, {n: frozenset(others) for n, others in alike.items()})
+        trial = choose_regressors(*arguments, regressors, average_s, MOST_TERMS)
+        shapes = {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}
+        trial, chosen = _bent(trial, shapes, arguments, known, average_s)
+    except TrainingFailed:
+        return None
+    parts = {n: chosen[n].columns @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
-    rows = [_row(n, trial, shapes, parts, samples, against[n], alike.get(n, {})) for n in columns]
+    rows = [_row(n, trial, chosen, parts, samples, against[n], alike.get(n, {})) for n in columns]
     effects = {n: np.where(np.isfinite(columns[n]), part, np.nan) for n, part in parts.items()}
-    return ChannelChoice(trial, shapes, added, effects, tuple(rows))
+    return ChannelChoice(trial, chosen, added, effects, tuple(rows))
 
 
 def _shapes(line: ChannelShape, values: FloatArray, samples: TrainingData) -> tuple[ChannelShape, ...]:
@@ -295,16 +301,15 @@ def _shapes(line: ChannelShape, values: FloatArray, samples: TrainingData) -> tu
 
 
 def _bent(
-    plain: PartsTrial,
+    plain: RegressorChoice,
     shapes: Mapping[str, tuple[ChannelShape, ...]],
-    of: TrainingData,
+    arguments: tuple[TrainingData, Scaling, NDArray[np.int64] | None],
     known: NDArray[np.bool_],
-    scaling: Scaling,
     average_s: float,
-) -> tuple[PartsTrial, dict[str, ChannelShape]]:
-    """What the taken channels add, by channel: lines, or what is earned in their place.
+) -> tuple[RegressorChoice, dict[str, ChannelShape]]:
+    """Return what the taken channels add: lines, or a richer shape where left-out history shows that it is better.
 
-    Every richer shape is the line and columns behind it, so of each these alone are tried.
+    Every richer shape is the line and columns behind it, so only these are tried.
     """
     found = {name: line for name, (line, *_) in shapes.items()}
     if not found:
@@ -313,7 +318,7 @@ def _bent(
     columns = {name: line.columns[known] for name, line in found.items()}
     columns |= {part: shape.columns[known, 1:] for part, (_, shape) in behind.items()}
     richer = {name: [part for part, (n, _) in behind.items() if n == name] for name in shapes}
-    trial = bent_parts(of, scaling, Parts(columns), plain, richer, average_s)
+    trial = enrich(*arguments, Regressors(columns), plain, richer, average_s)
     weights, rms = dict(trial.weights), list(trial.left_out_rms_dph)
     for part in (p for p in trial.chosen if p in behind):
         name, found[name] = behind[part]
@@ -361,19 +366,10 @@ def _less_smooth(values: FloatArray, samples: TrainingData, scaling: Scaling) ->
     return np.asarray(values - design @ np.linalg.lstsq(design, values, rcond=1e-9)[0])
 
 
-def _less_map(values: FloatArray, samples: TrainingData, process: Process, scaling: Scaling) -> FloatArray:
-    """What no map of temperature and its rate holds of a channel."""
-    t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
-    size = float(np.std(values)) / process.spread
-    mean = conditioned(process, t, r, values / size, samples.weight)
-    return np.asarray(values - size * mean(t, r))
-
-
-def _alike(
-    inputs: Mapping[str, FloatArray], samples: TrainingData, process: Process, scaling: Scaling
-) -> dict[str, dict[str, float]]:
-    """For every candidate those that say beside the map what it says, and their correlation."""
-    left = {n: _less_map(v[:, 0], samples, process, scaling) for n, v in inputs.items()}
+def _alike(beside: Beside) -> dict[str, dict[str, float]]:
+    """Return for every candidate those that say beside the map what it says, and their correlation."""
+    residuals = beside.residuals()
+    left = {name: residuals[:, place[0]] for name, place in beside.place.items()}
     found: dict[str, dict[str, float]] = {name: {} for name in left}
     for a, b in combinations(left, 2):
         same = abs(float(np.corrcoef(left[a], left[b])[0, 1]))
@@ -384,7 +380,7 @@ def _alike(
 
 def _row(
     name: str,
-    trial: PartsTrial,
+    trial: RegressorChoice,
     shapes: Mapping[str, ChannelShape],
     parts: Mapping[str, FloatArray],
     samples: TrainingData,
@@ -397,7 +393,7 @@ def _row(
         for chosen in (n for n in trial.chosen if n in alike):
             same = f"beside the map it says what {chosen} says (correlation {alike[chosen]:.3f})"
             return ChannelTried(name=name, verdict="collinear", reason=same)
-        reason = "it does not lessen what is left on history left out by more than a standard error"
+        reason = "it does not lessen what is left on history left out by more than the doubt of that"
         return ChannelTried(name=name, verdict="not earned", reason=reason)
     place = trial.chosen.index(name)
     before, after = trial.left_out_rms_dph[place : place + 2]

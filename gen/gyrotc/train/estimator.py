@@ -19,8 +19,8 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from .. import _core
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData
-from .evidence import MEAN_S
 from .mrbf import fit_mrbf
+from .process import MEAN_S
 
 _WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # times the square root of the number of inputs
 _CANDIDATES = 300  # samples as centers, drawn at random: bounds time and memory of the normal equations

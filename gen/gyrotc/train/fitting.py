@@ -1,7 +1,7 @@
 """From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
 
 Joins the stages recordings → mirror → train → model; computes nothing of its own beyond the choice of
-block, window and limits, and the refits with spans left out.
+block, window and limits.
 """
 
 from __future__ import annotations
@@ -30,15 +30,18 @@ from ..results.evaluation import Pooled
 from ..results.rows import RowsUsed
 from ..results.training import CandidateModel, DeclaredUnits, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
-from .data import RunSpan, TrainingData, cleaned_samples, joined, scaling_of, training_spans, whole_runs
-from .evidence import TrainingFailed, noise_terms, sensitivities, stretches
+from .data import TrainingData, cleaned_samples, joined, scaling_of
+from .gaussian import TrainingFailed
 from .methods import fit
 from .networks import snapped
+from .noise import noise_terms, sensitivities, stretches
 from .plausibility import AGREE_S, longest_same_s, stuck_after_s
 from .prior.given import Prior
 from .prior.unit_means import means_of_unit
+from .process import Process, TrainingHistory, smooth
 from .result import Fit, predict
 from .samples import Blocks, run_blocks
+from .simple import LeastSquares, powers_of_method
 from .uncertainty import coverage, rezero_dph, uncertainty_of
 
 __all__ = [
@@ -198,19 +201,13 @@ def fit_dataset(
     say("training")
     choice = None
     if options.channels:
-        choice = chosen_channels(dataset, data, read.channels, options.average_s)
+        choice = chosen_channels(dataset, data, power_ons(stretches), read.channels, options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
-    fitted = _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial)
-    spans = training_spans(stretches, data)
-    if not spans and not any(run.role == "exam" for run in dataset.runs):
-        spans = whole_runs(stretches, data)  # what the correction is judged by
-    use = fitted.lot or fitted.prior
-    again = replace(options, method=fitted.method, prior=options.prior if use and use.accepted else None)
-    left_out = _left_out(data, spans, again, say) if spans else None
+    fitted = _judged(data, _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial), options.average_s)
     front = replace(front, stuck_s=stuck_after_s(read.longest_same_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
-    training = training_of(dataset, data, fitted, front, options, spans, left_out)
+    training = training_of(dataset, data, fitted, front, options)
     content: dict[str, Any] = {
         "rows": read.rows,
         "means": _means(data, fitted),
@@ -308,37 +305,22 @@ def _fit(
     )
 
 
-def _left_out(data: TrainingData, spans: Sequence[RunSpan], options: FitOptions, say: Progress) -> list[Averages]:
-    """Each span left out in turn with its guard gap: residuals of a fit that has not seen it."""
-    results = []
-    for k, span in enumerate(spans):
-        say(f"leaving out span {k + 1} of {len(spans)}")
-        inside = span.contains(data.run, data.time_s)
-        near = span.contains(data.run, data.time_s, guard=True)
-        if inside.sum() == 0 or (~near).sum() < _MIN_SAMPLES:
-            continue
-        try:
-            rest = _fit(data.select(~near), options)
-        except TrainingFailed:
-            continue
-        held = data.select(inside)
-        residual = held.bias_dph - predict(rest, held.temperature_c, held.slope_c_per_min)
-        results.append(_averaged(held, residual, options.average_s))
-    return results
+def _judged(data: TrainingData, fitted: Fit, average_s: float) -> Fit:
+    """Return a fit that was asked for by name with what it leaves on history that it has not seen.
 
-
-def _averaged(data: TrainingData, residual: NDArray[np.float64], average_s: float) -> Averages:
-    """Weighted means over `average_s` of block samples of one run."""
-    cell = np.floor((data.time_s - data.time_s[0]) / average_s + 1e-9)
-    number = np.unique(cell, return_inverse=True)[1]
-    weight = np.bincount(number, weights=data.weight)
-    full = weight >= 0.5 * np.max(weight)
-
-    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        total = np.bincount(number, weights=values * data.weight)
-        return np.asarray((total / np.where(weight > 0, weight, 1.0))[full])
-
-    return Averages(mean(data.time_s), mean(data.bias_dph), mean(residual), mean(data.temperature_c))
+    Corrections by least squares and the map of the Gaussian model are left out by subtraction. Nothing is known of the
+    others, which would have to be fitted again.
+    """
+    if fitted.folds or fitted.known or fitted.method not in (*SIMPLE, "mrbf"):
+        return fitted
+    history = TrainingHistory.of(cleaned_samples(data), fitted.scaling, fitted.power_on)
+    try:
+        history, smooth_map = history.without_outliers(smooth(history.count))
+    except TrainingFailed:
+        return fitted
+    found = smooth_map if fitted.method == "mrbf" else LeastSquares(history.power_ons, powers_of_method(fitted.method))
+    left_out = [averages for [averages] in history.unseen([found], average_s)]
+    return replace(fitted, process=Process.of(history, smooth_map), folds=history.folds, left_out=left_out)
 
 
 def model_of(
@@ -393,7 +375,7 @@ def model_of(
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
             "uncertainty_dph": known,
-            "rezero_dph": rezero_dph(known["rules"]["between_dph"], len(np.unique(data.run))) if known else 0.0,
+            "rezero_dph": rezero_dph(known["rules"]) if known else 0.0,
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,
@@ -430,10 +412,15 @@ def training_of(
     fitted: Fit,
     front: FrontEnd,
     options: FitOptions,
-    spans: Sequence[RunSpan],
-    left_out: list[Averages] | None,
+    left_out: Sequence[Averages] | None = None,
 ) -> Training:
-    """What `training.json` holds."""
+    """Return what `training.json` holds.
+
+    Args:
+        left_out: What the correction leaves on pieces that it has not seen, if it is known better than to the fit.
+    """
+    left_out = fitted.left_out if left_out is None else left_out
+    runs = joined_runs([run for run in dataset.runs if run.role == "train"])
     return Training(
         gyrotc_version=__version__,
         serial=dataset.serial,
@@ -450,9 +437,9 @@ def training_of(
         predicted_rms_ratio=fitted.predicted_rms_ratio,
         prediction_withheld=fitted.withheld,
         noise_floor_dph=fitted.noise_floor_dph,
-        spans=tuple(span.result() for span in spans),
+        spans=tuple(span for fold in fitted.folds for span in fold.results(runs)),
         left_out=Pooled.of(left_out) if left_out else None,
-        left_out_spans=tuple(Pooled.of([a]) for a in left_out or []),
+        left_out_spans=tuple(Pooled.of([a]) for a in left_out),
         noise=_noise(data, fitted, front.block_s),
         sensitivity=sensitivities(data.temperature_c, data.slope_c_per_min, data.bias_dph, data.weight),
         candidates=tuple(CandidateModel(**row) for row in fitted.candidates),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +11,16 @@ from numpy.typing import NDArray
 from ..common.metrics import LEAST_SPAN_C
 from ..recordings.fit_options import AUTO, DEFAULTS, METHODS, SIMPLE, BuildOptions
 from .bank import fit_bank
+from .candidates import select
 from .data import Scaling, TrainingData, cleaned_samples, scaling_of
-from .evidence import TrainingFailed, floor_dph
+from .gaussian import TrainingFailed
 from .mrbf import fit_mrbf, fit_mrbf_t
 from .networks import network
+from .noise import floor_dph
 from .objection import objection_to
 from .ols import RIDGE, fit_ols
 from .prior.given import Prior
 from .result import Fit, Outcome, predict
-from .selection import chosen_by_cross_validation, fit_mixed
 from .simple import fit_simple
 from .stepwise import fit_mlr
 from .uncertainty import coverage, uncertainty_of
@@ -78,9 +80,8 @@ def fit(
     samples = cleaned_samples(data)
     scaling = scaling_of(samples)
     findings: list[dict[str, object]] = []
-    rows: list[dict[str, object]] = []
+    selected = None
     reason = ""
-    process = None
     like_auto = method in (AUTO, "mrbf") and centers is None
     given = (
         prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s) if like_auto and prior else None
@@ -93,10 +94,9 @@ def fit(
         findings.append(_no_information(samples))
         method = "constant" if method == AUTO else method
     elif method == AUTO:
-        found = chosen_by_cross_validation(samples, scaling, power_on, seed=seed, average_s=average_s)
-        method, outcome, rows, reason = found.method, found.outcome, found.rows, found.reason
-        process = found.process
-        findings += found.findings
+        selected = select(samples, scaling, power_on, seed=seed, average_s=average_s)
+        method, outcome, reason = selected.method, selected.outcome, selected.reason
+        findings += selected.findings
     else:
         outcome = trained(
             method, samples, scaling, seed=seed, centers=centers, rho=rho, average_s=average_s, power_on=power_on
@@ -108,11 +108,18 @@ def fit(
     bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
     residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
     floor = floor_dph(samples, residual, average_s)
-    return Fit(
-        method, outcome, scaling, findings, floor, average_s, mean, rows, reason,
-        given.lot if given else None, given.prior if given else None, given.known if given else None,
-        process,
-    )  # fmt: skip
+    found = replace(bare, noise_floor_dph=floor, reason=reason, power_on=power_on)
+    if given is not None:
+        return replace(found, lot=given.lot, prior=given.prior, known=given.known)
+    if selected is not None:
+        return replace(
+            found,
+            candidates=selected.rows,
+            process=selected.process,
+            folds=selected.folds,
+            left_out=selected.left_out,
+        )
+    return found
 
 
 def trained(
@@ -131,19 +138,17 @@ def trained(
 
     Args:
         ridge: For the methods by orthogonal least squares, as `fit_ols` takes it.
-        power_on: Of each run, for "mixed".
+        power_on: For the maps that follow the Gaussian model.
 
     Raises:
         TrainingFailed: The equations cannot be solved.
     """
     if method == "mlr":
         return fit_mlr(data, scaling, average_s)
-    if method == "mixed":
-        return fit_mixed(data, scaling, power_on, average_s)
     if method in SIMPLE:
         return fit_simple(method, data, scaling, average_s)
     if method in _MAPS:
-        return _MAPS[method](data, scaling, seed=seed, centers=centers, average_s=average_s)
+        return _MAPS[method](data, scaling, seed=seed, centers=centers, average_s=average_s, power_on=power_on)
     return fit_ols(method, data, scaling, seed=seed, centers=centers, rho=rho, average_s=average_s, ridge=ridge)
 
 

@@ -22,8 +22,8 @@ import numpy as np
 from .. import _core
 from ..common.arrays import FloatArray
 from .data import Scaling, TrainingData, average_samples
-from .evidence import floor_dph
 from .networks import network
+from .noise import floor_dph
 from .result import Outcome
 
 RIDGE = 1e-8

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..common.arrays import FloatArray
+from ..common.metrics import Averages
 from ..results.fleet import KnownMap, LotUse
 from ..results.training import EarlierUse
 from .data import Scaling
-from .evidence import Process
+from .folds import Fold
 from .networks import NetworkEntry, networks_dph
+from .process import Process
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,10 @@ class Fit:
         lot: What a lot did for it, where one was given.
         prior: What an earlier model did for it, where one was given.
         known: What it follows, where a lot or an earlier model was used, for `training.json`.
-        process: The evidence model of its samples, where model selection has made one.
+        process: The smooth map of its samples, where model selection has made one.
+        power_on: Number of the power-on of each run, by its index; None: each run is one.
+        folds: Pieces of history that were left out in turn, where model selection has done it.
+        left_out: What the correction leaves on each of them without having seen it, deg/h.
     """
 
     method: str
@@ -69,6 +74,9 @@ class Fit:
     prior: EarlierUse | None = None
     known: KnownMap | None = None
     process: Process | None = None
+    power_on: NDArray[np.int64] | None = None
+    folds: Sequence[Fold] = ()
+    left_out: Sequence[Averages] = ()
 
     @property
     def networks(self) -> Sequence[NetworkEntry]:

@@ -1,40 +1,28 @@
-"""Corrections without a search: constant, linear, cubic in T, and cubic in T with a slope in dT/dt.
+"""Corrections without a search: constant, linear, cubic in T, and cubic in T with a slope in dT/dt, by least squares.
 
-Each is least squares on the samples. A table knows Gaussians, so a cubic is written as a constant, a linear part and
-three or four Gaussians in T so wide that they reproduce it to 2.4e-4 of its coefficients.
-
-`mixed` is a cubic in T with a slope in dT/dt whose coefficients are shrunk by how much they differ from power-on to
-power-on. Least squares takes what one power-on shows for what all have in common. Here each has coefficients of its own
-about the common ones, a drift, and white noise; how large each of them is follows from the recordings, and the common
-coefficients are those that are most probable (a linear mixed model: Laird and Ware, Biometrics 38, 1982;
-`gen/core/mixed.hpp`). Of a single power-on the branches stand in place of power-ons.
+A table knows Gaussians, so a cubic is written as a constant, a linear part and three or four Gaussians in T so wide
+that they reproduce it to 2.4e-4 of its coefficients.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .. import _core
 from ..common.arrays import FloatArray
-from ..common.metrics import median
 from ..recordings.fit_options import SIMPLE
-from .data import Scaling, TrainingData, average_samples, edges_of, mean_cells, turning_points
-from .evidence import GRID, MEAN_S, TrainingFailed, floor_dph
+from .data import Scaling, TrainingData, average_samples
+from .gaussian import FEW, Sums, sum_of
 from .networks import NetworkEntry, network
+from .noise import floor_dph
 from .result import Outcome
 
 FLAT = 1e3  # width over dT/dt, in half ranges, of a map of T alone
 _POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt
-_FIRST = {"constant": 1, "linear": 2, "cubic": 4, "cubic_slope": 5}
-"""How many of `powers_of` each has."""
-_DEPENDENT = 1e-8
-"""Of a triangle's diagonal: only a singular value decomposition tells how far such columns depend on each other."""
 
 # Number, width and outermost center of Gaussians, in half ranges. Largest error of z² and z³ over |z| <= 1, and sum of
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
@@ -68,40 +56,40 @@ def powers_of(t: FloatArray, r: FloatArray) -> FloatArray:
     return columns
 
 
-def triangle_of(rows: FloatArray) -> FloatArray:
-    """Triangle of an orthogonal factorisation, shape (columns, columns) or with fewer rows; that of triangles of parts
-    one below the other is that of the whole."""
-    factor: Any = np.linalg.qr(rows, mode="r")
-    return np.asarray(factor, dtype=np.float64)
-
-
-def all_solved(triangle: FloatArray, samples: int) -> dict[str, FloatArray]:
-    """Return the weights of `powers_of` for each of `SIMPLE`, 0 for powers that it does without.
-
-    One orthogonal factor serves all: the first columns of a triangle are the triangle of the first columns.
-
-    Args:
-        triangle: `triangle_of` the powers and the bias behind them, each row times the root of its weight.
-        samples: Number of rows.
-    """
-    size = np.abs(np.diagonal(triangle)[:-1])
-    found = {}
-    for name, columns in _FIRST.items():
-        weights = np.zeros(triangle.shape[1] - 1)
-        of, by = triangle[:columns, :columns], triangle[:columns, -1]
-        if size[:columns].min() > _DEPENDENT * size[:columns].max():
-            weights[:columns] = np.linalg.solve(of, by)
-        else:
-            cut = max(samples, columns) * np.finfo(np.float64).eps  # as for the rows themselves
-            weights[:columns] = np.linalg.lstsq(of, by, rcond=cut)[0]
-        found[name] = weights
-    return found
-
-
 def solve_least_squares(columns: FloatArray, y: FloatArray, weight: FloatArray) -> FloatArray:
     """Weights of columns, shape (n, powers), by weighted least squares; of equally good ones the smallest."""
     root = np.sqrt(weight / weight.max())
     return np.asarray(np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0], dtype=np.float64)
+
+
+# Columns of `gaussian.Basis` in the order of `_POWERS`.
+_OF_BASIS = {power: k for k, power in enumerate(_POWERS)}
+
+
+def powers_of_method(name: str) -> tuple[int, ...]:
+    """Return the columns of the Gaussian model that a correction by least squares has."""
+    return tuple(sorted(_OF_BASIS[power] for power in SIMPLE[name]))
+
+
+@dataclass(frozen=True, slots=True)
+class LeastSquares:
+    """A correction by least squares, from sums of products.
+
+    Attributes:
+        power_ons: Sums of every power-on.
+        columns: Columns of the Gaussian model that it has.
+    """
+
+    power_ons: Sequence[Sums]
+    columns: tuple[int, ...]
+
+    def without(self, power_on: int, left_out: Sums) -> FloatArray:
+        """Return its coefficients of the first columns without a piece of a power-on."""
+        total = sum_of(self.power_ons) - left_out
+        at = list(self.columns)
+        found = np.zeros(FEW)
+        found[at] = np.linalg.lstsq(total.products[np.ix_(at, at)], total.moments[at], rcond=1e-12)[0]
+        return found
 
 
 def fit_simple(name: str, data: TrainingData, scaling: Scaling, average_s: float) -> Outcome:
@@ -156,105 +144,3 @@ def _as_gaussians(square: float, cube: float, tolerance: float) -> tuple[FloatAr
         if error <= tolerance:
             return trials[-1][1]
     return min(trials, key=lambda trial: trial[0])[1]
-
-
-_CELLS = 500  # means in all: more of them move the coefficients by less than a tenth of their own error
-_LEAST_WHITE = 1e-3  # of the spread: a drift is known no better
-
-
-@dataclass(frozen=True, slots=True)
-class Mixed:
-    """The model with the parameters of the whole record.
-
-    Attributes:
-        model: In standardised units.
-        cell: Which of its means each of the means that it was made of belongs to, shape (means,).
-        cells: Number of its means.
-        center, spread: Of the bias, deg/h.
-        rate: Typical dT/dt, in units of the normalised one.
-    """
-
-    model: _core.MixedModel
-    cell: NDArray[np.intp]
-    cells: int
-    center: float
-    spread: float
-    rate: float
-
-    def powers(self, out: NDArray[np.intp] | None = None) -> FloatArray:
-        """Weights of 1, T, T², T³ and dT/dt, normalised (`simple.powers_of`), without some of the means; deg/h.
-
-        Raises:
-            TrainingFailed: The equations cannot be solved.
-        """
-        kept = np.ones(self.cells, dtype=bool)
-        if out is not None:
-            kept[self.cell[out]] = False
-        try:
-            one, line, square, cube, rate = self.spread * self.model.weights(kept)
-        except RuntimeError as error:
-            raise TrainingFailed(f"the mixed model cannot be solved ({error})") from error
-        return np.array(
-            [self.center + one - 0.5 * square, line - 0.75 * cube, 1.5 * square, 1.25 * cube, rate / self.rate]
-        )
-
-
-def fit_mixed_model(means: TrainingData, scaling: Scaling, power_on: NDArray[np.int64]) -> Mixed:
-    """The most probable parameters.
-
-    Args:
-        means: Samples, or means of them, in order of run and time.
-        scaling: Normalisation of the inputs.
-        power_on: Number of the power-on of each of them, shape (n,).
-
-    Raises:
-        TrainingFailed: There is no spread to be explained.
-    """
-    edges = edges_of(means.run)
-    length = max(MEAN_S, float(means.duration_s.sum()) / _CELLS)
-    numbered = np.arange(len(means))
-    of = _cell_of(means, length)
-    cells = average_samples(means, length)
-    first = numbered[np.r_[True, np.diff(of) > 0]]
-    order = np.lexsort((cells.run, cells.time_s, power_on[first]))
-    place = np.empty(len(order), dtype=np.intp)
-    place[order] = np.arange(len(order))
-    cells, on = cells.select(order), power_on[first][order]
-    of_runs = np.array([means.bias_dph[a:b].mean() for a, b in pairwise(edges.tolist())])
-    center, spread = float(of_runs.mean()), float(cells.bias_dph.std())
-    if not spread > 0.0:
-        raise TrainingFailed("the bias is the same everywhere")
-    y = np.round((cells.bias_dph - center) / spread * GRID) / GRID
-    x, r = scaling.normalise(cells.temperature_c, cells.slope_c_per_min)
-    rate = max(float(np.sqrt(np.mean(r**2))), 1e-6)
-    columns = np.stack([np.ones_like(x), x, (3.0 * x**2 - 1.0) / 2.0, (5.0 * x**3 - 3.0 * x) / 4.0, r / rate], axis=1)
-    numbers = np.unique(on, return_inverse=True)[1].astype(np.int32)
-    group = numbers if numbers[-1] > 0 else _branches(cells.time_s, cells.temperature_c)
-    differences = np.diff(y)[np.diff(cells.run) == 0]
-    white = float(np.sqrt(np.mean(differences**2) / 2.0)) if len(differences) else _LEAST_WHITE
-    longest = max(float(means.time_s[b - 1] - means.time_s[a]) for a, b in pairwise(edges.tolist()))
-    model = _core.MixedModel(
-        columns,
-        y,
-        cells.weight / median(cells.weight),
-        cells.time_s - cells.time_s.min(),
-        numbers,
-        group,
-        white=max(white, _LEAST_WHITE),
-        length_s=max(longest, length),
-    )
-    model.optimise()
-    return Mixed(model, place[of], len(cells), center, spread, rate)
-
-
-def _cell_of(means: TrainingData, length_s: float) -> NDArray[np.intp]:
-    """Number of the cell of `average_samples` that each of the means belongs to."""
-    edges = mean_cells(means, length_s).edges
-    if edges is None:
-        return np.arange(len(means))
-    return np.repeat(np.arange(len(edges)), np.diff(edges, append=len(means)))
-
-
-def _branches(time_s: FloatArray, temperature_c: FloatArray) -> NDArray[np.int32]:
-    """Number of the branch between turning points of the temperature, of a single power-on."""
-    return np.searchsorted(turning_points(time_s, temperature_c), time_s).astype(np.int32)

@@ -10,33 +10,32 @@ D: what the map's own answer lacks (the map a time later less the map now; with 
 known at that moment (the slope times the age; the slope), σ: the map's own uncertainty. docs/design.md, "How
 uncertain a correction is".
 
-What the map may be wrong by at (T, dT/dt), noise of the gyro not included:
+What the map may be wrong by at (T, dT/dt), noise of the gyro not included, has two parts. That of the map is about the
+mean of a run:
 
-    σ² = κ² variance of the evidence process + (map − mean of the process)² + τ²
+    sigma^2 = variance of the smooth map about its mean over the training history + (map - smooth map)^2
 
-κ and τ come from runs left out in turn: the mean residuals that the process has there are explained by its own
-variance (factor κ²), by a constant of each run (variance τ²), and by noise. ln κ² is known beforehand to 0.3: over
-many gyros the process is right about itself, and six runs say little of it. τ is the likeliest, times what the next
-run may differ by after few (Student's t). No test asks whether it is there: five runs prove an offset only where it is
-large, and without it sigma may be too small by multiples, with it a little too large.
+with what the shape of the map differs by from power-on to power-on. That of the turn-on is the constant of the next
+power-on: its repeatability, as the intercepts of the training power-ons show it, and the uncertainty of the mean
+constant. It has one degree of freedom less than there are power-ons; from a single power-on it is not known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import ndtri, stdtrit
 
 from ..causes.hysteresis import strength
 from ..common.arrays import FloatArray
 from ..mirror.recursions import play
-from .data import TrainingData, average_samples, cleaned_samples, edges_of
-from .evidence import MEAN_S, Process, fit_process
+from .data import TrainingData, bin_of, cleaned_samples
+from .gaussian import GaussianMap
+from .process import Process, fit_process
 from .result import Fit, predict
 
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
@@ -54,7 +53,7 @@ class UncertaintyInputs:
     fit: Fit
     process: Process
     sigma: FloatArray  # of the map at each sample, deg/h
-    between: float  # of the constant from power-on to power-on, deg/h
+    turn_on: TurnOn
     covered: tuple[FloatArray, FloatArray]  # points where training was: C, C/min
     added: FloatArray | float = 0.0  # what terms add to the map at each sample, deg/h
 
@@ -79,20 +78,33 @@ def rules_of(known: UncertaintyInputs, block_s: float) -> dict[str, Any]:
         "beyond_dph_per_c_per_min": gradients[1],
         "fallback_dph": float(np.sqrt(spread + mean)),
         "none_dph": float(np.sqrt(np.average(here**2, weights=s.weight) + mean)),
-        "between_dph": known.between,
+        "between_dph": known.turn_on.sigma_dph,
+        "turn_on_dph": known.turn_on.repeatability_dph,
+        "turn_on_freedom": known.turn_on.freedom,
         "noise_deg_per_sqrt_h": fit.noise_floor_dph * float(np.sqrt(fit.average_s / 3600.0)),
         "correlation_s": _correlation_s(known, block_s),
         "terms": [],
     }
 
 
-def rezero_dph(between: float, runs: int) -> float:
-    """Largest shift of the constant in the field, deg/h: what one power-on in a thousand goes beyond.
+def rezero_dph(rules: dict[str, Any]) -> float:
+    """Return the largest shift of the constant in the field, deg/h: one power-on in a thousand goes beyond it.
 
-    `between` of few runs already has the variance of Student's t; its quantile lies farther out than the normal one.
+    Args:
+        rules: `rules` of `uncertainty_dph`; with unknown repeatability the shift is 0.
     """
-    freedom = max(runs - 1, 3)
-    return between * float(stdtrit(freedom, 0.9995)) * float(np.sqrt((freedom - 2.0) / freedom))
+    repeatability, freedom = rules["turn_on_dph"], rules["turn_on_freedom"]
+    if repeatability is None:
+        return 0.0
+    return float(repeatability * _quantile(freedom, 0.9995))
+
+
+def _quantile(freedom: int | None, probability: float) -> float:
+    """Return a quantile of Student's t, of the normal distribution without a number of degrees of freedom.
+
+    Quantiles with fewer than three degrees of freedom are of no use in the field.
+    """
+    return float(ndtri(probability) if freedom is None else stdtrit(max(freedom, _MIN_FREEDOM), probability))
 
 
 def start_sigma(
@@ -211,11 +223,11 @@ def _correlation_s(known: UncertaintyInputs, block_s: float) -> float:
     that of the exponential through the end.
     """
     s, scaling = known.samples, known.fit.scaling
-    scale_t, scale_r = known.process.scales
+    scale_t, scale_r = known.process.model.scales
     z_t, z_r = scaling.normalise(s.temperature_c, s.slope_c_per_min)
     z_t, z_r = z_t / scale_t, z_r / scale_r
     lag, longest = 1, max(int(np.max(np.bincount(s.run))) // 2, 1)
-    last, constant = 1.0, known.between**2
+    last, constant = 1.0, known.turn_on.sigma_dph**2
     every, variance = max(1, len(s) // _MOST), known.sigma**2
     while True:
         now, then = slice(0, max(len(s) - lag, 0), every), slice(lag, None, every)
@@ -234,14 +246,32 @@ def _correlation_s(known: UncertaintyInputs, block_s: float) -> float:
     return float(np.clip(-lag * block_s / np.log(last), block_s, 7.5e6))
 
 
-_POINTS = (96, 36)  # of T and of dT/dt, three times the cells of the coverage
-_SPANS = 5  # a single run is cut into so many
-_MOST_LEFT_OUT = 24  # fits without some runs: of more runs neighbours are left out together, at most a 24th and one
-_PATCHES = (12, 8)  # over which residuals of a run left out are averaged
-_SCALES = np.exp(np.linspace(np.log(0.5), np.log(8.0), 41))  # of κ², which its prior keeps within
-_NOISES = np.exp(np.linspace(np.log(0.7), np.log(4.0), 12))  # of its variance over a patch, beside white noise
-_SCALE_SD = 0.3  # of ln κ²: what the evidence says of its own scale is known to so much
-_LEVELS = np.exp(np.linspace(np.log(1e-4), np.log(1e5), 61))  # of τ², over the mean variance of a patch
+_POINTS = (64, 24)  # of T and of dT/dt, twice the cells of the coverage
+_MIN_FREEDOM = 3  # of quantiles of Student's t
+_ONE_SIGMA = 0.8413  # probability below one standard deviation of a normal distribution
+
+
+@dataclass(frozen=True, slots=True)
+class TurnOn:
+    """The constant of the next power-on less that of the table.
+
+    Attributes:
+        repeatability_dph: Its standard deviation: from power-on to power-on, and of the mean of those in training; None
+            if it is not known.
+        freedom: Degrees of freedom of it; None: many.
+        mean_dph: Standard uncertainty of the mean constant.
+    """
+
+    repeatability_dph: float | None
+    freedom: int | None
+    mean_dph: float
+
+    @property
+    def sigma_dph(self) -> float:
+        """Half width that holds the constant of 68 % of all power-ons, with Student's t; without what is not known."""
+        if self.repeatability_dph is None:
+            return self.mean_dph
+        return _quantile(self.freedom, _ONE_SIGMA) * self.repeatability_dph
 
 
 def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
@@ -276,42 +306,91 @@ def uncertainty_of(
         added: What terms add to the map at each sample, deg/h; the samples are in order then.
     """
     samples = cleaned_samples(data)
-    process = fit.outcome.process or fit.process or fit_process(samples, fit.scaling)
-    scale, between = _calibrated(samples, process, fit)
-    at_samples = _variance(process, fit, samples.temperature_c, samples.slope_c_per_min, scale)
+    process = fit.outcome.process or fit.process or fit_process(samples, fit.scaling, _power_on(samples, fit))
+    errors = _Errors.of(process, fit)
+    at_samples = errors.at_samples(samples)
     t, r = _points(fit)
-    at_points = _variance(process, fit, t, r, scale)
+    at_points = errors.variance(t, r)
     covered = _covered(data, fit, t, r)
     place = _cell(fit, cells, t, r)
     everywhere = _means(place, at_points, np.ones(len(t)), cells, np.zeros(cells[::-1]))
-    seen = _means(*_asked(samples, process, fit, cells, scale, at_samples), cells, everywhere)
+    asked, weight = _asked(samples, process)
+    of_asked = at_samples if process.asked is None else errors.variance(*asked)
+    seen = _means(_cell(fit, cells, *asked), of_asked, weight, cells, everywhere)
     unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
     points = t[covered], r[covered]
     added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
-    known = UncertaintyInputs(samples, fit, process, np.sqrt(at_samples), float(np.sqrt(between)), points, added)
+    turn_on = errors.turn_on
+    known = UncertaintyInputs(samples, fit, process, np.sqrt(at_samples), turn_on, points, added)
+    constant = turn_on.sigma_dph**2
     return {
         "cells": list(cells),
-        "rows": np.sqrt(seen + between).tolist(),
-        "uncovered": np.sqrt(unseen + between).tolist(),
+        "rows": np.sqrt(seen + constant).tolist(),
+        "uncovered": np.sqrt(unseen + constant).tolist(),
         "rules": rules_of(known, block_s),
     }
 
 
-def _asked(
-    samples: TrainingData, process: Process, fit: Fit, cells: tuple[int, int], scale: float, at_samples: FloatArray
-) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Where corrections are asked for, as the samples or a lot's units show: cells, variances, weights."""
-    asked = process.asked
-    if asked is None:
-        return _cell(fit, cells, samples.temperature_c, samples.slope_c_per_min), at_samples, samples.weight
-    t, r = asked.temperature_c, asked.slope_c_per_min
-    return _cell(fit, cells, t, r), _variance(process, fit, t, r, scale), asked.share
+def _power_on(samples: TrainingData, fit: Fit) -> NDArray[np.int64]:
+    return np.arange(int(samples.run.max()) + 1) if fit.power_on is None else fit.power_on
 
 
-def _variance(process: Process, fit: Fit, t: FloatArray, r: FloatArray, scale: float) -> FloatArray:
-    """Variance of the map at points, (deg/h)², without that from power-on to power-on."""
-    z = fit.scaling.normalise(t, r)
-    return scale * process.variance_dph2(*z) + (predict(fit, t, r) - process.mean_dph(*z)) ** 2
+def _asked(samples: TrainingData, process: Process) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
+    """Return where corrections are asked for, C and C/min, and weights: as the samples or a lot's units show."""
+    if process.asked is None:
+        return (samples.temperature_c, samples.slope_c_per_min), samples.weight
+    return (process.asked.temperature_c, process.asked.slope_c_per_min), process.asked.share
+
+
+@dataclass(frozen=True, slots=True)
+class _Errors:
+    """What a map may be wrong by.
+
+    Attributes:
+        process: The smooth map of the same samples.
+        fit: The map.
+        root: Mean over the history of the roots of the smooth map's covariance.
+        departure_dph: Mean over the history of the map less the smooth map.
+    """
+
+    process: Process
+    fit: Fit
+    root: FloatArray
+    departure_dph: float
+
+    @staticmethod
+    def of(process: Process, fit: Fit) -> _Errors:
+        bins, scaling = process.bins, fit.scaling
+        t = scaling.center_c + scaling.half_range_c * bins.t
+        r = scaling.half_range_c_per_min * bins.r
+        root = np.average(process.model.roots(bins.t, bins.r), axis=0, weights=bins.count)
+        departure = np.average(predict(fit, t, r) - process.mean_dph(bins.t, bins.r), weights=bins.count)
+        return _Errors(process, fit, root, float(departure))
+
+    def variance(self, t: FloatArray, r: FloatArray) -> FloatArray:
+        """Return the variance of the map about the mean of a run at inputs in C and C/min, (deg/h)^2."""
+        z = self.fit.scaling.normalise(t, r)
+        roots = self.process.model.roots(*z) - self.root
+        departure = predict(self.fit, t, r) - self.process.mean_dph(*z) - self.departure_dph
+        return np.asarray(self.process.spread**2 * np.sum(roots**2, axis=1) + departure**2)
+
+    def at_samples(self, samples: TrainingData) -> FloatArray:
+        """Return the same at samples, by small cells of the input plane, in which it hardly varies."""
+        cell = bin_of(*self.fit.scaling.normalise(samples.temperature_c, samples.slope_c_per_min))
+        count = np.bincount(cell)
+        t, r = (np.bincount(cell, x) / count for x in (samples.temperature_c, samples.slope_c_per_min))
+        return self.variance(t, r)[cell]
+
+    @property
+    def turn_on(self) -> TurnOn:
+        process, model = self.process, self.process.model
+        mean = float(np.hypot(process.spread * np.linalg.norm(self.root), self.departure_dph))
+        if process.asked is not None:
+            return TurnOn(float(np.hypot(process.asked.between_dph, mean)), None, mean)
+        if isinstance(model, GaussianMap) and model.structure.own:
+            scatter = process.spread * float(np.sqrt(model.scatter[0]))
+            return TurnOn(float(np.hypot(scatter, mean)), len(model.power_ons) - 1, mean)
+        return TurnOn(None, 0, mean)
 
 
 def _points(fit: Fit) -> tuple[FloatArray, FloatArray]:
@@ -352,67 +431,3 @@ def _index(x: FloatArray, span: tuple[float, float], n: int) -> NDArray[np.int64
     if width <= 0.0:
         return np.zeros(len(x), dtype=np.int64)
     return np.clip(np.floor((x - span[0]) * n / width), 0, n - 1).astype(np.int64)
-
-
-def _calibrated(samples: TrainingData, whole: Process, fit: Fit) -> tuple[float, float]:
-    """(κ², τ² in (deg/h)²) from parts left out in turn; (1, 0) where that cannot be done. A lot brings its own."""
-    if whole.asked is not None:
-        return 1.0, whole.asked.between_dph**2
-    edges, means = edges_of(samples.run), samples
-    if len(edges) > 2:
-        means = average_samples(samples, MEAN_S)  # each is of one run, and the process is learnt from them anyway
-        edges_of_means = edges_of(means.run)
-    else:
-        edges = edges_of_means = -(-np.arange(_SPANS + 1) * len(samples) // _SPANS)
-    pieces = len(edges) - 1
-    groups = min(pieces, _MOST_LEFT_OUT)
-    rows = []
-    for first, after in pairwise((np.arange(groups + 1) * pieces // groups).tolist()):
-        if len(samples) - (edges[after] - edges[first]) <= len(samples) // 10:
-            continue
-        rest = means.select(np.r_[: edges_of_means[first], edges_of_means[after] : len(means)])
-        process = fit_process(rest, fit.scaling, like=whole)
-        rows += [
-            _surprises(process, samples.select(np.arange(edges[k], edges[k + 1])), fit) for k in range(first, after)
-        ]
-    if not rows:
-        return 1.0, 0.0
-    scale, between = _likeliest(rows)
-    return scale, between * next_run_variance(len(rows))
-
-
-def _likeliest(rows: Sequence[FloatArray]) -> tuple[float, float]:
-    """κ² and the variance between runs of least deviance; of each run `_surprises`.
-
-    A run has one constant, common to all its patches, so what differs from patch to patch is the map's error or noise.
-    Means over a patch keep more of the noise than white noise would leave: its level is free, else κ² takes the rest.
-    """
-    levels = np.append(0.0, np.mean([np.mean(row[1:].sum(axis=0)) for row in rows]) * _LEVELS)[:, None, None]
-    deviance = np.zeros((levels.size, _NOISES.size, _SCALES.size)) + (np.log(_SCALES) / _SCALE_SD) ** 2
-    for residual, variance, noise in rows:
-        total = _SCALES[:, None] * variance + _NOISES[:, None, None] * noise
-        deviance += np.sum(residual**2 / total + np.log(total), axis=-1)
-        precision, sum_ = np.sum(1.0 / total, axis=-1), np.sum(residual / total, axis=-1)
-        deviance += np.log1p(levels * precision) - levels * sum_**2 / (1.0 + levels * precision)
-    level, _, k = np.unravel_index(np.argmin(deviance), deviance.shape)
-    return float(_SCALES[k]), float(levels[level, 0, 0])
-
-
-def next_run_variance(runs: int) -> float:
-    """Variance of the next run over that of so many: of Student's t with a degree of freedom less than runs."""
-    return (runs - 1.0) / max(runs - 3.0, 1.0)
-
-
-def _surprises(process: Process, held: TrainingData, fit: Fit) -> FloatArray:
-    """Of patches of the input plane: mean residual, variance of the process, variance by noise; shape (3, patches)."""
-    patch = _index(held.temperature_c, fit.scaling.temperature_c, _PATCHES[0])
-    patch = patch + _PATCHES[0] * _index(held.slope_c_per_min, fit.scaling.slope_c_per_min, _PATCHES[1])
-    _, index = np.unique(patch, return_inverse=True)
-    weight = np.bincount(index, held.weight)
-    t, r = fit.scaling.normalise(held.temperature_c, held.slope_c_per_min)
-    residual = np.bincount(index, held.weight * (held.bias_dph - process.mean_dph(t, r))) / weight
-    center_t = np.bincount(index, held.weight * t) / weight
-    center_r = np.bincount(index, held.weight * r) / weight
-    seconds = np.bincount(index, held.duration_s)
-    noise = process.noise_dph**2 * process.seconds / seconds
-    return np.stack([residual, process.variance_dph2(center_t, center_r), noise])

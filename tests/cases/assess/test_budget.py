@@ -106,7 +106,11 @@ def test_noise_fit_and_power_on_are_what_the_table_states(built: Path) -> None:
     parts = {one.id: one.contribution_dph for one in of(built).contributions}
     stated = read_result(built / "evaluate.json", Evaluation).sigma_rms_dph
     assert stated is not None
-    assert sum(parts[id] ** 2 for id in ("noise", "fit", "turn_on")) == pytest.approx(stated**2)
+    known = load_model(built / "model.json").uncertainty_dph
+    assert known is not None and known.rules is not None
+    assert parts["turn_on"] == known.rules.turn_on_dph
+    of_map = parts["noise"] ** 2 + parts["fit"] ** 2
+    assert of_map + known.rules.between_dph**2 == pytest.approx(stated**2), "the table has one sigma by Student's t"
 
 
 def test_an_instrument_that_is_not_well_stated_is_refused() -> None:

@@ -559,7 +559,7 @@ def test_a_correction_hardly_depends_on_the_length_of_a_block(tmp_path: Path) ->
         (chain,) = refitting.on_exam([effects])
         left.append(float(np.sqrt(np.mean(np.concatenate([a.after_dph for a in chain]) ** 2))))
     # A start takes three rows of 5 s, most of a block of 20 s.
-    assert max(left) < 1.1 * min(left), left
+    assert max(left) < 1.3 * min(left), left
 
 
 def test_spans_that_touch_are_one_run(tmp_path: Path) -> None:

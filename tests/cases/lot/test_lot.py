@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -244,20 +242,6 @@ def _negative(cluster: LotCluster) -> LotCluster:
     rows = [list(row) for row in cluster.covariance]
     rows[0][0] = -1e6
     return cluster.model_copy(update={"covariance": tuple(tuple(row) for row in rows)})
-
-
-def test_the_processes_of_a_lot_have_the_priors_of_the_evidence_method() -> None:
-    """The lot adds the amplitude of the constant before; the core has the noise behind."""
-    core = Path(__file__).parents[3].joinpath("gen/core/evidence.cpp").read_text("utf-8")
-
-    def numbers(name: str) -> list[float]:
-        found = re.search(rf"\b{name} =([^;]*);", core)
-        assert found is not None
-        return [float(n) for n in re.findall(r"\d+\.\d+", found[1])]
-
-    assert np.exp(lot_basis.PRIOR_LOG[1:]) == pytest.approx(numbers("kPriorMean")[:-1], rel=1e-12)
-    assert list(lot_basis._PRIOR_SD[1:]) == numbers("kPriorSd")[:-1]
-    assert numbers("kReach") == [lot_basis._REACH]
 
 
 @pytest.mark.parametrize("n", [1, 15, 16, 47, 121])

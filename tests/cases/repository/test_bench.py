@@ -73,7 +73,7 @@ def test_states_that_harm_a_split_and_faults_of_its_diagnosis_are_counted() -> N
     answers = (
         ("explained", (1.0, 0.5)), ("not_testable", (1.0, 1.06)), ("consistent", None), ("fault: ValueError", None)
     )  # fmt: skip
-    rows = [Judged(Split("set", "run", ROOT), "x", "cubic", 1.0, 1.0, trivial, *answer) for answer in answers]
+    rows = [Judged(Split("set", "run", ROOT), "x", "cubic", 1.0, trivial, *answer) for answer in answers]
     found = counts(rows)
     assert [found[name] for name in ("faults", "with_states", "states_at_not_testable", "states_harm")] == [1, 2, 1, 1]
     assert found["states_worst"] == pytest.approx(1.06)

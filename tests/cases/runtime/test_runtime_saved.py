@@ -123,7 +123,8 @@ def gyro(between: float) -> Model:
     for grid in ("rows", "uncovered"):
         known[grid] = np.hypot(np.array(known[grid]), between).tolist()
     known["rules"]["between_dph"] = between
-    return Model.from_dict({**content, "rezero_dph": rezero_dph(between, 6)})
+    rules = {"turn_on_dph": between, "turn_on_freedom": 5}
+    return Model.from_dict({**content, "rezero_dph": rezero_dph(rules)})
 
 
 def shifts(numeric: str, between: float, offsets: np.ndarray, seed: int) -> np.ndarray:

@@ -83,7 +83,7 @@ def named(*names: str) -> Dataset:
 
 
 def verdicts(samples: TrainingData, columns: dict[str, Array]) -> dict[str, tuple[str, str]]:
-    choice = chosen_channels(named(*columns), samples, columns, 100.0)
+    choice = chosen_channels(named(*columns), samples, None, columns, 100.0)
     assert choice is not None
     return {row.name: (row.verdict, row.reason) for row in choice.rows}
 
@@ -98,7 +98,7 @@ def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.
     samples = history(rng)
     supply = 28.0 + 0.1 * wander(rng)
     made = replace(samples, bias_dph=samples.bias_dph + 8e-3 * (supply - 28.0))
-    choice = chosen_channels(named("supply_v"), made, {"supply_v": supply}, 100.0)
+    choice = chosen_channels(named("supply_v"), made, None, {"supply_v": supply}, 100.0)
     assert choice is not None
     (row,) = choice.rows
     assert row.verdict == "taken"
@@ -106,7 +106,8 @@ def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.
     assert row.left_out_rms_after_dph is not None
     assert row.left_out_rms_before_dph is not None
     assert row.left_out_rms_after_dph < 0.7 * row.left_out_rms_before_dph
-    assert choice.added == pytest.approx(row.slope_dph_per_unit * (supply - supply.mean()))
+    line = row.slope_dph_per_unit * (supply - supply.mean())
+    assert np.std(choice.added - line) < 0.15 * np.std(line), "whatever its shape"
 
 
 def _effect(shape: str, u: Array, t: Array) -> Array:
@@ -127,7 +128,7 @@ def test_a_bent_channel_gets_the_part_that_is_its_own(shape: str, seed: int) -> 
     effect = _effect(shape, u, samples.temperature_c)
     made = replace(samples, bias_dph=samples.bias_dph + effect)
     seen, supply = made.run < _RUNS - 1, 28.0 + 0.1 * u
-    choice = chosen_channels(named("supply_v"), made.select(seen), {"supply_v": supply[seen]}, 100.0)
+    choice = chosen_channels(named("supply_v"), made.select(seen), None, {"supply_v": supply[seen]}, 100.0)
     assert choice is not None
     (row,) = choice.rows
     assert (row.verdict, row.shape) == ("taken", shape)
@@ -155,7 +156,7 @@ def test_a_useless_channel_is_seldom_taken_and_does_no_harm() -> None:
     taken, harm = 0, []
     for _ in range(3):
         columns = {f"channel_{k}_v": wander(rng) for k in range(4)}
-        choice = chosen_channels(named(*columns), samples, columns, 100.0)
+        choice = chosen_channels(named(*columns), samples, None, columns, 100.0)
         assert choice is not None
         taken += len(choice.trial.chosen)
         harm.append(float(np.mean(choice.added**2)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,35 +14,19 @@ from gyrotc.common import InputError
 from gyrotc.recordings import SIMPLE, Dataset, Run, load
 from gyrotc.train import (
     CANDIDATES,
-    CandidateScores,
     Fit,
     FitOptions,
     Fitted,
     Fold,
-    Rest,
-    RunSpan,
     TrainingData,
-    all_solved,
-    average_samples,
-    cleaned_samples,
-    conditioned,
-    design,
     fit,
     fit_dataset,
-    fit_mixed_model,
-    fit_process,
     fit_simple,
+    folds,
     gather,
     objection_to,
-    pieces,
-    powers_of,
     predict,
-    scaling_of,
-    solve_least_squares,
-    training_spans,
-    triangle_of,
     turning_points,
-    weighted_mean,
 )
 from recordings import toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
@@ -76,7 +59,7 @@ def test_a_gyro_that_repeats_gets_a_map_that_is_as_good_as_the_default_was(seed:
     ("name", "bias"),
     [
         ("constant", lambda t, r: 0.0 * t + 5.0),
-        ("cubic", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 1e-8 * (t - 10.0) ** 3),
+        ("cubic_slope", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 1e-8 * (t - 10.0) ** 3),
         ("cubic_slope", lambda t, r: 5.0 + 4e-5 * t - 2e-6 * t**2 + 8e-4 * r),
     ],
 )
@@ -100,93 +83,68 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
     assert "nothing is shown to be better" in found.reason
 
 
-def candidates(**rms: list[float]) -> CandidateScores:
-    """What each candidate leaves on four runs; others leave what a constant does. The noise is 1."""
-    table = np.array([rms.get(name, rms["constant"]) for name in CANDIDATES]).T
-    whole = np.arange(4)
-    folds = [Fold("run", k, whole, whole) for k in range(4)]
-    return CandidateScores(folds, table, 1.0, 1.0, np.full(4, 50.0), table)
-
-
-def test_the_least_score_is_taken_the_network_only_where_pieces_agree() -> None:
-    constant, cubic = [900.0, 1100.0, 1000.0, 950.0], [20.0, 90.0, 30.0, 60.0]
-    assert candidates(constant=constant, cubic=cubic).chosen() == "cubic"
-    assert candidates(constant=constant, cubic=cubic, cubic_slope=[0.9 * x for x in cubic]).chosen() == "cubic_slope"
-    assert candidates(constant=constant, cubic=cubic, mixed=[0.9 * x for x in cubic]).chosen() == "mixed"
-    assert candidates(constant=constant, cubic=cubic, cubic_slope=[0.99 * x for x in cubic]).chosen() == "cubic"
-    assert candidates(constant=constant, cubic=cubic, mrbf=[0.9 * x for x in cubic]).chosen() == "mrbf"
-    assert candidates(constant=constant, cubic=cubic, mrbf=[12.0, 91.0, 29.0, 60.0]).chosen() == "cubic"
-
-
-def test_the_constant_stays_unless_it_is_beaten_by_a_tenth_or_surely() -> None:
-    constant = [300.0, 400.0, 350.0, 320.0]
-    assert candidates(constant=constant, cubic=[0.95 * x for x in constant]).chosen() == "cubic", "surely"
-    assert candidates(constant=constant, cubic=[250.0, 390.0, 360.0, 320.0]).chosen() == "constant"
-    undecided = candidates(constant=constant, cubic=[60.0, 900.0, 500.0, 340.0])
-    assert undecided.gain("cubic")[0] < 1.0 and undecided.chosen() == "constant"
-    assert candidates(constant=constant, cubic=[60.0, 200.0, 400.0, 340.0]).chosen() == "cubic"
-
-
-def test_where_only_noise_is_left_the_likelihood_on_unseen_means_decides() -> None:
-    """Two hundred means: what explains 3 % more of the squares is three units of likelihood, and hardly luck."""
-    constant, noise = [1.1, 1.0, 1.3, 1.0], [1.0] * 4
-    assert candidates(constant=constant, cubic=noise).chosen() == "cubic"
-    assert candidates(constant=noise, cubic=[0.999] * 4).chosen() == "constant"
-    assert candidates(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.1] * 4, mrbf=noise).chosen() == "mrbf"
-    assert candidates(constant=[9.0, 1.0, 8.0, 1.0], cubic=[1.001] * 4, mrbf=noise).chosen() == "cubic"
-
-
-def test_a_mixed_model_is_the_most_probable_map_of_a_linear_mixed_model() -> None:
-    """Against plain matrices: columns with scatter between power-ons, an exponential drift, white noise."""
-    data = average_samples(cleaned_samples(samples(0)), 50.0)
-    scaling = scaling_of(data)
-    found = fit_mixed_model(data, scaling, data.run)
-    p = np.exp(2.0 * found.model.log_parameters[:9])
-    length = float(np.exp(found.model.log_parameters[9]))
-    x, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
-    r = r / found.rate
-    columns = np.stack([x**0, x, (3 * x**2 - 1) / 2, (5 * x**3 - 3 * x) / 4, r], axis=1)
-    same = np.equal.outer(data.run, data.run)
-    apart = np.abs(np.subtract.outer(data.time_s, data.time_s))
-    common = columns * [25.0, p[0], p[1], p[1], p[2]] @ columns.T
-    own = (columns * [p[3], p[4], p[5], p[5], p[6]] @ columns.T) * same
-    white = p[8] / (data.weight / np.median(data.weight))
-    total = common + own + p[7] * np.exp(-apart / length) * same + np.diag(white)
-    y = (data.bias_dph - found.center) / found.spread
-    weights = np.array([25.0, p[0], p[1], p[1], p[2]]) * (columns.T @ np.linalg.solve(total, y))
-    expected = found.center + found.spread * columns @ weights
-    powers = np.stack([x**0, x, x**2, x**3, r * found.rate], axis=1)
-    np.testing.assert_allclose(powers @ found.powers(), expected, atol=2e-5 * found.spread)
+def repeated(data: TrainingData, times: int) -> TrainingData:
+    """The runs so many times, each with a number of its own."""
+    parts = [replace(data, run=data.run + 3 * k) for k in range(times)]
+    return TrainingData(*(np.concatenate([getattr(p, n) for p in parts]) for n in TrainingData.__dataclass_fields__))
 
 
 def test_coefficients_that_scatter_between_power_ons_are_shrunk() -> None:
-    """Six power-ons with a slope of their own about none: least squares follows their mean, the mixed model less."""
-    data = samples(0)
-    parts = [replace(data, run=data.run + 3 * k) for k in range(2)]
-    data = TrainingData(*(np.concatenate([getattr(p, n) for p in parts]) for n in TrainingData.__dataclass_fields__))
+    """Six power-ons with a slope of their own about none: least squares follows their mean, the model less."""
+    data = repeated(samples(0), 2)
     slope = np.array([3e-4, -4e-4, 1e-4, 2e-4, -1e-4, 3e-4])[data.run]
     data = with_bias(data, 5.0 + slope * data.temperature_c)
-    fits = [fit(data, method=name) for name in ("cubic_slope", "mixed")]
-    spans = [np.ptp(predict(f, np.linspace(-30.0, 50.0, 9), 0.0)) for f in fits]
+    found = auto(data)
+    least_squares = fit(data, method="cubic_slope")
+    spans = [np.ptp(predict(f, np.linspace(-30.0, 50.0, 9), 0.0)) for f in (least_squares, found)]
     assert spans[1] < 0.9 * spans[0]
 
 
-def test_pieces_are_whole_runs_and_do_not_overlap() -> None:
+def test_an_offset_of_each_power_on_is_not_taken_for_the_map() -> None:
+    """Each run visits other temperatures: without intercepts of power-ons the offsets become structure over T."""
+    errors = []
+    for seed in range(4):
+        data = repeated(samples(seed), 2)
+        offset = np.random.default_rng(seed).normal(0.0, 5.0 * NOISE_DPH, 6)
+        truth = true_bias(data.temperature_c, data.slope_c_per_min)
+        found = auto(with_bias(data, truth + offset[data.run]))
+        error = predict(found, data.temperature_c, data.slope_c_per_min) - truth
+        errors.append(rms(error[data.run == 2] - error[data.run == 2].mean()))
+    assert rms(np.array(errors)) < 0.5 * NOISE_DPH
+
+
+def times_left_out(data: TrainingData, found: tuple[Fold, ...]) -> np.ndarray:
+    return np.asarray(sum(fold.held(data).astype(int) for fold in found))
+
+
+def test_folds_are_whole_runs_and_do_not_overlap() -> None:
     data = samples(0)
-    found = pieces(data)
-    assert [(fold.kind, fold.run) for fold in found] == [("run", 0), ("run", 1), ("run", 2)]
-    assert sorted(np.concatenate([fold.held for fold in found])) == list(range(len(data)))
+    found = folds(data)
+    assert [(fold.kind, fold.spans[0].run) for fold in found] == [("run", 0), ("run", 1), ("run", 2)]
+    assert (times_left_out(data, found) == 1).all()
+
+
+def test_a_power_on_is_left_out_with_all_its_runs() -> None:
+    """A run of the same power-on would tell its constant."""
+    data = samples(0)
+    found = folds(data, np.array([0, 1, 0]))
+    assert [(fold.kind, [span.run for span in fold.spans]) for fold in found] == [("power-on", [0, 2]), ("run", [1])]
+    assert (times_left_out(data, found) == 1).all()
+
+
+def test_of_one_power_on_its_runs_are_left_out() -> None:
+    assert [fold.kind for fold in folds(samples(0), np.zeros(3, dtype=np.int64))] == ["run"] * 3
 
 
 def test_of_a_single_run_branches_are_left_out_and_keep_their_distance() -> None:
     one = samples(0).select(samples(0).run == 0)
     data = replace(one, temperature_c=30.0 * np.sin(one.time_s / 1500.0))
-    found = pieces(data)
+    found = folds(data)
     assert {fold.kind for fold in found} == {"branch"} and len(found) > 2
-    assert sorted(np.concatenate([fold.held for fold in found])) == list(range(len(data)))
+    assert (times_left_out(data, found) == 1).all()
     for fold in found:
-        free = np.setdiff1d(np.arange(len(data)), fold.near)
-        assert np.abs(data.time_s[fold.held][:, None] - data.time_s[free][None, :]).min() >= 100.0
+        held, free = fold.held(data), ~fold.near(data)
+        assert np.abs(data.time_s[held][:, None] - data.time_s[free][None, :]).min() >= 90.0
 
 
 @pytest.mark.parametrize("name", list(SIMPLE))
@@ -259,8 +217,7 @@ def same(one: Fit, two: Fit, shift: float = 0.0, share: float = 1e-3) -> None:
     """The same candidate, the same table, and maps within a share of the noise."""
     assert two.method == one.method
     for a, b in zip(one.candidates, two.candidates, strict=True):
-        if a["id"] != "nothing":
-            assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=max(share, 1e-6))
+        assert b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=max(share, 1e-6))
     t, r = np.meshgrid(np.linspace(*one.scaling.temperature_c, 21), np.linspace(*one.scaling.slope_c_per_min, 11))
     assert np.abs(predict(two, t, r) - shift - predict(one, t, r)).max() < share * one.noise_floor_dph
 
@@ -315,8 +272,7 @@ def test_where_a_measured_recording_is_cut_changes_nothing_that_matters(tmp_path
     later = cut_at(tmp_path / "later", table | {"time_s": table["time_s"] + 4096.0}, [])
     assert moved.model.method == later.model.method == whole.model.method
     for row, a, b in zip(*(f.training.content()["candidates"] for f in (whole, moved, later)), strict=True):
-        if row["id"] != "nothing":
-            assert a["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
+        assert a["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
         assert b["left_out_rms_dph"] == pytest.approx(row["left_out_rms_dph"], rel=1e-3), row["id"]
 
 
@@ -330,54 +286,6 @@ def test_simple_corrections_are_least_squares() -> None:
         predict(found, data.temperature_c, data.slope_c_per_min), expected, atol=0.01 * found.noise_floor_dph
     )
     assert fit_simple("linear", data, found.scaling, 100.0).networks[0]["weights"] == []
-
-
-@pytest.mark.parametrize("still", [False, True])
-def test_one_factor_gives_all_simple_rungs_as_least_squares_does(still: bool) -> None:
-    """At one dT/dt columns depend on one another, and the smallest of equally good weights counts."""
-    rng = np.random.default_rng(3)
-    t, r = rng.uniform(-1.0, 1.0, (2, 500))
-    r = np.zeros(500) if still else r
-    weight, y = rng.uniform(0.5, 4.0, 500), rng.normal(size=500)
-    rows = np.column_stack([powers_of(t, r), y]) * np.sqrt(weight)[:, None]
-    found = all_solved(triangle_of(rows), len(rows))
-    for name in SIMPLE:
-        expected = design(name, t, r) @ solve_least_squares(design(name, t, r), y, weight)
-        np.testing.assert_allclose(powers_of(t, r) @ found[name], expected, rtol=1e-9, atol=1e-11)
-
-
-@pytest.mark.parametrize("still", [False, True])
-def test_what_remains_without_a_piece_is_what_a_fit_of_the_rest_gives(still: bool) -> None:
-    """Runs of very different weight, and stretches that leave little behind.
-
-    1e-7 of the bias: products of the process' functions are known to 1e-16 of the largest, and what is solved for has
-    a condition of up to 1e9 (variances from 1e-10 on beside noise); simple corrections agree to 1e-11.
-    """
-    seed = int.from_bytes(os.urandom(4), "little")
-    print(f"seed {seed}")
-    rng = np.random.default_rng(seed)
-    data = samples(seed % 1000)
-    slope = np.zeros(len(data)) if still else data.slope_c_per_min
-    weight = rng.choice([1.0, 4.0, 1e4], 3)[data.run] * rng.choice([1.0, 2.0], len(data))
-    data = average_samples(cleaned_samples(replace(data, slope_c_per_min=slope, weight=weight)), 50.0)
-    scaling = scaling_of(data)
-    process = fit_process(data, scaling)
-    rest = Rest(data, process.kept, scaling, process, data.run)
-    t, r = scaling.normalise(data.temperature_c, data.slope_c_per_min)
-    most = np.flatnonzero(data.time_s > 300.0)  # some minutes remain of each run
-    for near in [*(fold.near for fold in pieces(data)), most]:
-        found = rest.corrections(near, t, r, CANDIDATES[1:])
-        out = np.ones(len(data), dtype=bool)
-        out[near] = False
-        left = data.select(out)
-        center = weighted_mean(left.bias_dph, left.weight)
-        for name in ("constant", "cubic", "cubic_slope"):
-            columns = design(name, t, r)
-            expected = center + columns @ solve_least_squares(columns[out], left.bias_dph - center, left.weight)
-            np.testing.assert_allclose(found[name][out], expected[out], rtol=1e-9, atol=1e-11)
-        known = out & process.kept
-        mean = conditioned(process, t[known], r[known], data.bias_dph[known], data.weight[known])
-        np.testing.assert_allclose(found["mrbf"], mean(t, r), rtol=1e-7)
 
 
 @pytest.mark.parametrize("reach", [1.0, 30.0])
@@ -399,16 +307,6 @@ class Samples:
     run: np.ndarray
 
 
-def runs(n: int) -> list[Run]:
-    """Runs of which only the names matter here."""
-    made = []
-    for k in range(n):
-        run = object.__new__(Run)
-        object.__setattr__(run, "file", f"{k}.csv")
-        made.append(run)
-    return made
-
-
 def profile(*legs: tuple[float, float], noise: float = 0.05, start: float = 0.0) -> Samples:
     """Temperature along legs of (minutes, change in C), one sample in 10 s, with noise."""
     edges = np.cumsum([0.0, *(60.0 * minutes for minutes, _ in legs)])
@@ -419,14 +317,15 @@ def profile(*legs: tuple[float, float], noise: float = 0.05, start: float = 0.0)
     return Samples(temperature, time + start, np.zeros(len(time), dtype=np.int64))
 
 
-def edges_of(spans: tuple[RunSpan, ...]) -> list[float]:
+def edges_of(found: tuple[Fold, ...]) -> list[float]:
+    spans = [fold.spans[0] for fold in found]
     return [spans[0].from_s, *(s.to_s for s in spans)]
 
 
 def test_a_cycle_is_cut_at_its_turning_points() -> None:
-    spans = training_spans(runs(1), profile((20, -60.0), (30, 90.0), (20, -40.0)))
-    assert [s.kind for s in spans] == ["branch"] * 3
-    assert edges_of(spans) == pytest.approx([0.0, 1200.0, 3000.0, 4200.0], abs=60.0)
+    found = folds(profile((20, -60.0), (30, 90.0), (20, -40.0)))
+    assert [fold.kind for fold in found] == ["branch"] * 3
+    assert edges_of(found) == pytest.approx([0.0, 1200.0, 3000.0, 4200.0], abs=60.0)
 
 
 def test_turning_points_depend_neither_on_where_a_record_begins_nor_on_its_samples() -> None:
@@ -442,58 +341,46 @@ def test_turning_points_depend_neither_on_where_a_record_begins_nor_on_its_sampl
 
 
 def test_holds_and_steps_on_the_way_are_no_turning_points() -> None:
-    spans = training_spans(runs(1), profile((10, 20.0), (30, 0.0), (10, 20.0), (30, 0.0), (20, -40.0)))
-    assert len(spans) == 2
-    assert edges_of(spans)[1] == pytest.approx(4800.0, abs=1900.0)
+    found = folds(profile((10, 20.0), (30, 0.0), (10, 20.0), (30, 0.0), (20, -40.0)))
+    assert len(found) == 2
+    assert edges_of(found)[1] == pytest.approx(4800.0, abs=1900.0)
 
 
 def test_branches_shorter_than_five_minutes_join_their_neighbour() -> None:
-    spans = training_spans(runs(1), profile((20, -60.0), (3, 5.0), (20, -40.0), (20, 60.0)))
-    assert len(spans) == 2
-    spans = training_spans(runs(1), profile((20, -60.0), (20, 60.0), (2, -10.0)))
-    assert edges_of(spans) == pytest.approx([0.0, 1200.0, 2520.0], abs=60.0)
+    assert len(folds(profile((20, -60.0), (3, 5.0), (20, -40.0), (20, 60.0)))) == 2
+    found = folds(profile((20, -60.0), (20, 60.0), (2, -10.0)))
+    assert edges_of(found) == pytest.approx([0.0, 1200.0, 2520.0], abs=60.0)
 
 
 def test_without_turning_points_there_are_five_equal_parts() -> None:
-    spans = training_spans(runs(1), profile((10, 0.0), noise=0.1))
-    assert [s.kind for s in spans] == ["part"] * 5
-    np.testing.assert_allclose(np.diff(edges_of(spans)), 120.0)
+    found = folds(profile((10, 0.0), noise=0.1))
+    assert [fold.kind for fold in found] == ["part"] * 5
+    np.testing.assert_allclose(np.diff(edges_of(found)), 120.0)
 
 
-def test_spans_cover_every_sample_once() -> None:
+def test_folds_cover_every_sample_once() -> None:
     for cut in (profile((20, -60.0), (30, 90.0), start=7000.0), profile((60, 30.0))):
-        spans = training_spans(runs(1), cut)
-        inside = sum(s.contains(cut.run, cut.time_s).astype(int) for s in spans)
+        inside = sum(fold.held(cut).astype(int) for fold in folds(cut))
         assert (inside == 1).all()
 
 
-def test_the_guard_gap_lies_around_the_span_in_its_own_run_only() -> None:
-    one = profile((20, -60.0), (30, 90.0), (20, -40.0))
-    both = Samples(*(np.tile(x, 2) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1], len(one.time_s)))
-    spans = training_spans(runs(2), both)
-    assert {s.run for s in spans} == {0, 1}
-    middle = spans[1]
-    near = middle.contains(both.run, both.time_s, guard=True)
-    inside = middle.contains(both.run, both.time_s)
-    assert (near & ~inside).sum() == 20, "100 s of 10 s samples on both sides"
-    assert not near[both.run == 1].any()
+def test_the_guard_gap_is_on_both_sides() -> None:
+    cut = profile((20, -60.0), (30, 90.0), (20, -40.0))
+    middle = folds(cut)[1]
+    assert (middle.near(cut) & ~middle.held(cut)).sum() == 20, "100 s of 10 s samples on both sides"
 
 
-def test_a_short_span_has_a_short_guard_gap() -> None:
-    spans = training_spans(runs(1), profile((5, 0.0)))
-    assert all(s.guard_s == pytest.approx(0.25 * (s.to_s - s.from_s)) for s in spans)
+def test_a_short_branch_has_a_short_guard_gap() -> None:
+    for fold in folds(profile((5, 0.0))):
+        [span] = fold.spans
+        assert fold.guard_s == pytest.approx(0.25 * (span.to_s - span.from_s))
 
 
-def test_three_runs_are_left_out_whole() -> None:
-    one = profile((20, -60.0), (30, 90.0))
-    three = Samples(*(np.tile(x, 3) for x in (one.temperature_c, one.time_s)), np.repeat([0, 1, 2], len(one.time_s)))
-    assert training_spans(runs(3), three) == ()
-
-
-def test_what_was_cut_can_be_printed_and_recorded() -> None:
-    span = training_spans(runs(1), profile((50, 30.0)))[1]
-    assert str(span) == "0.csv 600 ... 1200 s (part)"
-    assert span.result().content() == {
+def test_what_was_left_out_is_recorded() -> None:
+    run = object.__new__(Run)
+    object.__setattr__(run, "file", "0.csv")
+    [span] = folds(profile((50, 30.0)))[1].results([run])
+    assert span.content() == {
         "file": "0.csv",
         "from_s": 600.0,
         "to_s": 1200.0,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gyrotc.jobs import lot_from
 from gyrotc.recordings import METHODS
-from gyrotc.train import Fit, TrainingData, fit, predict, start_sigma, uncertainty_of
+from gyrotc.train import Fit, TrainingData, fit, predict, rezero_dph, start_sigma, uncertainty_of
 from gyrotc.train.prior import Learned, LotPrior, UnitMeans, learn_prior, prior_of
 from numpy.typing import NDArray
 from training_data import samples, true_bias
@@ -67,6 +67,47 @@ def test_each_method_states_the_error_that_it_makes(method: str) -> None:
     assert 1.0 / FACTOR < np.sqrt(np.mean(ratios)) < FACTOR, ratios
 
 
+def shares_of_the_map(data: TrainingData, found: Fit) -> tuple[float, float]:
+    """Shares of samples of moving runs whose error about the mean of their run is within one and two sigma."""
+    known = uncertainty_of(data, found, (8, 5))
+    sigma = np.sqrt(stated_at(data, known, found) ** 2 - known["rules"]["between_dph"] ** 2)
+    error = predict(found, data.temperature_c, data.slope_c_per_min)
+    error -= true_bias(data.temperature_c, data.slope_c_per_min)
+    within = []
+    for run in np.unique(data.run):
+        own = data.run == run
+        if np.ptp(data.temperature_c[own]) > 1.0:
+            within.append(np.abs(error[own] - error[own].mean()) / sigma[own])
+    ratio = np.concatenate(within)
+    return float(np.mean(ratio < 1.0)), float(np.mean(ratio < 2.0))
+
+
+@pytest.mark.parametrize("between_dph", [0.0, 6e-4])
+@pytest.mark.parametrize("method", METHODS)
+def test_the_part_of_the_map_holds_its_error_about_the_mean_of_a_run(method: str, between_dph: float) -> None:
+    """Two in three within one sigma, nineteen in twenty within two; five gyros tell that to a tenth."""
+    gyros = [gyro(seed, between_dph) for seed in range(GYROS)]
+    one, two = np.mean([shares_of_the_map(data, fit(data, method=method)) for data in gyros], axis=0)
+    assert 0.5 < one < 0.9 and two > 0.88, (one, two)
+
+
+def test_the_repeatability_of_a_single_power_on_is_not_known_and_adds_nothing() -> None:
+    data = gyro(3, 6e-4)
+    one = data.select(data.run == 1)
+    rules = uncertainty_of(one, fit(one), CELLS)["rules"]
+    assert rules["turn_on_dph"] is None and rules["turn_on_freedom"] == 0
+    assert rezero_dph(rules) == 0.0
+
+
+@pytest.mark.parametrize(("power_on", "freedom"), [(None, 5), (np.array([0, 0, 1, 1, 2, 2]), 2)])
+def test_repeatability_has_one_degree_of_freedom_less_than_there_are_power_ons(
+    power_on: NDArray[np.int64] | None, freedom: int
+) -> None:
+    data = gyro(3, 6e-4)
+    rules = uncertainty_of(data, fit(data, method="auto", power_on=power_on), CELLS)["rules"]
+    assert rules["turn_on_freedom"] == freedom
+
+
 @pytest.mark.parametrize("method", ["constant", "cubic_slope", "mrbf"])
 def test_an_offset_of_each_run_is_in_what_is_stated_for_the_next_one(method: str) -> None:
     between = 6e-4
@@ -79,7 +120,7 @@ def test_an_offset_of_each_run_is_in_what_is_stated_for_the_next_one(method: str
 def test_the_rule_of_the_scatter_between_runs_is_its_true_size(offset_dph: float) -> None:
     """What a field re-zero and a budget take from the table; six runs tell it to a third."""
     found = [
-        uncertainty_of(data, fit(data), CELLS)["rules"]["between_dph"]
+        uncertainty_of(data, fit(data), CELLS)["rules"]["turn_on_dph"]
         for data in (gyro(80 + seed, offset_dph) for seed in range(2 * GYROS))
     ]
     low, high = (offset_dph / FACTOR, FACTOR * offset_dph) if offset_dph else (0.0, 2e-4)

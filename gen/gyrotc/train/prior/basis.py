@@ -1,8 +1,8 @@
 """The functions that maps of a lot are written in, and how large a smooth process makes each of them.
 
-The same Hilbert-space process as in training (`gen/core/evidence.cpp`, docs/training.md, section 1): a constant, sines
-of T for a short and a long scale, and products of sines for what couples T and dT/dt. Inputs are normalised to the
-lot's envelope, so that units with other programmes share one set of functions.
+A Hilbert-space process as the smooth map of training (`train/gaussian.py`, docs/training.md, section 1): a constant,
+sines of T for a short and a long scale, and products of sines for what couples T and dT/dt. Inputs are normalised to
+the lot's envelope, so that units with other programmes share one set of functions.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from ...results.fleet import LotFunctions
 
 PARAMETERS = ("constant", "short", "short_scale", "long", "long_scale", "coupled", "coupled_scale_t", "coupled_scale_r")
 """Standard deviations in units of the lot and scales in half ranges; a process is given by their logarithms."""
-PRIOR_LOG = np.log([1.0, 0.3, 0.15, 1.0, 0.7, 0.3, 0.8, 0.8])  # as kPriorMean of gen/core/evidence.cpp
-_PRIOR_SD = np.array([3.0, 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5])  # as kPriorSd there
-CONSTANT = np.log(10.0)  # of the mean of a lot: as kConstVariance there, nothing is known of it
-_OF_T, _COUPLED = 40, (10, 8)  # as there: 121 functions
-_REACH = 1.4  # as kReach there: the functions vanish at the edge of the domain
+PRIOR_LOG = np.log([1.0, 0.3, 0.15, 1.0, 0.7, 0.3, 0.8, 0.8])
+_PRIOR_SD = np.array([3.0, 1.5, 0.7, 1.0, 0.5, 1.5, 0.5, 0.5])
+CONSTANT = np.log(10.0)  # of the mean of a lot: nothing is known of it
+_OF_T, _COUPLED = 40, (10, 8)  # 121 functions
+_REACH = 1.4  # the functions vanish at the edge of the domain
 _FREQUENCIES: FloatArray = np.asarray(np.pi * (np.arange(_OF_T) + 1.0) / (2.0 * _REACH), dtype=np.float64)
-_FLOOR = 1e-10  # as kVarianceFloor there
+_FLOOR = 1e-10  # a function that is not used keeps the equations solvable
 _STEPS = 15  # of a search that goes on in the next round
 _BOUND = 5.0  # prior standard deviations: no parameter of use lies beyond
 

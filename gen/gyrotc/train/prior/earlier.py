@@ -20,7 +20,7 @@ from ...model import Model
 from ...results.fleet import KnownMap
 from ...results.training import ChangeKind, EarlierUse, Training, TriedChange
 from ..data import Scaling, TrainingData
-from ..evidence import Asked
+from ..process import Asked
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .departures import Departures, Hypothesis, revised, updated, within
 from .given import Given

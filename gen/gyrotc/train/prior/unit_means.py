@@ -11,7 +11,8 @@ from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.training import MapMeans
 from ..data import Scaling, TrainingData, average_samples, gather
-from ..evidence import MEAN_S, Process, difference_sigma
+from ..noise import difference_sigma
+from ..process import MEAN_S, Process
 
 _SPREAD_GRID = 2.0**30  # of a spread: as many digits as a file holds
 

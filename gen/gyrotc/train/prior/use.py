@@ -16,9 +16,10 @@ from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.fleet import KnownMap, Lot, LotProcess, LotUse, UnitCurve
 from ..data import Bins, Scaling, TrainingData, average_samples
-from ..evidence import MEAN_S, Asked, Process, TrainingFailed, fit_process
+from ..gaussian import TrainingFailed
 from ..mrbf import fit_mrbf
 from ..objection import objection_to
+from ..process import MEAN_S, Asked, Process, fit_process
 from ..result import Outcome
 from .basis import PARAMETERS, LotBasis
 from .given import Given
@@ -175,24 +176,23 @@ class _PosteriorMap:
     spread: float
     sigma: float
     freedom: float
-    value: float = 0.0
-    evaluations: int = 0
 
     @property
-    def log_parameters(self) -> FloatArray:
-        """As of the evidence model: what a unit differs by has the scales of the lot's rest."""
-        _, short, short_scale, long, long_scale, coupled, scale_t, scale_r = np.exp(self.posterior.prior.rest)
+    def scales(self) -> tuple[float, float]:
+        """Shortest scales of what a unit differs by, which are those of the lot's rest; normalised."""
+        _, _, short, _, _, _, of_t, of_r = np.exp(self.posterior.prior.rest)
         basis = self.posterior.prior.basis
-        of_t = basis.half_range_c / self.scaling.half_range_c
-        of_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
-        of_both = coupled, scale_t * of_t, scale_r * of_r
-        return np.log([short, short_scale * of_t, long, long_scale * of_t, *of_both, self.sigma])
+        by_t = basis.half_range_c / self.scaling.half_range_c
+        by_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
+        return float(min(short, of_t) * by_t), float(of_r * by_r)
 
     def mean(self, t: FloatArray, r: FloatArray) -> FloatArray:
         return (self.posterior.mean_dph(*self._physical(t, r)) - self.center) / self.spread
 
-    def variance(self, t: FloatArray, r: FloatArray) -> FloatArray:
-        return self.posterior.variance_dph2(*self._physical(t, r)) / self.spread**2
+    def roots(self, t: FloatArray, r: FloatArray) -> FloatArray:
+        prior = self.posterior.prior
+        values = prior.basis.values(*self._physical(t, r))
+        return np.asarray(prior.unit_dph / self.spread * values @ np.linalg.cholesky(self.posterior.covariance))
 
     def _physical(self, t: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         s = self.scaling

@@ -1,0 +1,100 @@
+"""The one decision of training: is a richer candidate better on history that it has not seen?
+
+A candidate's loss on a piece of history is the logarithm of the RMS that it leaves there without having seen it, so all
+pieces count alike and one gross failure does not outvote the others. A candidate is beaten by a richer one whose mean
+loss is smaller by more than its doubt: the standard error of the mean difference over the pieces. The simplest
+candidate that no richer one beats is taken.
+
+Two or three pieces may agree by accident, and their scatter then says that there is no doubt. So one more deviation is
+added to theirs: that of a piece on which the candidates are equally good, give or take 3 %. It counts much with two
+pieces and hardly at all with ten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..common.arrays import FloatArray
+
+# Smallest deviation from piece to piece that is believed, in log RMS: a difference of two candidates of 3 % on a piece
+# is as large as what noise and the choice of the pieces make of it (`bench ONLY=splits`, `bench ONLY=accuracy`).
+_PRIOR_DEVIATION = 0.03
+# Standard errors that a gain must exceed. More keep the constant where a map would help; fewer take maps by chance.
+_STANDARD_ERRORS = 1.0
+# Least RMS, as a share of the largest: below it lie rates without noise, which differ by rounding.
+_LEAST_RMS = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateChoice:
+    """Losses of all candidates, and the one that is taken.
+
+    Attributes:
+        candidates: Names, the simplest first.
+        losses: Log RMS on each piece left out, shape (pieces, candidates); nan: it could not be fitted.
+        chosen: Name of the candidate that is taken.
+    """
+
+    candidates: tuple[str, ...]
+    losses: FloatArray
+    chosen: str
+
+    def gain(self, name: str, other: str) -> tuple[float, float]:
+        """Return by how much the mean loss of `name` is below that of `other`, and the doubt of this gain."""
+        return gain_over_pieces(self._of(other) - self._of(name))
+
+    def rms(self, name: str) -> float | None:
+        """Return the RMS over the pieces, all counting alike; None if it is not known."""
+        rms = float(np.sqrt(np.mean(np.exp(2.0 * self._of(name))))) if len(self.losses) else np.nan
+        return rms if np.isfinite(rms) else None
+
+    def beats(self, name: str, other: str) -> bool:
+        """Test whether a candidate is better than another by more than its doubt."""
+        gain, doubt = self.gain(name, other)
+        return bool(gain > doubt)
+
+    def without(self, refused: Sequence[str]) -> CandidateChoice:
+        """Return the choice among the candidates that may be used."""
+        return CandidateChoice(self.candidates, self.losses, _chosen(self.candidates, self.losses, refused))
+
+    def _of(self, name: str) -> FloatArray:
+        return np.asarray(self.losses[:, self.candidates.index(name)])
+
+
+def choose(candidates: Sequence[str], mean_squares: FloatArray) -> CandidateChoice:
+    """Choose the simplest candidate that no richer one beats by more than its doubt.
+
+    With fewer than two pieces nothing can be said for a richer candidate: the first is taken.
+
+    Args:
+        candidates: Names, the simplest first.
+        mean_squares: What each leaves on each piece without having seen it, shape (pieces, candidates); nan if it
+            could not be fitted.
+    """
+    names = tuple(candidates)
+    squares = np.asarray(mean_squares, dtype=np.float64).reshape(-1, len(names))
+    largest = float(np.nanmax(squares, initial=0.0))
+    losses = 0.5 * np.log(np.maximum(squares, max(_LEAST_RMS**2 * largest, np.finfo(np.float64).tiny)))
+    return CandidateChoice(names, losses, _chosen(names, losses, ()))
+
+
+def _chosen(names: Sequence[str], losses: FloatArray, refused: Sequence[str]) -> str:
+    able = [k for k, n in enumerate(names) if n not in refused and np.all(np.isfinite(losses[:, k]))]
+    for place, k in enumerate(able):
+        gains = [gain_over_pieces(losses[:, k] - losses[:, richer]) for richer in able[place + 1 :]]
+        if not any(gain > doubt for gain, doubt in gains):
+            return names[k]
+    return names[0]
+
+
+def gain_over_pieces(gains: FloatArray) -> tuple[float, float]:
+    """Return the mean gain in log RMS over pieces of history, and its doubt; nothing with fewer than two pieces."""
+    n = len(gains)
+    if n < 2 or not np.all(np.isfinite(gains)):
+        return 0.0, float("inf")
+    mean = float(gains.mean())
+    squares = float(np.sum((gains - mean) ** 2)) + mean**2 + _PRIOR_DEVIATION**2
+    return mean, _STANDARD_ERRORS * float(np.sqrt(squares / (n - 1) / n))

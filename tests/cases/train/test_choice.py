@@ -1,0 +1,88 @@
+"""The one decision of training, on either side of its doubt. The doubt is that of docs/training.md, section 2."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gyrotc.train import choose
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+PIECES = (2, 3, 6, 20)
+
+
+def gains(mean: float, doubts: float, n: int) -> Floats:
+    """Gains in log RMS over pieces with this mean, which is so many of its doubts.
+
+    With the scatter s over n pieces the squared doubt is ((n - 1) s^2 + mean^2 + 0.03^2)/(n (n - 1)).
+    """
+    shape = np.linspace(-1.0, 1.0, n) ** 3
+    shape -= shape.mean()
+    squares = (mean / doubts) ** 2 * n * (n - 1) - mean**2 - 0.03**2
+    assert squares >= 0.0, "no scatter is small enough"
+    return np.asarray(mean + shape / np.sqrt(np.sum(shape**2)) * np.sqrt(squares))
+
+
+def squares(*gains_over_first: Floats) -> Floats:
+    """Mean squares of candidates with gains over the first one, shape (pieces, candidates)."""
+    first = np.zeros(len(gains_over_first[0]))
+    return np.exp(-2.0 * np.stack([first, *gains_over_first], axis=1))
+
+
+@pytest.mark.parametrize("n", PIECES)
+@pytest.mark.parametrize(("doubts", "chosen"), [(1.02, "rich"), (0.98, "simple")])
+def test_a_richer_candidate_is_taken_if_its_gain_exceeds_its_doubt(n: int, doubts: float, chosen: str) -> None:
+    found = choose(["simple", "rich"], squares(gains(0.2, doubts, n)))
+    assert found.chosen == chosen
+    assert found.beats("rich", "simple") == (chosen == "rich")
+
+
+@pytest.mark.parametrize("n", PIECES)
+def test_pieces_that_agree_to_the_last_digit_leave_a_doubt_that_shrinks_with_their_number(n: int) -> None:
+    """Without scatter the gain must exceed 3 % with two pieces, 1.3 % with three, 0.15 % with twenty."""
+    least = 0.03 / np.sqrt(n * (n - 1) - 1)
+    assert choose(["simple", "rich"], squares(np.full(n, 1.02 * least))).chosen == "rich"
+    assert choose(["simple", "rich"], squares(np.full(n, 0.98 * least))).chosen == "simple"
+
+
+def test_one_piece_decides_nothing() -> None:
+    assert choose(["simple", "rich"], squares(np.array([3.0]))).chosen == "simple"
+    assert choose(["simple", "rich"], np.zeros((0, 2))).chosen == "simple"
+
+
+def test_of_candidates_that_are_alike_the_simplest_is_taken() -> None:
+    middle = gains(0.5, 5.0, 6)
+    assert choose(["simple", "middle", "rich"], squares(middle, middle + 0.001)).chosen == "middle"
+    assert choose(["simple", "middle", "rich"], squares(middle, middle + 0.1)).chosen == "rich"
+
+
+def test_a_candidate_that_scatters_does_not_shield_the_simplest_from_another() -> None:
+    """The best one may be doubtful; the simplest is beaten all the same if another surely is better."""
+    middle, rich = gains(0.2, 3.0, 6), gains(0.21, 0.5, 6)
+    assert choose(["simple", "middle", "rich"], squares(middle, rich)).chosen == "middle"
+
+
+def test_a_candidate_that_could_not_be_fitted_or_is_refused_is_not_taken() -> None:
+    made = squares(gains(0.2, 3.0, 6), gains(0.6, 3.0, 6))
+    found = choose(["simple", "middle", "rich"], made)
+    assert found.chosen == "rich"
+    assert found.without(["rich"]).chosen == "middle"
+    made[2, 2] = np.nan
+    assert choose(["simple", "middle", "rich"], made).chosen == "middle"
+
+
+@given(
+    losses=st.lists(st.floats(-3.0, 3.0), min_size=8, max_size=8),
+    scale=st.floats(1e-3, 1e3),
+    order=st.permutations(range(4)),
+)
+def test_the_choice_depends_neither_on_the_unit_nor_on_the_order_of_pieces(
+    losses: list[float], scale: float, order: list[int]
+) -> None:
+    made = np.exp(np.array(losses).reshape(4, 2))
+    names = ["simple", "rich"]
+    gain, doubt = choose(names, made).gain("rich", "simple")
+    others = choose(names, scale**2 * made[order]).gain("rich", "simple")
+    assert others == pytest.approx((gain, doubt), abs=1e-9)
