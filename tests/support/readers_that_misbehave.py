@@ -1,10 +1,8 @@
-"""Readers of logger files as an attacker would have them, once a hole in a library runs his code."""
+"""Readers of logger files that do what a library does with a damaged file."""
 
 from __future__ import annotations
 
 import os
-import signal
-import socket
 from pathlib import Path
 
 import numpy as np
@@ -20,44 +18,6 @@ def a_table(path: Path, text: str = "") -> LoggerFile:
 
 def reads_the_file(path: Path) -> LoggerFile:
     return a_table(path, path.read_text(encoding="ascii"))
-
-
-def reads_another(path: Path) -> LoggerFile:
-    return a_table(path, (path.parent / "secret").read_text(encoding="ascii"))
-
-
-def lists_the_folder(path: Path) -> LoggerFile:
-    return a_table(path, " ".join(one.name for one in path.parent.iterdir()))
-
-
-def writes_beside(path: Path) -> LoggerFile:
-    (path.parent / "made").write_text("x", encoding="ascii")
-    return a_table(path)
-
-
-def writes_into_it(path: Path) -> LoggerFile:
-    path.write_text("x", encoding="ascii")
-    return a_table(path)
-
-
-def removes_it(path: Path) -> LoggerFile:
-    path.unlink()
-    return a_table(path)
-
-
-def starts_a_program(path: Path) -> LoggerFile:
-    os.execv("/bin/true", ["true"])
-    return a_table(path)
-
-
-def calls_home(path: Path) -> LoggerFile:
-    with socket.create_connection(("127.0.0.1", int(path.read_text(encoding="ascii"))), timeout=5):
-        return a_table(path)
-
-
-def kills_others(path: Path) -> LoggerFile:
-    os.kill(int(path.read_text(encoding="ascii")), signal.SIGTERM)
-    return a_table(path)
 
 
 def takes_all_memory(path: Path) -> LoggerFile:

@@ -1,3 +1,4 @@
+from .child import open_in_child as open_in_child
 from .description import Layout as Layout
 from .description import Problems as Problems
 from .description import dataset_toml as dataset_toml
@@ -12,12 +13,9 @@ from .fit_options import SIMPLE as SIMPLE
 from .loading import axes_of as axes_of
 from .loading import load as load
 from .loading import load_reporting as load_reporting
-from .parser_process import Parser as Parser
-from .parser_process import landlock_version as landlock_version
-from .parser_process import open_confined as open_confined
+from .parquet import ParquetFile as ParquetFile
 from .plausibility import EARTH_RATE_DPH as EARTH_RATE_DPH
 from .plausibility import earth_rate as earth_rate
-from .reading import ParquetFile as ParquetFile
 from .reading import known_rows as known_rows
 from .records import Applied as Applied
 from .records import Dataset as Dataset

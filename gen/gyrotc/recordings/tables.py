@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import IntArray
 from ..common.errors import InputError, install_command
+from ..common.inputs import refuse_above
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
 Array = NDArray[Any]
@@ -152,6 +153,17 @@ class LoggerFile:
     csv: dict[str, Any] = field(default_factory=dict)
     close: Callable[[], object] = lambda: None
     joined: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuses tables of more rows or columns than are allowed.
+
+        Raises:
+            InputError: There is one.
+        """
+        for table in self.tables:
+            where = f"{self.path.name} {table.name}".rstrip()
+            refuse_above("rows", table.rows, where, "rows")
+            refuse_above("columns", len(table.columns), where, "columns")
 
 
 def optional_library(path: Path, module: str, extra: str, what: str) -> ModuleType:

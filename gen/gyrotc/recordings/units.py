@@ -17,6 +17,8 @@ from fractions import Fraction
 from functools import cache
 from typing import Literal
 
+import numpy as np
+
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 
@@ -141,7 +143,8 @@ class Conversion:
         """Values in gyrotc's own unit; the same array where that is the file's."""
         if not self.changes:
             return values
-        converted = values * self.factor
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out or refused with its row
+            converted = values * self.factor
         if self.offset:
             converted += self.offset
         return converted

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import importlib
-import importlib.util
 import json
 import os
 import random
@@ -22,7 +20,7 @@ import pytest
 import scipy.io
 from conftest import Command, run_gyrotc
 from gyrotc.quality import check
-from gyrotc.recordings import LoggerFile, load, units
+from gyrotc.recordings import load, units
 from gyrotc.recordings.importers import ImportOptions, Map, Stamps, import_files, load_map
 from gyrotc.results import ImportedFiles, read_result
 from logger_analysis import ANALYSIS_CASES
@@ -536,11 +534,6 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
     from gyrotc.recordings import tables
     from gyrotc.recordings.importers import job as import_job
 
-    def in_this_process(parser: import_job.Parser, path: Path) -> LoggerFile:
-        module = importlib.import_module(parser.module, "gyrotc.recordings")
-        file: LoggerFile = getattr(module, parser.function)(path)
-        return file
-
     class Importlib:
         """Finds nothing."""
 
@@ -550,7 +543,7 @@ def test_a_missing_library_is_named_with_the_extra_that_brings_it(
 
     (tmp_path / name).write_bytes(head + bytes(2000))
     monkeypatch.setattr(tables, "importlib", Importlib)
-    monkeypatch.setattr(import_job, "open_confined", in_this_process)
+    monkeypatch.setattr(import_job, "open_in_child", lambda opener, path: opener(path))
     status, _, error = run("import", tmp_path / name, "--out", tmp_path / "R")
     assert status == 2
     assert error.startswith(f"gyrotc: {name}: ")

@@ -20,6 +20,8 @@ from gyrotc.recordings.importers import ImportOptions, Map, import_files
 from gyrotc.results import ImportedFile, ImportedFiles, read_result
 from hypothesis import given
 from hypothesis import strategies as st
+from logger_binaries import BINARY_CASES
+from logger_files import Case, truth
 
 NAMES = "time_s,temperature_c,rate_dph"
 Row = Callable[[int], str]
@@ -493,3 +495,74 @@ def test_the_count_is_printed(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join([*PREAMBLE, NAMES, *rows(three, 0, 60), NAMES]) + "\n")
     done = run_gyrotc("import", tmp_path / "a.csv", "--out", tmp_path / "R")
     assert "61 read, 1 left out: repeated header lines; lines of text above them: 4" in done.stdout
+
+
+BODIES: dict[str, bytes] = {}
+
+
+def body_of(case: Case, folder: Path) -> bytes:
+    """The bytes of a whole file, which is written once."""
+    if case.id not in BODIES:
+        case.write(folder / case.file, truth())
+        BODIES[case.id] = (folder / case.file).read_bytes()
+    return BODIES[case.id]
+
+
+IN_PROCESS = [case for case in BINARY_CASES if case.file.endswith((".parquet", ".tdms"))]
+IN_CHILDREN = [case for case in BINARY_CASES if case not in IN_PROCESS and not case.options]
+
+
+def damaged_bytes(data: bytes, kind: str, at: float, mask: int) -> bytes:
+    k = int(at * (len(data) - 1))
+    return {
+        "bit": data[:k] + bytes([data[k] ^ (1 << mask % 8)]) + data[k + 1 :],
+        "end": data[: max(k, 1)],
+        "zeros": data[:k] + bytes(min(mask, len(data) - k)) + data[k + mask :],
+        "twice": data[:k] + data[max(k - mask, 0) :],
+    }[kind]
+
+
+def import_damaged(case: Case, kind: str, at: float, mask: int) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        path = folder / f"damaged-{case.file}"
+        path.write_bytes(damaged_bytes(body_of(case, folder), kind, at, mask))
+        try:
+            done = import_files([path], folder / "R", Map(), ImportOptions(serial="R", trust_units=True))
+        except InputError as error:
+            assert error.where and error.found and error.expected
+            return
+        assert done is not None
+        (run,) = done.result().runs
+        assert run.read == run.rows + sum(run.left_out.values())
+        assert pq.read_metadata(folder / "R" / run.file).num_rows == run.rows
+
+
+damages = {
+    "kind": st.sampled_from(["bit", "end", "zeros", "twice"]),
+    "at": st.floats(0.0, 1.0),
+    "mask": st.integers(1, 400),
+}
+
+
+@given(case=st.sampled_from(IN_PROCESS), **damages)
+@examples(200)
+def test_a_damaged_file_is_counted_or_refused(case: Case, kind: str, at: float, mask: int) -> None:
+    import_damaged(case, kind, at, mask)
+
+
+@pytest.mark.slow
+@given(case=st.sampled_from(IN_CHILDREN), **damages)
+@examples(100)
+def test_a_damaged_file_of_a_child_is_counted_or_refused(case: Case, kind: str, at: float, mask: int) -> None:
+    import_damaged(case, kind, at, mask)
+
+
+@pytest.mark.parametrize("lost", [100, 1000])
+def test_a_tdms_file_that_ends_early_is_said_to(lost: int, tmp_path: Path, gyrotc: Command) -> None:
+    """The library reads what is there of the last segment, and only logs that it states more."""
+    case = next(case for case in BINARY_CASES if case.file == "wave.tdms")
+    (tmp_path / "cut.tdms").write_bytes(body_of(case, tmp_path)[:-lost])
+    done = gyrotc("import", tmp_path / "cut.tdms", "--out", tmp_path / "R")
+    assert (done.returncode == 2) or "the file ends within its last segment" in done.stdout
+    assert "WARNING" not in done.stderr

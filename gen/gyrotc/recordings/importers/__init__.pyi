@@ -1,3 +1,4 @@
+from .format import format_of as format_of
 from .job import ImportOptions as ImportOptions
 from .job import import_files as import_files
 from .map_file import Map as Map

@@ -1,19 +1,13 @@
-"""CSV of any dialect: what stands above the rows, then blocks of whole lines, read by pyarrow.
-
-Sheets of a spreadsheet (`.xlsx`, by openpyxl) become CSV files in a folder of its own, and are read as one is.
-"""
+"""CSV of any dialect: what stands above the rows, then blocks of whole lines, read by pyarrow."""
 
 from __future__ import annotations
 
 import codecs
-import csv
 import re
 import shlex
-import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import date, datetime, time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +16,7 @@ import pyarrow as pa
 
 from ...common.errors import InputError
 from ..files import blocks_of_lines, lines_held, nuls_at_end, number_in, parsed
-from ..tables import Chunk, Column, LoggerFile, LoggerTable, optional_library
+from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .cells import (
     HEXADECIMAL,
     MISSING_WORDS,
@@ -34,7 +28,7 @@ from .cells import (
     split_line,
 )
 from .csv_dialect import Dialect, dialect_of, encoding_of, without_nuls
-from .layout import SeveralLayouts, can_be_row, other_names, row_misfit
+from .layout import can_be_row, other_names, row_misfit
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
@@ -346,62 +340,3 @@ def _words(dialect: Dialect) -> str:
     head = f"header in line {dialect.header_line}" if dialect.header_line else "no header"
     units = f", units in line {dialect.units_line}" if dialect.units_line else ""
     return f"CSV, {dialect.encoding}, delimiter {delimiter}, decimals with {dialect.decimal!r}, {head}{units}"
-
-
-_MOST_SHEETS = 20  # of a workbook that is a recording
-
-
-def open_spreadsheet(path: Path) -> LoggerFile:
-    """A workbook: each sheet with a header and rows is a table; formulas count by the value that was saved.
-
-    Raises:
-        InputError: openpyxl is not installed, the file is damaged, or no sheet holds rows of numbers.
-    """
-    openpyxl = optional_library(path, "openpyxl", "excel", "a spreadsheet")
-    try:
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    except Exception as error:  # whatever a damaged file makes of the parser
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as a spreadsheet ({what})", "a whole .xlsx file") from error
-    folder = Path(tempfile.mkdtemp())
-    tables: list[LoggerTable] = []
-    refused: list[InputError] = []
-    notes: list[str] = []
-    sheets = book.worksheets
-    if len(sheets) > _MOST_SHEETS:
-        raise InputError(path.name, f"{len(sheets)} sheets", f"at most {_MOST_SHEETS}: those with the recording")
-    for k, sheet in enumerate(sheets):
-        place = folder / str(k) / path.name
-        place.parent.mkdir()
-        with place.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerows([_cell(value) for value in row] for row in sheet.iter_rows(values_only=True))
-        try:
-            tables += _tables(place, sheet.title if len(sheets) > 1 else "")
-        except SeveralLayouts as error:
-            where = f"{path.name}, sheet {sheet.title}{error.where.removeprefix(path.name)}"
-            raise SeveralLayouts(where, error.found, error.expected) from error
-        except InputError as error:
-            refused.append(InputError(f"{path.name}, sheet {sheet.title}", error.found, error.expected))
-            if any(can_be_row(split_line(line, ","), ".") for line in place.read_text("utf-8").splitlines()):
-                notes.append(f"the rows of sheet {sheet.title} are not read: {error.found}")
-    if not tables:
-        raise refused[0] if refused else InputError(path.name, "no sheets", "a sheet with a header and rows")
-    return LoggerFile(path, "spreadsheet", tuple(replace(table, notes=tuple(notes)) for table in tables))
-
-
-def _tables(place: Path, name: str) -> list[LoggerTable]:
-    given = {"encoding": "utf-8", "delimiter": ",", "decimal": "."}
-    return [replace(table, name=name) for table in open_csv(place, given).tables]
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return str(int(value))
-    if isinstance(value, datetime):
-        return value.isoformat(sep=" ")
-    if isinstance(value, date | time):
-        return value.isoformat()
-    return repr(value) if isinstance(value, float) else " ".join(str(value).split())

@@ -28,12 +28,13 @@ from ...results.base import ADVICE, Finding
 from ...results.files import write_own
 from ...results.folder import Stage, result_folder, scratch_folder
 from ...results.recordings import ImportedFile, ImportedFiles, OriginalFile
+from ..child import open_in_child
 from ..description import FILE, MIN_ROWS, Problems, SourceEntry, check_serial, dataset_toml, parse_description
-from ..parser_process import Parser, open_confined
 from ..plausibility import TRUSTED, Suspicion, suspicions
 from ..reading import Evidence
 from ..tables import LoggerFile, LoggerTable
 from .csv_table import open_csv
+from .format import format_of
 from .map_file import MAP_FILE, Choice, ImportPlan, JoinMap, Map, map_text
 from .propose import Ask, propose
 from .rows import NAMES_OF_COLUMNS, ImportedRows, RowsChunk, RunFile
@@ -544,31 +545,8 @@ def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOp
     return [f"{one.column}: {one.found}" for one in found]
 
 
-_MAGIC = (
-    (b"MATLAB 5.0", "mat"),
-    (b"MATLAB 7.3", "hdf5"),
-    (b"\x89HDF\r\n\x1a\n", "hdf5"),
-    (b"PAR1", "parquet"),
-    (b"CDF\x01", "netcdf"),
-    (b"CDF\x02", "netcdf"),
-    (b"CDF\x05", "netcdf"),
-    (b"TDSm", "tdms"),
-)
-_NAMED = {".mat": "mat"}
-_SHEETS = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
-"""How the name of the first file in a spreadsheet begins."""
-_PARSERS = {
-    "mat": Parser(".importers.matfile", "open_mat", "scipy.io"),
-    "hdf5": Parser(".importers.matfile", "open_hdf5", "h5py"),
-    "parquet": Parser(".importers.parquet", "open_parquet", "pyarrow.parquet"),
-    "spreadsheet": Parser(".importers.csv_table", "open_spreadsheet", "openpyxl", unpacks=True),
-    "netcdf": Parser(".importers.netcdf", "open_netcdf", "xarray"),
-    "tdms": Parser(".importers.tdms", "open_tdms", "nptdms"),
-}
-"""Formats that a library reads: each in a process of its own. CSV is split into lines and cells here."""
-_GZIP, _ZIP, _ZIP_NAME = b"\x1f\x8b", b"PK\x03\x04", 30  # 30: where a name begins (APPNOTE.TXT, 4.3.7)
+_GZIP = b"\x1f\x8b"
 _REFUSED = (
-    (b"PK\x03\x04", "a ZIP archive", "its files, unpacked"),
     (b"\x28\xb5\x2f\xfd", "compressed by zstd", "the file unpacked (unzstd)"),
     (b"\xd0\xcf\x11\xe0", "an old spreadsheet", "the sheet saved as CSV"),
 )
@@ -608,20 +586,13 @@ def _head(path: Path) -> bytes:
 
 
 def _opened(path: Path, head: bytes, chosen: Map) -> LoggerFile:
-    kind = _kind(path, head)
+    kind = format_of(path, head)
     for magic, what, instead in _REFUSED if kind is None else ():
         if head.startswith(magic):
             raise InputError(path.name, what, instead)
-    return open_csv(path, chosen.csv.given()) if kind is None else open_confined(_PARSERS[kind], path)
-
-
-def _kind(path: Path, head: bytes) -> str | None:
-    """The parser of a file by its first bytes, then by its name; None: text."""
-    if head.startswith(_ZIP):
-        first = head[_ZIP_NAME : _ZIP_NAME + int.from_bytes(head[26:28], "little")]
-        return "spreadsheet" if first.startswith(_SHEETS) else None
-    kind = next((kind for magic, kind in _MAGIC if head.startswith(magic)), _NAMED.get(path.suffix.lower()))
-    return "netcdf" if kind == "hdf5" and path.suffix.lower() in (".nc", ".nc4", ".cdf") else kind
+    if kind is None:
+        return open_csv(path, chosen.csv.given())
+    return open_in_child(kind.open, path) if kind.in_child else kind.open(path)
 
 
 def _unpacked(path: Path, chosen: Map) -> LoggerFile:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
+from io import StringIO
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ...common.errors import InputError
-from ..tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library
+from ....common.errors import InputError
+from ...tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library
+from ..format import Format
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
 
@@ -23,22 +28,42 @@ def open_tdms(path: Path) -> LoggerFile:
         InputError: nptdms is not installed, or the file is damaged.
     """
     nptdms = optional_library(path, "nptdms", "tdms", "a TDMS file")
-    stream = path.open("rb")  # nptdms leaves one that it opens itself open where the file is damaged
+    with ExitStack() as stack:
+        said = stack.enter_context(_log(nptdms))
+        stream = stack.enter_context(path.open("rb"))  # by its path the library would read the index file beside it
+        try:
+            file = nptdms.TdmsFile.open(stream)
+            tables = tuple(table for group in file.groups() for table in _tables(group, path.name))
+        except Exception as error:  # whatever a damaged file makes of the parser
+            what = " ".join(str(error).split())[:100]
+            raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
+        if not tables:
+            raise InputError(path.name, "no numeric channels", "a TDMS file with channels of numbers")
+        facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
+        if _SHORT in said.getvalue():
+            tables = tuple(replace(table, notes=(_CUT,)) for table in tables)
+        opened = LoggerFile(path, "TDMS file", tables, facts)
+        return replace(opened, close=stack.pop_all().close)
+
+
+# What the library logs of a file whose last segment states more than there is, and what that means.
+_SHORT = "less data than expected"
+_CUT = "the file ends within its last segment: the rows that it states behind are missing"
+
+
+@contextmanager
+def _log(nptdms: ModuleType) -> Iterator[StringIO]:
+    """What the library logs while a file is open; it is not printed."""
+    handler = nptdms.log.log_manager.console_handler
+    said = StringIO()
+    before = handler.setStream(said)
     try:
-        file = nptdms.TdmsFile.open(stream)
-        tables = tuple(table for group in file.groups() for table in _tables(group))
-    except Exception as error:  # whatever a damaged file makes of the parser
-        stream.close()
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
-    if not tables:
-        stream.close()
-        raise InputError(path.name, "no numeric channels", "a TDMS file with channels of numbers")
-    facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
-    return LoggerFile(path, "TDMS file", tables, facts, close=stream.close)
+        yield said
+    finally:
+        handler.setStream(before or sys.stderr)
 
 
-def _tables(group: Any) -> Iterator[LoggerTable]:
+def _tables(group: Any, file: str) -> Iterator[LoggerTable]:
     """A table for each rhythm of a group: channels of one length, one increment and one time of the first sample."""
     rhythms: dict[_Rhythm, list[Any]] = {}
     for channel in group.channels():
@@ -55,7 +80,7 @@ def _tables(group: Any) -> Iterator[LoggerTable]:
             f"wf_increment = {step} s of {names[0]}" if rate else "",
             rhythm.started if rate else None,
             rows=rhythm.rows,
-            parts={channel.name: _part(channel) for channel in channels},
+            parts={channel.name: _part(channel, file) for channel in channels},
         )
 
 
@@ -87,9 +112,13 @@ def _column(channel: Any) -> Column | None:
     return Column(channel.name, unit, "a property of the channel" if unit else "")
 
 
-def _part(channel: Any) -> ReadPart:
+def _part(channel: Any, file: str) -> ReadPart:
     def part(first: int, last: int) -> Any:
-        values = channel[first:last]
+        try:
+            values = channel[first:last]
+        except Exception as error:  # whatever a damaged file makes of the parser
+            what = " ".join(str(error).split())[:100]
+            raise InputError(file, f"is damaged ({what})", "a whole TDMS file") from error
         return values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)
 
     return part
@@ -100,3 +129,6 @@ def _instant(value: Any) -> datetime | None:
         return None
     microseconds = int(np.datetime64(value, "us").astype(np.int64))
     return datetime.fromtimestamp(microseconds / 1e6, timezone.utc)
+
+
+FORMAT = Format(open_tdms, (b"TDSm",), in_child=False)

@@ -1,17 +1,11 @@
-"""A library that reads a file of others can do nothing but read that file, within limits, and hand back rows.
-
-Whatever a file of a logger holds, it is read or refused within limits.
-"""
+"""Whatever a file of a logger holds, it is read or refused within limits: a child process has them."""
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import sysconfig
@@ -24,11 +18,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import ROOT
+import readers_that_misbehave
+from conftest import ROOT, Command
 from gyrotc.common import InputError
-from gyrotc.recordings import LoggerFile, ParquetFile, Parser, landlock_version, open_confined, parser_process
-from gyrotc.recordings.importers import Map
-from gyrotc.recordings.importers import job as import_job
+from gyrotc.recordings import LoggerFile, ParquetFile, open_in_child
+from gyrotc.recordings.importers import format_of
 from logger_binaries import BINARY_CASES
 from logger_files import Case, truth
 
@@ -36,7 +30,7 @@ MOVED = "memory_gib=0.25 parser_s=1"
 
 
 def opened(reader: str, path: Path) -> LoggerFile:
-    return open_confined(Parser("readers_that_misbehave", reader, "numpy"), path)
+    return open_in_child(getattr(readers_that_misbehave, reader), path)
 
 
 @pytest.fixture
@@ -66,96 +60,38 @@ def test_what_a_reader_does_wrong_is_one_message_about_the_file(reader: str, mes
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.skipif(landlock_version() == 0, reason="this kernel has no Landlock")
-@pytest.mark.parametrize(
-    "reader", ["reads_another", "lists_the_folder", "writes_beside", "writes_into_it", "removes_it", "starts_a_program"]
-)
-def test_a_reader_reaches_no_file_but_its_own(reader: str, file: Path) -> None:
-    with pytest.raises(InputError, match="PermissionError"):
-        opened(reader, file)
-    assert file.read_text(encoding="ascii") == "rows" and {p.name for p in file.parent.iterdir()} == {
-        "log.bin",
-        "secret",
-    }
-
-
-def test_nothing_is_written_without_landlock_either(file: Path) -> None:
-    """By the limit of a file's size: a file may be made, and holds nothing."""
-    with pytest.raises(InputError):
-        opened("writes_beside", file)
-    made = file.parent / "made"
-    assert not made.exists() or made.stat().st_size == 0
-
-
-@pytest.mark.skipif(landlock_version() < 4, reason="Landlock of this kernel knows no network")
-def test_a_reader_reaches_no_port(file: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        file.write_text(str(server.getsockname()[1]), encoding="ascii")
-        with pytest.raises(InputError, match="PermissionError"):
-            opened("calls_home", file)
-
-
-@pytest.mark.skipif(landlock_version() < 6, reason="Landlock of this kernel knows no signals")
-def test_a_reader_reaches_no_process(file: Path) -> None:
-    file.write_text(str(os.getpid()), encoding="ascii")
-    with pytest.raises(InputError, match="PermissionError"):
-        opened("kills_others", file)
-
-
-def test_a_file_is_read_and_its_process_gone_afterwards(file: Path) -> None:
+def test_a_file_is_read_part_by_part(file: Path) -> None:
     found = opened("reads_the_file", file)
     assert found.facts == {"read": "rows"}
     with closing(found):
         chunks = list(found.tables[0].chunks(["x"]))
         assert [len(chunk) for chunk in chunks] == [10] and chunks[0].columns["x"][9] == 9.0
-        number = found.tables[0].worker._pid  # type: ignore[attr-defined]
-        os.kill(number, 0)
-    with pytest.raises(ProcessLookupError):
-        os.kill(number, 0)
 
 
 @pytest.mark.parametrize("case", BINARY_CASES, ids=lambda c: c.id)
-def test_a_process_hands_back_what_the_library_reads(
-    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_child_hands_back_what_the_library_reads(case: Case, tmp_path: Path) -> None:
     """Tables, columns and every value, as the same code gives them in this process."""
     path = tmp_path / case.file
     case.write(path, truth())
-    parsers: list[Parser] = []
-
-    def confined(parser: Parser, path: Path) -> LoggerFile:
-        parsers.append(parser)
-        return open_confined(parser, path)
-
-    monkeypatch.setattr(import_job, "open_confined", confined)
-    with closing(import_job.open_logger_file(path, Map())) as there:
-        module = importlib.import_module(parsers[0].module, "gyrotc.recordings")
-        with closing(getattr(module, parsers[0].function)(path)) as here:
-            assert (there.format, there.facts) == (here.format, here.facts)
-            for one, other in zip(there.tables, here.tables, strict=True):
-                assert one.columns == other.columns
-                assert (one.name, one.rate_hz, one.started) == (other.name, other.rate_hz, other.started)
-                names = [column.name for column in one.columns]
-                for got, expected in zip(one.chunks(names), other.chunks(names), strict=True):
-                    assert (got.first, got.done) == (expected.first, expected.done)
-                    for name in names:
-                        np.testing.assert_array_equal(got.columns[name], expected.columns[name], strict=True)
+    kind = format_of(path, path.read_bytes()[:1024])
+    assert kind is not None
+    with closing(open_in_child(kind.open, path)) as there, closing(kind.open(path)) as here:
+        assert (there.format, there.facts) == (here.format, here.facts)
+        for one, other in zip(there.tables, here.tables, strict=True):
+            assert one.columns == other.columns
+            assert (one.name, one.rate_hz, one.started) == (other.name, other.rate_hz, other.started)
+            assert one.place(3) == other.place(3)
+            names = [column.name for column in one.columns]
+            for got, expected in zip(one.chunks(names), other.chunks(names), strict=True):
+                assert (got.first, got.done) == (expected.first, expected.done)
+                for name in names:
+                    np.testing.assert_array_equal(got.columns[name], expected.columns[name], strict=True)
 
 
-def _recording(folder: Path) -> Path:
+def test_a_damaged_recording_is_refused_by_its_name(tmp_path: Path) -> None:
     columns = {name: np.arange(600.0) for name in ("time_s", "temperature_c", "rate_dph")}
-    pq.write_table(pa.table(columns), folder / "run.parquet")
-    return folder / "run.parquet"
-
-
-def test_a_parquet_recording_is_read_in_a_process_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before: pyarrow read it in the job."""
-
-    def never(*_: object, **__: object) -> None:
-        raise AssertionError("read in this process")
-
-    path = _recording(tmp_path)
-    monkeypatch.setattr(pq, "ParquetFile", never)
+    path = tmp_path / "run.parquet"
+    pq.write_table(pa.table(columns), path)
     file = ParquetFile("sub/run.parquet", path)
     assert file.names == ("time_s", "temperature_c", "rate_dph")
     assert file.read(["rate_dph"])["rate_dph"].tolist() == list(range(600))
@@ -164,23 +100,16 @@ def test_a_parquet_recording_is_read_in_a_process_of_its_own(tmp_path: Path, mon
         ParquetFile("sub/run.parquet", path)
 
 
-@pytest.mark.parametrize("rows", [599, 601])
-def test_rows_that_were_not_stated_are_refused(rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = ParquetFile("run.parquet", _recording(tmp_path))
-    monkeypatch.setattr(file, "_rows", rows)
-    with pytest.raises(InputError, match="states"):
-        file.read(file.names)
-
-
-def test_a_server_that_was_ended_is_one_message_and_started_again(file: Path) -> None:
-    """Before: the broken pipe to it counted as a closed standard output."""
-    opened("reads_the_file", file).close()
-    server = parser_process._server(os.getpid())
-    server._process.kill()
-    server._process.wait()
-    with pytest.raises(InputError, match="its reader cannot be started"):
-        opened("reads_the_file", file)
-    opened("reads_the_file", file).close()
+def test_a_long_text_that_is_packed_into_few_bytes_is_refused(tmp_path: Path, gyrotc: Command) -> None:
+    """400 rows of 16 MB each take 6.4 GB once unpacked."""
+    rows = 400
+    text = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, dtype=np.int32)), pa.array(["x" * 2**24]))
+    numbers = {name: np.arange(float(rows)) for name in ("time_s", "temperature_c", "rate_dph")}
+    pq.write_table(pa.table(numbers | {"serial": text}), tmp_path / "a.parquet", compression="zstd", store_schema=False)
+    assert (tmp_path / "a.parquet").stat().st_size < 2**15
+    done = gyrotc("import", tmp_path / "a.parquet", "--out", tmp_path / "R")
+    assert done.returncode == 2
+    assert "a.parquet, column serial: a text of 16777216 characters" in done.stderr
 
 
 TESTS = ROOT / "tests" / "support"

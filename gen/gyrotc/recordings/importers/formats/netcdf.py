@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...common.errors import InputError
-from ..tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, rate_of
+from ....common.errors import InputError
+from ...tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, rate_of
+from ..format import Format
 
 _MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
 
@@ -72,3 +73,7 @@ def _part(variable: Any, index: int | None) -> ReadPart:
         return array.astype("M8[ns]") if array.dtype.kind == "M" else numbers(array)
 
     return read
+
+
+_BEGINS = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
+FORMAT = Format(open_netcdf, _BEGINS, endings=(".nc", ".nc4", ".cdf"))
