@@ -34,9 +34,9 @@ from ..plausibility import TRUSTED, Suspicion, suspicions
 from ..reading import Evidence
 from ..tables import LoggerFile, LoggerTable
 from .csv_table import open_csv
-from .format import format_of
 from .map_file import MAP_FILE, Choice, ImportPlan, JoinMap, Map, map_text
 from .propose import Ask, propose
+from .recognise import format_of
 from .rows import NAMES_OF_COLUMNS, ImportedRows, RowsChunk, RunFile
 from .selection import NO_DEVICE
 
