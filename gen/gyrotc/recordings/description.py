@@ -249,26 +249,31 @@ class RunEntry(_Part):
     axis_elevation_deg: PerAxis | None = None
 
 
-class Description(_Part):
+class GyroFacts(_Part):
+    """What `dataset.toml` and the map of a logger state alike of a gyro and how it was recorded."""
+
+    description: str = ""
+    earth_rate: Literal["removed", "none", "compute"] | None = None
+    latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
+    pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    units: dict[Label, Label] = {}
+    meta: Annotated[dict[str, Any], BeforeValidator(_free_facts)] = {}
+    noise: NoiseEntry | None = None
+
+
+class Description(GyroFacts):
     """`dataset.toml`. Times in s on the file's clock; azimuth in deg clockwise from north, elevation up."""
 
     schema_: Annotated[Literal[1], Field(alias="schema")] = 1
     serial: Annotated[str, AfterValidator(check_serial)]
-    description: str = ""
-    earth_rate: Literal["removed", "none", "compute"] | None = None
-    latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
     latitude_sigma_deg: Level = 0.01
     axis_sigma_deg: Level = 0.1
     applied_table: Annotated[str, Field(pattern="^(none|[0-9a-f]{64})$")] = "none"
     applied_model: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
-    pulse_weight_arcsec: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
     temperature_late_s: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
     columns: Columns = Columns()
-    units: dict[Label, Label] = {}
     trust_units: bool = False
     source: Sources = ()
-    meta: Annotated[dict[str, Any], BeforeValidator(_free_facts)] = {}
-    noise: NoiseEntry | None = None
     fit: dict[Label, Any] = {}
     run: Annotated[tuple[RunEntry, ...], Field(min_length=1)]
 

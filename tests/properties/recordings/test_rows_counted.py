@@ -551,9 +551,8 @@ def test_a_damaged_file_is_counted_or_refused(case: Case, kind: str, at: float, 
     import_damaged(case, kind, at, mask)
 
 
-@pytest.mark.slow
 @given(case=st.sampled_from(IN_CHILDREN), **damages)
-@examples(100)
+@examples(8)
 def test_a_damaged_file_of_a_child_is_counted_or_refused(case: Case, kind: str, at: float, mask: int) -> None:
     import_damaged(case, kind, at, mask)
 

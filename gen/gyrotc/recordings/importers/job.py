@@ -160,7 +160,7 @@ def description_of(serial: str, chosen: Map, runs: Sequence[ImportedRun]) -> str
     if chosen.meta:
         tables["meta"] = chosen.meta
     if chosen.noise:
-        tables["noise"] = chosen.noise
+        tables["noise"] = chosen.noise.model_dump(exclude_none=True)
     return dataset_toml(head, tables, [dict(_run_entry(run)) for run in runs])
 
 
@@ -534,7 +534,7 @@ def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOp
     Raises:
         InputError: They contradict them, and nobody says that they are right.
     """
-    noise = (chosen.noise or {}).get("arw_deg_per_sqrt_h")
+    noise = chosen.noise.arw_deg_per_sqrt_h if chosen.noise else None
     found: list[Suspicion] = list(
         suspicions(rows.evidence, rows.layout, rows.units, earth_stated=chosen.earth_rate is not None, noise=noise)
     )

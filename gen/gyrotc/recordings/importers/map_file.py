@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from ...common.errors import InputError
 from ...common.inputs import read_toml
-from ..description import dataset_toml
+from ..description import GyroFacts, dataset_toml
 from ..tables import Column, LoggerTable
 from .selection import Where
 
@@ -87,22 +87,17 @@ class JoinMap(_Part):
     zone: Text | None = None
 
 
-class Map(_Part):
-    """A map. Keys that are those of `dataset.toml` go there."""
+class Map(GyroFacts):
+    """A map. What it states of the gyro goes to `dataset.toml`."""
+
+    model_config = ConfigDict(strict=False)
 
     serial: Text | None = None
-    description: str = ""
-    earth_rate: Literal["removed", "none", "compute"] | None = None
-    latitude_deg: float | None = None
-    pulse_weight_arcsec: float | None = None
     table: Text | None = None
     where: Text | None = None
     hold: bool = False
     columns: ColumnMap = ColumnMap()
     channels: dict[Text, Text] | None = None
-    units: dict[Text, Text] = {}
-    meta: dict[str, Any] = {}
-    noise: dict[str, float] | None = None
     csv: CsvMap = CsvMap()
     time: TimeMap = TimeMap()
     join: tuple[JoinMap, ...] = ()
