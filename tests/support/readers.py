@@ -222,7 +222,7 @@ def _used(folder: Path, axis: str | None = None) -> None:
     if found.problems:
         raise found.problems[0]
     dataset = load(folder, axis=axis)
-    judged = judge(dataset.runs)
+    judged = judge(dataset)
     for run in dataset.runs:
         rows = run.rows()
         blocks = run_blocks(

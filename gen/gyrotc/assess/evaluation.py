@@ -135,7 +135,7 @@ def evaluate(
         raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
     table = tables[chosen]
     window = average_s or model.average_s
-    judged = judged or judge(dataset.runs)
+    judged = judged or judge(dataset)
     parts = []
     compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
     with compiling as program:

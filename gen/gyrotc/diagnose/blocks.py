@@ -181,7 +181,7 @@ def records_of(
     Raises:
         InputError: There is no such run, or nothing usable in them.
     """
-    judged = judged or judge(dataset.runs)
+    judged = judged or judge(dataset)
     runs = [run for run in dataset.runs if run.role == role]
     if not runs:
         raise InputError(str(dataset.folder), f"no run has the role {role}", "at least one run with it")

@@ -95,7 +95,7 @@ def diagnose(
     say = progress or (lambda _: None)
     say("reading")
     whole = replace(dataset, runs=joined_runs(dataset.runs))
-    judged = judged or judge(dataset.runs)
+    judged = judged or judge(dataset)
     events = found_events(dataset, judged)
     found = _diagnosed(whole, judged, options or FitOptions(), say)
     reported = {"events": tuple(events)}

@@ -191,7 +191,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     options = with_prior(options.with_stated(dataset.fit), dataset, order.prior, order.ageing_dph, order.limits)
     earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
     say("judging rows")
-    judged = judge(dataset.runs)
+    judged = judge(dataset)
     fitted, diagnosis = _extended(dataset, work, options, judged, say) if order.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, judged=judged, progress=say)
     if order.limits:

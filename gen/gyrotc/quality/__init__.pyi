@@ -15,6 +15,7 @@ from .inspection import findings_of_run as findings_of_run
 from .judgement import Judged as Judged
 from .judgement import Judgement as Judgement
 from .judgement import judge as judge
+from .judgement import judge_runs as judge_runs
 from .jumps import jumps as jumps
 from .noise import noise_parts as noise_parts
 from .odds import Event as Event

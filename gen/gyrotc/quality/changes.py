@@ -9,7 +9,7 @@ of two hundred sets. See Basseville and Nikiforov, Detection of Abrupt Changes, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,7 +18,6 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import stdtrit
 
 from ..common.arrays import FloatArray
-from ..common.metrics import median_step
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
 from .findings import ValueWithLimits
 from .fits import (
@@ -78,6 +77,7 @@ class Change:
         size: deg/h, of a drift deg/h each hour, of a gain the factor; 95 % limits.
         sigmas: Size over its standard error.
         gap_s: Length of the gap in the rows that it falls into, else 0.
+        restarts: True if the gyro was switched on anew in that gap.
     """
 
     run: int
@@ -87,6 +87,7 @@ class Change:
     size: ValueWithLimits
     sigmas: float
     gap_s: float = 0.0
+    restarts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,16 +124,35 @@ class _At:
 
 
 def changes_of(runs: Sequence[RowArrays]) -> list[Change]:
-    """Changes of all runs, by run in order of time.
+    """Return the changes of all runs, by run in order of time.
 
     Args:
         runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
     """
-    lengths = [_length_s(runs[k]) for k in range(len(runs))]  # by number: no run is held while the next one is read
-    cell_s = max(_CELL_S, sum(length for length, _ in lengths) / _MOST_CELLS)
-    long = [k for k, (length, row) in enumerate(lengths) if length > _LEAST_LENGTH * max(row, cell_s)]
-    fine = [run_cells(runs[k], cell_s) for k in long]
-    coarse = [run_cells(runs[k], max(_COARSE_S, cell_s)) for k in long]
+    numbers = range(len(runs))  # by number: no run is held while the next one is read
+    cell_s = cell_length(sum(_length_s(runs[k]) for k in numbers))
+    return changes_in_cells([run_cells(runs[k], cell_s) for k in numbers], lambda k: runs[k])
+
+
+def _length_s(rows: RowArrays) -> float:
+    return float(np.ptp(rows[0]))
+
+
+def cell_length(total_s: float) -> float:
+    """Return the length of the cells in which runs of so many seconds in all are searched, s."""
+    return max(_CELL_S, total_s / _MOST_CELLS)
+
+
+def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArrays]) -> list[Change]:
+    """Return the changes of all runs, by run in order of time.
+
+    Args:
+        cells: Means over cells of each run (`cell_length`).
+        rows_of: Gives the rows of a run, as for `changes_of`; only those of runs with changes are read.
+    """
+    long = [k for k, one in enumerate(cells) if len(one) > _LEAST_LENGTH and np.ptp(one.rate_dph) > 0.0]
+    fine = [cells[k] for k in long]
+    coarse = [run_cells((one.time_s, one.temperature_c, one.rate_dph), max(_COARSE_S, one.cell_s)) for one in fine]
     if sum(len(one) for one in coarse) < _LEAST_CELLS:
         return []
     knots_c = knots_of(coarse)
@@ -145,16 +165,30 @@ def changes_of(runs: Sequence[RowArrays]) -> list[Change]:
         found = search.found(found)
         if not found:
             return []
-    changes = (search.change(at, found, runs[long[at.run]]) for at in found)
+    changes = (search.change(at, found, rows_of(long[at.run])) for at in found)
     known = [replace(one, run=long[one.run]) for one in changes if one is not None]
     gains = [one for one in known if one.kind == "gain"]
     kept = [one for one in known if one in gains or not any(_within(one, gain) for gain in gains)]
     return sorted(kept, key=lambda one: (one.run, one.time_s[0]))
 
 
-def _length_s(rows: RowArrays) -> tuple[float, float]:
-    """How long a run and one of its rows are, s; of one whose rate does not move at all 0."""
-    return (float(np.ptp(rows[0])), median_step(rows[0])) if np.ptp(rows[2]) > 0.0 else (0.0, 0.0)
+def paired(changes: Sequence[Change]) -> Iterator[tuple[Change, Change | None]]:
+    """Yield the changes of a run; a step that comes back with the step that takes it back."""
+    k = 0
+    while k < len(changes):
+        one, back = changes[k], changes[k + 1] if k + 1 < len(changes) else None
+        comes_back = one.gap_s == 0.0 and back is not None and back.gap_s == 0.0 and _undoes(one, back)
+        yield one, back if comes_back else None
+        k += 2 if comes_back else 1
+
+
+def _undoes(one: Change, back: Change) -> bool:
+    """Test whether the second step takes the first one back, by their intervals."""
+    if {one.kind, back.kind} - {"step", "transition"}:
+        return False
+    low, high = sorted((-back.size[1], -back.size[2]))
+    own_low, own_high = sorted(one.size[1:])
+    return one.size[0] * back.size[0] < 0.0 and low <= own_high and own_low <= high
 
 
 def _within(one: Change, gain: Change) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from ..recordings.records import Mark, Run
 from ..results.base import Finding
 from ..results.rows import STATED, LeftOutRows, RowsCount, RowsUsed
+from .change_findings import change_findings
 from .findings import ValueWithLimits, finding
 from .judgement import Judged, Judgement, LeftOut
 from .odds import Event
@@ -24,6 +25,7 @@ def row_findings(judgement: Judgement) -> Iterator[Finding]:
         say = _SAYS.get((kind, column))
         if say is not None:
             yield say(judgement, events)
+    yield from change_findings(judgement)
 
 
 def _largest(events: Sequence[Event]) -> Event:
@@ -203,7 +205,7 @@ _SAYS = {
 
 def rows_used(judged: Judged, runs: Sequence[Run]) -> RowsUsed:
     """Return the count of rows of some runs, and the stretches that are left out because of what they show."""
-    judgements = [judged.of(run) for run in runs]
+    judgements = list({id(one): one for one in map(judged.of, runs)}.values())
     counts = [row_count(one) for one in judgements]
     left_out: dict[str, int] = {}
     for count in counts:

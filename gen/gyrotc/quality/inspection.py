@@ -139,7 +139,7 @@ def check(
             _refuse_another(earlier or {}, dataset)
             serial = dataset.serial
             progress("judging rows")
-            judged = judge(dataset.runs)
+            judged = judge(dataset)
             looked = []
             for k, run in enumerate(dataset.runs, 1):
                 progress(f"{run.file}, {k} of {len(dataset.runs)}")

@@ -6,8 +6,8 @@ test runs are treated alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -15,10 +15,14 @@ from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray, IntArray, steps_are, those
 from ..common.metrics import MAD_TO_SIGMA, median
-from ..recordings.records import Rows, Run, joined_runs
+from ..common.statistics import NORMAL_95
+from ..recordings.records import Dataset, Rows, Run, joined_runs
+from .changes import Change, cell_length, changes_in_cells, paired
+from .curves import curve_findings
+from .fits import RowArrays, RunCells, run_cells
 from .jumps import jumps
 from .noise import noise_parts
-from .odds import CELL_S, GAP_S, MIN_JUMP_C, USELESS_NOISE, Column, Event, EventKind
+from .odds import CELL_S, GAP_S, MIN_JUMP_C, USELESS_NOISE, Column, Event, EventKind, cost_of
 from .outlying import outlying
 from .repeats import piles, resolution, stuck
 from .smooth_rate import smooth_rate
@@ -27,7 +31,7 @@ _T = TypeVar("_T", bound=np.generic)
 # Reasons for which a row is left out, in the order in which they are tried; each row has one.
 REASONS = (
     "excluded", "no rate", "no temperature", "rate stuck", "rate at end stop", "temperature stuck",
-    "temperature outlier", "rate outlier", "rate too noisy",
+    "temperature outlier", "rate outlier", "rate too noisy", "rate displaced",
 )  # fmt: skip
 # Steps of the temperature from row to row at their 95 % quantile, times this: an outlier of it is larger.
 _ABOVE_STEPS = 3.0
@@ -57,16 +61,20 @@ class Judgement:
     Attributes:
         run: The run; spans of one file that touch are one.
         read: Rows of the file between the start and the end of the run.
+        span_s: Times of the first and of the last of these rows, s.
         left_out: Stretches of these rows that are left out, in order.
         events: What happened, in order of time.
         noise_dph: Noise of a row, deg/h; 0 for fewer than three rows.
+        changes: Changes of the rate that last, in order of time; they are among the events.
     """
 
     run: Run
     read: int
+    span_s: tuple[float, float]
     left_out: tuple[LeftOut, ...]
     events: tuple[Event, ...]
     noise_dph: float
+    changes: tuple[Change, ...] = ()
 
     def count(self) -> dict[str, int]:
         """Return how many rows are left out, by reason."""
@@ -74,6 +82,11 @@ class Judgement:
         for one in self.left_out:
             count[one.reason] += one.end - one.first
         return {reason: rows for reason, rows in count.items() if rows}
+
+    @property
+    def power_ons_s(self) -> tuple[float, ...]:
+        """Times at which the gyro was switched on anew within the run, s."""
+        return tuple(change.time_s[2] for change in self.changes if change.restarts)
 
     @property
     def kept(self) -> int:
@@ -96,7 +109,18 @@ class Judged:
             first = -np.inf if one.run.from_s is None else one.run.from_s
             if first <= start and (one.run.to_s is None or start < one.run.to_s):
                 return one
-        return judge([run]).runs[0]
+        return judge_runs([run]).runs[0]
+
+    def split(self, runs: Sequence[Run]) -> tuple[Run, ...]:
+        """Return the runs, cut where the gyro was switched on anew."""
+        found: list[Run] = []
+        for run in runs:
+            rest = run
+            for time_s in self.of(run).power_ons_s:
+                found.append(replace(rest, to_s=time_s))
+                rest = replace(rest, from_s=time_s, power_on_s=time_s)
+            found.append(rest)
+        return tuple(found)
 
     def usable(self, run: Run, rows: Rows) -> BoolArray:
         """Return which rows of the file of a run may be used for it."""
@@ -106,16 +130,71 @@ class Judged:
         return np.asarray(usable)
 
 
-def judge(runs: Sequence[Run]) -> Judged:
+def judge(dataset: Dataset) -> Judged:
     """Judge the rows of all runs of a gyro; the rows of one run are in memory at a time."""
-    return Judged(tuple(_judgement(run) for run in joined_runs(runs)))
+    strange = {found.file for found in curve_findings(dataset, ()) if found.file is not None}
+    return judge_runs(dataset.runs, strange)
 
 
-def _judgement(run: Run) -> Judgement:
-    rows = run.rows()
-    column = _Columns(run, rows)
-    column.judge()
-    return column.judgement()
+def judge_runs(runs: Sequence[Run], strange: Collection[str] = ()) -> Judged:
+    """Judge the rows of runs.
+
+    Args:
+        strange: Files whose rates are not those of the gyro in the other files, such as with another sign: changes
+            that last are not looked for in them, nor are the others compared with them.
+    """
+    whole = joined_runs(runs)
+    cell_s = cell_length(sum(run.n_rows * run.row_period_s for run in whole))
+    judgements, cells = list[Judgement](), list[RunCells]()
+    for run in whole:
+        columns = _Columns(run, run.rows())
+        columns.judge()
+        judgements.append(columns.judgement())
+        cells.append(columns.cells(cell_s if run.file not in strange else np.inf))
+        del columns  # before the rows of the next run are read
+
+    def rows_of(number: int) -> RowArrays:
+        one, rows = judgements[number], whole[number].rows()
+        usable = Judged((one,)).usable(one.run, rows)
+        return rows.time_s[usable], rows.temperature_c[usable], rows.rate_dph[usable]
+
+    changes = changes_in_cells(cells, rows_of)
+    for number in sorted({change.run for change in changes}):
+        of_run = tuple(change for change in changes if change.run == number)
+        judgements[number] = _with_changes(judgements[number], of_run, whole[number].rows().time_s)
+    return Judged(tuple(judgements))
+
+
+def _with_changes(judgement: Judgement, changes: tuple[Change, ...], time_s: FloatArray) -> Judgement:
+    """Return the judgement with changes that last; what comes back is left out."""
+    reason = np.zeros(len(time_s), dtype=np.uint8)
+    for one in judgement.left_out:
+        reason[one.first : one.end] = REASONS.index(one.reason) + 1
+    events = list(judgement.events)
+    gaps = [event.time_s for event in events if event.kind == "gap"]
+    changes = tuple(
+        replace(one, restarts=one.kind == "step" and any(a <= one.time_s[0] <= b for a, b in gaps)) for one in changes
+    )
+    for change, back in paired(changes):
+        low, high = change.time_s[1], change.time_s[2] if back is None else back.time_s[2]
+        first, end = np.searchsorted(time_s, (low, high), side="left").tolist()
+        end = min(end + 1, len(time_s))
+        kind: EventKind = "restart" if change.restarts else change.kind
+        sigma = (change.size[2] - change.size[1]) / (2.0 * NORMAL_95)
+        odds = 0.5 * change.sigmas**2 - cost_of(float(judgement.read))
+        if back is not None:
+            kind = "displaced"
+            part = reason[first:end]
+            reason[first:end] = np.where(part == 0, REASONS.index("rate displaced") + 1, part)
+        why = "rate displaced" if back is not None else ""
+        span = (float(time_s[first]), float(time_s[end - 1]))
+        events.append(Event(kind, "rate", (first, end), span, change.size[0], sigma, odds, why))
+    return replace(
+        judgement,
+        left_out=tuple(_stretches(reason, time_s)),
+        events=tuple(sorted(events, key=lambda one: (one.rows, one.kind))),
+        changes=changes,
+    )
 
 
 class _Columns:
@@ -250,14 +329,24 @@ class _Columns:
             reason = "rate too noisy" if part.factor > USELESS_NOISE else ""
             self._event("noise", "rate", rows, part.factor, part.sigma, part.log_odds, reason)
 
+    def cells(self, cell_s: float) -> RunCells:
+        """Return means of the usable rows over cells; none for an infinite length."""
+        usable = self._usable()
+        if len(usable) < 2 or np.isinf(cell_s):
+            return RunCells(np.zeros(0), np.zeros(0), np.zeros(0), CELL_S, ())
+        columns = (self._rows.time_s, self._rows.temperature_c, self._rows.rate_dph)
+        time, temperature, rate = (_taken(column, usable) for column in columns)
+        return run_cells((time, temperature, rate), cell_s)
+
     def judgement(self) -> Judgement:
         """Return what was found."""
-        usable = self._usable()
+        usable, inside, time = self._usable(), np.flatnonzero(self.reason != 255), self._rows.time_s
         rate = self._rows.rate_dph[usable[:_NOISE_ROWS]]
         noise = MAD_TO_SIGMA * median(np.abs(np.diff(rate, 2))) / np.sqrt(6.0) if len(rate) > 2 else 0.0
         return Judgement(
             run=self._run,
-            read=int(np.count_nonzero(self.reason != 255)),
+            read=len(inside),
+            span_s=(float(time[inside[0]]), float(time[inside[-1]])) if len(inside) else (0.0, 0.0),
             left_out=tuple(_stretches(self.reason, self._rows.time_s)),
             events=tuple(sorted(self.events, key=lambda one: (one.rows, one.kind))),
             noise_dph=float(noise),
@@ -277,12 +366,3 @@ def _stretches(reason: NDArray[np.uint8], time_s: FloatArray) -> Iterator[LeftOu
         code = int(reason[first])
         if 0 < code < 255:
             yield LeftOut(first, end, (float(time_s[first]), float(time_s[end - 1])), REASONS[code - 1])
-
-
-def count_of(judgements: Sequence[Judgement]) -> Mapping[str, int]:
-    """Return how many rows of several runs are left out, by reason."""
-    total = dict.fromkeys(REASONS, 0)
-    for one in judgements:
-        for reason, rows in one.count().items():
-            total[reason] += rows
-    return {reason: rows for reason, rows in total.items() if rows}

@@ -17,7 +17,10 @@ from ..common.arrays import FloatArray, IntArray
 from ..common.metrics import MAD_TO_SIGMA
 
 Column = Literal["time", "temperature", "rate"]
-EventKind = Literal["outlier", "end_stop", "stuck", "noise", "gap", "jump"]
+EventKind = Literal[
+    "outlier", "end_stop", "stuck", "noise", "gap", "jump", "step", "transition", "drift", "gain", "restart",
+    "displaced",
+]  # fmt: skip
 
 # False events of a sound recording for each search: a needless look costs an hour, which one in a hundred may.
 FALSE_ALARMS = 0.01

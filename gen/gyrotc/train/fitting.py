@@ -21,7 +21,7 @@ from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
 from ..model import Model
 from ..quality.event_findings import rows_used
-from ..quality.judgement import Judged, judge
+from ..quality.judgement import Judged, judge, judge_runs
 from ..recordings.fit_options import AUTO, SIMPLE, BuildOptions
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Rows, Run, joined_runs
@@ -115,7 +115,7 @@ class FrontEnd:
             judged: Judgement of its rows and of those of the other runs; None: they are judged alone.
         """
         rows = run.rows() if rows is None else rows
-        judged = judge([run]) if judged is None else judged
+        judged = judge_runs([run]) if judged is None else judged
         return run_blocks(
             rows,
             run,
@@ -187,10 +187,11 @@ def fit_dataset(
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
-    stretches = joined_runs(runs)
-    if read is None:
+    if judged is None:
         say("judging rows")
-        read = _read(dataset, stretches, front, judged or judge(dataset.runs), say, channels=options.channels)
+        judged = judge(dataset)
+    stretches = judged.split(joined_runs(runs)) if read is None else joined_runs(runs)
+    read = read or _read(dataset, stretches, front, judged, say, channels=options.channels)
     data = read.data
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -264,8 +265,8 @@ def map_method(method: str) -> str:
 
 def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
     """Number of the power-on of each stretch: a file is one recording, without a power-on within it."""
-    files = sorted({run.file for run in runs})
-    return np.array([files.index(run.file) for run in runs], dtype=np.int64)
+    keys = [(run.file, run.power_on_s) for run in runs]
+    return np.array([sorted(set(keys), key=str).index(key) for key in keys], dtype=np.int64)
 
 
 def _means(data: TrainingData, fitted: Fit) -> MapMeans:
