@@ -341,7 +341,7 @@ def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Pat
     from gyrotc.jobs import build
 
     table = cycle()
-    table["rate_dph"][[5000, 9000]] += 5.0
+    table["rate_dph"][[5000, 9100]] += 5.0
     write_csv(tmp_path / "R" / "a.csv", table)
     (tmp_path / "R" / "dataset.toml").write_text(toml(RUN), "utf-8")
     build(tmp_path / "R", tmp_path / "out", FitOptions(), numerics=["f32"], targets=["host-gcc-O2"])
@@ -349,7 +349,7 @@ def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Pat
     assert "Rows left out of training" in page
     lines = (
         "exclude = [{from_s = 5000.0, to_s = 5000.5, reason = &#34;left out&#34;}, "
-        "{from_s = 9000.0, to_s = 9000.5, reason = &#34;left out&#34;}]"
+        "{from_s = 9100.0, to_s = 9100.5, reason = &#34;left out&#34;}]"
     )
     assert lines in page
 
