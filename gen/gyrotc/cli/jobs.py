@@ -27,20 +27,9 @@ from .options import (
 )
 from .output import show, tell, write_json
 from .progress import BUILD, COMPARE, DIAGNOSE, progress
-from .results import (
-    change_lines,
-    limit_lines,
-    not_installed_lines,
-    rounding_lines,
-    summary_line,
-    training_lines,
-    verified_line,
-    verify_table,
-)
+from .results import built_lines, verify_table
 
 if TYPE_CHECKING:
-    from ..jobs.calibration import Built
-    from ..model import Model
     from ..results.diagnosed import Diagnosed, NamedCause
 
 
@@ -64,16 +53,6 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     if result.physical and result.extended is None:
         yield _not_shipped(result)
     yield from (f"next: {step}" for step in result.next)
-
-
-def extension_lines(diagnosis: Diagnosed) -> Iterator[str]:
-    """What the diagnosis added to the model."""
-    yield f"diagnosis: {diagnosis.verdict.replace('_', ' ')}: {diagnosis.text}"
-    extended = diagnosis.extended
-    if extended is None:
-        yield _not_shipped(diagnosis)
-        return
-    yield f"added: {', '.join(extended.terms)}; {extended.centers} centers"
 
 
 def _not_shipped(result: Diagnosed) -> str:
@@ -141,47 +120,14 @@ def build(
     else:
         write_json(json_file, {str(r.evaluation.axis): r.evaluation.content() for r in results})
     for result in results:
-        if result.model.axis:
-            tell(f"axis {result.model.axis}")
-        _print_built(result)
+        if result.verification.failed:
+            show(verify_table(result.verification))
+        for line in built_lines(result.unit, shlex.quote(str(dataset))):
+            tell(line)
     tell(f"report: {out / 'report.html'}")
-    why = [r.evaluation.residual_words for r in results if not r.diagnosis and r.evaluation.structure_left]
-    if why:
-        tell(f"next, as the residual is more than noise ({why[0]}): gyrotc diagnose {shlex.quote(str(dataset))}")
     failures = [(f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures]
     if failures:
         raise CheckFailed("; ".join(failures))
-
-
-def _left_out(model: Model) -> Iterator[str]:
-    """What the runtime does not do, as nobody asked for it or the recordings do not show it."""
-    if model.left_out:
-        yield f"not needed, left out of tables and runtime: {', '.join(model.left_out)}"
-    if not model.stuck_s:
-        yield (
-            "a stuck thermometer is not looked for: the rows do not show for how long its readings stay the same "
-            "(guards.temperature_c.stuck_s of a limits file states it)"
-        )
-
-
-def _print_built(result: Built) -> None:
-    evaluation = result.evaluation
-    if result.verification.failed:
-        show(verify_table(result.verification))
-    for line in (
-        verified_line(result.verification),
-        *not_installed_lines(result.verification),
-        *training_lines(result.training),
-        *(f"{name} left out: {reason}" for name, reason in result.refused.items()),
-        *rounding_lines(result.verification.errors),
-        *_left_out(result.model),
-        *(extension_lines(result.diagnosis) if result.diagnosis else ()),
-        *(limit_lines(result.limits) if result.limits else ()),
-        *(change_lines(result.changes) if result.changes else ()),
-        *(f"finding {finding.id}: {finding.text}" for finding in evaluation.findings),
-        summary_line(evaluation),
-    ):
-        tell(line)
 
 
 @app.command()

@@ -9,21 +9,19 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 
 from ..pages.display import (
-    CONSTANT_PASSES,
     bound_words,
     limit_words,
     measured_words,
-    plain,
     rounded,
     sci,
     with_uncertainty,
 )
 
 if TYPE_CHECKING:
-    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
+    from ..pages.unit import UnitResults
+    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, ModelSizes, Pooled
     from ..results.release import (
         EmittedTable,
-        HeldLimits,
         JointVerification,
         MapError,
         ReadLog,
@@ -38,7 +36,7 @@ def evaluation_table(result: Evaluation) -> RichTable:
     table = RichTable(title=title, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("run", "role", "environment"):
         table.add_column(name, no_wrap=True)
-    for name in ("before", "after", "std after", "samples"):
+    for name in ("constant", "after", "std after", "samples"):
         table.add_column(name, justify="right", no_wrap=True)
     for run in result.runs:
         table.add_row(
@@ -52,7 +50,7 @@ def evaluation_table(result: Evaluation) -> RichTable:
 
 
 def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
-    return sci(part.before.rms_dph), sci(part.after.rms_dph), sci(part.after.std_dph)
+    return sci(part.constant.rms_dph), sci(part.after.rms_dph), sci(part.after.std_dph)
 
 
 def training_lines(training: Training) -> Iterator[str]:
@@ -188,8 +186,52 @@ def _difference_text(file: VerifiedFile) -> str:
     )
 
 
-def summary_line(result: Evaluation) -> str:
-    """Return one line with what was gained against a constant, and what remains against the noise floor.
+def built_lines(unit: UnitResults, dataset: str) -> Iterator[str]:
+    """Return the verdict, the gain, what remains, sizes, proof, findings by id and the next step: nine lines at most.
+
+    Args:
+        dataset: The data set as a shell takes it.
+    """
+    evaluation = unit.evaluation
+    axis = f" {unit.model.axis}" if unit.model.axis else ""
+    yield f"{unit.model.serial}{axis}: {verdict_words(unit)}"
+    yield from summary_lines(evaluation)
+    if kept := [one for one in unit.held if one.constant_passes]:
+        bounds = "; ".join(f"{limit_words(one.limit)} {bound_words(one)}" for one in kept)
+        yield f"a constant keeps {bounds}, too: {'they ask' if len(kept) > 1 else 'it asks'} nothing of the map"
+    yield size_line(evaluation.model)
+    if unit.verification:
+        yield verified_line(unit.verification)
+    if unit.changes:
+        yield "; ".join(change_lines(unit.changes))
+    if evaluation.findings:
+        yield f"findings: {', '.join(dict.fromkeys(one.id for one in evaluation.findings))}"
+    yield f"next: {unit.next_step.replace('DATASET', dataset)}"
+
+
+def verdict_words(unit: UnitResults) -> str:
+    """Return the verdict with what it rests on: each limit that did not pass, and what the recordings lack."""
+    if not unit.verdict:
+        return "no limits given"
+    product = f" for {unit.limits.product}" if unit.limits and unit.limits.product else ""
+    reasons = [*unit.failures]
+    for one in unit.held:
+        if one.verdict == "FAIL" or (one.verdict != "PASS" and not one.capped):
+            reasons.append(f"{limit_words(one.limit)} {bound_words(one)}: {measured_words(one)}, {one.verdict}")
+    return f"{unit.verdict}{product}" + "".join(f"; {why}" for why in (*reasons, *unit.capped))
+
+
+def size_line(sizes: ModelSizes) -> str:
+    """Return the size of the table, and of all that a program links, in one line."""
+    linked = ""
+    if sizes.rom_bytes:
+        linked = f"; with the runtime {sizes.rom_bytes} of code and constants, {sizes.ram_bytes} of memory"
+        linked += f" ({sizes.sizes_on})"
+    return f"table: {sizes.table_bytes} bytes, {sizes.centers} centers{linked}"
+
+
+def summary_lines(result: Evaluation) -> Iterator[str]:
+    """Return what was gained against a constant, and what remains against the noise floor.
 
     The improvement about zero stands behind it, and the paper's own figure beside that for the paper's scenario.
     """
@@ -197,51 +239,29 @@ def summary_line(result: Evaluation) -> str:
 
     found = result.judged()
     if found is None or not found[1].improvement:
-        return "no sample to judge by"
+        yield "no sample to judge by"
+        return
     part, known = found[1], result.uncertainty or {}
     spread = {name: one.expanded for name, one in known.items()}
     simulated = result.noise_floor_source == "simulated"  # the paper's own campaign; nobody's product
     published = result.exam and simulated and {run.environment for run in result.runs} == set(ENVIRONMENTS)
-    text = (
+    yield (
         f"improvement {with_uncertainty(part.improvement, spread.get('improvement'))} against a constant on "
         f"{_JUDGED_ON[found[0]]} (about zero {sci(part.improvement_about_zero)}{'; paper: 9.8-10.4' * bool(published)})"
     )
     floor, rms = result.noise_floor_dph, part.after.rms_dph
-    if floor and rms is not None:
-        text += (
-            f"; RMS {with_uncertainty(rms, spread.get('rms_dph'))} deg/h = {rms / floor:.4f} x noise floor "
-            f"({result.noise_floor_source})"
-        )
-    if (robust := result.usable) is not None and robust.rms_dph is not None:
-        role = "exam" if result.exam else "train"
-        rows = sum(run.rows.bad for run in result.runs if run.role == role and run.rows)
-        text += f"; {sci(robust.rms_dph)} without {rows} rows that say nothing of the gyro"
-    return f"{text}; {result.model.centers} centers, {result.model.table_bytes} bytes of table"
+    if rms is not None:
+        text = f"RMS {with_uncertainty(rms, spread.get('rms_dph'))} deg/h"
+        text += f" = {rms / floor:.4f} x noise floor ({result.noise_floor_source})" if floor else ""
+        text += f", of means over {result.average_s:g} s"
+        if (robust := result.usable) is not None and robust.rms_dph is not None:
+            role = "exam" if result.exam else "train"
+            rows = sum(run.rows.bad for run in result.runs if run.role == role and run.rows)
+            text += f"; {sci(robust.rms_dph)} without {rows} rows that say nothing of the gyro"
+        yield text
 
 
 _JUDGED_ON = {"exam": "exam runs", "left_out": "spans left out", "train": "the training runs themselves"}
-_RULES = {
-    "guard_band": "guard band w = U",
-    "guard_band_binary": "guard band w = U, binary",
-    "simple_acceptance": "simple acceptance",
-}
-
-
-def limit_lines(limits: HeldLimits) -> Iterator[str]:
-    """Return the verdict, and every limit that did not pass with what was measured."""
-    product = f" of {limits.product}" if limits.product else ""
-    if limits.verdict is None:
-        yield f"limits{product}: the file gives none, so nothing was judged"
-        return
-    yield f"limits{product}: {limits.verdict} ({_RULES[limits.decision_rule]}, ILAC-G8:09/2019)"
-    yield from (f"  no PASS: {why}" for why in limits.capped)
-    for check in limits.limits:
-        if check.constant_passes:
-            yield f"  {limit_words(check.limit)} {bound_words(check)}: {CONSTANT_PASSES} ({plain(check.constant)})"
-        if check.verdict != "PASS":
-            kind, _, figure = check.limit.partition(".")
-            name = figure if kind in ("at_most", "at_least") else check.limit
-            yield f"  {name} {bound_words(check)}: {measured_words(check)}, {check.verdict}"
 
 
 def change_lines(changes: Changes) -> Iterator[str]:

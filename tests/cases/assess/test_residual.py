@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import HOST, run_here
 from gyrotc.assess import residual_test
-from gyrotc.cli.results import summary_line
+from gyrotc.cli.results import summary_lines
 from gyrotc.pages import write_report
 from gyrotc.recordings import load
 from gyrotc.results import RMS_OVER_FLOOR, ResidualTest
@@ -155,5 +155,5 @@ def test_spikes_of_an_exam_are_in_the_plain_figure_and_not_in_the_robust_one(tmp
     assert exam.usable is not None and built.evaluation.usable == exam.usable
     plain, robust, other = exam.after.rms_dph, exam.usable.rms_dph, clean.after.rms_dph
     assert plain and robust and other and plain > 5.0 * robust and robust < 2.0 * other
-    assert "without 3 rows" in summary_line(built.evaluation)
+    assert "without 3 rows" in " ".join(summary_lines(built.evaluation))
     assert "(without 3 rows)" in write_report(tmp_path / "out").read_text("utf-8")

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 from typing import Any, get_args
 
 import pytest
-from conftest import Command, invoked, on_terminal
+from conftest import HOST, Command, invoked, on_terminal
 from emitted import emitted
 from gyrotc.cli import progress as stage_module
 from gyrotc.cli.application import GROUPS, INSTEAD
@@ -31,7 +31,7 @@ from gyrotc.model import Model
 from gyrotc.results import MARKER
 from gyrotc.simulate import campaign
 from gyrotc.tables import emit
-from recordings import described
+from recordings import columns, described, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
 
@@ -300,18 +300,25 @@ def test_a_wrong_word_is_answered_with_the_right_ones() -> None:
         assert done.exit_code == 2 and all(f"'{word.value}'" in done.stderr for word in right), command
 
 
-@pytest.mark.parametrize(("left", "diagnosis"), [(True, None), (False, None), (True, "made")])
-def test_a_build_ends_with_the_next_command(
-    left: bool, diagnosis: str | None, monkeypatch: pytest.MonkeyPatch, gyrotc: Command
-) -> None:
-    evaluation = SimpleNamespace(structure_left=left, content=dict, residual_words="it is correlated")
-    built = SimpleNamespace(
-        model=SimpleNamespace(axis=None), evaluation=evaluation, diagnosis=diagnosis, failures=(), limits=None
-    )
-    monkeypatch.setattr("gyrotc.jobs.calibration.build", lambda *_, **__: [built])
-    monkeypatch.setattr("gyrotc.cli.jobs._print_built", lambda _: None)
-    last = gyrotc("build", "my data").stdout.splitlines()[-1]
-    assert last.endswith("gyrotc diagnose 'my data'") == (left and diagnosis is None), last
+def test_a_build_says_what_one_asks_in_ten_lines(tmp_path: Path, gyrotc: Command) -> None:
+    """Verdict, gain, floor, bytes, findings by id, the next step and the page; the rest is on the page."""
+    data = tmp_path / "my data"
+    for k in range(2):
+        write_csv(data / f"run-{k}.csv", columns(720, seed=k))
+    head = 'schema = 1\nserial = "RLG-1"\nearth_rate = "none"'
+    (data / "dataset.toml").write_text(toml('file = "run-0.csv"', 'file = "run-1.csv"', head=head))
+    (tmp_path / "limits.toml").write_text("schema = 1\n[at_most]\nrms_dph = 1.0\ntable_bytes = 20\n")
+    build = ("build", data, *HOST, "--limits", tmp_path / "limits.toml")
+    gyrotc(*build, "--out", tmp_path / "before")
+    done = gyrotc(*build, "--out", tmp_path / "out", "--previous", tmp_path / "before")
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 10, done.stdout
+    assert lines[0].startswith("RLG-1: FAIL; table, bytes ≤ 20: ")
+    assert lines[1].startswith("improvement ") and " against a constant on " in lines[1]
+    assert lines[2].startswith("RMS ") and " x noise floor (estimated), of means over 100 s" in lines[2]
+    assert any(line.startswith("a constant keeps RMS, deg/h ≤ 1") for line in lines)
+    assert any(re.match(r"table: \d+ bytes, \d+ centers", line) for line in lines)
+    assert lines[-2].startswith("next: ") and lines[-1] == f"report: {tmp_path / 'out' / 'report.html'}"
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-"])
