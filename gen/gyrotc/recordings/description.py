@@ -526,7 +526,8 @@ def _order(name: str, time: FloatArray) -> Iterator[Fault]:
         if wrong.any():
             first = int(np.argmax(wrong)) + 1
             found = f"{what}: {time[first]:.10g} s after {time[first - 1]:.10g} s"
-            yield Fault(first, name, int(wrong.sum()), found, "times that strictly increase")
+            expected = "times that strictly increase; `gyrotc import` of the file says what goes on"
+            yield Fault(first, name, int(wrong.sum()), found, expected)
 
 
 def _temperature(name: str, values: FloatArray) -> Iterator[Fault]:

@@ -224,7 +224,7 @@ def blocks_of_lines(
         raise InputError(name, f"became {left} bytes shorter while it was read", "a file that stays as it is")
 
 
-def lines_held(lines: bytes) -> int:
+def _lines_held(lines: bytes) -> int:
     """Number of lines that are not empty."""
     if lines.startswith(b"\n") or b"\n\n" in lines:
         lines = re.sub(rb"\n+", b"\n", lines).removeprefix(b"\n")
@@ -248,7 +248,7 @@ def parsed(
     delimiter: str = ",",
     decimal: str = ".",
     missing: Sequence[str] = ("",),
-) -> pa.Table:
+) -> pa.RecordBatch | None:
     """The columns that have a type, of lines without a header; NaN is a number, null stands for `missing`.
 
     pyarrow's own streaming reader reads ahead in threads of its own, which outlive a file given up half-way.
@@ -256,22 +256,30 @@ def parsed(
     Args:
         names: Of all columns; they differ.
 
-    Raises:
-        pa.ArrowInvalid: A line has another number of cells, or a cell is no value of its type.
+    Returns:
+        The rows; None where a line has another number of cells, a cell is no value of its type, or a quote that stays
+        open joins lines.
     """
-    return pacsv.read_csv(
-        pa.BufferReader(lines),
-        pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=list(names)),
-        pacsv.ParseOptions(delimiter=delimiter),
-        pacsv.ConvertOptions(
-            column_types=dict(types),
-            include_columns=list(types),
-            null_values=list(missing),
-            strings_can_be_null=True,
-            decimal_point=decimal,
-            check_utf8=False,
-        ),
-    )
+    try:
+        table = pacsv.read_csv(
+            pa.BufferReader(lines),
+            pacsv.ReadOptions(use_threads=False, block_size=2**30, column_names=list(names)),
+            pacsv.ParseOptions(delimiter=delimiter),
+            pacsv.ConvertOptions(
+                column_types=dict(types),
+                include_columns=list(types),
+                null_values=list(missing),
+                strings_can_be_null=True,
+                decimal_point=decimal,
+                check_utf8=False,
+            ),
+        )
+    except (pa.ArrowInvalid, pa.ArrowKeyError):
+        return None
+    if len(table) != _lines_held(lines):
+        return None
+    batches = table.combine_chunks().to_batches()
+    return batches[0] if batches else pa.RecordBatch.from_pylist([], schema=table.schema)
 
 
 class CsvFile(Source):
@@ -311,19 +319,13 @@ class CsvFile(Source):
         need_memory(_COPIES * 8.0 * most * len(columns), self.name, f"{most} rows of {len(columns)} columns")
         read = {name: np.empty(most) for name in columns}
         at = 0
-        try:
-            for lines, _, _ in blocks_of_lines(self.path, self.size, self.name):
-                before = at
-                for batch in parsed(lines, unique, wanted).to_batches():
-                    for column, values in zip(read.values(), batch.columns, strict=True):
-                        if values.null_count:
-                            return None
-                        column[at : at + len(batch)] = numpy_of(values)
-                    at += len(batch)
-                if at - before != lines_held(lines):  # a quote that stays open joins lines
-                    return None
-        except pa.ArrowInvalid:
-            return None
+        for lines, _, _ in blocks_of_lines(self.path, self.size, self.name):
+            batch = parsed(lines, unique, wanted)
+            if batch is None or any(values.null_count for values in batch.columns):
+                return None
+            for column, values in zip(read.values(), batch.columns, strict=True):
+                column[at : at + len(batch)] = numpy_of(values)
+            at += len(batch)
         return {name: column[:at] for name, column in read.items()}
 
     def _most_rows(self) -> int:

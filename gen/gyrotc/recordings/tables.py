@@ -141,7 +141,7 @@ class LoggerFile:
         format: Words for its format.
         tables: What it holds.
         facts: Facts about the recording that the file states, such as a serial.
-        csv: How a CSV file is read, as keys of `[csv]` of a map; empty for other formats.
+        csv: What a map keeps of how a CSV file is written, as keys of `[csv]`; empty for other formats.
         close: Ends the reading: after it no chunk comes.
         joined: Files whose tables stand behind its own.
     """
@@ -150,7 +150,7 @@ class LoggerFile:
     format: str
     tables: tuple[LoggerTable, ...]
     facts: dict[str, str] = field(default_factory=dict)
-    csv: dict[str, Any] = field(default_factory=dict)
+    csv: dict[str, str] = field(default_factory=dict)
     close: Callable[[], object] = lambda: None
     joined: tuple[Path, ...] = ()
 

@@ -9,7 +9,7 @@ import codecs
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -17,6 +17,7 @@ from ...common.errors import InputError
 from ..units import quantity_of
 from .cells import DELIMITERS, MISSING_WORDS, is_number, kind_of_cells, split_line, thousands_of
 from .layout import check_between, first_row, rows_among
+from .map_file import CsvMap
 from .stamps import forms_of
 
 _FACTS = re.compile(r"^\W*(?P<key>[A-Za-z][\w .#/]{1,40}?)\s*[:=,;\t]+\s*(?P<value>[^;,\t]+?)[\s;,]*$")
@@ -51,7 +52,7 @@ def _rejoined(cells: list[str], count: int) -> list[str]:
 
 
 def header_of(
-    above: Sequence[tuple[int, list[str]]], count: int, given: Mapping[str, Any], decimal: str
+    above: Sequence[tuple[int, list[str]]], count: int, given: CsvMap, decimal: str
 ) -> tuple[int, int, tuple[str, ...], tuple[str, ...]]:
     """Line of the names, line of the units, names, units; made-up names where there is no header."""
     rows = [
@@ -59,13 +60,13 @@ def header_of(
     ]
     rows += [(k, _rejoined(cells, count)) for k, cells in above if len(cells) > count]
     rows = sorted((k, cells) for k, cells in rows if _fits_header(cells, count, decimal))
-    if "header_line" in given:
-        rows = [(k, cells) for k, cells in above if k == given["header_line"]]
-        rows += [(k, cells) for k, cells in above if k == given.get("units_line", 0)]
+    if given.header_line is not None:
+        rows = [(k, cells) for k, cells in above if k == given.header_line]
+        rows += [(k, cells) for k, cells in above if k == given.units_line]
     if not rows:
         return 0, 0, tuple(f"column {k + 1}" for k in range(count)), ("",) * count
     units_line, units = _labelled(above, count)
-    of_units = [k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.get("units_line")]
+    of_units = [k for k in range(1, len(rows)) if _is_units(rows[k][1]) or rows[k][0] == given.units_line]
     if of_units:
         units_line, cells = rows[of_units[-1]]
         rows = rows[: of_units[-1]]
@@ -180,23 +181,13 @@ class Dialect:
     ignored: int = 0
     facts: dict[str, str] = field(default_factory=dict)
 
-    def to_map(self) -> dict[str, Any]:
-        """The dialect as `[csv]` of a map."""
-        comment: Any = self.comment[0] if len(self.comment) == 1 else list(self.comment)
-        found = {
-            "encoding": self.encoding,
-            "delimiter": self.delimiter,
-            "decimal": self.decimal,
-            "comment": comment,
-            "header_line": self.header_line,
-            "units_line": self.units_line,
-        }
-        extra = [token for token in self.missing if token not in MISSING_WORDS]
-        found |= {"thousands": self.thousands} if self.thousands else {}
-        return found | ({"missing": extra} if extra else {})
+    def kept(self) -> dict[str, str]:
+        """What a map keeps of the dialect for the next file of the logger."""
+        found = {"encoding": self.encoding, "delimiter": self.delimiter, "decimal": self.decimal}
+        return found | ({"thousands": self.thousands} if self.thousands else {})
 
 
-def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool) -> Dialect:
+def dialect_of(name: str, head: bytes, given: CsvMap, *, whole: bool) -> Dialect:
     """The dialect of a file.
 
     Args:
@@ -208,7 +199,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     Raises:
         InputError: No rows of numbers can be found.
     """
-    encoding = given.get("encoding") or encoding_of(head)
+    encoding = given.encoding or encoding_of(head)
     text = _text(name, head, encoding)
     lines = re.split(r"\r\n|\n|\r", text)[: None if whole else -1]
     comment = _comments(lines, given)
@@ -216,7 +207,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
     delimiter, decimal = _separators(name, [line for _, line in kept], given)
     split = [(k, split_line(line, delimiter)) for k, line in kept]
     count = Counter((len(cells) for _, cells in _last(split))).most_common(1)[0][0]
-    stated = int(given.get("header_line") or 0)
+    stated = given.header_line or 0
     skipped = sum(k < stated for k, _ in kept)
     guessed = _first_row(name, split, count, decimal, stated)
     first = skipped + first_row(name, kept[skipped:], guessed - skipped, count, delimiter, decimal)
@@ -241,7 +232,7 @@ def dialect_of(name: str, head: bytes, given: Mapping[str, Any], *, whole: bool)
         ignored=ignored,
         names=names,
         units=units,
-        missing=(*MISSING_WORDS, *given.get("missing", ())),
+        missing=(*MISSING_WORDS, *given.missing),
         **_digits([cell for _, row in split[first:] for cell in row], decimal, given),
         facts=facts_above(lines[: split[first][0] - 1], header),
     )
@@ -270,10 +261,10 @@ def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]]
         raise InputError(f"{name}, line {above[-1][0]}", found, "the file exported again with semicolons or tabs")
 
 
-def _digits(cells: Sequence[str], decimal: str, given: Mapping[str, Any]) -> dict[str, Any]:
+def _digits(cells: Sequence[str], decimal: str, given: CsvMap) -> dict[str, Any]:
     """How numbers are written besides their decimal mark."""
     spaced_sign = any(cell[:2] in ("+ ", "- ") for cell in cells)
-    return {"thousands": given.get("thousands") or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
+    return {"thousands": given.thousands or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
 
 
 def without_nuls(name: str) -> str:
@@ -324,23 +315,21 @@ def _text(name: str, head: bytes, encoding: str) -> str:
     return text
 
 
-def _comments(lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, ...]:
-    stated = given.get("comment")
-    more = (stated,) if isinstance(stated, str) else tuple(stated or ())
+def _comments(lines: Sequence[str], given: CsvMap) -> tuple[str, ...]:
     seen = tuple(mark for mark in _COMMENTS if any(line.startswith(mark) for line in lines)) or ("#",)
-    return tuple(dict.fromkeys((*seen, *more)))
+    return tuple(dict.fromkeys((*seen, *given.comment)))
 
 
-def _separators(name: str, lines: Sequence[str], given: Mapping[str, Any]) -> tuple[str, str]:
+def _separators(name: str, lines: Sequence[str], given: CsvMap) -> tuple[str, str]:
     """Delimiter and decimal mark that make numbers of most cells of the last lines."""
     sample = _last(lines)
     best: tuple[float, int, tuple[str, str]] = (0.0, 0, ("", ""))
-    for delimiter in [given["delimiter"]] if given.get("delimiter") else DELIMITERS:
+    for delimiter in [given.delimiter] if given.delimiter else DELIMITERS:
         split = [split_line(line, delimiter) for line in sample]
         count, often = Counter(len(cells) for cells in split).most_common(1)[0]
-        for decimal in [given["decimal"]] if given.get("decimal") else (".", ","):
+        for decimal in [given.decimal] if given.decimal else (".", ","):
             rows = [cells for cells in split if len(cells) == count and _holds_number(cells, decimal)]
-            stated = given.get("thousands", "")
+            stated = given.thousands or ""
             kinds = [kind_of_cells(column, decimal, stated) for column in zip(*rows, strict=True)]
             numbers = sum(kind in ("number", "stamp") for kind in kinds)
             texts = sum(kind == "text" for kind in kinds)

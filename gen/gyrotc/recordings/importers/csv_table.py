@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from ...common.errors import InputError
-from ..files import blocks_of_lines, lines_held, nuls_at_end, number_in, parsed
+from ..files import blocks_of_lines, nuls_at_end, number_in, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .cells import (
     HEXADECIMAL,
@@ -29,6 +29,7 @@ from .cells import (
 )
 from .csv_dialect import Dialect, dialect_of, encoding_of, without_nuls
 from .layout import can_be_row, other_names, row_misfit
+from .map_file import CsvMap
 
 
 def _lines_of(lines: bytes, number: int) -> Iterator[tuple[int, str]]:
@@ -40,7 +41,7 @@ _MOST = 0.8  # share of the cells of a column of numbers that are numbers
 _SAMPLE = 40  # rows, half of them from the end, where formats that change show
 
 
-def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
+def open_csv(path: Path, given: CsvMap) -> LoggerFile:
     """A CSV file with its dialect, recognised from its head and `[csv]` of a map.
 
     Raises:
@@ -49,7 +50,7 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     size, nuls = path.stat().st_size, 0
-    if not (given.get("encoding") or encoding_of(head)).lower().startswith("utf-16"):
+    if not (given.encoding or encoding_of(head)).lower().startswith("utf-16"):
         nuls = nuls_at_end(path, size)
     size -= nuls
     head, whole = head[:size], size <= len(head)
@@ -71,7 +72,7 @@ def open_csv(path: Path, given: dict[str, Any]) -> LoggerFile:
         notes=(f"{nuls} NUL bytes behind the last row are no rows: the logger lost power",) if nuls else (),
         **_stated_rate(dialect),
     )
-    return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.to_map())
+    return LoggerFile(path, _words(dialect), (table,), dialect.facts, dialect.kept())
 
 
 @dataclass(frozen=True)
@@ -160,14 +161,8 @@ class CsvTable(LoggerTable):
         self, lines: bytes, number: int, names: Sequence[str], left: Counter[str], *, last: bool
     ) -> dict[str, Any]:
         """The rows of a block; lines that are none are counted in `left`."""
-        plain = self._without_comments(lines)
-        try:
-            rows = self._fast(plain, names)
-        except (pa.ArrowInvalid, pa.ArrowKeyError):
-            return self._slow(lines, number, names, left, last=last)
-        if len(next(iter(rows.values()))) != lines_held(plain):  # a quote that stays open joins lines
-            return self._slow(lines, number, names, left, last=last)
-        return rows
+        rows = self._fast(self._without_comments(lines), names)
+        return self._slow(lines, number, names, left, last=last) if rows is None else rows
 
     def _without_comments(self, lines: bytes) -> bytes:
         for mark in self.dialect.comment:
@@ -182,10 +177,11 @@ class CsvTable(LoggerTable):
             lines = plain_lines(lines, one.delimiter, one.thousands, spaced_sign=one.spaced_sign)
         return lines
 
-    def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any]:
+    def _fast(self, lines: bytes, names: Sequence[str]) -> dict[str, Any] | None:
+        """The rows of lines, None where one is no row."""
         if not lines.strip():
             return {name: np.empty(0) for name in names}
-        table = parsed(
+        batch = parsed(
             lines,
             [column.name for column in self.columns],
             {name: self._type(name) for name in names},
@@ -193,7 +189,7 @@ class CsvTable(LoggerTable):
             decimal=self.dialect.decimal,
             missing=self.dialect.missing,
         )
-        return {name: _values(table.column(name)) for name in names}
+        return {name: _values(batch.column(name)) for name in names} if batch is not None else None
 
     def _type(self, name: str) -> pa.DataType:
         column = self.column(name)
@@ -280,14 +276,9 @@ def _whole(values: Sequence[Any]) -> bool:
     return all(isinstance(value, int) for value in values)
 
 
-def _values(column: Any) -> Any:
-    """Numbers as numpy arrays, text as one pyarrow array."""
-    joined = column.combine_chunks()
-    if isinstance(joined, pa.ChunkedArray):
-        joined = pa.concat_arrays(joined.chunks) if joined.num_chunks else pa.array([], joined.type)
-    if pa.types.is_string(joined.type):
-        return joined
-    return joined.to_numpy(zero_copy_only=False)
+def _values(column: pa.Array) -> Any:
+    """Numbers as numpy arrays, text as it is."""
+    return column if pa.types.is_string(column.type) else column.to_numpy(zero_copy_only=False)
 
 
 def _sample_rows(head: bytes, dialect: Dialect, whole: bool) -> list[list[str]]:

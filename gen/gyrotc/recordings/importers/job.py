@@ -57,9 +57,7 @@ def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows
         units["rate"] = plan.values[0].unit
     units |= {choice.role: choice.unit for choice in plan.channels if choice.unit and choice.role in rows.units}
     time = chosen.time.model_copy(update={"format": rows.clock.form or None, "rate_hz": plan.rate_hz})
-    csv = {
-        k: v for k, v in file.csv.items() if k in ("encoding", "delimiter", "decimal", "thousands")
-    } | chosen.csv.given()
+    csv = file.csv | chosen.csv.given()
     update = {
         "columns": columns,
         "channels": {choice.role: choice.source for choice in plan.channels},
@@ -591,7 +589,7 @@ def _opened(path: Path, head: bytes, chosen: Map) -> LoggerFile:
         if head.startswith(magic):
             raise InputError(path.name, what, instead)
     if kind is None:
-        return open_csv(path, chosen.csv.given())
+        return open_csv(path, chosen.csv)
     return open_in_child(kind.open, path) if kind.in_child else kind.open(path)
 
 

@@ -15,6 +15,7 @@ from ..cells import split_line
 from ..csv_table import open_csv
 from ..format import Format
 from ..layout import SeveralLayouts, can_be_row
+from ..map_file import CsvMap
 
 # How the name of the first file in a spreadsheet begins.
 _FIRST_NAMES = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/")
@@ -77,7 +78,7 @@ def _refuse_archive(path: Path) -> None:
 
 
 def _tables(place: Path, name: str) -> list[LoggerTable]:
-    given = {"encoding": "utf-8", "delimiter": ",", "decimal": "."}
+    given = CsvMap(encoding="utf-8", delimiter=",", decimal=".")
     return [replace(table, name=name) for table in open_csv(place, given).tables]
 
 
