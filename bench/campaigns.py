@@ -78,6 +78,7 @@ CAMPAIGNS = {
     "budget": Campaign("Uncertainty that the page states", "half an hour"),
     "kills": Campaign("Jobs that are killed, signalled or let down by the disk", "an hour"),
     "invariance": Campaign("The same recordings, handed over in other ways", "half an hour"),
+    "mutation": Campaign("Small faults planted in the generator, and whether its tests find them", "a day"),
     "oracle": Campaign(
         "Results that differ from those of another commit (BASE=commit)", "half an hour", keeps_record=False
     ),
