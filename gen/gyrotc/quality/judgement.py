@@ -6,8 +6,9 @@ test runs are treated alike.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..common.arrays import BoolArray, FloatArray, IntArray, steps_are, those
 from ..common.metrics import MAD_TO_SIGMA, median
 from ..common.statistics import NORMAL_95
 from ..recordings.records import Dataset, Rows, Run, joined_runs
+from ..recordings.records import inside as in_limits
 from .changes import Change, cell_length, changes_in_cells, paired
 from .curves import curve_findings
 from .fits import RowArrays, RunCells, run_cells
@@ -61,6 +63,7 @@ class Judgement:
     Attributes:
         run: The run; spans of one file that touch are one.
         read: Rows of the file between the start and the end of the run.
+        absent: How many of these the file has no whole reading of, by the reason.
         span_s: Times of the first and of the last of these rows, s.
         left_out: Stretches of these rows that are left out, in order.
         events: What happened, in order of time.
@@ -75,12 +78,14 @@ class Judgement:
     events: tuple[Event, ...]
     noise_dph: float
     changes: tuple[Change, ...] = ()
+    absent: Mapping[str, int] = field(default_factory=dict)
 
     def count(self) -> dict[str, int]:
         """Return how many rows are left out, by reason."""
-        count = dict.fromkeys(REASONS, 0)
+        count = Counter(dict.fromkeys(REASONS, 0))
         for one in self.left_out:
             count[one.reason] += one.end - one.first
+        count.update(self.absent)
         return {reason: rows for reason, rows in count.items() if rows}
 
     @property
@@ -91,7 +96,7 @@ class Judgement:
     @property
     def kept(self) -> int:
         """Rows that may be used."""
-        return self.read - sum(one.end - one.first for one in self.left_out)
+        return self.read - sum(self.count().values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,9 +348,15 @@ class _Columns:
         usable, inside, time = self._usable(), np.flatnonzero(self.reason != 255), self._rows.time_s
         rate = self._rows.rate_dph[usable[:_NOISE_ROWS]]
         noise = MAD_TO_SIGMA * median(np.abs(np.diff(rate, 2))) / np.sqrt(6.0) if len(rate) > 2 else 0.0
+        run = self._run
+        absent = {
+            reason: int(np.count_nonzero(in_limits(times_s, run.from_s, run.to_s, ())))
+            for reason, times_s in self._rows.absent_s.items()
+        }
         return Judgement(
-            run=self._run,
-            read=len(inside),
+            run=run,
+            read=len(inside) + sum(absent.values()),
+            absent=absent,
             span_s=(float(time[inside[0]]), float(time[inside[-1]])) if len(inside) else (0.0, 0.0),
             left_out=tuple(_stretches(self.reason, self._rows.time_s)),
             events=tuple(sorted(self.events, key=lambda one: (one.rows, one.kind))),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
@@ -16,7 +17,7 @@ from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, co
 from .files import CsvFile, Source
 from .fingerprints import Fingerprints, fingerprints_of
 from .parquet import ParquetFile
-from .records import Applied, EarthRate, Mark, Rows
+from .records import NO_CHANNEL, NO_TEMPERATURE, NO_TEMPERATURE_THEN, Applied, EarthRate, Mark, Rows
 from .units import Conversion, declared
 
 _PART = 2**16  # rows that are looked at together
@@ -155,15 +156,15 @@ class Reader:
         if layout.pulses:
             weight = self.pulse_weight_arcsec or 1.0
             columns |= {value: rate_of_pulses(columns[layout.time], columns[value], weight)}
+        absent_s = unknown_times(columns, layout, self.channels)
         columns = known_rows(columns, layout, self.channels)
         time, rate = columns[layout.time], columns[value]
         if self.earth is not None:
             rate = rate - self.earth.rate_dph
         channels = {name: columns[name] for name in self.channels}
-        rows = Rows(time, columns[layout.temperature], rate, channels)
+        rows = Rows(time, columns[layout.temperature], rate, channels, absent_s)
         if self.applied is not None:
-            rate = rate + self.applied.correction_dph(rows, self.row_period_s)
-            rows = Rows(time, rows.temperature_c, rate, channels)
+            rows = replace(rows, rate_dph=rate + self.applied.correction_dph(rows, self.row_period_s))
         return in_time(rows, self.temperature_late_s, self.row_period_s) if self.temperature_late_s else rows
 
 
@@ -175,7 +176,28 @@ def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
     known &= np.diff(rows.time_s)[after - 1] <= _LONGEST_GAP * row_period_s
     temperature = np.interp(then, rows.time_s, rows.temperature_c)
     channels = {name: values[known] for name, values in rows.channels.items()}
-    return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels)
+    absent_s = {**rows.absent_s, NO_TEMPERATURE_THEN: rows.time_s[~known]}
+    return Rows(rows.time_s[known], temperature[known], rows.rate_dph[known], channels, absent_s)
+
+
+def unknown_times(columns: Mapping[str, FloatArray], layout: Layout, channels: Sequence[str]) -> dict[str, FloatArray]:
+    """Times of the rows that `known_rows` leaves out, by the reason."""
+    unknown = {}
+    no_temperature = _missing(columns[layout.temperature])
+    if no_temperature is not None:
+        unknown[NO_TEMPERATURE] = columns[layout.time][no_temperature]
+    for name in channels:
+        missing = _missing(columns[name])
+        if missing is not None:
+            only = missing if no_temperature is None else missing & ~no_temperature
+            unknown[NO_CHANNEL] = np.union1d(unknown.get(NO_CHANNEL, np.zeros(0)), columns[layout.time][only])
+    return unknown
+
+
+def _missing(values: FloatArray) -> NDArray[np.bool_] | None:
+    """Which values are NaN; None: none is."""
+    with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
+        return np.isnan(values) if np.isnan(np.sum(values)) else None
 
 
 def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequence[str]) -> dict[str, FloatArray]:
@@ -185,10 +207,9 @@ def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequenc
     """
     known = np.ones(len(columns[layout.time]), dtype=bool)
     for name in (layout.temperature, *channels):
-        with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
-            not_finite = np.isnan(np.sum(columns[name]))
-        if not_finite:
-            known &= ~np.isnan(columns[name])
+        missing = _missing(columns[name])
+        if missing is not None:
+            known &= ~missing
     if not known.all():
         for name in columns:  # one after the other, so that what is replaced goes: a long recording is not held twice
             columns[name] = columns[name][known]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 
 __all__ = [
+    "NO_CHANNEL",
+    "NO_TEMPERATURE",
+    "NO_TEMPERATURE_THEN",
     "Applied",
     "Curve",
     "Dataset",
@@ -30,6 +33,10 @@ __all__ = [
 ]
 
 Role = Literal["train", "exam"]
+# Reasons for which a row of a file is not among its `Rows`.
+NO_TEMPERATURE = "no temperature"
+NO_CHANNEL = "no reading of a channel"
+NO_TEMPERATURE_THEN = "no temperature temperature_late_s later"
 _OWN = "temperature_c"  # what a difference calls the temperature of the gyro itself, whatever the column is named
 
 
@@ -43,12 +50,14 @@ class Rows:
         rate_dph: Measured rate of the chosen axis, deg/h, without Earth's rate where that is computed; NaN in
             the first row of counted pulses.
         channels: Auxiliary channels by column name, in their own units.
+        absent_s: Times of the rows of the file that are not among these, by the reason, s.
     """
 
     time_s: FloatArray
     temperature_c: FloatArray
     rate_dph: FloatArray
     channels: dict[str, FloatArray]
+    absent_s: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time_s)

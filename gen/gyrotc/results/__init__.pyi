@@ -60,6 +60,7 @@ from .marker import read_marker as read_marker
 from .marker import result_faults as result_faults
 from .marker import write_marker as write_marker
 from .place import held as held
+from .recordings import Checked as Checked
 from .recordings import ImportedFile as ImportedFile
 from .recordings import ImportedFiles as ImportedFiles
 from .release import Budget as Budget

@@ -8,7 +8,9 @@ from pydantic import Field
 
 from .base import Count, Part
 
-STATED = ("excluded", "no rate", "no temperature")
+STATED = (
+    "excluded", "no rate", "no temperature", "no reading of a channel", "no temperature temperature_late_s later",
+)  # fmt: skip
 """Reasons that the recording or its description states; any other reason was found by looking at the rows."""
 
 

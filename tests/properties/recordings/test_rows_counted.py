@@ -17,7 +17,7 @@ from conftest import Command, run_gyrotc
 from drawn import examples
 from gyrotc.common import InputError
 from gyrotc.recordings.importers import ImportOptions, Map, import_files
-from gyrotc.results import ImportedFile, ImportedFiles, read_result
+from gyrotc.results import Checked, ImportedFile, ImportedFiles, read_result
 from hypothesis import given
 from hypothesis import strategies as st
 from logger_binaries import BINARY_CASES
@@ -565,3 +565,27 @@ def test_a_tdms_file_that_ends_early_is_said_to(lost: int, tmp_path: Path, gyrot
     done = gyrotc("import", tmp_path / "cut.tdms", "--out", tmp_path / "R")
     assert (done.returncode == 2) or "the file ends within its last segment" in done.stdout
     assert "WARNING" not in done.stderr
+
+
+def test_the_count_of_check_closes(tmp_path: Path, gyrotc: Command) -> None:
+    """Cells that are NaN, rows whose temperature would come behind the end, and an excluded span."""
+    body = [row.split(",") for row in rows(three, 0, 300)]
+    for k in (5, 6, 50):
+        body[k][1] = "nan"
+    body[80][2] = "nan"
+    (tmp_path / "D").mkdir()
+    (tmp_path / "D" / "a.csv").write_text("\n".join([NAMES, *(",".join(row) for row in body)]) + "\n")
+    (tmp_path / "D" / "dataset.toml").write_text(
+        'schema = 1\nserial = "R"\nearth_rate = "removed"\ntemperature_late_s = 100.0\n'
+        '[[run]]\nfile = "a.csv"\nexclude = [{from_s = 1000.0, to_s = 1050.0}]\n'
+    )
+    assert gyrotc("check", tmp_path / "D", "--json", tmp_path / "check.json").returncode == 0
+    (run,) = read_result(tmp_path / "check.json", Checked).runs
+    assert run.rows.read == 300
+    assert run.rows.kept + sum(run.rows.left_out.values()) == 300
+    assert run.rows.left_out == {
+        "excluded": 5,
+        "no rate": 1,
+        "no temperature": 3,
+        "no temperature temperature_late_s later": 10,
+    }
