@@ -477,6 +477,11 @@ class Model(_Frozen):
             del content["q31_bias_frac_bits"]
         if not self.left_out:
             del content["left_out"]
+        if self.uncertainty_dph is not None and self.uncertainty_dph.rules is not None:
+            rules = content["uncertainty_dph"]["rules"]
+            for name in ("turn_on_dph", "turn_on_freedom"):
+                if rules[name] is None:
+                    del rules[name]
         return content
 
     def to_json(self) -> str:

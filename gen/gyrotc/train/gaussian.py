@@ -334,13 +334,13 @@ class _Integrated:
     """What power-ons have of their own, integrated out of the normal equations; stacked over power-ons.
 
     Attributes:
-        lower: Cholesky factors of I + root HH root / noise, shape (power-ons, own, own).
-        coupling: lower^-1 root HX, shape (power-ons * own, columns).
-        moment: lower^-1 root Hy, shape (power-ons * own,).
+        inverse: Inverses of the Cholesky factors of I + root HH root / noise, shape (power-ons, own, own).
+        coupling: inverse root HX, shape (power-ons * own, columns).
+        moment: inverse root Hy, shape (power-ons * own,).
         root: Roots of the variances, shape (own,).
     """
 
-    lower: FloatArray
+    inverse: FloatArray
     coupling: FloatArray
     moment: FloatArray
     root: FloatArray
@@ -355,9 +355,9 @@ class _Integrated:
         """`joint`: HX and Hy of every power-on, shape (power-ons, own, columns + 1)."""
         root = np.sqrt(scatter)
         inner = np.eye(own) + root[:, None] * joint[:, :, :own] * root / noise
-        lower = np.linalg.cholesky(inner)
-        both = np.linalg.solve(lower, root[:, None] * joint).reshape(-1, joint.shape[2])
-        return _Integrated(np.asarray(lower), np.asarray(both[:, :-1]), np.asarray(both[:, -1]), np.asarray(root))
+        inverse = np.asarray(np.linalg.inv(np.linalg.cholesky(inner)))
+        both = np.asarray(inverse @ (root[:, None] * joint)).reshape(-1, joint.shape[2])
+        return _Integrated(inverse, both[:, :-1], both[:, -1], root)
 
 
 class VarianceSearch:
@@ -399,7 +399,7 @@ class VarianceSearch:
             precision = precision - one.coupling.T @ one.coupling / noise
             moment = moment - one.coupling.T @ one.moment / noise
             fitted -= float(one.moment @ one.moment) / noise
-            log_determinant = float(np.log(np.diagonal(one.lower, axis1=1, axis2=2)).sum())
+            log_determinant = -float(np.log(np.diagonal(one.inverse, axis1=1, axis2=2)).sum())
         scaled = h[:, None] * precision * h
         scaled[np.diag_indices_from(scaled)] += noise
         lower, failed = lapack.dpotrf(scaled, lower=1)
@@ -413,15 +413,14 @@ class VarianceSearch:
         value += (self._samples - n) * p[-1] + 0.5 * float(off @ off)
         if not np.isfinite(value):
             return np.inf, np.zeros(len(p))
-        triangle = lapack.dpotri(lower, lower=1)[0]
-        share = noise * np.diagonal(triangle)
+        inverse = lapack.dtrtri(lower, lower=1)[0]
+        share = noise * np.einsum("ij,ij->j", inverse, inverse)
         gradient = off / self.sd
         m = s.map_parameters
         gradient[:m] += (0.5 * (1.0 - share - alpha**2) / variance) @ slope
         used = n - float(share.sum())
         square = self._squares - 2.0 * beta @ self._moments + beta @ self._products @ beta
         if one is not None:
-            inverse = np.tril(triangle) + np.tril(triangle, -1).T
             more, by_own, of_own = self._own_terms(one, beta, h, inverse, noise)
             for k, value_k in enumerate(by_own):
                 gradient[m + (0 if k == 0 else 1 + _PART[k - 1])] += value_k
@@ -434,15 +433,13 @@ class VarianceSearch:
         self, one: _Integrated, beta: FloatArray, h: FloatArray, inverse: FloatArray, noise: float
     ) -> tuple[float, FloatArray, float]:
         """Return what b_g changes of the squared residual, derivatives by its variances, and its effective number."""
-        groups, own = one.lower.shape[:2]
-        upper = np.swapaxes(one.lower, 1, 2)
-        coupling = one.coupling.reshape(groups, own, -1)
+        groups, own = one.inverse.shape[:2]
+        upper = np.swapaxes(one.inverse, 1, 2)
         left = (one.moment - one.coupling @ beta).reshape(groups, own, 1)
-        both = np.linalg.solve(upper, np.concatenate([left, np.broadcast_to(np.eye(own), upper.shape), coupling], 2))
-        standard, alone, by_map = both[:, :, 0] / noise, both[:, :, 1 : 1 + own], both[:, :, 1 + own :] / noise
-        scaled = by_map.reshape(groups * own, -1) * h
-        spread = noise * np.sum((scaled @ inverse) * scaled, axis=1).reshape(groups, own)
-        remaining = np.sum(alone**2, axis=2) + spread
+        standard = (upper @ left)[:, :, 0] / noise
+        by_map = (upper @ one.coupling.reshape(groups, own, -1)).reshape(groups * own, -1) * (h / noise)
+        spread = noise * np.sum((inverse @ by_map.T) ** 2, axis=0).reshape(groups, own)
+        remaining = np.sum(upper**2, axis=2) + spread
         u = one.root * standard
         hh, hx, hy = self._joint[:, :, :own], self._joint[:, :, :-1], self._joint[:, :, -1]
         more = -2.0 * np.sum(u * hy) + np.einsum("gi,gij,gj->", u, hh, u) + 2.0 * np.sum(u * (hx @ beta))
