@@ -124,7 +124,7 @@ class Model:
     def channels(self) -> list[str]:
         return sorted({term["channel"] for term in self.raw["terms"] if term.get("channel")})
 
-    def stand_ins(self) -> list[dict[str, Any]]:
+    def fallback_models(self) -> list[dict[str, Any]]:
         """Networks that stand for terms whose channels are lost."""
         return [term["stand_in"] for term in self.raw["terms"] if term.get("stand_in")]
 
@@ -224,8 +224,8 @@ class Image:
         """The equation of docs/numerics.md with the table's words, without the target's rounding."""
         point, limits = self.point(temperature, slope)
         shares, parts = [], []
-        stand_ins = sum(word >> 16 != 0 for word in self.array["terms"][1::8])
-        for head, centers in list(self.networks())[: self.one("n_networks") - stand_ins]:
+        fallback_models = sum(word >> 16 != 0 for word in self.array["terms"][1::8])
+        for head, centers in list(self.networks())[: self.one("n_networks") - fallback_models]:
             regions = ((head[4], head[5]), (head[6], head[7]))
             share = min(share_in(*edge) for edge in zip(point, regions, limits, strict=True))
             if share > 0.0:
@@ -367,7 +367,7 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
         "quantity": [0], "unit": [0], "id": [zlib.crc32(name.encode("ascii"))],
         "calibrated": [calibrated(raw["meta"])], "block_us": [round(raw["block_s"] * 1e6)],
         "slope_blocks": [raw["slope_blocks"]], "lead_blocks": [raw["lead_blocks"]],
-        "n_networks": [len(raw["networks"]) + len(model.stand_ins())],
+        "n_networks": [len(raw["networks"]) + len(model.fallback_models())],
         "n_channels": [1 + len(model.channels())], "n_terms": [len(raw["terms"])],
         "coverage_cells": (raw["coverage"] or {"cells": [0, 0]})["cells"],
         "sigma_cells": (raw["uncertainty_dph"] or {"cells": [0, 0]})["cells"],
@@ -530,7 +530,7 @@ def check_regions(model: Model, image: Image) -> Iterator[str]:
     """Where the networks of a bank hold."""
     e, s = image.member["envelope"], image.member["scale"]
     whole = {"temperature_c": model.t_range, "slope_c_per_min": model.r_range}
-    for network, (head, _) in zip([*model.raw["networks"], *model.stand_ins()], image.networks(), strict=True):
+    for network, (head, _) in zip([*model.raw["networks"], *model.fallback_models()], image.networks(), strict=True):
         region = network["region"] or whole
         edges = [*region["temperature_c"], *(r * model.per_block for r in region["slope_c_per_min"])]
         for k, (got, edge) in enumerate(zip(head[4:], edges, strict=True)):
@@ -600,16 +600,16 @@ def check_map(model: Model, image: Image, bound: float) -> Iterator[str]:
         yield f"at T = {where[0]:.4f} C, slope = {where[1]:.6f} C per block the table departs by {worst:.3e} deg/h"
 
 
-def check_stand_ins(model: Model, image: Image, header: str) -> Iterator[str]:
+def check_fallback_models(model: Model, image: Image, header: str) -> Iterator[str]:
     """What stands for the terms of lost channels against the model's networks."""
-    if not model.stand_ins():
+    if not model.fallback_models():
         return
     printed = re.search(rf"\* {image.numeric} fallback models: .*\|error\| <= (\S+) deg/h", header)
     if printed is None:
         raise Unreadable(f"the header prints no bound of the fallback models of {image.numeric}")
     (t0, t1), (r0, r1) = model.t_range, model.r_range
-    own = list(image.networks())[-len(model.stand_ins()) :]
-    for network, (head, centers) in zip(model.stand_ins(), own, strict=True):
+    own = list(image.networks())[-len(model.fallback_models()) :]
+    for network, (head, centers) in zip(model.fallback_models(), own, strict=True):
         for t, slope in places(model):
             point, _ = image.point(image.input(t), image.input(slope))
             want = model.of_network(network, min(max(t, t0), t1), min(max(slope / model.per_block, r0), r1))
@@ -708,7 +708,7 @@ def check(folder: Path) -> list[str]:
             *check_members(model, image, name),
             *check_regions(model, image),
             *check_terms(model, image),
-            *check_stand_ins(model, image, header),
+            *check_fallback_models(model, image, header),
             *check_sigma(model, image),
             *check_authority(model, image, bound),
             *check_header(model, image, name, header),

@@ -196,14 +196,16 @@ class Network(_Frozen):
 class Term(_Frozen):
     """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel.
 
-    `stand_in`: what it adds on average at a temperature and its rate, while its channel is not known; None: the
-    guard's fallback stands for the channel. In the file only where there is one.
+    `fallback_model`: what it adds on average at a temperature and its rate, while its channel is not known; None: the
+    guard's fallback stands for the channel. In the file it is `stand_in`, only where there is one.
     """
+
+    model_config = ConfigDict(populate_by_name=True)
 
     id: str
     parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]]
     channel: str | None = None
-    stand_in: Network | None = None
+    fallback_model: Annotated[Network | None, Field(alias="stand_in")] = None
 
     @model_validator(mode="after")
     def _known(self) -> Term:
@@ -219,15 +221,15 @@ class Term(_Frozen):
                 raise ValueError(f"{parameter.name} of term {self.id} must be above 0")
         if cause.needs.channel != (self.channel is not None):
             raise ValueError("a channel belongs to an auxiliary term and to no other")
-        if self.stand_in is not None and (self.channel is None or self.stand_in.region is not None):
+        if self.fallback_model is not None and (self.channel is None or self.fallback_model.region is not None):
             raise ValueError("a fallback model belongs to a term with a channel, and has no region")
         return self
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         content: dict[str, Any] = handler(self)
-        if self.stand_in is None:
-            del content["stand_in"]
+        if self.fallback_model is None:
+            content = {name: value for name, value in content.items() if name not in ("stand_in", "fallback_model")}
         return content
 
     @property
@@ -319,11 +321,11 @@ class Model(_Frozen):
 
     @model_validator(mode="after")
     def _whole(self) -> Model:
-        networks = [*self.networks, *self.stand_ins]
+        networks = [*self.networks, *self.fallback_models]
         if sum(len(n.centers) for n in networks) > MOST_CENTERS:
             raise ValueError(f"more than {MOST_CENTERS} centers")
         if len(networks) > _MAX_NETWORKS:
-            raise ValueError(f"more than {_MAX_NETWORKS} networks, stand-ins of terms among them")
+            raise ValueError(f"more than {_MAX_NETWORKS} networks, fallback models of terms among them")
         regions = [n.region is not None for n in self.networks]
         if len(regions) > 1 and not all(regions):
             raise ValueError("every network of a bank needs a region")
@@ -352,9 +354,9 @@ class Model(_Frozen):
         return tuple(map(str, found)) if isinstance(found, list | tuple) else (str(found),)
 
     @property
-    def stand_ins(self) -> tuple[Network, ...]:
+    def fallback_models(self) -> tuple[Network, ...]:
         """Those of the terms that have one, in their order."""
-        return tuple(t.stand_in for t in self.terms if t.stand_in is not None)
+        return tuple(t.fallback_model for t in self.terms if t.fallback_model is not None)
 
     @property
     def between_dph(self) -> float:

@@ -45,7 +45,7 @@ class Part:
 _MISSING = {"f32": "gtc_f32_is_missing"}
 _RELATED = {"f32": "gtc_f32_is_missing,gtc_f32_cell", "q31": "gtc_q31_position"}
 _TERMS = {"f32": "gtc_f32_follow,gtc_f32_mean,gtc_f32_is_missing", "q31": "gtc_q31_follow,gtc_q31_mean"}
-_STAND_INS = {**_TERMS, "q31": f"{_TERMS['q31']},gtc_q31_position"}
+_FALLBACK_MODELS = {**_TERMS, "q31": f"{_TERMS['q31']},gtc_q31_position"}
 PARTS = {
     "map": Part("map", precision=7, contracts=_MISSING, checks=1),
     "map of a bank": Part("map", "bank", precision=7, contracts=_MISSING, checks=1, left=2),
@@ -77,9 +77,9 @@ PARTS = {
     "map of any table": Part("map", precision=7, contracts=_RELATED, checks=1, shape=(1, "warm_up")),
     "map of any bank": Part("map", precision=7, contracts=_RELATED, checks=1, left=3, shape=(2, "warm_up")),
     "terms of any table": Part("terms", precision=7, contracts=_TERMS, checks=1, shape=(1, "warm_up")),
-    "channels of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "auxiliary")),
-    "curve of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "curve")),
-    "product of any table": Part("terms", precision=7, contracts=_STAND_INS, checks=1, shape=(1, "product")),
+    "channels of any table": Part("terms", precision=7, contracts=_FALLBACK_MODELS, checks=1, shape=(1, "auxiliary")),
+    "curve of any table": Part("terms", precision=7, contracts=_FALLBACK_MODELS, checks=1, shape=(1, "curve")),
+    "product of any table": Part("terms", precision=7, contracts=_FALLBACK_MODELS, checks=1, shape=(1, "product")),
 }
 
 

@@ -167,7 +167,7 @@ class Runtime:
             setattr(struct, name, words.ctypes.data if words.size else None)
             if width and name != "guards":
                 setattr(struct, f"n_{name}", words.size // width)
-        struct.n_networks, struct.n_fallback_models = table.n_networks, table.n_stand_ins
+        struct.n_networks, struct.n_fallback_models = table.n_networks, table.n_fallback_models
         return struct, keep
 
     def function(self, numeric: str, name: str) -> Any:

@@ -92,7 +92,7 @@ def random_uncertainty(seed: int, n_terms: int = 0) -> Uncertainty:
     return Uncertainty(cells=cells, rows=grid(), uncovered=grid(), rules=rules)
 
 
-def random_stand_in(seed: int, size: float) -> Network:
+def random_fallback_model(seed: int, size: float) -> Network:
     """A network of up to four Gaussians anywhere near room temperature."""
     rng = np.random.default_rng([seed, 5])
     n = int(rng.integers(0, 5))
@@ -106,7 +106,7 @@ def random_stand_in(seed: int, size: float) -> Network:
 
 
 def random_terms(seed: int) -> tuple[Term, ...]:
-    """One to four terms of any kind, those of channels with stand-ins or without."""
+    """One to four terms of any kind, those of channels with fallback models or without."""
     rng = np.random.default_rng([seed, 1])
     tau, amplitude = float(rng.uniform(15.0, 4000.0)), float(rng.normal(0.0, 0.01))
     every = (
@@ -132,13 +132,13 @@ def random_terms(seed: int) -> tuple[Term, ...]:
             id="auxiliary",
             parameters={"slope_dph_per_unit": amplitude, "reference": float(rng.normal(12.0, 3.0))},
             channel="supply_v",
-            stand_in=random_stand_in(seed, 0.01) if seed % 4 else None,
+            fallback_model=random_fallback_model(seed, 0.01) if seed % 4 else None,
         ),
         Term(
             id="auxiliary",
             parameters={"slope_dph_per_unit": 0.1 * amplitude, "reference": 0.0},
             channel="magnetic_ut",
-            stand_in=random_stand_in(seed + 1, 0.01) if seed % 3 else None,
+            fallback_model=random_fallback_model(seed + 1, 0.01) if seed % 3 else None,
         ),
     )
     chosen = rng.permutation(len(every))[: int(rng.integers(1, 5))]
@@ -155,7 +155,12 @@ def _another_form(term: Term, rng: np.random.Generator) -> Term:
     if term.channel is None or kind == 0:
         return term
     if kind == 1:
-        return Term(id="auxiliary_curve", parameters=_random_curve(rng), channel=term.channel, stand_in=term.stand_in)
+        return Term(
+            id="auxiliary_curve",
+            parameters=_random_curve(rng),
+            channel=term.channel,
+            fallback_model=term.fallback_model,
+        )
     growth = {"slope_dph_per_unit_per_c": float(rng.normal(0.0, 1e-4))}
     middle = {"reference_c": float(rng.uniform(-40.0, 60.0))}
     parameters = term.parameters | growth | middle
@@ -209,7 +214,7 @@ def with_memories(model: Model) -> Model:
 
 
 def bank_with_channels(model: Model) -> Model:
-    """The same network thrice with a hand-over, a harmonic, two auxiliary channels, one with a stand-in."""
+    """The same network thrice with a hand-over, a harmonic, two auxiliary channels, one with a fallback model."""
     wave = {"period_c": 11.0, "amplitude_dph": 0.0007, "phase_rad": 2.0}
     terms = (
         Term(id="path_length_periodicity", parameters=wave),
@@ -218,7 +223,7 @@ def bank_with_channels(model: Model) -> Model:
             id="auxiliary",
             parameters={"slope_dph_per_unit": -0.001, "reference": 0.0},
             channel="magnetic_ut",
-            stand_in=random_stand_in(3, 0.001),
+            fallback_model=random_fallback_model(3, 0.001),
         ),
     )
     # Without a noise floor: fixed point costs nearly 1 % of the golden one, more than that with other terms.

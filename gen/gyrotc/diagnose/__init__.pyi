@@ -17,7 +17,7 @@ from .diagnosis import diagnose as diagnose
 from .diagnosis import series_of as series_of
 from .discrepancy import NoiseFinding as NoiseFinding
 from .extension import extend as extend
-from .extension import stand_ins_of as stand_ins_of
+from .extension import fallback_models_of as fallback_models_of
 from .gain import emitted_means as emitted_means
 from .gain import floor_of as floor_of
 from .gain import gain_of as gain_of

@@ -29,7 +29,7 @@ from ..results.diagnosed import (
     SeriesValues,
 )
 from ..results.training import Training
-from ..train.channels import StandIn
+from ..train.channels import FallbackModel
 from ..train.data import TrainingData
 from ..train.fitting import HOLD_S, FitOptions, fit_dataset, model_of, training_of
 from ..train.plausibility import channel_guard, readings_of, stuck_after_s
@@ -38,7 +38,7 @@ from .attribution import LEVEL, Attribution
 from .blocks import Records, centred_slope, name_of, records_of
 from .candidates import diagnosable_causes
 from .detection import Found
-from .extension import Extension, extend, stand_ins_of
+from .extension import Extension, extend, fallback_models_of
 from .gain import emitted_means, floor_of, gain_of
 from .noise import declared_noise
 from .pipeline import Analysis, analyse
@@ -196,17 +196,17 @@ def _extended_model(
     runs, played = refitting.runs, refitting.train
     front = replace(refitting.front, stuck_s=stuck_after_s(max(run.longest_same_s for run in played)))
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
-    stand_ins = stand_ins_of(plain, extension.samples, played, extension.shipped)
-    entries = _entries(extension.shipped, stand_ins)
+    fallback_models = fallback_models_of(plain, extension.samples, played, extension.shipped)
+    entries = _entries(extension.shipped, fallback_models)
     left_out = extension.after if extension.measured_on == "left out" else ()
     training = training_of(dataset, extension.samples, extension.extended, front, options, left_out)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
     low, high = added_range(played, extension.shipped)
     own = [e for e in extension.shipped if e.channel is None]
-    lost = added_range(played, own, sum(s.added for s in stand_ins.values()))
+    lost = added_range(played, own, sum(s.added for s in fallback_models.values()))
     reported = {"guards": guards, "effects_dph": [min(low, lost[0]), max(high, lost[1])]}
-    content = _with_terms(plain, entries, extension.samples, runs, stand_ins)
+    content = _with_terms(plain, entries, extension.samples, runs, fallback_models)
     return Model.from_dict({**content, **reported}), training
 
 
@@ -223,7 +223,7 @@ def _as_emitted(
     return replace(extension, total=total, before=before, after=after)
 
 
-def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> list[dict[str, Any]]:
+def _entries(shipped: Sequence[Effect], fallback_models: Mapping[str, FallbackModel]) -> list[dict[str, Any]]:
     """Terms as a model has them, those of channels last: a fallback model is fitted to what all others leave."""
     entries = []
     for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):
@@ -235,8 +235,8 @@ def _entries(shipped: Sequence[Effect], stand_ins: Mapping[str, StandIn]) -> lis
             "parameters": {n: effect.values[n] for n in names},
             "channel": effect.channel,
         }
-        if effect.channel is not None and effect.channel in stand_ins:
-            entry["stand_in"] = stand_ins[effect.channel].network
+        if effect.channel is not None and effect.channel in fallback_models:
+            entry["stand_in"] = fallback_models[effect.channel].network
         entries.append(entry)
     return entries
 
@@ -246,15 +246,15 @@ def _with_terms(
     entries: list[dict[str, Any]],
     samples: TrainingData,
     runs: Sequence[Run],
-    stand_ins: Mapping[str, StandIn],
+    fallback_models: Mapping[str, FallbackModel],
 ) -> dict[str, Any]:
     """The model with its terms, and what its uncertainty says of each."""
     content = {**plain.to_dict(), "terms": entries}
     if content["uncertainty_dph"] is not None:
         rules = content["uncertainty_dph"]["rules"]
         rules["terms"] = [
-            stand_ins[e["channel"]].sigma_dph
-            if e["channel"] in stand_ins
+            fallback_models[e["channel"]].sigma_dph
+            if e["channel"] in fallback_models
             else start_sigma(
                 e["id"], e["parameters"], rules, samples, readings_of(runs if e["channel"] else (), e["channel"])
             )

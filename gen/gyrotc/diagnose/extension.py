@@ -18,7 +18,7 @@ from ..common.arrays import BoolArray, Progress
 from ..common.metrics import Averages
 from ..model import Model
 from ..results.fleet import LotUse
-from ..train.channels import StandIn, stand_in_of
+from ..train.channels import FallbackModel, fallback_model_of
 from ..train.data import TrainingData, joined
 from ..train.result import Fit
 from .gain import Gain, gain_of
@@ -28,9 +28,9 @@ from .refitting import FOLDS, Chain, Refitting, held_out_masks, is_corrected
 from .shipping import Shipping, choose_shipped
 
 
-def stand_ins_of(
+def fallback_models_of(
     plain: Model, samples: TrainingData, runs: Sequence[Played], effects: Sequence[Effect]
-) -> dict[str, StandIn]:
+) -> dict[str, FallbackModel]:
     """A fallback model for the term of each channel, by channel; none where none can be fitted.
 
     Args:
@@ -48,9 +48,9 @@ def stand_ins_of(
             shown = run.channels[effect.channel]
             unknown = shown.is_away | ~np.isfinite(shown.mean)
             added.append(np.where(unknown, np.nan, run.outcome(effect).added)[run.in_force])
-        stand_in = stand_in_of(plain, samples, np.concatenate(added))
-        if stand_in is not None:
-            found[effect.channel] = stand_in
+        fallback_model = fallback_model_of(plain, samples, np.concatenate(added))
+        if fallback_model is not None:
+            found[effect.channel] = fallback_model
     return found
 
 

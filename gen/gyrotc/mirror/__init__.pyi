@@ -9,10 +9,10 @@ from .history import FollowedHistory as FollowedHistory
 from .history import Replay as Replay
 from .history import answers as answers
 from .history import evaluate_map as evaluate_map
+from .history import fallback_model as fallback_model
 from .history import follow_history as follow_history
 from .history import recursions_of_table as recursions_of_table
 from .history import replay as replay
-from .history import stand_in as stand_in
 from .q31 import GAUSS_ERROR as GAUSS_ERROR
 from .q31 import exp2 as exp2
 from .q31 import exp2_table as exp2_table

@@ -113,7 +113,7 @@ def biases(table: Table, points: Points, fused: Fused = _NONE) -> NDArray[np.flo
     return np.asarray(np.where(shares > 0, quotient, fallback))
 
 
-def stand_in(table: Table, number: int, points: Points) -> NDArray[np.float32]:
+def fallback_model(table: Table, number: int, points: Points) -> NDArray[np.float32]:
     """What the network of this number, from 1 on, makes of inputs."""
     records = table.records("networks")
     first, count = int(records[: number - 1, 0].sum()), int(records[number - 1, 0])

@@ -297,7 +297,7 @@ def follow_history(
     )
     if not led.at.size:  # no corrections: nothing that terms could change
         outcome.away += [np.zeros(0, dtype=np.bool_) for channel in table.channels if channel]
-    terms = zip(recursions_of_table(table), table.channels, table.stand_ins, strict=True)
+    terms = zip(recursions_of_table(table), table.channels, table.fallback_models, strict=True)
     for recursion, channel, number in terms if led.at.size else ():
         shown = None
         if channel:
@@ -305,7 +305,7 @@ def follow_history(
             fallback = table.numbers(table.records("guards")[channel])[7]
             shown = channel_at(arithmetic, of_rows, _guarded(table, channel), fallback, settings, led)
             if number:
-                shown = replace(shown, stand_in=_stand_in(table, number, outcome, shown, led))
+                shown = replace(shown, fallback_model=_fallback_model(table, number, outcome, shown, led))
         recursion.apply(course, shown, outcome)
     status, bits = _corrections(table, led, outcome)
     found = evidence_of(table, steps, course, outcome, status, samples_per_block)
@@ -320,11 +320,11 @@ def follow_history(
     )
 
 
-def _stand_in(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> NumberArray:
+def _fallback_model(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> NumberArray:
     """What a term adds without its channel, where that is asked for; else 0."""
     asked = np.flatnonzero((shown.is_away | ((shown.remarks & CLAMPED) != 0)) & (steps.kind == FROM_MAP))
     found = np.zeros_like(outcome.added)
-    found[asked] = stand_in(table, number, outcome.temperature[asked], outcome.slope[asked])
+    found[asked] = fallback_model(table, number, outcome.temperature[asked], outcome.slope[asked])
     return found
 
 
@@ -485,7 +485,7 @@ def evaluate_map(table: Table, inputs: Words, fused: f32.Fused = frozenset()) ->
     return status, np.where(usable, bits, np.uint32(0)).astype(np.uint32)
 
 
-def stand_in(table: Table, number: int, temperature: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
+def fallback_model(table: Table, number: int, temperature: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
     """What stands for a term whose channel is not known.
 
     Args:
@@ -496,8 +496,8 @@ def stand_in(table: Table, number: int, temperature: NDArray[Any], slope: NDArra
     low, high = table.numbers(table.envelope).reshape(2, 2).T
     x = np.minimum(np.maximum(np.stack([temperature, slope], axis=1), low), high)
     if table.numeric == "f32":
-        return f32.stand_in(table, number, f32.normalise(table, x))
-    return q31.stand_in(table, number, q31.normalise(table, x))
+        return f32.fallback_model(table, number, f32.normalise(table, x))
+    return q31.fallback_model(table, number, q31.normalise(table, x))
 
 
 def governed(bounds: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:

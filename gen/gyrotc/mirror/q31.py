@@ -81,7 +81,7 @@ def biases(table: Table, points: Points) -> IntArray:
     return np.where(shares > 0, blended, table.numbers([table.fallback])[0])
 
 
-def stand_in(table: Table, number: int, points: Points) -> IntArray:
+def fallback_model(table: Table, number: int, points: Points) -> IntArray:
     """What the network of this number, from 1 on, makes of inputs."""
     networks = table.numbers(table.records("networks"))
     return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)

@@ -130,14 +130,14 @@ class CourseChannel:
         mean: Mean of its last block with enough readings, or what stands for it; NaN where nothing does, shape (n,).
         remarks: Status bits: held, lost, clamped, shape (n,).
         is_away: Where nothing of it is accepted, so that something stands for it, shape (n,).
-        stand_in: What its term adds then, shape (n,), needed there and where a reading lies at the edge of its range;
-            None: the effect of `mean`.
+        fallback_model: What its term adds then, shape (n,), needed there and where a reading is at the edge of its
+            range; None: the effect of `mean`.
     """
 
     mean: NumberArray
     remarks: NDArray[np.int32]
     is_away: NDArray[np.bool_]
-    stand_in: NumberArray | None = None
+    fallback_model: NumberArray | None = None
 
 
 @dataclass(slots=True)
@@ -231,11 +231,11 @@ class _OfChannel(Recursion):
             raise ValueError("a term of a channel without its channel")
         added = self._added(channel.mean, course.temperature)
         added = np.where(np.isnan(added), added.dtype.type(0), added)
-        usual = np.zeros_like(added) if channel.stand_in is None else channel.stand_in
+        usual = np.zeros_like(added) if channel.fallback_model is None else channel.fallback_model
         beyond = np.where((channel.remarks & CLAMPED) != 0, np.abs(added - usual), np.zeros_like(added))
         outcome.edge = self.do.limited(outcome.edge + beyond)
         outcome.added = outcome.added + (
-            added if channel.stand_in is None else np.where(channel.is_away, channel.stand_in, added)
+            added if channel.fallback_model is None else np.where(channel.is_away, channel.fallback_model, added)
         )
         outcome.remarks = outcome.remarks | channel.remarks
         outcome.away.append(channel.remarks != 0)

@@ -87,7 +87,7 @@ class Table:
     probes: Words
     error_bound_dph: float  # |map - model| never exceeds it: arithmetic and input rounding, no terms
     bound_parts_dph: dict[str, float]  # what the bound is made of
-    stand_in_bounds_dph: tuple[float, ...] = ()  # the same of each fallback model alone
+    fallback_model_bounds_dph: tuple[float, ...] = ()  # the same of each fallback model alone
 
     def records(self, array: str) -> Words:
         """An array of records, one a row: shape (n, words of a record)."""
@@ -99,18 +99,18 @@ class Table:
         return self.centers.size // ARRAYS["centers"]
 
     @property
-    def stand_ins(self) -> tuple[int, ...]:
+    def fallback_models(self) -> tuple[int, ...]:
         """Of every term the number of its fallback model among the networks, from 1 on; 0: it has none."""
         return tuple(int(word) >> 16 for word in self.records("terms")[:, 1])
 
     @property
-    def n_stand_ins(self) -> int:
-        return sum(number != 0 for number in self.stand_ins)
+    def n_fallback_models(self) -> int:
+        return sum(number != 0 for number in self.fallback_models)
 
     @property
     def n_networks(self) -> int:
         """Networks of the map; the fallback models stand behind them."""
-        return self.networks.size // ARRAYS["networks"] - self.n_stand_ins
+        return self.networks.size // ARRAYS["networks"] - self.n_fallback_models
 
     @property
     def channels(self) -> tuple[int, ...]:
@@ -171,7 +171,7 @@ class Table:
         return 4 * (3 * networks + 3 + self.centers.size + 6 * terms)
 
     @property
-    def stand_in_bytes(self) -> int:
+    def fallback_model_bytes(self) -> int:
         """Those of the fallback models among them."""
         counts = self.records("networks")[self.n_networks :, 0]
         return 4 * (3 * counts.size + ARRAYS["centers"] * int(counts.sum()))

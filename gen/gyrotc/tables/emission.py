@@ -279,10 +279,10 @@ def _sizes(model: Model, emission: Emission) -> Iterator[str]:
             f"{table.table_bytes} of them parameters; "
             f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded{beside})"
         )
-        if table.n_stand_ins:
+        if table.n_fallback_models:
             yield (
-                f"{numeric} fallback models: {table.stand_in_bytes} of these parameters are added for channels "
-                f"that are lost; of each |error| <= {_upwards(max(table.stand_in_bounds_dph))} deg/h"
+                f"{numeric} fallback models: {table.fallback_model_bytes} of these parameters are added for channels "
+                f"that are lost; of each |error| <= {_upwards(max(table.fallback_model_bounds_dph))} deg/h"
             )
 
 

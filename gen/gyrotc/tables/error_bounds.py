@@ -293,7 +293,7 @@ class _Ramps:
 
 def regions(model: Model) -> tuple[Envelope, ...]:
     """Region of every network, those of fallback models last; the envelope where it has none of its own."""
-    return tuple(n.region or model.envelope for n in (*model.networks, *model.stand_ins))
+    return tuple(n.region or model.envelope for n in (*model.networks, *model.fallback_models))
 
 
 def handover_error_dph(

@@ -39,11 +39,11 @@ def table_of(model: Model) -> Table:
     scale = f32_words([center, 1.0 / half, 1.0 / (model.scale.slope_c_per_min * per_block)])
     envelope = _region(model.envelope, per_block)
     _check_range(scale, envelope)
-    of_map, networks = len(model.networks), (*model.networks, *model.stand_ins)
+    of_map, networks = len(model.networks), (*model.networks, *model.fallback_models)
     centers = [_centers(network, scale, per_block) for network in networks]
     heads = [_record(n, region, per_block) for n, region in zip(networks, regions(model), strict=True)]
     parts = _bound_parts(model, scale, envelope, centers[:of_map], np.concatenate(heads[:of_map]))
-    stand_ins = zip(model.stand_ins, centers[of_map:], strict=True)
+    fallback_models = zip(model.fallback_models, centers[of_map:], strict=True)
     return Table(
         numeric="f32",
         **shared(model),
@@ -61,7 +61,9 @@ def table_of(model: Model) -> Table:
         probes=np.zeros(0, dtype=np.uint32),
         error_bound_dph=math.fsum(parts.values()),
         bound_parts_dph=parts,
-        stand_in_bounds_dph=tuple(math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in stand_ins),
+        fallback_model_bounds_dph=tuple(
+            math.fsum(_bound(*one, scale, envelope, per_block).values()) for one in fallback_models
+        ),
     )
 
 

@@ -210,7 +210,7 @@ def table_of(model: Model) -> Table:
     per_block = model.block_s / 60.0
     envelope = _envelope(model, per_block)
     inputs = (position_scale(*envelope[:2]), position_scale(*envelope[2:]))
-    given = (*model.networks, *model.stand_ins)
+    given = (*model.networks, *model.fallback_models)
     surfaces = [surface_of(n, model.scale, per_block, inputs) for n in given]
     felt = [_felt(surface, _moved(inputs)) for surface in surfaces]
     chosen = [_chosen(surface, keep) for surface, keep in zip(surfaces, felt, strict=True)]
@@ -222,14 +222,14 @@ def table_of(model: Model) -> Table:
     size = max(largest, abs(model.fallback_dph)) + term_size_dph(model) + model.rezero_dph
     frac_bits = _frac_bits(size, model.q31_bias_frac_bits)
     bounds = [_bound(network, inputs, frac_bits) for network in networks]
-    of_map, stand_ins = bounds[: len(model.networks)], bounds[len(model.networks) :]
+    of_map, fallback_models = bounds[: len(model.networks)], bounds[len(model.networks) :]
     parts = {part: max(bound[part] for bound in of_map) for part in bounds[0]}
     if len(model.networks) > 1:
         axes = _axes(model, inputs, per_block)
         parts["hand-over"] = handover_error_dph(model, "q31", axes, share_step=_SHARE, share_error=0.0)
         parts["blend"] = 2.0**-frac_bits  # the quotient is rounded
     table = _table(model, envelope, inputs, networks, frac_bits, parts)
-    return replace(table, stand_in_bounds_dph=tuple(math.fsum(bound.values()) for bound in stand_ins))
+    return replace(table, fallback_model_bounds_dph=tuple(math.fsum(bound.values()) for bound in fallback_models))
 
 
 def _fixed(whole: Surface, part: Surface, keep: NDArray[np.bool_], fraction: int) -> _Fixed:

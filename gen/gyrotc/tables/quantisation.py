@@ -121,11 +121,13 @@ def _terms(table: Table, limits: WordLimits) -> Iterator[str]:
     width, last = ARRAYS["terms"] - 2, table.n_networks
     if last < 1:
         yield "no network is left to the map"
-    for record, channel, stand_in in zip(table.records("terms"), table.channels, table.stand_ins, strict=True):
+    for record, channel, fallback_model in zip(
+        table.records("terms"), table.channels, table.fallback_models, strict=True
+    ):
         kind = int(record[0])
-        last += stand_in != 0
-        if stand_in and (stand_in != last or channel == 0):
-            yield f"fallback model of a term is network {stand_in}"
+        last += fallback_model != 0
+        if fallback_model and (fallback_model != last or channel == 0):
+            yield f"fallback model of a term is network {fallback_model}"
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
         elif channel >= table.n_channels or (channel != 0) != TableKind(kind).reads_channel:

@@ -323,8 +323,8 @@ def _heads(model: Model) -> list[int]:
     """Second words of the records: channel, and number of the fallback model among the networks in the upper half."""
     heads, last = [], len(model.networks)
     for term in model.terms:
-        last += term.stand_in is not None
-        heads.append(_term_record(model, term)[1] + 65536 * (last if term.stand_in is not None else 0))
+        last += term.fallback_model is not None
+        heads.append(_term_record(model, term)[1] + 65536 * (last if term.fallback_model is not None else 0))
     return heads
 
 

@@ -114,7 +114,7 @@ def table_text(table: Table, model: Model) -> TableText:
         text = ", ".join(f"{n}UL" for n in counts[name])
         text = f"{table.n_networks}UL" if name == "n_networks" else text  # an image counts all
         members.append(_member(name, f"{{ {text} }}" if name.endswith("cells") else text))
-    members.append(_member("n_fallback_models", f"{table.n_stand_ins}UL"))
+    members.append(_member("n_fallback_models", f"{table.n_fallback_models}UL"))
     arrays = []
     for name, length in _array_lengths(counts).items():
         body = [next(words) for _ in range(length)]
@@ -152,12 +152,12 @@ def _row_comments(model: Model) -> dict[str, list[str]]:
     """What a row of an array says in the units of the trade."""
     centers = [
         f"{t:.2f} C, {r:+.3f} C/min; widths {_width(d_t)}, {_width(d_r)}; {w:+.3e} deg/h"
-        for n in (*model.networks, *model.stand_ins)
+        for n in (*model.networks, *model.fallback_models)
         for (t, r), (d_t, d_r), w in zip(n.centers, n.widths, n.weights, strict=True)
     ]
     channels = ["temperature_c", *channel_names(model)]
-    stand_ins = [f"fallback model of {term.channel}" for term in model.terms if term.stand_in is not None]
-    networks = [*[""] * len(model.networks), *stand_ins]
+    fallback_models = [f"fallback model of {term.channel}" for term in model.terms if term.fallback_model is not None]
+    networks = [*[""] * len(model.networks), *fallback_models]
     return {"networks": networks, "centers": centers, "guards": channels, "terms": [term.id for term in model.terms]}
 
 

@@ -266,7 +266,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
         for alone in (n // 2 + 1, n // 2, n - 2, n - 1, 2 * n + 3):
             yield replace(ramp(alone, t, noise=40), kind="ALONE")
             yield ramp(3 * n - alone % n, t, noise=40)
-    if model.stand_ins:
+    if model.fallback_models:
         # Lost, and a ramp over the envelope beside it; then it comes back.
         longest_s = max(guard_of(model, name).missing_s for name in channel_names(model))
         yield replace(ramp(min(round(longest_s / model.block_s * n) + 2 * n, 4000), t, noise=40), kind="ALONE")

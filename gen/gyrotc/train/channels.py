@@ -133,7 +133,7 @@ _METHODS = ("mrbf", "linear", "constant")  # the first whose map keeps to the sa
 
 
 @dataclass(frozen=True, slots=True)
-class StandIn:
+class FallbackModel:
     """What stands for a term.
 
     Attributes:
@@ -147,7 +147,7 @@ class StandIn:
     sigma_dph: float
 
 
-def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> StandIn | None:
+def fallback_model_of(model: Model, samples: TrainingData, effect: FloatArray) -> FallbackModel | None:
     """The fallback model of a term; None where nothing can be fitted.
 
     Args:
@@ -169,7 +169,7 @@ def stand_in_of(model: Model, samples: TrainingData, effect: FloatArray) -> Stan
             continue
         added = predict(found, samples.temperature_c, samples.slope_c_per_min)
         network = snapped(rescaled(found.networks[0], found.scale, scale), scale)
-        return StandIn(network, added, _next_rms(effect[known] - added[known], seen.run))
+        return FallbackModel(network, added, _next_rms(effect[known] - added[known], seen.run))
     return None
 
 
@@ -423,13 +423,13 @@ def with_channels(
     for name in choice.trial.chosen:
         shape, weights = choice.shapes[name], choice.trial.weights[name]
         terms.append({"id": shape.cause.id, "parameters": shape.parameters(weights), "channel": name})
-        stand_in = stand_in_of(model, samples, choice.effects[name])
-        if stand_in is None:
+        fallback_model = fallback_model_of(model, samples, choice.effects[name])
+        if fallback_model is None:
             sigmas.append(shape.sigma_dph(weights))
             continue
-        terms[-1]["stand_in"] = stand_in.network
-        sigmas.append(stand_in.sigma_dph)
-        stood += stand_in.added
+        terms[-1]["stand_in"] = fallback_model.network
+        sigmas.append(fallback_model.sigma_dph)
+        stood += fallback_model.added
     if rules:
         rules["terms"] = sigmas
     guards = {name: channel_guard(runs, name, missing_s) for name in sorted(choice.trial.chosen)}

@@ -27,6 +27,7 @@ from gyrotc.diagnose import (
     completed,
     cycle_of,
     diagnose,
+    fallback_models_of,
     gain,
     holds,
     is_single_cycle,
@@ -37,7 +38,6 @@ from gyrotc.diagnose import (
     samples,
     sentence_of,
     shows_as,
-    stand_ins_of,
     verdict_of,
 )
 from gyrotc.mirror import FollowedHistory, evaluate_map, first_order, follow_history, missed_before, play
@@ -266,7 +266,7 @@ profiles = ["nested loops"]
 """
 
 
-def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alone(tmp_path: Path) -> None:
+def test_a_fallback_model_takes_what_map_and_other_terms_leave_and_is_of_channels_alone(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(SCENARIO)
     simulate(tmp_path / "short.toml", seed=4, out=tmp_path / "data")
     dataset = load(tmp_path / "data")
@@ -275,16 +275,18 @@ def test_a_stand_in_takes_what_map_and_other_terms_leave_and_is_of_channels_alon
     effects = [Effect(id, VALUES[id], "supply_v" if id == "auxiliary" else None) for id in VALUES]
     effects = [e for e in effects if e.id in ("hysteresis", "auxiliary")]
     plain = fit_dataset(dataset, FitOptions(method="linear")).model
-    found = stand_ins_of(plain, joined([samples(run, effects) for run in played]), played, effects)
+    found = fallback_models_of(plain, joined([samples(run, effects) for run in played]), played, effects)
     assert list(found) == ["supply_v"]
-    stand_in = found["supply_v"]
+    fallback_model = found["supply_v"]
     beside = joined([samples(run, effects[:1]) for run in played])
     left = beside.bias_dph - plain.map_dph(beside.temperature_c, beside.slope_c_per_min)
-    assert stand_in.sigma_dph > 0.0 and np.ptp(stand_in.added) > 0.0
-    assert np.sqrt(np.mean((left - stand_in.added) ** 2)) < left.std(), "better than any constant"
-    low, high = added_range(played, effects[:1], stand_in.added)
+    assert fallback_model.sigma_dph > 0.0 and np.ptp(fallback_model.added) > 0.0
+    assert np.sqrt(np.mean((left - fallback_model.added) ** 2)) < left.std(), "better than any constant"
+    low, high = added_range(played, effects[:1], fallback_model.added)
     alone = added_range(played, effects[:1])
-    assert low >= alone[0] + stand_in.added.min() - 1e-12 and high <= alone[1] + stand_in.added.max() + 1e-12
+    assert (
+        low >= alone[0] + fallback_model.added.min() - 1e-12 and high <= alone[1] + fallback_model.added.max() + 1e-12
+    )
 
 
 LOOPS = """

@@ -414,7 +414,7 @@ def test_a_bent_channel_and_one_that_goes_with_temperature_stand_in_the_table_as
     built: Path, model: Model
 ) -> None:
     assert {t.channel: t.id for t in model.terms} == {"supply_v": "auxiliary_curve", "magnetic_ut": "auxiliary_product"}
-    assert all(t.stand_in is not None for t in model.terms)
+    assert all(t.fallback_model is not None for t in model.terms)
     training = json.loads((built / "training.json").read_text("utf-8"))
     shapes = {row["name"]: row["shape"] for row in training["channels"]}
     assert shapes == {"supply_v": "curve", "magnetic_ut": "product"}

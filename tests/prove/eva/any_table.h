@@ -1,7 +1,7 @@
 /* any_table.h - with -DANY_TABLE the table is any that `init` and `check` accept: words anywhere in libc/gtc_limits.inl.
  *
  * Counts are those of a small table: SHAPE_NETWORKS networks of two centers each, four terms, grids of 3 x 2 cells; where
- * the last term is that of a channel, a stand-in behind the networks, which it has or has not. Intervals cannot say the conditions on several words; the files that need them take
+ * the last term is that of a channel, a fallback model behind the networks, which it has or has not. Intervals cannot say the conditions on several words; the files that need them take
  * functions by contract. Included behind gtc.c, whose limits it reads.
  */
 #ifndef ANY_TABLE_H_INCLUDED

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gyrotc.mirror import CHANNEL_LOST, Replay, Table, replay, stand_in
+from gyrotc.mirror import CHANNEL_LOST, Replay, Table, fallback_model, replay
 from gyrotc.model import Model, Network, Scale, Term
 from gyrotc.recordings import Rows, load
 from gyrotc.simulate import simulate
 from gyrotc.tables import NUMERICS, channels_of, quantise
 from gyrotc.train import FitOptions, fit_dataset, rescaled
 from libc_build import runtime
-from models import random_guards, random_history, random_model, random_stand_in, random_uncertainty
+from models import random_fallback_model, random_guards, random_history, random_model, random_uncertainty
 
 from bench.signals import rms_of, scenario_of, without
 
@@ -28,14 +28,14 @@ _SEEDS = [701]  # a world that neither bench nor method was tried on
 
 
 def with_two_channels(seed: int, **changes: Any) -> Model:
-    """A random map beside two channels, each with a stand-in, and an uncertainty."""
+    """A random map beside two channels, each with a fallback model, and an uncertainty."""
     slopes = {"supply_v": 0.01, "magnetic_ut": -0.004}
     terms = tuple(
         Term(
             id="auxiliary",
             parameters={"slope_dph_per_unit": slope, "reference": 12.0},
             channel=name,
-            stand_in=random_stand_in(seed + k, 0.01),
+            fallback_model=random_fallback_model(seed + k, 0.01),
         )
         for k, (name, slope) in enumerate(slopes.items())
     )
@@ -74,7 +74,7 @@ def test_lost_channels_agree_bit_for_bit_with_the_compiled_code(numeric: str, tr
     rng = np.random.default_rng(seed)
     model = with_two_channels(seed)
     table = quantise(model, numeric)
-    assert table.n_stand_ins == 2
+    assert table.n_fallback_models == 2
     x, missed = random_history(model, seed, 1500, _SAMPLES_PER_BLOCK)
     channels = table.encode_inputs(np.column_stack([x, away(rng, 1500)]))
     want = replay(table, channels, missed=missed, samples_per_block=_SAMPLES_PER_BLOCK)
@@ -85,8 +85,8 @@ def test_lost_channels_agree_bit_for_bit_with_the_compiled_code(numeric: str, tr
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_while_channels_are_lost_the_correction_is_that_of_map_and_stand_ins(numeric: str) -> None:
-    """Within the bounds of the map and of each stand-in, for one channel and for both; and without them again after."""
+def test_while_channels_are_lost_the_correction_is_that_of_map_and_fallback_models(numeric: str) -> None:
+    """Within the bounds of map and fallback models, for one channel and for both; and without them again after."""
     model = with_two_channels(11, lead_blocks=0, stuck_s=0.0)
     table = quantise(model, numeric)
     low, high = model.envelope.temperature_c
@@ -98,12 +98,12 @@ def test_while_channels_are_lost_the_correction_is_that_of_map_and_stand_ins(num
     channels = table.encode_inputs(np.column_stack([temperature, readings]))
     found = table.decode_bias(replayed(table, channels, _SAMPLES_PER_BLOCK).bits)
     of_map = float(model.map_dph(t, 0.0))
-    order = [term.stand_in for term in model.terms if term.channel == "magnetic_ut"]  # channel 1 by its name
+    order = [term.fallback_model for term in model.terms if term.channel == "magnetic_ut"]  # channel 1 by its name
     assert order[0] is not None
     first = float(model.network_dph(order[0], t, 0.0))
-    both = sum(float(model.network_dph(network, t, 0.0)) for network in model.stand_ins)
+    both = sum(float(model.network_dph(network, t, 0.0)) for network in model.fallback_models)
     low_effect, high_effect = table.decode_bias(table.effect)
-    room = 2.0 * (table.error_bound_dph + sum(table.stand_in_bounds_dph)) + 1e-6
+    room = 2.0 * (table.error_bound_dph + sum(table.fallback_model_bounds_dph)) + 1e-6
     for at, added in ((199, 0.0), (399, first), (499, 0.0), (699, both), (899, 0.0)):
         assert found[at] == pytest.approx(of_map + np.clip(added, low_effect, high_effect), abs=room), at
 
@@ -128,7 +128,7 @@ def test_sigma_counts_the_channels_that_are_lost_and_no_other() -> None:
 
 
 @pytest.mark.parametrize("numeric", NUMERICS)
-def test_a_stand_in_keeps_to_its_bound(numeric: str) -> None:
+def test_a_fallback_model_keeps_to_its_bound(numeric: str) -> None:
     seed = secrets.randbelow(2**20)
     print("seed", seed)
     model = with_two_channels(seed)
@@ -137,8 +137,8 @@ def test_a_stand_in_keeps_to_its_bound(numeric: str) -> None:
     points = np.random.default_rng(seed).uniform([t0, r0], [t1, r1], (5000, 2))
     inputs = table.encode_inputs(points * [1.0, model.block_s / 60.0])
     t, slope = table.decode_inputs(inputs).T
-    for k, (network, bound) in enumerate(zip(model.stand_ins, table.stand_in_bounds_dph, strict=True)):
-        made = stand_in(table, table.n_networks + 1 + k, *table.numbers(inputs.ravel()).reshape(-1, 2).T)
+    for k, (network, bound) in enumerate(zip(model.fallback_models, table.fallback_model_bounds_dph, strict=True)):
+        made = fallback_model(table, table.n_networks + 1 + k, *table.numbers(inputs.ravel()).reshape(-1, 2).T)
         wrong = made * 2.0**-table.bias_frac_bits - model.network_dph(network, t, slope * 60.0 / model.block_s)
         assert np.abs(wrong).max() <= bound
 
@@ -147,11 +147,11 @@ def test_a_network_in_another_scale_is_the_same_function() -> None:
     old = {"temperature_c": [20.0, 30.0], "slope_c_per_min": 2.0}
     model = with_two_channels(5)
     new = model.to_dict()["scale"]
-    moved = rescaled(model.stand_ins[0].model_dump(mode="json"), old, new)
+    moved = rescaled(model.fallback_models[0].model_dump(mode="json"), old, new)
     own = model.model_copy(update={"scale": Scale(temperature_c=(20.0, 30.0), slope_c_per_min=2.0)})
     other = Network.model_validate_json(json.dumps(moved))
     t, r = np.linspace(*model.envelope.temperature_c, 50), np.linspace(*model.envelope.slope_c_per_min, 50)
-    assert model.network_dph(other, t, r) == pytest.approx(own.network_dph(model.stand_ins[0], t, r), abs=1e-12)
+    assert model.network_dph(other, t, r) == pytest.approx(own.network_dph(model.fallback_models[0], t, r), abs=1e-12)
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class World:
 
 @pytest.fixture(scope="module", params=_SEEDS)
 def gyro(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> World:
-    folder = tmp_path_factory.mktemp("stand-ins")
+    folder = tmp_path_factory.mktemp("fallback models")
     (folder / "world.toml").write_text(scenario_of(request.param), "utf-8")
     simulate(folder / "world.toml", seed=request.param, out=folder / "data")
     dataset = load(folder / "data")
@@ -182,7 +182,7 @@ def test_a_channel_lost_in_the_exam_costs_no_more_than_2_percent_over_one_thermo
     gyro: World, tmp_path: Path
 ) -> None:
     """Each channel alone, and all of them at once."""
-    assert gyro.columns and all(term.stand_in is not None for term in gyro.model.terms)
+    assert gyro.columns and all(term.fallback_model is not None for term in gyro.model.terms)
     most = 1.02 * rms_of(gyro.plain, gyro.exam, tmp_path)
     rows = gyro.exam
     for name in gyro.columns:
