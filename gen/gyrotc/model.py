@@ -155,6 +155,13 @@ class Rules(_Frozen):
     correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)]
     terms: tuple[BiasAmount, ...] = ()
 
+    @model_serializer(mode="wrap")
+    def _without_unknown(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what is not known of power-ons: a model that states nothing of them has no such field."""
+        content: dict[str, Any] = handler(self)
+        unknown = [name for name in ("turn_on_dph", "turn_on_freedom") if content[name] is None]
+        return {name: value for name, value in content.items() if name not in unknown}
+
 
 class Uncertainty(_Frozen):
     """1 σ of the compensated bias, deg/h: `rows[j][i]` for cell i of T and j of dT/dt.
