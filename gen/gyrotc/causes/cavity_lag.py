@@ -52,6 +52,7 @@ CAUSE = Cause(
         signature="residual loops over T that widen with the ramp rate and close in holds with the time constant",
         remedy="one first-order state: the map sees the cavity's temperature",
         experiment=ADVICE_MORE_RATES,
+        advice="In the gyro it goes away with a thermometer on the block, which reads what the bias follows.",
     ),
     search=SearchRule(price=2, grid=geometric(_TAU, 22), over=_TAU.name, imitates=True),
     table=Tabled(TableKind.MEMORY, _record),

@@ -79,6 +79,8 @@ CAUSE = Cause(
         experiment=_BOTH_SIDES,
         telling=Telling.DIRECTION,
         beside={"turn_on_offset": _BOTH_SIDES + ", all within one power-on"},
+        advice="In the gyro, look at parts that temperature stresses: mounts, adhesives, mirrors. In use, a working "
+        "temperature that is always reached from one side avoids it.",
     ),
     search=SearchRule(
         price=2,

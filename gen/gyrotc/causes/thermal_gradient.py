@@ -63,9 +63,10 @@ CAUSE = Cause(
         signature="residual follows the ramp with the same size at every temperature and fades in holds",
         remedy="one first-order state and a linear term",
         experiment=ADVICE_MORE_RATES,
-        advice="A fixture that tilts with a temperature of its own shows the same through Earth's rate (5e-5 deg/h for "
-        "each arcsec at 45 degrees): repeat a run with the gyro rotated by 180 degrees; what then changes its sign is "
-        "the fixture's.",
+        advice="In the gyro it shrinks with a better thermal path between block and housing, with a cover against the "
+        "air stream of the chamber, or with a second thermometer where the gradient begins. A fixture that tilts with "
+        "a temperature of its own shows the same through Earth's rate (5e-5 deg/h for each arcsec at 45 degrees): "
+        "repeat a run with the gyro rotated by 180 degrees; what then changes its sign is the fixture's.",
     ),
     search=SearchRule(
         price=2,

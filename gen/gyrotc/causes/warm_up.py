@@ -70,6 +70,8 @@ CAUSE = Cause(
         telling=Telling.COLD_START,
         beside={"thermal_gradient": COLD_STARTS, "cavity_lag": COLD_STARTS},
         recording="note the time of power-on of every run (power_on_s)",
+        advice="In use, wait for three time constants after power-on; in the gyro, it shrinks with less power in the "
+        "housing.",
     ),
     search=SearchRule(price=2, grid=geometric(_TAU, 12), over=_TAU.name, imitates=True),
     table=Tabled(TableKind.WARM_UP, _record),

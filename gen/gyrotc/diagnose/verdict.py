@@ -109,7 +109,6 @@ _REPEAT = "one profile twice: what repeats is memory or map, what does not is ch
 
 _STEPS: dict[DiagnosisVerdict, str] = {
     "consistent": "Nothing is needed. For lower detection limits record the programme of docs/howto-calibration.md.",
-    "explained": "Mend the cause and record again.",
     "partial": f"Record {_REPEAT}. Record supply, discharge current, pressure and magnetic field beside the rate.",
     "noise_differs": "Declare the noise that was measured ([noise] of dataset.toml), or find out why it differs;"
     " then diagnose again: detection limits follow the noise.",
@@ -146,7 +145,7 @@ def next_steps(
     if verdict == "explained" and gain is None:
         remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
         steps.append(f"Against it: {'; '.join(remedies)}.")
-    elif verdict != "ambiguous":
+    elif verdict in _STEPS:
         steps.append(_STEPS[verdict])
     steps += [f"Paste {c.repair} into dataset.toml and build again." for c in causes if c.repair]
     named = [CATALOGUE[c.id].words for c in causes if c.id in CATALOGUE]

@@ -78,6 +78,7 @@ def _gains(result: Diagnosed) -> list[tuple[str, GainOnUnseen]]:
     return rows
 
 
+_SIGNATURE_MEANS = 16  # dots of the picture of residual against signature
 _LEAST_SHOWN = 20  # blocks at a kind of rate: fewer give no mean to speak of
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _LINEAR = 20.0  # -ln p up to which the axis is linear, so that what was not found is seen
@@ -89,6 +90,7 @@ def diagnosis_pictures(result: Diagnosed, series: DiagnosisSeries) -> dict[str, 
     cycle = result.single_cycle is not None
     width = max(round(HALF_HOUR_S / series.block_s), 1)
     made: dict[str, Markup | None] = {
+        "signature": None if cycle else _against_signature(series.runs),
         "residual": _cycle_over_time(series.runs) if cycle else _residual_over_time(series.runs, width),
         "statistics": _statistics(result.discrepancies),
         "inputs": None if cycle else _over_inputs(series.runs, width),
@@ -129,6 +131,33 @@ def _events(runs: Sequence[RunSeries], events: Sequence[Finding]) -> Markup | No
     return _drawn(panels)
 
 
+def _against_signature(runs: Sequence[RunSeries]) -> Markup | None:
+    """Draw what the map leaves against what the named causes make of it; None where no cause is named.
+
+    Means of equal numbers of blocks, with their standard errors. On the dashed line the causes are the whole of it.
+    """
+    known = [run for run in runs if run.named_dph is not None]
+    if not known:
+        return None
+    named, residual = (
+        np.concatenate([np.array(values) for values in of])
+        for of in zip(*((run.named_dph, run.residual_dph) for run in known), strict=True)
+    )
+    order = np.argsort(named, kind="stable")
+    parts = [part for part in np.array_split(order, _SIGNATURE_MEANS) if part.size >= _LEAST_SHOWN]
+    if len(parts) < 2:
+        return None
+    x, y = (np.array([values[part].mean() for part in parts]) for values in (named, residual))
+    error = np.array([residual[part].std() / np.sqrt(part.size) for part in parts])
+    panel = Panel(x="bias by the named causes, deg/h", y="what the map leaves, deg/h")
+    ends = np.array([x.min(), x.max()])
+    panel.horizontal(0.0)
+    panel.line(ends, ends, AFTER, "as the causes say", dash="5 3", width=1.4)
+    panel.errors(x, y - error, y + error, BEFORE)
+    panel.dots(x, y, BEFORE, "measured, with standard error", size=6.0)
+    return drawing([panel], width=HALF, height=220.0)
+
+
 def _residual_over_time(runs: Sequence[RunSeries], width: int) -> Markup:
     """Half-hour means of every run's residual over the band of the simulated ones, and the fitted causes."""
     panels = _panels(len(runs), "h since the first row", "residual, deg/h")
@@ -165,7 +194,7 @@ def _statistics(discrepancies: Sequence[Statistic]) -> Markup:
     found = list(reversed(discrepancies))
     names = [d.statistic.removesuffix("_dph").replace("_", " ") for d in found]
     panel = Panel(
-        x="half widths of the simulated 95 % range (beyond 1: square root)",
+        x="half widths of the 95 % range (beyond 1: square root)",
         y_range=(-0.7, len(found) - 0.3),
         y_ticks=list(enumerate(names)),
     )
@@ -175,7 +204,7 @@ def _statistics(discrepancies: Sequence[Statistic]) -> Markup:
     if after:
         at, places = zip(*after, strict=True)
         panel.dots(places, at, AFTER, "measured, with what was found", size=9.0, hollow=True)
-    return drawing([panel], height=16.0 + 25.0 * len(found))
+    return drawing([panel], width=HALF, height=16.0 + 25.0 * len(found))
 
 
 def _place(d: ComparedStatistic) -> float:
@@ -270,7 +299,7 @@ def _likelihood(likelihood: ParameterLikelihood) -> Markup:
 
 
 def _posterior(causes: Sequence[NamedCause]) -> Markup | None:
-    """Probabilities of every cause in the place of each named one."""
+    """Posterior probability of every cause, one panel for each named one."""
     panels, rows = [], 0
     for cause in causes:
         if cause.probabilities is None:
@@ -278,7 +307,8 @@ def _posterior(causes: Sequence[NamedCause]) -> Markup | None:
         ids = list(cause.probabilities)
         places = list(range(len(ids)))[::-1]
         panel = Panel(
-            x=f"probability in the place of {cause.name[0].lower()}{cause.name[1:]}",
+            x="posterior probability",
+            title=cause.name,
             x_range=(0.0, 1.0),
             y_range=(-0.6, len(ids) - 0.4),
             y_ticks=[(place, id.replace("_", " ")) for place, id in zip(places, ids, strict=True)],
@@ -286,7 +316,7 @@ def _posterior(causes: Sequence[NamedCause]) -> Markup | None:
         panel.bars(list(cause.probabilities.values()), places, AFTER)
         panels.append(panel)
         rows = max(rows, len(ids))
-    return drawing(panels, columns=1, height=40.0 + 20.0 * rows) if panels else None
+    return drawing(panels, columns=1, width=HALF, height=40.0 + 20.0 * rows) if panels else None
 
 
 def _considered(scores: SearchScores) -> Markup:

@@ -81,6 +81,9 @@ class Statistic(ComparedStatistic):
     extended: ComparedStatistic | None = Field(description="null where nothing was found")
 
 
+# A smaller posterior is 0 % in print.
+_WORTH_A_WORD = 0.01
+
 UNNAMED, NOTHING = "unnamed", "nothing"
 """In the place of a cause: an effect that is in no catalogue; no effect at all."""
 
@@ -118,6 +121,16 @@ class NamedCause(Part):
     equivalent_channels: tuple[str, ...] | None = Field(
         default=None, description="channels that explain the runs as well"
     )
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What else is possible in the place of the cause, in words with its posterior; of 1 % and more."""
+        words = {UNNAMED: "an effect that is in no catalogue", NOTHING: "chance"}
+        return tuple(
+            f"{words.get(id, id.replace('_', ' '))} {share:.0%}"
+            for id, share in (self.probabilities or {}).items()
+            if id != self.id and share >= _WORTH_A_WORD
+        )
 
 
 class Baseline(Part):

@@ -732,14 +732,15 @@ def test_an_ambiguous_verdict_names_the_run_that_decides() -> None:
     (cause,) = result("ambiguous").causes
     expected = "To separate hysteresis from turn on offset, record holds from both sides."
     limit = " The present runs separate them from d = 16 on."
-    assert next_steps("ambiguous", [cause], [], gain=None) == [expected + limit]
+    in_the_gyro = CATALOGUE["hysteresis"].words.advice
+    assert next_steps("ambiguous", [cause], [], gain=None) == [expected + limit, in_the_gyro]
     unknown = cause.model_copy(update={"separable_from_d": {}})
-    assert next_steps("ambiguous", [unknown], [], gain=None) == [expected]
+    assert next_steps("ambiguous", [unknown], [], gain=None) == [expected, in_the_gyro]
 
 
 def test_what_no_table_holds_has_its_own_remedy() -> None:
     causes = result("explained").causes
-    assert next_steps("explained", causes, [], gain=None) == ["Against it: one play operator."]
+    assert next_steps("explained", causes, [], gain=None)[0] == "Against it: one play operator."
 
 
 @pytest.mark.parametrize(
