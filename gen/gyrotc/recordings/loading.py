@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -42,6 +43,7 @@ __all__ = [
     "calibration_day",
     "check_channel_units",
     "check_description",
+    "check_devices",
     "check_spans",
     "common_channels",
     "in_entry",
@@ -148,6 +150,24 @@ def check_channel_units(description: Description, recordings: Mapping[str, Recor
         if name not in NATIVE_UNITS and name not in channels:
             expected = f"rate, time, temperature or a channel ({', '.join(sorted(channels)) or 'there is none'})"
             problems.add(InputError(f"{FILE}, field units.{name}", "no such column", expected))
+
+
+def check_devices(recordings: Mapping[str, Recording], problems: Problems) -> None:
+    """Checks that no column that names the gyro has two values: one data set is of one gyro."""
+    for column in dict.fromkeys(column for recording in recordings.values() for column in recording.devices):
+        files: dict[float, str] = {}
+        for name, recording in recordings.items():
+            for device in recording.devices.get(column, ()):
+                files.setdefault(device, name)
+        if len(files) > 1:
+            first, second = list(files)[:2]
+            found = f"names several devices: {first:g} in {files[first]}, {second:g} in {files[second]}"
+            condition = shlex.quote(f"{column} == {first:g}")
+            expected = (
+                f"one gyro in a data set: gyrotc import with --where {condition}, or another name of the column if "
+                "it names no gyros"
+            )
+            problems.add(InputError(f"{files[second]}, column {column}", found, expected))
 
 
 def suspected(description: Description, recordings: Mapping[str, Recording]) -> Iterator[Suspected]:
@@ -341,6 +361,7 @@ def load_reporting(
         if r.file.torn
     ]
     check_channel_units(description, recordings, problems)
+    check_devices(recordings, problems)
     suspicions = [*suspected(description, recordings), *suspected_of_earth(axis, runs, recordings)]
     trusted = judge(suspicions, description.trust_units, problems)
     warnings += [f"{name}: {TRUSTED}{text}" for name, text in trusted]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import median_step
 from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, column_faults, rate_faults
+from .devices import MAX_DEVICES, names_device
 from .files import CsvFile, Source
 from .fingerprints import Fingerprints, fingerprints_of
 from .parquet import ParquetFile
@@ -101,6 +103,7 @@ class Recording:
         evidence: What its units can be judged by.
         fingerprints: What its rows can be known again by.
         equal_axes: Pairs of axes that hold the same values.
+        devices: Values of the columns that name the gyro, by column.
         time_s: Its times, s.
         n_rows: Number of its rows.
         row_period_s: Median row period, s.
@@ -112,6 +115,7 @@ class Recording:
     evidence: Evidence
     fingerprints: Fingerprints
     equal_axes: tuple[tuple[str, str], ...]
+    devices: dict[str, tuple[float, ...]]
     time_s: FloatArray
     n_rows: int
     row_period_s: float
@@ -248,18 +252,18 @@ def open_recording(
         if layout.pulses and "rate" in units:
             raise InputError("dataset.toml, field units.rate", "a unit", "none: the files count pulses")
         conversions = declared(units, _by_kind(layout))
-        time, evidence, fingerprints, equal_axes = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
+        found = _checked(file, layout, conversions, pulse_weight_arcsec, problems)
     except InputError as error:
         problems.add(error)
         return None
     if len(problems) > before:
         return None
-    period = median_step(time)
+    period = median_step(found.time_s)
     if period < _SHORTEST_S:
         where, expected = f"{name}, column {layout.time}", f"at least {_SHORTEST_S:g} s; are they seconds?"
         problems.add(InputError(where, f"a median step of {period:.4g} s", expected))
         return None
-    return Recording(file, layout, conversions, evidence, fingerprints, equal_axes, time, len(time), period)
+    return Recording(file, layout, conversions, *found, n_rows=len(found.time_s), row_period_s=period)
 
 
 def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
@@ -280,10 +284,20 @@ def open_file(name: str, path: Path) -> Source:
     return ParquetFile(name, path) if path.suffix.lower() == ".parquet" else CsvFile(name, path)
 
 
+class _Contents(NamedTuple):
+    """What is kept of the rows of a file: fields of `Recording`."""
+
+    evidence: Evidence
+    fingerprints: Fingerprints
+    equal_axes: tuple[tuple[str, str], ...]
+    devices: dict[str, tuple[float, ...]]
+    time_s: FloatArray
+
+
 def _checked(
     file: Source, layout: Layout, units: Mapping[str, Conversion], pulse_weight_arcsec: float | None, problems: Problems
-) -> tuple[FloatArray, Evidence, Fingerprints, tuple[tuple[str, str], ...]]:
-    """Read all columns and check them; return times, evidence, fingerprints and equal axes of a `Recording`."""
+) -> _Contents:
+    """Read all columns and check them."""
     values = file.columns(file.names)
     lines = None
     if values is None:
@@ -321,7 +335,9 @@ def _checked(
         for one, other in combinations(layout.axes, 2)
         if _are_copies(values[layout.axes[one]], values[layout.axes[other]])
     )
-    return time, evidence, fingerprints, equal_axes
+    named = {name: np.unique(values[name]) for name in layout.channels if names_device(name)}
+    devices = {name: tuple(found.tolist()) for name, found in named.items() if len(found) <= MAX_DEVICES}
+    return _Contents(evidence, fingerprints, equal_axes, devices, time)
 
 
 def _are_copies(one: FloatArray, other: FloatArray) -> bool:

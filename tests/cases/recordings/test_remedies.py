@@ -341,3 +341,15 @@ def test_rates_that_are_all_alike_are_not_diagnosed(folder: Path, gyrotc: Comman
     done = gyrotc("diagnose", folder / "D", "--out", folder / "R")
     assert done.returncode == 0
     assert "All rates are the same" in done.stdout + done.stderr
+
+
+def test_a_data_set_of_two_devices_is_refused(folder: Path, gyrotc: Command) -> None:
+    """The rows of each come in by what the refusal names."""
+    (folder / "D").mkdir()
+    near = np.repeat(TIME, 2) + [0.0, 0.5] * ROWS
+    (folder / "D" / "a.csv").write_bytes(table(f"id,{NAMES}", IDS, near, *TWICE))
+    done = gyrotc("check", folder / "D")
+    assert done.returncode == 2
+    assert "a.csv, column id: names several devices: 1 in a.csv, 2 in a.csv" in done.stdout
+    option = re.findall(r"--where '([^']+)'", done.stdout)
+    assert imported(gyrotc, folder / "D", "a.csv", ["--where", *option]) == ROWS

@@ -13,17 +13,10 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ...common.errors import InputError
+from ..devices import MAX_DEVICES, names_device
 from ..files import number_in
 from ..tables import Chunk, Column, LoggerTable
-from ..units import words_of_name
 
-# Words of which the name of a column of devices consists, beside those of `_NUMBERS`.
-_DEVICES = {
-    "serial", "sn", "device", "sensor", "unit", "node", "imu", "gyro", "dut", "uut", "addr", "address", "gerät",
-}  # fmt: skip
-_NUMBERS = {"id", "no", "nr", "number", "name", "nummer"}
-# More values in the first rows are a count or a status; a table of so many gyros names them in a word.
-_MAX_DEVICES = 16
 _MAX_LISTED = 4
 NO_DEVICE = "none"
 
@@ -66,9 +59,8 @@ def device_column(table: LoggerTable, stated: str | None, where: Where | None) -
     if stated is not None:
         return None if stated == NO_DEVICE else table.column(stated)
     for column in table.columns:
-        words = set(words_of_name(column.name))
-        named = bool(words & _DEVICES) and words <= _DEVICES | _NUMBERS
-        if (named or words == {"id"}) and column.kind != "stamp" and (where is None or where.column != column.name):
+        picks = where is not None and where.column == column.name
+        if names_device(column.name) and column.kind != "stamp" and not picks:
             return column
     return None
 
@@ -104,7 +96,7 @@ class Device:
         if self._column is None:
             return
         names, codes = _coded(chunk.columns[self._column.name])
-        if not self._stated and not self.name and len(names) > _MAX_DEVICES:
+        if not self._stated and not self.name and len(names) > MAX_DEVICES:
             self._column = None  # it counts, or says something else of the rows
             return
         if not names:
