@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from gyrotc.train import joined
+
 from ..campaigns import say
 from . import contestants
 
@@ -168,7 +170,7 @@ def _select(name: str, n: str, n_t: str, n_r: str, widths: str, centers: str) ->
 
 def _learn(name: str, scenario: str, seed: str) -> dict[str, Any]:
     unit = contestants.gyro(scenario, int(seed))
-    data = contestants.joined(unit.train)
+    data = joined(unit.train)
     learn = contestants.METHODS[name]
     learn(data.select(slice(None, None, 60)))  # type: ignore[arg-type]  # imports
     seconds, (predictor, size) = measured(lambda: learn(data))
