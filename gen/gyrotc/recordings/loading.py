@@ -162,10 +162,10 @@ def check_devices(recordings: Mapping[str, Recording], problems: Problems) -> No
         if len(files) > 1:
             first, second = list(files)[:2]
             found = f"names several devices: {first:g} in {files[first]}, {second:g} in {files[second]}"
-            condition = shlex.quote(f"{column} == {first:g}")
+            condition = shlex.quote(f"where={column} == {first:g}")
             expected = (
-                f"one gyro in a data set: gyrotc import with --where {condition}, or another name of the column if "
-                "it names no gyros"
+                f"one gyro in a data set: gyrotc import with --set {condition}, or another name of the column if it "
+                "names no gyros"
             )
             problems.add(InputError(f"{files[second]}, column {column}", found, expected))
 

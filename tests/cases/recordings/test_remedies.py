@@ -351,5 +351,5 @@ def test_a_data_set_of_two_devices_is_refused(folder: Path, gyrotc: Command) -> 
     done = gyrotc("check", folder / "D")
     assert done.returncode == 2
     assert "a.csv, column id: names several devices: 1 in a.csv, 2 in a.csv" in done.stdout
-    option = re.findall(r"--where '([^']+)'", done.stdout)
-    assert imported(gyrotc, folder / "D", "a.csv", ["--where", *option]) == ROWS
+    (option,) = re.findall(r"--set '([^']+)'", done.stdout)
+    assert imported(gyrotc, folder / "D", "a.csv", ["--set", option]) == ROWS
