@@ -81,22 +81,23 @@ def campaign() -> Campaign:
     return small_campaign()
 
 
-def test_a_search_has_an_alarm_at_its_level_of_one_percent_and_not_before(campaign: Campaign) -> None:
+@pytest.mark.parametrize("seed", [20, 22, 26])  # of noise beside which the evidence is for a cause before the level is
+def test_a_search_has_an_alarm_at_its_level_of_one_percent_and_not_before(campaign: Campaign, seed: int) -> None:
     """Noise with so much of what fades after power-on that chance gives it once in fifty times; then three times more.
 
     The size is sought by bisection, so that the catalogue may grow.
     """
-    noise = LEVEL_DPH * np.random.default_rng(8).normal(size=campaign.records.size)
+    noise = LEVEL_DPH * np.random.default_rng(seed).normal(size=campaign.records.size)
     settles = campaign.records.columns(lambda h: np.exp(-np.asarray(h.on_s) / 2000.0)[:, None])[:, 0]
     low, high, p = 0.0, 3.0, 1.0
     for _ in range(12):
         size = 0.5 * (low + high)
         search = campaign.search(size * LEVEL_DPH * settles + noise)
         p = detect(search, "map and beside")[0].p_value
-        if 0.012 < p < 0.045:
+        if 0.012 < p < 0.03:
             break
-        low, high = (size, high) if p >= 0.045 else (low, size)
-    assert 0.012 < p < 0.045
+        low, high = (size, high) if p >= 0.03 else (low, size)
+    assert 0.012 < p < 0.03
     found = attribute(search)
     assert not found.detected and not found.causes
-    assert attribute(campaign.search(3.0 * LEVEL_DPH * settles + noise)).detected
+    assert attribute(campaign.search((size + 3.0) * LEVEL_DPH * settles + noise)).detected

@@ -28,7 +28,8 @@ from gyrotc.diagnose.posterior import LOOKED_AT, Rival, odds_of, probabilities_o
 from gyrotc.diagnose.rivals import _Place, _points, _Simulated, calibrated, ranked_rivals, rival_key
 from gyrotc.mirror import delayed, first_order
 from numpy.typing import NDArray
-from scipy.stats import multivariate_normal
+from scipy.optimize import brentq
+from scipy.stats import chi2, multivariate_normal
 from small_campaign import BLOCK_S, LEVEL_DPH, Campaign, small_campaign
 
 Array = NDArray[np.float64]
@@ -306,6 +307,17 @@ def test_another_level_is_reported_with_its_ratio(campaign: Campaign, ratio: flo
     found = noise_findings(campaign.search(ratio * noise(campaign)), DECLARED, causes=True)
     level = next(f for f in found if f.id == "noise_level")
     assert level.parameters["ratio"] == pytest.approx(ratio, rel=0.12) and level.id in NOISE_WORDS
+
+
+def test_a_level_is_reported_from_one_in_a_thousand_on(campaign: Campaign) -> None:
+    """The energy of residuals follows chi-square; its degrees of freedom are those that a reported level implies."""
+    (loud,) = (f for f in noise_findings(campaign.search(1.4 * noise(campaign)), DECLARED, causes=True))
+    ratio, p = loud.parameters["ratio"], loud.p_value
+    freedom = brentq(lambda f: np.log(2.0 * chi2.sf(ratio**2 * f, f) / p), 5.0, 2000.0)
+    for wanted, reported in ((3e-3, []), (4e-4, ["noise_level"])):
+        scale = 1.4 * np.sqrt(chi2.isf(0.5 * wanted, freedom) / freedom) / ratio
+        found = noise_findings(campaign.search(scale * noise(campaign)), DECLARED, causes=True)
+        assert [f.id for f in found] == reported, wanted
 
 
 def test_a_level_is_as_rare_as_monte_carlo_says() -> None:
