@@ -39,6 +39,7 @@ from .noise import flicker_row as flicker_row
 from .noise import markov_row as markov_row
 from .pipeline import Analysis as Analysis
 from .pipeline import analyse as analyse
+from .pipeline import needed_lead_s as needed_lead_s
 from .pipeline import needs_finer as needs_finer
 from .pipeline import screen as screen
 from .pipeline import search_of as search_of

@@ -144,10 +144,10 @@ def singled_out(where: NDArray[np.bool_]) -> FloatArray:
     return out
 
 
-def centred_slope(history: History) -> FloatArray:
-    """dT/dt in C/min at every row: least-squares slope over ±100 s (at least ±2 rows), one-sided at the ends."""
+def centred_slope(history: History, span_s: float = _SLOPE_SPAN_S) -> FloatArray:
+    """dT/dt in C/min at every row: least-squares slope over a span (at least ±2 rows), one-sided at the ends."""
     time, value = history.time_s, history.temperature_c
-    half = max(_SLOPE_SPAN_S / 2, 2.0 * float(np.median(np.diff(time))))
+    half = max(span_s / 2, 2.0 * float(np.median(np.diff(time))))
     low = np.searchsorted(time, time - half - 1e-9)
     high = np.searchsorted(time, time + half + 1e-9)
     t = time - time[0]

@@ -23,7 +23,7 @@ from ..train.data import TrainingData, joined
 from ..train.result import Fit
 from .gain import Gain, gain_of
 from .refinement import Refined
-from .refit import Effect, Played, completed, samples, scored_means
+from .refit import Effect, Played, completed, known, samples, scored_means
 from .refitting import FOLDS, Chain, Refitting, held_out_masks, is_corrected
 from .shipping import Shipping, choose_shipped
 
@@ -47,7 +47,8 @@ def fallback_models_of(
         for run in runs:
             shown = run.channels[effect.channel]
             unknown = shown.is_away | ~np.isfinite(shown.mean)
-            added.append(np.where(unknown, np.nan, run.outcome(effect).added)[run.in_force])
+            there = run.in_force[known(run, effects)]
+            added.append(np.where(unknown, np.nan, run.outcome(effect).added)[there])
         fallback_model = fallback_model_of(plain, samples, np.concatenate(added))
         if fallback_model is not None:
             found[effect.channel] = fallback_model
@@ -140,8 +141,8 @@ def extend(
         shipped=tuple(shipped),
         crossed=crossed,
         refuted=frozenset(numbers[k] for k in crossed.refuted),
-        samples=_seen(refitting, shipped),
-        added=_seen(refitting, []).bias_dph - _seen(refitting, shipped).bias_dph,
+        samples=_seen(refitting, shipped, shipped),
+        added=_seen(refitting, [], shipped).bias_dph - _seen(refitting, shipped, shipped).bias_dph,
         floor=floor,
         lot=refitting.fit(shipped).lot,
         baseline_rms=_rms(chain[0]),
@@ -152,9 +153,9 @@ def extend(
     )
 
 
-def _seen(refitting: Refitting, shipped: Sequence[Effect]) -> TrainingData:
-    """Training samples as the map sees them beside effects."""
-    return joined([samples(run, list(shipped)) for run in refitting.train])
+def _seen(refitting: Refitting, effects: Sequence[Effect], shipped: Sequence[Effect]) -> TrainingData:
+    """Training samples as the map sees them beside effects, of those that the shipped model is learned from."""
+    return joined([samples(run, list(effects)).select(known(run, shipped)) for run in refitting.train])
 
 
 def _rms(runs: Sequence[Averages]) -> float:

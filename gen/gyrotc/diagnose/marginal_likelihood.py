@@ -101,6 +101,27 @@ class MarginalLikelihood:
         price = sum(map(_price, members)) * float(np.log(self.gains.size))
         return self._evidence(members, left_out) - self._evidence((), left_out) - price
 
+    def static_leads(self, points: Sequence[Point], mapped: FloatArray) -> tuple[float, float]:
+        """Return the criterion of another static map over the plain one, and over the best of the models near it.
+
+        Args:
+            points: Models that it is compared with.
+            mapped: Whitened functions of the static map, as many as the plain one has, shape (N, m).
+        """
+        near = self._near(points)
+        left_out = self._unknown(near)
+        price = float(np.log(self.gains.size))
+        own = self._marginal(mapped, [], [], left_out) - self._evidence((), left_out) - price
+        best = max((found for _, found in self._weighed(near).values()), default=0.0)
+        return own, own - best
+
+    def _unknown(self, near: _Near) -> NDArray[np.bool_]:
+        """Test which blocks one of the models does not know, shape (N,)."""
+        left_out = np.zeros(self.gains.size, dtype=bool)
+        for member in (m for points in near.values() for p in points for m in p.members if m.role == "input"):
+            left_out |= ~self.bank.known[self.bank.inputs.index(member)]
+        return left_out
+
     def _evidence(self, members: CauseSet, left_out: NDArray[np.bool_]) -> float:
         key = frozenset(m.key for m in members), left_out.tobytes()
         if key not in self._done:
@@ -124,9 +145,7 @@ class MarginalLikelihood:
 
     def _weighed(self, near: _Near) -> dict[Kinds, tuple[Point, float]]:
         """Of each kind its best point and criterion, all on the blocks that each of them knows."""
-        left_out = np.zeros(self.gains.size, dtype=bool)
-        for member in (m for points in near.values() for p in points for m in p.members if m.role == "input"):
-            left_out |= ~self.bank.known[self.bank.inputs.index(member)]
+        left_out = self._unknown(near)
         tried = {key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()}
         return {key: max(found, key=lambda one: one[1]) for key, found in tried.items()}
 

@@ -23,14 +23,17 @@ from .candidates import Candidate, columns_of, diagnosable_causes, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
 from .joined import ROUNDING, Channels
+from .marginal_likelihood import MarginalLikelihood
 from .noise import NOISE_WORDS, Colour, Declared
-from .profile_likelihood import Gains
+from .posterior import EQUIVALENT
+from .profile_likelihood import Gains, Point
 from .refinement import Refined
 from .search import Search, open_search
 from .signature_bank import bank_of
-from .static_map import LEVELS, fits_exactly
+from .static_map import LEVELS, fits_exactly, led_map
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
+_MEMORIES = ("thermal_memory", "hysteresis")  # families of causes that a lag of the sensor may be taken for
 _MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
 
 
@@ -120,18 +123,30 @@ def _separations(search: Search, causes: Sequence[Refined]) -> tuple[dict[str, f
     return tuple(overlap(gains, cause, [id for id in imitators if id != cause.candidate.id]) for cause in causes)
 
 
+# Leads of the static map that are tried, s: in steps that a map hardly tells apart, as long as sensors lag.
+_LEADS_S = (60.0, 100.0, 160.0, 230.0, 300.0, 380.0, 480.0, 600.0, 800.0, 1000.0)
+
+
 def search_of(
     records: Records,
     declared: Declared | None = None,
     screened: Screened | None = None,
     say: Progress = lambda _: None,
 ) -> Search:
-    """The search with the coarsest map that the data do not reject."""
+    """The search with the coarsest map that the data do not reject, of the temperature ahead of a sensor that lags."""
     checked = screen(records) if screened is None else screened
+    search = _with_map(records, declared, checked, say, lead_s=0.0)
+    lead_s = needed_lead_s(search)
+    return _with_map(records, declared, checked, say, lead_s=lead_s) if lead_s else search
+
+
+def _with_map(
+    records: Records, declared: Declared | None, checked: Screened, say: Progress, *, lead_s: float
+) -> Search:
     y = records.target()
     channels = _channels(records)
     for level in range(len(LEVELS)):
-        bank = bank_of(records, level, say)
+        bank = bank_of(records, level, say, lead_s)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None
@@ -139,6 +154,35 @@ def search_of(
         if level + 1 == len(LEVELS) or fits_exactly(records, level + 1) or not needs_finer(search):
             break
     return search
+
+
+def needed_lead_s(search: Search) -> float:
+    """Return by how much the map has to be ahead of the sensor; 0 where it need not be.
+
+    A sensor that lags by tau makes of f(T) the function f(T_s + tau dT_s/dt), which is static, but far from what few
+    Gaussians of T_s and dT_s/dt can be where ramps are quick. A map of T_s + tau dT_s/dt is taken where it is better
+    than the plain one and no memory of the temperature is clearly better, a record that is late among them: every
+    sensor lags, and then nothing is to be named.
+    """
+    gains = Gains(search)
+    maps = {lead_s: gains.whiten(led_map(search.records, search.bank.basis, lead_s)) for lead_s in _LEADS_S}
+    rest = {lead_s: _rest(gains, led) for lead_s, led in maps.items()}
+    best = min(_LEADS_S, key=lambda lead_s: rest[lead_s])
+    if _rest(gains, gains.map) - rest[best] < EQUIVALENT:
+        return 0.0
+    memories: dict[str, Point] = {}
+    for point in gains.single():
+        id = point.members[0].id
+        if CATALOGUE[id].family in _MEMORIES and (id not in memories or point.gain > memories[id].gain):
+            memories[id] = point
+    over_plain, over_memories = MarginalLikelihood(gains).static_leads([*memories.values()], maps[best])
+    return best if over_plain >= EQUIVALENT and over_memories >= -EQUIVALENT else 0.0
+
+
+def _rest(gains: Gains, functions: FloatArray) -> float:
+    """Energy that a static map leaves, over the noise."""
+    held = orthonormal(gains.beside, functions)
+    return float(((gains.target - held @ (held.T @ gains.target)) ** 2).sum())
 
 
 def _channels(records: Records) -> Channels | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from ..causes import CATALOGUE
 from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, CauseValues, History, Scene
 from ..common.arrays import FloatArray, give_back
-from ..common.metrics import Averages, average_rows
+from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, Averages, average_rows
 from ..mirror.front_end import blocks_since_power_on
 from ..mirror.recursions import Course, CourseChannel, TermOutcome
 from ..quality.judgement import Judged
@@ -33,6 +34,7 @@ from ..train.plausibility import longest_same_s
 from ..train.process import fit_process
 from ..train.result import Fit, predict
 from ..train.simple import without_rate
+from .bridged import BridgedCourse
 from .candidates import searched
 from .refinement import Refined
 
@@ -122,6 +124,7 @@ class Played:
         environment: Environment as the data set names it.
         longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
         seen: Channels and differences at the training samples, where they may be inputs of the map's model.
+        bridged: Of a training run with gaps: what its states are learned from; None: `course`.
     """
 
     data: TrainingData
@@ -136,6 +139,7 @@ class Played:
     environment: str
     longest_same_s: float
     seen: Mapping[str, FloatArray]
+    bridged: BridgedCourse | None = None
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
     def outcome(self, effect: Effect) -> TermOutcome:
@@ -145,26 +149,72 @@ class Played:
                 return outcome
         table = effect.term.table
         assert table is not None
+        recursion = table.recursion(effect.values, self.block_s)
         x = self.course.temperature
         made = TermOutcome(x, self.slope, np.zeros_like(x), np.zeros(x.size, dtype=np.int32))
         channel = None if effect.channel is None else self.channels[effect.channel]
-        table.recursion(effect.values, self.block_s).apply(self.course, channel, made)
+        if self.bridged is None or channel is not None:
+            recursion.apply(self.course, channel, made)
+        else:
+            self.bridged.apply(recursion, made)
         self._outcomes[:0] = [(effect, made)]
         del self._outcomes[_KEPT:]
         return made
 
+    def is_known(self, effect: Effect) -> NDArray[np.bool_]:
+        """Test at every training sample whether the state of an effect is known within the noise, shape (n,)."""
+        if self.bridged is None or effect.term.table is None or effect.channel is not None:
+            return np.ones(self.in_force.size, dtype=bool)
+        recursion = effect.term.table.recursion(effect.values, self.block_s)
+        of_input, added = self.bridged.uncertainty(recursion)
+        unknown_dph = added + of_input * self.steepness_dph_per_c
+        return np.asarray(self.bridged.has_slope[self.in_force] & (unknown_dph[self.in_force] <= self.noise_dph))
 
+    @cached_property
+    def noise_dph(self) -> float:
+        """Noise of a mean over 100 s, from the differences of consecutive samples."""
+        differences = np.abs(np.diff(self.data.bias_dph))
+        sigma = MAD_TO_SIGMA * float(np.median(differences)) / np.sqrt(2.0) if differences.size else 0.0
+        return float(sigma * np.sqrt(self.block_s / INDEPENDENT_S))
+
+    @cached_property
+    def steepness_dph_per_c(self) -> float:
+        """Largest slope of the bias over temperature, of a cubic through the samples."""
+        t = self.data.temperature_c
+        if t.size < _CUBIC or float(np.ptp(t)) < LEAST_SPAN_C:
+            return 0.0
+        cubic = np.polynomial.Polynomial.fit(t, self.data.bias_dph, 3)
+        return float(np.abs(cubic.deriv()(np.linspace(t.min(), t.max(), _PLACES))).max())
+
+
+_CUBIC, _PLACES = 8, 50  # fewest samples for a cubic; temperatures at which its slope is looked at
 _KEPT = 2 * MOST_TERMS  # outcomes of terms for each run: those of two full tables
 
 
 def play_runs(
-    dataset: Dataset, runs: Sequence[Run], front: FrontEnd, judged: Judged, *, channels: bool = False
+    dataset: Dataset,
+    runs: Sequence[Run],
+    front: FrontEnd,
+    judged: Judged,
+    *,
+    channels: bool = False,
+    bridged: bool = False,
 ) -> list[Played]:
-    """Front end over all runs; `channels`: with what training chooses channels by."""
+    """Run the front end over all runs.
+
+    Args:
+        dataset: Where they belong.
+        runs: Training or test runs.
+        front: The front end.
+        judged: Judgement of the rows of all runs.
+        channels: With what training chooses channels by.
+        bridged: States are learned from these runs, so they go on over gaps (`BridgedCourse`); else they are those of
+            the target, which begins again at rest behind a gap.
+    """
     first = min((r.started for r in dataset.runs if r.started is not None), default=None)
     played = []
     for k, run in enumerate(runs):
-        played.append(_played(dataset, run, k, front, judged, first, channels=channels))
+        played.append(_played(dataset, run, k, front, judged, first, channels=channels, bridged=bridged))
         give_back()  # what the rows of a whole recording took
     return played
 
@@ -178,6 +228,7 @@ def _played(
     first: datetime | None,
     *,
     channels: bool,
+    bridged: bool,
 ) -> Played:
     rows = run.rows()
     blocks = front.blocks(run, rows, judged)
@@ -185,13 +236,15 @@ def _played(
     before = blocks_since_power_on(rows, run, front.block_s)
     rows = readings_alone(rows)
     course = blocks.stream.course(blocks.steps, blocks.settings.samples_per_block, before)
+    course = replace(course, temperature=course.temperature.astype(np.float64))
     day = None
     if run.started is not None and first is not None:
         day = (run.started - first).total_seconds() / 86400.0
     return Played(
         data=data,
         in_force=blocks.in_force[blocks.used],
-        course=replace(course, temperature=course.temperature.astype(np.float64)),
+        course=course,
+        bridged=BridgedCourse.over(course, blocks.steps) if bridged else None,
         slope=blocks.steps.slope.astype(np.float64),
         begins_s=blocks.begins_s,
         on_s=data.time_s - (run.power_on_s or 0.0),
@@ -227,10 +280,17 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
 
 
 def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
-    """Samples whose input is known beside the effects, shape (n,): a late record does not say how a run ends."""
-    if not any(effect.term.mended for effect in effects):
-        return np.ones(run.in_force.size, dtype=bool)
-    return np.isfinite(samples(run, effects).temperature_c)
+    """Test which samples say something beside the effects, shape (n,).
+
+    Those do not whose input is not known, as at the end of a run that was recorded late, and in training those whose
+    states are not, as behind a gap.
+    """
+    mask = np.ones(run.in_force.size, dtype=bool)
+    for effect in terms_of(effects):
+        mask &= run.is_known(effect)
+    if any(effect.term.mended for effect in effects):
+        mask &= np.isfinite(samples(run, effects).temperature_c)
+    return mask
 
 
 def _masks(

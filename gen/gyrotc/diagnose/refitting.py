@@ -72,7 +72,7 @@ class Refitting:
         self.runs = [r for r in dataset.runs if r.role == "train"]
         self.front = front_end(self.runs, options.block_s)
         self._judged = judged or judge(dataset)
-        self.train = play_runs(dataset, self.runs, self.front, self._judged, channels=options.channels)
+        self.train = play_runs(dataset, self.runs, self.front, self._judged, channels=options.channels, bridged=True)
         self.average_s = options.average_s
         exam = play_runs(dataset, [r for r in dataset.runs if r.role == "exam"], self.front, self._judged)
         self.exam = [run for run in exam if mean_count(run, self.average_s)]

@@ -112,9 +112,9 @@ class SignatureBank:
         return replace(self, grams=grams, log_dets=log_dets)
 
 
-def build_bank(records: Records, level: int) -> SignatureBank:
-    """Computes the bank of the map of a level (`static_map.LEVELS`)."""
-    basis, static = make_basis(records, level)
+def build_bank(records: Records, level: int, lead_s: float = 0.0) -> SignatureBank:
+    """Compute the bank of the map of a level (`static_map.LEVELS`) and of a lead (`static_map.MapBasis`)."""
+    basis, static = make_basis(records, level, lead_s)
     groups, columns, untestable = _columns(records)
     raw = np.column_stack(columns)
     on_map = static.T @ raw
@@ -138,7 +138,7 @@ def build_bank(records: Records, level: int) -> SignatureBank:
         grams=grams,
         log_dets=log_dets,
         untestable=untestable,
-        finer=_finer(records, static, level),
+        finer=_finer(records, static, level, lead_s),
         alternatives=alternatives,
         alternative_groups=alternative_groups,
     )
@@ -188,11 +188,11 @@ def _grams(
     return np.array(grams), np.array(log_dets)
 
 
-def _finer(records: Records, static: FloatArray, level: int) -> FloatArray:
+def _finer(records: Records, static: FloatArray, level: int, lead_s: float) -> FloatArray:
     """Orthonormal functions of the next level that are not in the map."""
     if level + 1 >= len(LEVELS):
         return np.zeros((len(static), 0))
-    finer = make_basis(records, level + 1)[1]
+    finer = make_basis(records, level + 1, lead_s)[1]
     left, size, _ = np.linalg.svd(finer - static @ (static.T @ finer), full_matrices=False)
     return np.asarray(left[:, size > 0.1])
 
@@ -264,13 +264,15 @@ _NUMPY = {
 }  # fmt: skip
 
 
-def bank_of(records: Records, level: int, say: Callable[[str], None] = lambda _: None) -> SignatureBank:
+def bank_of(
+    records: Records, level: int, say: Callable[[str], None] = lambda _: None, lead_s: float = 0.0
+) -> SignatureBank:
     """The bank of these temperature records, from disk or made and kept."""
-    digest = hashlib.sha256(f"{level} {_code()} {records.key()}".encode()).hexdigest()
+    digest = hashlib.sha256(f"{level} {lead_s:g} {_code()} {records.key()}".encode()).hexdigest()
     bank = cache.kept(f"{digest}.bank", _bank)
     if bank is None:
         say("computing the signatures of all causes")
-        bank = build_bank(records, level)
+        bank = build_bank(records, level, lead_s)
         cache.keep(f"{digest}.bank", pickle.dumps(bank, protocol=5))
     return bank
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..causes import CATALOGUE
+from ..causes import CATALOGUE, History
 from ..common.arrays import FloatArray
 from ..train.data import MIN_HALF_RANGE_C, MIN_HALF_RANGE_C_PER_MIN
 from .blocks import Records, centred_slope
@@ -34,6 +34,8 @@ class MapBasis:
         along: Centers over T, normalised, shape (a,), and their common width.
         across: Centers over (T, dT/dt), shape (b, 2), and their widths.
         mix: From raw functions to the basis, shape (3 + a + b, m).
+        lead_s: What the functions get in place of T is T + lead dT/dt: a sensor that lags by so much makes that of a
+            function of the true temperature.
     """
 
     middle_c: float
@@ -43,6 +45,7 @@ class MapBasis:
     across: FloatArray
     across_width: tuple[float, float]
     mix: FloatArray
+    lead_s: float = 0.0
 
     def raw(self, temperature_c: FloatArray, slope_c_per_min: FloatArray) -> FloatArray:
         """Constant, linear and Gaussian functions, shape (n, 3 + a + b)."""
@@ -69,11 +72,23 @@ class MapBasis:
         return np.asarray(self.raw(temperature_c, slope_c_per_min) @ self.mix)
 
 
-def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
+_LEAD_SPAN_S = 60.0  # window of the dT/dt that a lead is taken with: a lag of a minute bends within it
+
+
+def _led(history: History, lead_s: float) -> History:
+    """The history of the temperature that a sensor shows which lags by so much."""
+    if not lead_s:
+        return history
+    slope = centred_slope(history, _LEAD_SPAN_S)
+    return replace(history, temperature_c=history.temperature_c + (lead_s / 60.0) * slope)
+
+
+def make_basis(records: Records, level: int, lead_s: float = 0.0) -> tuple[MapBasis, FloatArray]:
     """Basis of a level and its block means, shape (N, m) with orthonormal columns."""
     n_t, n_a, n_r = LEVELS[level]
-    slopes = [centred_slope(run.history) for run in records.runs]
-    t = records.average([run.history.temperature_c for run in records.runs])
+    led = [_led(run.history, lead_s) for run in records.runs]
+    slopes = [centred_slope(history) for history in led]
+    t = records.average([history.temperature_c for history in led])
     r = records.average(slopes)
     grid_t, grid_a, grid_r = np.linspace(-1, 1, n_t), np.linspace(-1, 1, n_a), np.linspace(-1, 1, n_r)
     across = np.array([(a, b) for a in grid_a for b in grid_r])
@@ -85,8 +100,9 @@ def make_basis(records: Records, level: int) -> tuple[MapBasis, FloatArray]:
         across=across,
         across_width=(1.5 * 2.0 / (n_a - 1), 1.5 * 2.0 / (n_r - 1)),
         mix=np.eye(3 + n_t + len(across)),
+        lead_s=lead_s,
     )
-    mean = records.average([raw(run.history.temperature_c, s) for run, s in zip(records.runs, slopes, strict=True)])
+    mean = records.average([raw(history.temperature_c, s) for history, s in zip(led, slopes, strict=True)])
     left, size, right = np.linalg.svd(mean, full_matrices=False)
     keep = size > _KEEP * size[0]
     return replace(raw, mix=right[keep].T / size[keep]), left[:, keep]
@@ -126,21 +142,30 @@ def changed_inputs(records: Records, basis: MapBasis) -> tuple[list[Candidate], 
 
 def replaced_map(records: Records, basis: MapBasis, candidate: Candidate) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Block means of the map of changed inputs, shape (N, m), and where these are known, shape (N,)."""
-    seen = _moved_inputs(records, candidate)
+    seen = _moved_inputs(records, basis, candidate)
     maps = [records.average_run(k, basis(t, slope)) for k, (t, slope, _) in enumerate(seen)]
     return np.concatenate(maps), np.concatenate([known for _, _, known in seen])
+
+
+def led_map(records: Records, basis: MapBasis, lead_s: float) -> FloatArray:
+    """Block means of the map of T + lead dT/dt in place of T, shape (N, m)."""
+    led = [_led(run.history, lead_s) for run in records.runs]
+    return records.average([basis(history.temperature_c, centred_slope(history)) for history in led])
 
 
 def proportional_map(records: Records, basis: MapBasis, candidate: Candidate | None) -> FloatArray:
     """Block means of `MapBasis.proportional` of changed inputs (None: of the plain ones), shape (N, k)."""
     if candidate is None:
-        seen = [(run.history.temperature_c, centred_slope(run.history)) for run in records.runs]
+        led = [_led(run.history, basis.lead_s) for run in records.runs]
+        seen = [(history.temperature_c, centred_slope(history)) for history in led]
     else:
-        seen = [(t, slope) for t, slope, _ in _moved_inputs(records, candidate)]
+        seen = [(t, slope) for t, slope, _ in _moved_inputs(records, basis, candidate)]
     return records.average([basis.proportional(t, slope) for t, slope in seen])
 
 
-def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
+def _moved_inputs(
+    records: Records, basis: MapBasis, candidate: Candidate
+) -> list[tuple[FloatArray, FloatArray, NDArray[np.bool_]]]:
     """Temperature and its rate as the map sees them, per run and row, and the blocks where they are known."""
     term = CATALOGUE[candidate.id]
     assert term.features is not None
@@ -152,5 +177,8 @@ def _moved_inputs(records: Records, candidate: Candidate) -> list[tuple[FloatArr
             mended = term.mended(run.history.time_s, run.history.temperature_c, slope, candidate.values)[0]
             slope = centred_slope(replace(run.history, temperature_c=temperature))
             known = records.average_run(k, np.isnan(mended).astype(float)) == 0.0
+        if basis.lead_s:
+            moved = _led(replace(run.history, temperature_c=temperature), basis.lead_s)
+            temperature, slope = moved.temperature_c, centred_slope(moved)
         out.append((temperature, slope, known))
     return out
