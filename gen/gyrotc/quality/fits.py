@@ -60,6 +60,11 @@ def run_cells(rows: RowArrays, cell_s: float) -> RunCells:
     """Means over cells of at least one row."""
     length = max(median_step(rows[0]), cell_s)
     t, x, y = cell_means(length, *rows)
+    return cells_of_means(t, x, y, length)
+
+
+def cells_of_means(t: FloatArray, x: FloatArray, y: FloatArray, length: float) -> RunCells:
+    """Return the cells with these means of time (s), temperature (C) and rate (deg/h), and the gaps between them."""
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > _GAP_CELLS * length)
     return RunCells(t, x, y, length, tuple((int(k) + 1, float(steps[k])) for k in gaps))

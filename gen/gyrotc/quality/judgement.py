@@ -9,27 +9,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray, IntArray, steps_are, those
-from ..common.metrics import MAD_TO_SIGMA, median
+from ..common.arrays import BoolArray, FloatArray, parts_of, steps_are, those
+from ..common.metrics import MAD_TO_SIGMA, median, quantile_of_parts
 from ..common.statistics import NORMAL_95
 from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..recordings.records import inside as in_limits
 from .changes import Change, cell_length, changes_in_cells, paired
 from .curves import curve_findings
-from .fits import RowArrays, RunCells, run_cells
+from .fits import RowArrays, RunCells, cells_of_means
 from .jumps import jumps
 from .noise import noise_parts
 from .odds import CELL_S, GAP_S, MIN_JUMP_C, USELESS_NOISE, Column, Event, EventKind, cost_of
 from .outlying import outlying
 from .repeats import piles, resolution, stuck
-from .smooth_rate import smooth_rate
+from .smooth_rate import cell_length_of, smooth_rate
 
-_T = TypeVar("_T", bound=np.generic)
 # Reasons for which a row is left out, in the order in which they are tried; each row has one.
 REASONS = (
     "excluded", "no rate", "no temperature", "rate stuck", "rate at end stop", "temperature stuck",
@@ -38,8 +37,10 @@ REASONS = (
 # Steps of the temperature from row to row at their 95 % quantile, times this: an outlier of it is larger.
 _ABOVE_STEPS = 3.0
 _ON_RAMPS = 0.95
-# The steps at both ends of an outlier of the temperature, as shares of its size, at least.
-_EDGES = 0.5
+# The largest step from row to row at an outlier of the temperature, as a share of its size, at least.
+_STEP = 0.5
+# Row periods between two rows that follow each other, at most.
+_TOGETHER = 1.5
 # Differences of neighbouring rates that the noise of a row is estimated from.
 _NOISE_ROWS = 2**18
 
@@ -228,8 +229,8 @@ class _Columns:
         part = self.reason[rows]
         self.reason[rows] = np.where(part == 0, REASONS.index(reason) + 1, part)
 
-    def _usable(self) -> IntArray:
-        return np.flatnonzero(self.reason == 0)
+    def _usable(self) -> _Chosen:
+        return _Chosen(self.reason == 0)
 
     def _event(
         self,
@@ -250,7 +251,7 @@ class _Columns:
 
     def judge(self) -> None:
         """Look for events of every kind."""
-        if len(self._usable()) < 2:
+        if self._usable().count < 2:
             return
         self._gaps()
         self._stuck("temperature")
@@ -261,92 +262,111 @@ class _Columns:
 
     def _gaps(self) -> None:
         """Times without rows, other than those that are excluded."""
-        time, period = self._rows.time_s, self._run.row_period_s
-        inside = np.flatnonzero(self.reason != 255)
-        least = max(GAP_S, 3.0 * period)
-        for k in np.flatnonzero(steps_are(those(time, self.reason != 255), lambda step: step > least)).tolist():
-            first, end = int(inside[k]), int(inside[k + 1])
-            self._event("gap", "time", (first, end + 1), float(time[end] - time[first]), period, np.inf)
+        inside, period = _Chosen(self.reason != 255), self._run.row_period_s
+        time, least = inside.of(self._rows.time_s), max(GAP_S, 3.0 * period)
+        for k in np.flatnonzero(steps_are(time, lambda step: step > least)).tolist():
+            self._event("gap", "time", inside.span(k, k + 2), float(time[k + 1] - time[k]), period, np.inf)
 
     def _stuck(self, column: Column) -> None:
         """Stretches in which a column is stuck."""
         usable, time = self._usable(), self._rows.time_s
-        values = _taken(self._rows.rate_dph if column == "rate" else self._rows.temperature_c, usable)
+        values = usable.of(self._rows.rate_dph if column == "rate" else self._rows.temperature_c)
         for one in stuck(values, needs_release=column == "temperature"):
-            rows = int(usable[one.first]), int(usable[one.end - 1]) + 1
+            rows = usable.span(one.first, one.end)
             length = float(time[rows[1] - 1] - time[rows[0]]) + self._run.row_period_s
             self._event("stuck", column, rows, length, self._run.row_period_s, one.log_odds, f"{column} stuck")
 
     def _piles(self) -> None:
         """Rates at an end stop."""
         usable = self._usable()
-        for pile, stretches in piles(_taken(self._rows.rate_dph, usable)):
-            rows = int(usable[pile.first]), int(usable[pile.end - 1]) + 1
+        for pile, stretches in piles(usable.of(self._rows.rate_dph)):
+            rows = usable.span(pile.first, pile.end)
             self._event("end_stop", "rate", rows, pile.value, 0.0, pile.log_odds)  # only some of these rows hold it
             for first, end in stretches.tolist():
-                self._mark(slice(int(usable[first]), int(usable[end - 1]) + 1), "rate at end stop")
+                self._mark(slice(*usable.span(first, end)), "rate at end stop")
 
     def _temperature(self) -> None:
         """Temperatures that leave the course of the others, for a time or for good."""
         usable = self._usable()
-        if len(usable) < 2:
+        temperature = usable.of(self._rows.temperature_c)
+        if len(temperature) < 2 or np.ptp(temperature) == 0.0:
             return
-        temperature = _taken(self._rows.temperature_c, usable)
-        if np.ptp(temperature) == 0.0:
-            return
-        steps = np.abs(np.diff(temperature))
-        least = max(MIN_JUMP_C, _ABOVE_STEPS * float(np.quantile(steps, _ON_RAMPS)))
+
+        def steps() -> Iterator[FloatArray]:
+            return (np.abs(np.diff(temperature[p.start : p.stop + 1])) for p in parts_of(len(temperature) - 1))
+
+        least = max(MIN_JUMP_C, _ABOVE_STEPS * quantile_of_parts(steps, _ON_RAMPS))
         found = [one for one in outlying(temperature, 1) if abs(one.size) > least]
         if found:
             temperature = temperature.copy()
         for one in found:
-            edges = [temperature[k] - temperature[k - 1] for k in (one.first, one.end) if 0 < k < len(temperature)]
-            if min(map(abs, edges)) < _EDGES * abs(one.size):
+            around = temperature[max(one.first - 1, 0) : one.end + 1]
+            if np.abs(np.diff(around)).max() < _STEP * abs(one.size):
                 continue  # it bends
-            rows = int(usable[one.first]), int(usable[one.end - 1]) + 1
+            rows = usable.span(one.first, one.end)
             self._event("outlier", "temperature", rows, one.size, one.sigma, one.log_odds, "temperature outlier")
             ends = temperature[max(one.first - 1, 0)], temperature[min(one.end, len(temperature) - 1)]
             temperature[one.first : one.end] = np.linspace(*ends, one.end - one.first)
-        for jump in jumps(temperature, _taken(self._rows.time_s, usable), self._run.row_period_s):
-            rows = int(usable[jump.first]), int(usable[jump.end - 1]) + 1
-            if rows[1] - rows[0] > jump.end - jump.first:
-                continue  # rows between are left out: the temperature went on meanwhile
-            self._event("jump", "temperature", rows, jump.size, jump.sigma, jump.log_odds)
+        for jump in jumps(temperature, self._run.row_period_s):
+            first, end = usable.span(jump.first, jump.end)
+            # Where rows are missing or left out the temperature went on meanwhile
+            together = float(self._rows.time_s[end - 1] - self._rows.time_s[first]) / (jump.end - jump.first)
+            if together < _TOGETHER * self._run.row_period_s:
+                self._event("jump", "temperature", (first, end), jump.size, jump.sigma, jump.log_odds)
 
     def _rate(self) -> None:
         """Rates that leave the level around them and come back, and parts that are noisier or quieter than usual."""
         usable = self._usable()
-        if len(usable) < 2:
+        if usable.count < 2:
             return
-        rate = _taken(self._rows.rate_dph, usable)
-        smooth = smooth_rate(_taken(self._rows.time_s, usable), _taken(self._rows.temperature_c, usable), rate)
-        rate = rate if smooth is None else rate - smooth
-        del smooth
-        longest = max(int(CELL_S / self._run.row_period_s), 1)
-        kept = np.ones(len(rate), dtype=bool)
-        for one in outlying(rate, longest):
-            rows = int(usable[one.first]), int(usable[one.end - 1]) + 1
+        rest = np.array(usable.of(self._rows.rate_dph))
+        step = resolution(rest)
+        t, smooth = smooth_rate(*self._means(cell_length_of(self._rows.time_s)))
+        for part in parts_of(len(rest)) if len(smooth) else ():
+            rest[part] -= np.interp(usable.of(self._rows.time_s, part), t, smooth)
+        for one in outlying(rest, max(int(CELL_S / self._run.row_period_s), 1)):
+            rows = usable.span(one.first, one.end)
             self._event("outlier", "rate", rows, one.size, one.sigma, one.log_odds, "rate outlier")
-            kept[one.first : one.end] = False
-        usable, rate = _taken(usable, np.flatnonzero(kept)), _taken(rate, np.flatnonzero(kept))
-        for part in noise_parts(rate, resolution(_taken(self._rows.rate_dph, usable))):
-            rows = int(usable[part.first]), int(usable[min(part.end, len(usable)) - 1]) + 1
-            reason = "rate too noisy" if part.factor > USELESS_NOISE else ""
-            self._event("noise", "rate", rows, part.factor, part.sigma, part.log_odds, reason)
+            ends = rest[max(one.first - 1, 0)], rest[min(one.end, len(rest) - 1)]
+            rest[one.first : one.end] = np.linspace(*ends, one.end - one.first)
+        for noise in noise_parts(rest, step):
+            reason = "rate too noisy" if noise.factor > USELESS_NOISE else ""
+            rows = usable.span(noise.first, min(noise.end, usable.count))
+            self._event("noise", "rate", rows, noise.factor, noise.sigma, noise.log_odds, reason)
 
     def cells(self, cell_s: float) -> RunCells:
         """Return means of the usable rows over cells; none for an infinite length."""
-        usable = self._usable()
-        if len(usable) < 2 or np.isinf(cell_s):
+        length = max(cell_s, self._run.row_period_s)
+        if np.isinf(length):
             return RunCells(np.zeros(0), np.zeros(0), np.zeros(0), CELL_S, ())
+        return cells_of_means(*self._means(length), length)
+
+    def _means(self, length_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the means of time, temperature and rate of the usable rows over cells, part by part."""
         columns = (self._rows.time_s, self._rows.temperature_c, self._rows.rate_dph)
-        time, temperature, rate = (_taken(column, usable) for column in columns)
-        return run_cells((time, temperature, rate), cell_s)
+        numbers, sums = list[FloatArray](), list[FloatArray]()
+        for part in parts_of(len(self.reason)):
+            use = self.reason[part] == 0
+            if use.any():
+                time, *others = (those(column[part], use) for column in columns)
+                number = np.floor((time - columns[0][0]) / length_s + 1e-9)
+                begun = np.flatnonzero(np.diff(number, prepend=-1.0))
+                numbers.append(number[begun])
+                counted = (np.ones(len(time)), time, *others)
+                sums.append(np.stack([np.add.reduceat(column, begun) for column in counted]))
+        if not numbers:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        number = np.concatenate(numbers)
+        begun = np.flatnonzero(np.diff(number, prepend=-1.0))  # a cell may lie in two parts
+        count, time, temperature, rate = np.add.reduceat(np.concatenate(sums, axis=1), begun, axis=1)
+        return time / count, temperature / count, rate / count
 
     def judgement(self) -> Judgement:
         """Return what was found."""
-        usable, inside, time = self._usable(), np.flatnonzero(self.reason != 255), self._rows.time_s
-        rate = self._rows.rate_dph[usable[:_NOISE_ROWS]]
+        time, inside = self._rows.time_s, self.reason != 255
+        first, last = int(np.argmax(inside)), len(inside) - 1 - int(np.argmax(inside[::-1]))
+        part = slice(first, first + _NOISE_ROWS)
+        rate = self._rows.rate_dph[part][self.reason[part] == 0]
         noise = MAD_TO_SIGMA * median(np.abs(np.diff(rate, 2))) / np.sqrt(6.0) if len(rate) > 2 else 0.0
         run = self._run
         absent = {
@@ -355,18 +375,29 @@ class _Columns:
         }
         return Judgement(
             run=run,
-            read=len(inside) + sum(absent.values()),
+            read=int(np.count_nonzero(inside)) + sum(absent.values()),
             absent=absent,
-            span_s=(float(time[inside[0]]), float(time[inside[-1]])) if len(inside) else (0.0, 0.0),
-            left_out=tuple(_stretches(self.reason, self._rows.time_s)),
+            span_s=(float(time[first]), float(time[last])),
+            left_out=tuple(_stretches(self.reason, time)),
             events=tuple(sorted(self.events, key=lambda one: (one.rows, one.kind))),
             noise_dph=float(noise),
         )
 
 
-def _taken(values: NDArray[_T], rows: IntArray) -> NDArray[_T]:
-    """Return the values of some rows; the same array if these are all."""
-    return values if len(rows) == len(values) else values[rows]
+class _Chosen:
+    """Some rows of a file, in order; nothing is copied if these are all."""
+
+    def __init__(self, chosen: BoolArray) -> None:
+        self._rows = None if chosen.all() else np.flatnonzero(chosen).astype(np.int32)
+        self.count = len(chosen) if self._rows is None else len(self._rows)
+
+    def of(self, values: FloatArray, part: slice = slice(None)) -> FloatArray:
+        """Return the values of these rows, or of a part of them."""
+        return values[part] if self._rows is None else values[self._rows[part]]
+
+    def span(self, first: int, end: int) -> tuple[int, int]:
+        """Return the first row of the file, and the row after the last, of a stretch of these rows."""
+        return (first, end) if self._rows is None else (int(self._rows[first]), int(self._rows[end - 1]) + 1)
 
 
 def _stretches(reason: NDArray[np.uint8], time_s: FloatArray) -> Iterator[LeftOut]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from ..common.arrays import FloatArray, IntArray
@@ -102,7 +103,7 @@ _GROUP = 20
 _SPREAD_OF_LARGEST = 0.55
 
 
-def largest_of_groups(z: FloatArray) -> FloatArray:
+def largest_of_groups(z: NDArray[np.floating]) -> FloatArray:
     """Return the largest magnitude of every 20 values."""
     whole = len(z) // _GROUP * _GROUP
     return np.asarray(np.abs(z[:whole]).reshape(-1, _GROUP).max(axis=1))

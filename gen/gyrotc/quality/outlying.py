@@ -65,7 +65,8 @@ def outlying(values: FloatArray, longest: int) -> list[Outliers]:
     for n in scales:
         if len(values) // n < 4 * OCTAVE:
             break
-        edges = np.arange(len(values) // n + 1) * len(values) // (len(values) // n)
+        count = len(values) // n
+        edges = np.arange(count + 1 if n > 1 else 0) * len(values) // count
         blocks = clean if n == 1 else np.add.reduceat(clean, edges[:-1]) / np.diff(edges)
         scale = _Scale(blocks)
         row_sigma = row_sigma or scale.usual_sigma
@@ -83,7 +84,7 @@ def outlying(values: FloatArray, longest: int) -> list[Outliers]:
             after = float(level[-1]) if end < len(blocks) else before
             if abs(after - before) > _BACK * far:
                 continue  # it does not come back: a step, which the level follows late where the column slopes
-            rows = int(edges[first]), int(edges[end])
+            rows = (first, end) if n == 1 else (int(edges[first]), int(edges[end]))
             if n > 1:
                 size = float(np.mean(blocks[first:end])) - 0.5 * (before + after)
                 rows = _refined(clean, edges, (first, end), (0.5 * (before + after), size), row_sigma)
@@ -103,9 +104,22 @@ class _Scale:
         self._blocks = blocks
         self._start, self._end = _line(blocks[: 2 * WINDOW]), _line(blocks[-2 * WINDOW :])
         self._group = len(blocks) // max(len(blocks) // _GROUP, 1)
-        self._sigma = self._noise()
-        self.usual_sigma = float(np.median(self._sigma))
-        self._z = np.concatenate([self._deviation(*part) for part in self._parts()])
+        beyond, rest, bends = list[NDArray[np.float32]](), list[FloatArray](), list[FloatArray]()
+        for first, end in self._parts():
+            of_part = self._beyond(first, end)
+            beyond.append(of_part[0])
+            rest.append(self._medians(of_part[1]))
+            around = blocks[max(first - 1, 0) : end + 1]
+            around = np.pad(around, (int(first == 0), int(end == len(blocks))), "reflect")
+            bends.append(self._medians(np.diff(around, 2) / np.sqrt(6.0)))
+        # Noise of each group: about the level, or by second differences, whichever is larger, since the level follows
+        # noise that a filter made slow
+        sigma = np.maximum(_smoothed(np.concatenate(rest)), _smoothed(np.concatenate(bends)))
+        self.usual_sigma = float(np.median(sigma))
+        self._z = np.concatenate(beyond)
+        for first, end in self._parts():
+            group = np.minimum(np.arange(first, end) // self._group, len(sigma) - 1)
+            self._z[first:end] /= sigma[group]
         self._freedom = freedom_of(largest_of_groups(self._z))
 
     def _parts(self) -> Iterator[tuple[int, int]]:
@@ -122,20 +136,6 @@ class _Scale:
             level[-OCTAVE:] = self._end[-OCTAVE:]
         return np.asarray(level[first - low : end - low])
 
-    def _noise(self) -> FloatArray:
-        """Return the standard deviation of the blocks of each group, at least half of what is usual.
-
-        It is that of the blocks about their level, or of their second differences, whichever is larger: the level
-        follows noise that a filter made slow.
-        """
-        rest, bends = [], []
-        for first, end in self._parts():
-            around = self._blocks[max(first - 1, 0) : end + 1]
-            around = np.pad(around, (int(first == 0), int(end == len(self._blocks))), "reflect")
-            rest.append(self._medians(self._blocks[first:end] - self.level(first, end)))
-            bends.append(self._medians(np.diff(around, 2) / np.sqrt(6.0)))
-        return np.maximum(_smoothed(np.concatenate(rest)), _smoothed(np.concatenate(bends)))
-
     def _medians(self, values: FloatArray) -> FloatArray:
         size = np.abs(values)
         whole = size[: len(size) // self._group * self._group].reshape(-1, self._group)
@@ -145,16 +145,14 @@ class _Scale:
         # A coarse column repeats: its differences are what it shows of its step
         return np.where(median > 0.0, median, whole.mean(axis=1) / MAD_TO_SIGMA)
 
-    def _deviation(self, first: int, end: int) -> NDArray[np.float32]:
-        """Return how far blocks lie outside the level of their neighbours, in standard deviations."""
+    def _beyond(self, first: int, end: int) -> tuple[NDArray[np.float32], FloatArray]:
+        """Return how far blocks lie outside the level of their neighbours, and how far from their own."""
         low, high = max(first - 1, 0), min(end + 1, len(self._blocks))
         level = np.pad(self.level(low, high), (int(low == first), int(high == end)), "edge")
         floor = np.minimum(np.minimum(level[:-2], level[1:-1]), level[2:])
         ceiling = np.maximum(np.maximum(level[:-2], level[1:-1]), level[2:])
         blocks = self._blocks[first:end]
-        beyond = blocks - np.clip(blocks, floor, ceiling)
-        group = np.minimum(np.arange(first, end) // self._group, len(self._sigma) - 1)
-        return np.asarray(beyond / self._sigma[group], dtype=np.float32)
+        return (blocks - np.clip(blocks, floor, ceiling)).astype(np.float32), blocks - level[1:-1]
 
     def segments(self, cost: float) -> list[tuple[int, int, float]]:
         """Return the segments of outliers (first, end, log-odds)."""

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.arrays import FloatArray, IntArray, parts_of
+from ..common.arrays import FloatArray, IntArray, parts_of, steps_are
+from ..common.metrics import quantile_of_parts
 from .odds import OCTAVE, cost_of
 
 # Rows to one share of repetitions: a coarse value repeats more at some levels than at others.
@@ -47,12 +48,11 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
     n = len(values)
     if n < 2:
         return []
-    starts = np.concatenate([[0], *(p.start + 1 + np.flatnonzero(_steps(values, p)) for p in parts_of(n - 1))])
-    if len(starts) == 1:
+    again = steps_are(values, lambda step: step == 0.0)
+    if again.all():
         return []  # a column of one value is no event of the run: the finding `constant_channel` names it
-    lengths = np.diff(np.r_[starts, n])
-    again = np.ones(n - 1, dtype=bool)
-    again[starts[1:] - 1] = False
+    starts = np.flatnonzero(again & ~np.r_[False, again[:-1]])
+    lengths = np.flatnonzero(again & ~np.r_[again[1:], False]) - starts + 2
     count = max(len(again) // _GROUP, 1)
     shares = again[: len(again) // count * count].reshape(count, -1).mean(axis=1)
     chance = max(float(np.quantile(shares, _OFTEN)), 1.0 / n)
@@ -61,17 +61,19 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
     chance = _MORE_OFTEN * chance / (1.0 + (_MORE_OFTEN - 1.0) * chance)
     odds = -(lengths - 1) * np.log(chance) - cost_of(2.0 * n)
     likely = np.flatnonzero(odds > 0.0)
-    if needs_release:
-        moves = np.abs(np.diff(values[starts]))
-        release = _RELEASE * float(np.quantile(moves, _ON_RAMPS))
-        likely = likely[(likely < len(moves)) & (moves[np.minimum(likely, len(moves) - 1)] > release)]
+    if needs_release and len(likely):
+
+        def moves() -> Iterator[FloatArray]:
+            for part in parts_of(n - 1):
+                size = np.abs(np.diff(values[part.start : part.stop + 1]))
+                yield size[size > 0.0]
+
+        release = _RELEASE * quantile_of_parts(moves, _ON_RAMPS)
+        ends = np.minimum(starts + lengths, n - 1)[likely]  # the last stretch has no release
+        likely = likely[np.abs(values[ends] - values[ends - 1]) > release]
     return [
         Repeats(int(starts[k]), int(starts[k] + lengths[k]), float(values[starts[k]]), float(odds[k])) for k in likely
     ]
-
-
-def _steps(values: FloatArray, part: slice) -> FloatArray:
-    return np.diff(values[part.start : part.stop + 1])
 
 
 def resolution(values: FloatArray) -> float:

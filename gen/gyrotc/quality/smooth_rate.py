@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
-from ..common.statistics import cell_means, running_mean
+from ..common.statistics import running_mean
 from .odds import CELL_S, OCTAVE, WINDOW
 
 # Distance of the knots over temperature: the bias of a gyro hardly bends within it.
@@ -33,20 +33,22 @@ _ROUNDS = 6
 _BISQUARE = 4.685
 
 
-def smooth_rate(time_s: FloatArray, temperature_c: FloatArray, rate_dph: FloatArray) -> FloatArray | None:
-    """Return the smooth rate at every row, deg/h; None if the run is too short to show one.
+def cell_length_of(time_s: FloatArray) -> float:
+    """Return the length of the cells over which a run with rows at these times is averaged for `smooth_rate`, s."""
+    return max(CELL_S, float(time_s[-1] - time_s[0]) / _MAX_CELLS)
+
+
+def smooth_rate(t: FloatArray, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return times (s) and the smooth rate at them (deg/h); both empty if the run is too short to show one.
 
     Args:
-        time_s, temperature_c, rate_dph: Finite columns in order of time.
+        t, x, y: Means of time (s), temperature (C) and rate (deg/h) over cells (`cell_length_of`).
     """
-    cell_s = max(CELL_S, float(time_s[-1] - time_s[0]) / _MAX_CELLS)
-    t, x, y = cell_means(cell_s, time_s, temperature_c, rate_dph)
-    columns = _columns(t, x)
+    columns = _columns(t, x) if len(t) > 1 else None
     if columns is None:
-        return None
+        return np.zeros(0), np.zeros(0)
     level = float(np.median(y))
-    smooth = level + columns @ _robust_fit(columns, y - level)
-    return smooth if len(t) == len(time_s) else np.asarray(np.interp(time_s, t, smooth))
+    return t, np.asarray(level + columns @ _robust_fit(columns, y - level))
 
 
 def _columns(t: FloatArray, x: FloatArray) -> FloatArray | None:
