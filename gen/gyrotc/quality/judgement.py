@@ -38,7 +38,7 @@ REASONS = (
 _ABOVE_STEPS = 3.0
 _ON_RAMPS = 0.95
 # The largest step from row to row at an outlier of the temperature, as a share of its size, at least.
-_STEP = 0.5
+_STEP = 0.75
 # Row periods between two rows that follow each other, at most.
 _TOGETHER = 1.5
 # Differences of neighbouring rates that the noise of a row is estimated from.
