@@ -93,7 +93,7 @@ def rezero_dph(rules: dict[str, Any]) -> float:
     Args:
         rules: `rules` of `uncertainty_dph`; with unknown repeatability the shift is 0.
     """
-    repeatability, freedom = rules["turn_on_dph"], rules["turn_on_freedom"]
+    repeatability, freedom = rules.get("turn_on_dph"), rules.get("turn_on_freedom")
     if repeatability is None:
         return 0.0
     return float(repeatability * _quantile(freedom, 0.9995))
