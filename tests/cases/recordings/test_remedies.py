@@ -353,3 +353,15 @@ def test_a_data_set_of_two_devices_is_refused(folder: Path, gyrotc: Command) -> 
     assert "a.csv, column id: names several devices: 1 in a.csv, 2 in a.csv" in done.stdout
     (option,) = re.findall(r"--set '([^']+)'", done.stdout)
     assert imported(gyrotc, folder / "D", "a.csv", ["--set", option]) == ROWS
+
+
+def test_a_map_of_one_gyro_does_not_name_another(folder: Path, gyrotc: Command) -> None:
+    for name in ("A", "B"):
+        (folder / f"{name}.csv").write_bytes(table(f"serial,{NAMES}", [name] * ROWS, fixed(TIME), T, R))
+    assert gyrotc("import", folder / "A.csv", "--out", folder / "R").returncode == 0
+    known = ("--map", folder / "R" / "map.toml", "--out", folder / "S")
+    done = gyrotc("import", folder / "B.csv", *known)
+    assert done.returncode == 2
+    assert "B.csv: the rows are of 'B', and the map is of 'A'; expected --serial A, or" in done.stderr
+    assert gyrotc("import", folder / "B.csv", *known, "--serial", "B").returncode == 0
+    assert 'serial = "B"' in (folder / "S" / "dataset.toml").read_text()

@@ -75,6 +75,9 @@ def serial_of(stated: str | None, chosen: Map, file: LoggerFile, device: str, ou
         InputError: It is no legal serial.
     """
     in_file = next((v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None)
+    if device and chosen.serial not in (None, device) and not stated:
+        found = f"the rows are of {device!r}, and the map is of {chosen.serial!r}"
+        raise InputError(file.path.name, found, f"--serial {chosen.serial}, or --serial with that of the gyro")
     in_file = device or in_file
     known = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
     serial = known or out.resolve().name

@@ -239,7 +239,8 @@ class ImportedRows:
         Raises:
             InputError: It has no times, or none that can be compared with those of the rates.
         """
-        joined = next((one for one in self.chosen.join if table.tolerance_s is not None), None)
+        of_file = table.name.partition("/")[0] if table.tolerance_s is not None else None
+        joined = next((one for one in self.chosen.join if Path(one.file).name == of_file), None)
         columns = [c for n in joined.time if (c := table.column(n))] if joined else []
         columns = columns or _same_time(self.plan, table)
         where = self._file_of(table)
