@@ -115,7 +115,8 @@ def folds(samples: Samples, power_on: NDArray[np.int64] | None = None) -> tuple[
                 Fold("run" if len(own) == 1 else "power-on", own)
                 for own in (tuple(s for s in spans if number[s.run] == n) for n in dict.fromkeys(number.values()))
             ]
-    return tuple(f for f in found if f.held(samples).any() and (~f.near(samples)).sum() >= _MIN_REMAINING)
+    total = len(samples.run)
+    return tuple(f for f in found if f.held(samples).any() and total - f.near(samples).sum() >= _MIN_REMAINING)
 
 
 def edges_of(run: NDArray[np.int64]) -> NDArray[np.intp]:

@@ -233,15 +233,14 @@ class GaussianMap:
     evaluations: int
     coefficients: FloatArray = field(init=False)
     factor: FloatArray = field(init=False)
+    _whole: tuple[FloatArray, FloatArray] = field(init=False)
 
     def __post_init__(self) -> None:
-        n, noise = self.structure.columns, np.exp(2.0 * self.p[-1])
-        precision, moment = self._equations(self.power_ons)
-        h, lower, coefficients = self._solved(precision, moment)
+        object.__setattr__(self, "_whole", self._equations(self.power_ons))
+        h, lower, coefficients = self._solved(*self._whole)
         inverse = lapack.dtrtri(lower, lower=1)[0]
         object.__setattr__(self, "coefficients", coefficients)
-        object.__setattr__(self, "factor", np.sqrt(noise) * h[:, None] * inverse.T)
-        assert self.factor.shape == (n, n)
+        object.__setattr__(self, "factor", self.sigma * h[:, None] * inverse.T)
 
     @property
     def sigma(self) -> float:
@@ -287,13 +286,14 @@ class GaussianMap:
 
     def without(self, power_on: int, left_out: Sums) -> FloatArray:
         """Return the coefficients without a piece of a power-on, with the variances of the whole history."""
-        rest = list(self.power_ons)
-        rest[power_on] = rest[power_on] - left_out
-        if rest[power_on].samples < 0.5:
-            del rest[power_on]
-        if not rest:
+        whole = self.power_ons[power_on]
+        rest = whole - left_out
+        precision, moment = (a - b for a, b in zip(self._whole, self._equations([whole]), strict=True))
+        if rest.samples > 0.5:
+            precision, moment = (a + b for a, b in zip((precision, moment), self._equations([rest]), strict=True))
+        elif len(self.power_ons) == 1:
             raise TrainingFailed("nothing remains to train on")
-        return self._solved(*self._equations(rest))[2]
+        return self._solved(precision, moment)[2]
 
     def _equations(self, power_ons: Sequence[Sums]) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations of b, times the noise variance, with what power-ons have of their own out."""

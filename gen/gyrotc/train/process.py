@@ -230,9 +230,10 @@ class TrainingHistory:
         return [self._unseen(fold, found, average_s) for fold in self.folds]
 
     def _unseen(self, fold: Fold, found: Sequence[LinearMap], average_s: float) -> list[Averages]:
-        near, power_on = fold.near(self.means), int(self.power_on[np.argmax(fold.held(self.means))])
-        judged = self.means if average_s >= MEAN_S else self.samples
-        rest, piece = ~near, judged.select(fold.held(judged))
+        held = fold.held(self.means)
+        near = fold.near(self.means) if fold.guard_s else held
+        power_on, rest = int(self.power_on[np.argmax(held)]), ~near
+        piece = self.means.select(held) if average_s >= MEAN_S else self.samples.select(fold.held(self.samples))
         inputs = zip(self.scaling.normalise(piece.temperature_c, piece.slope_c_per_min), (self.t, self.r), strict=True)
         t, r = (np.clip(x, seen[rest].min(), seen[rest].max()) for x, seen in inputs)
         flat = float(np.ptp(self.means.temperature_c[rest])) < LEAST_SPAN_C
