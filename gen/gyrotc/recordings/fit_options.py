@@ -26,9 +26,9 @@ SIMPLE: dict[str, tuple[tuple[int, int], ...]] = {
     "cubic_slope": ((0, 0), (1, 0), (0, 1), (2, 0), (3, 0)),
 }
 """Corrections without a search: powers of (z_T, z_r) of each."""
-COMPARED = ("mlr", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
+COMPARED = ("constant", "mlr", "rbf_random", "rbf_ols", "mrbf_paper", "mrbf", "bank")
 """Methods that `gyrotc compare` shows side by side."""
-METHODS = (*SIMPLE, "mrbf_t", *COMPARED)
+METHODS = (*SIMPLE, "mrbf_t", *COMPARED[1:])
 """All methods."""
 AUTO = "auto"
 """Model selection: the simplest correction that does on unseen history what the best one does."""
