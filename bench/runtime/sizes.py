@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gyrotc.model import load_model
+from gyrotc.model import RuntimePart, load_model
 from gyrotc.tables import NUMERICS, SWITCHES, emit_texts, needs_of, quantise_all, runtime_texts
 
 from ..records import ROOT
@@ -33,10 +33,11 @@ COMPILER = (
     "-mthumb",
     "-ffunction-sections",
     "-fdata-sections",
-    "-fno-tree-loop-distribute-patterns",
 )
 LINKED = ("-nostdlib", "-Wl,--gc-sections", "-Wl,-e,main", "-lgcc")
 
+#: The four functions of a C library that compilers call of their own accord.
+_MEMORY = ROOT / "gen" / "gyrotc" / "verify" / "bare" / "memory.c"
 _MAIN = """#include "gtc_{id}.h"
 gtc_f32_state_t state;
 {objects}
@@ -127,20 +128,23 @@ class Program:
     """Functions that are called beside init, sample and bias.
 
     `is_fitted`: the runtime has what the table needs, else everything.
-    `is_least`: table and runtime without the parts that a product may leave out.
+    `left_out`: parts that the product leaves out of table and runtime.
     """
 
     name: str
     calls: tuple[str, ...] = ()
     is_fitted: bool = True
-    is_least: bool = False
+    left_out: tuple[RuntimePart, ...] = ()
     text: str = _MAIN
 
 
+_ALL_BUT_SIGMA = tuple(part for part in SWITCHES if part != "uncertainty")
 PROGRAMS = (
     Program("init, sample, bias; whole runtime", is_fitted=False),
     Program("init, sample, bias"),
-    Program("init, sample, bias; all else left out", is_least=True),
+    Program("init, sample, bias; all else left out", left_out=tuple(SWITCHES)),
+    Program("with check; all else left out", ("check",), left_out=tuple(SWITCHES)),
+    Program("with snapshot; all else left out", ("snapshot",), left_out=_ALL_BUT_SIGMA),
     Program("with check", ("check",)),
     Program("with check and snapshot", ("check", "snapshot")),
     Program("with check, snapshot, rezero, save, restore", ("check", "snapshot", "rezero", "save", "restore")),
@@ -160,8 +164,7 @@ def size(program: Program, core: str, level: str, folder: Path) -> tuple[int, in
         subprocess.CalledProcessError: It does not compile.
     """
     model = load_model(MODEL)
-    if program.is_least:
-        model = model.model_copy(update={"left_out": tuple(SWITCHES)})
+    model = model.model_copy(update={"left_out": program.left_out})
     for name, data in emit_texts(model, quantise_all(model, None)).items():
         (folder / name).write_bytes(data)
     if not program.is_fitted:
@@ -181,7 +184,7 @@ def _text(program: Program) -> str:
 
 
 def _linked(sources: Sequence[str], core: str, level: str, folder: Path) -> tuple[int, int]:
-    command = [*COMPILER, *CORES[core], level, *sources, *LINKED, "-o", "program.elf"]
+    command = [*COMPILER, *CORES[core], level, *sources, str(_MEMORY), *LINKED, "-o", "program.elf"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     reported = subprocess.run(
         ["arm-none-eabi-size", "program.elf"], cwd=folder, check=True, capture_output=True, text=True
