@@ -50,7 +50,7 @@
 #define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
 #define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
 #define GTC_TERM_WORDS 8U    /* kind, channel + 65536 * number of the fallback model, then six parameters of the kind */
-#define GTC_SIGMA_RULES 11U  /* words of `sigma` behind its two grids, before one for each term */
+#define GTC_SIGMA_RULES 12U  /* words of `sigma` behind its two grids, before one for each term */
 #define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
 #if GTC_WITH_F32

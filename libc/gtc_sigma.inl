@@ -10,15 +10,18 @@
 #if GTC_WITH_UNCERTAINTY
 /* Words of a table's uncertainty behind its two grids; then one for each term. */
 #define RULE_HOLD 0U        /* deg/h per C that a held input may have gone on by at its slope */
-#define RULE_REST 1U        /* deg/h per block for which a correction is held, whatever its slope */
+#define RULE_REST 1U        /* deg/h per block for which a correction is held, as T may move at any trained slope */
 #define RULE_SLOPE 2U       /* deg/h per C/block of a slope that is known and not in the correction yet */
 #define RULE_START 3U       /* deg/h: nothing is known of the slope */
-#define RULE_BEYOND 4U      /* deg/h per C, deg/h per C/block beyond the envelope */
-#define RULE_FALLBACK 6U    /* deg/h about the constant correction */
-#define RULE_NONE 7U        /* deg/h of the bias itself */
-#define RULE_BETWEEN 8U     /* deg/h of the constant from power-on to power-on */
-#define RULE_NOISE 9U       /* deg/h of a mean of the rate over 1 s */
-#define RULE_CORRELATION 10U /* s */
+#define RULE_TURN 4U        /* deg/h: a held input may have turned to any trained slope */
+#define RULE_BEYOND 5U      /* deg/h per C, deg/h per C/block beyond the envelope */
+#define RULE_FALLBACK 7U    /* deg/h about the constant correction */
+#define RULE_NONE 8U        /* deg/h of the bias itself */
+#define RULE_BETWEEN 9U     /* deg/h of the constant from power-on to power-on */
+#if GTC_WITH_REZERO
+#define RULE_NOISE 10U      /* deg/h of a mean of the rate over 1 s */
+#endif
+#define RULE_CORRELATION 11U /* s */
 
 /* 1 if a table says how uncertain its corrections are: two grids, rules, and a word for each term. */
 static int has_sigma(const TABLE *table)
@@ -157,16 +160,22 @@ static SQUARE variance_of_age(const STATE *state, const TABLE *table)
     return add_squares(square, squared(without_readings(state, rule(table, RULE_REST))));
 }
 
-/* Of a slope that the correction does not have yet. */
-static SQUARE variance_of_start(const STATE *state, const TABLE *table)
+/* Of a slope that the correction does not have: while it is held, as the temperature may then turn to any slope, and while
+ * the window fills. */
+static SQUARE variance_of_slope(const STATE *state, const TABLE *table)
 {
-    if ((state->status & GTC_WARMING) == 0) {
-        return NO_SQUARE;
+    SQUARE square = NO_SQUARE;
+
+    if (state->input[0].held_blocks != 0U) {
+        square = squared(rule(table, RULE_TURN));
+    } else if ((state->status & GTC_WARMING) == 0) {
+        /* it has the slope */
+    } else if (state->uncertainty.slope_known != 2U) {
+        square = squared(rule(table, RULE_START));
+    } else {
+        square = squared(scaled_difference(state->uncertainty.slope, NUM_ZERO, rule(table, RULE_SLOPE)));
     }
-    if (state->uncertainty.slope_known != 2U) {
-        return squared(rule(table, RULE_START));
-    }
-    return squared(scaled_difference(state->uncertainty.slope, NUM_ZERO, rule(table, RULE_SLOPE)));
+    return square;
 }
 
 /* Of inputs beyond the envelope. */
@@ -235,7 +244,7 @@ static SQUARE variance(const STATE *state, const TABLE *table)
         sum = unknown;
     } else {
         sum = add_squares(variance_of_map(state, table), variance_of_age(state, table));
-        sum = add_squares(sum, variance_of_start(state, table));
+        sum = add_squares(sum, variance_of_slope(state, table));
         sum = add_squares(sum, variance_beyond(state, table));
 #if GTC_WITH_RETAINED || GTC_WITH_CHANNELS
         sum = add_squares(sum, variance_of_terms(state, table));

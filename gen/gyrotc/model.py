@@ -129,6 +129,7 @@ class Rules(_Frozen):
         rest_dph_per_min: For each minute for which a correction is held, whatever its slope.
         slope_dph_per_c_per_min: For the slope while it is known and not in the correction yet.
         start_dph: Nothing is known of the slope.
+        turn_dph: A held input may have turned to any trained slope; None: as `start_dph`.
         beyond_dph_per_c, beyond_dph_per_c_per_min: For each C and C/min beyond the envelope.
         fallback_dph: About the constant correction.
         none_dph: Of the bias itself, before any reading is accepted.
@@ -144,6 +145,7 @@ class Rules(_Frozen):
     rest_dph_per_min: BiasAmount
     slope_dph_per_c_per_min: BiasAmount
     start_dph: BiasAmount
+    turn_dph: BiasAmount | None = None
     beyond_dph_per_c: BiasAmount
     beyond_dph_per_c_per_min: BiasAmount
     fallback_dph: BiasAmount
@@ -488,7 +490,7 @@ class Model(_Frozen):
             del content["left_out"]
         if self.uncertainty_dph is not None and self.uncertainty_dph.rules is not None:
             rules = content["uncertainty_dph"]["rules"]
-            for name in ("turn_on_dph", "turn_on_freedom"):
+            for name in ("turn_dph", "turn_on_dph", "turn_on_freedom"):
                 if rules[name] is None:
                     del rules[name]
         return content

@@ -91,6 +91,28 @@ TEST(every_flipped_bit_of_a_member_is_found)
     }
 }
 
+/* A count that memory lost is found before anything is read by it. */
+TEST(a_count_beyond_all_tables_is_found)
+{
+    table_t table;
+
+#define FOUND(change)                                \
+    do {                                             \
+        table = TABLE;                               \
+        change;                                      \
+        CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));  \
+    } while (0)
+
+    FOUND(table.n_networks = 17U);
+    FOUND(table.n_fallback_models = 1U);
+    FOUND(table.n_centers ^= 1U);
+    FOUND(table.n_sigma = 0x4001U);
+    FOUND(table.n_sigma = 0x3FFFU);
+    FOUND(table.n_probes = 0x4001U);
+    FOUND(table.coverage_cells[0] = 0x200U);
+#undef FOUND
+}
+
 TEST(a_known_answer_that_is_not_met_is_found)
 {
     gtc_word_t probes[64];
@@ -114,6 +136,7 @@ TEST(a_known_answer_that_is_not_met_is_found)
 int main(void)
 {
     RUN(a_known_answer_that_is_not_met_is_found);
+    RUN(a_count_beyond_all_tables_is_found);
     RUN(a_sound_table_passes);
     RUN(every_flipped_bit_of_an_array_is_found);
     RUN(changed_members_are_found);

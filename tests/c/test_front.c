@@ -625,6 +625,41 @@ TEST(missed_is_the_same_as_missing_samples)
     CHECK_INT(status_of(&b), missed(&b, 0U));
 }
 
+/* A table holds nothing that it does not name among its parts. */
+TEST(a_part_that_a_table_does_not_name_is_refused)
+{
+    const uint_least32_t parts[3] = {GTC_PART_COVERAGE, GTC_PART_UNCERTAINTY, GTC_PART_PROBES};
+    uint_least32_t i;
+
+    for (i = 0U; i < 3U; i++) {
+        table_t table = TABLE;
+
+        table.parts &= ~parts[i];
+        CHECK_INT(GTC_E_LAYOUT, checked(&table));
+    }
+}
+
+/* Of a state that was overwritten, so that the next correction would be no number: the constant correction. */
+#ifndef GTC_CHECKED_H_INCLUDED
+TEST(a_correction_that_is_no_number_is_the_fallback)
+{
+    state_t state = started();
+    num_t temp = C(15);
+
+    (void)ramp(&state, &temp, C(0.015625), (int)N * 5);
+#if TEST_Q31
+    state.window[0] = GTC_TEMP_MISSING; /* a slope of the whole range from here to 0 */
+    state.input[0].base = 0;
+    state.input[0].sum = 0;
+    state.window_valid = 1U;
+#else
+    state.input[0].base = MISSING;
+#endif
+    CHECK_INT(GTC_HELD | GTC_FALLBACK, feed(&state, temp, 1) & (GTC_HELD | GTC_FALLBACK));
+    CHECK(same(bias_of(&state), WORD_OF(TABLE.fallback)));
+}
+#endif
+
 TEST(a_table_that_this_build_cannot_use_is_refused)
 {
     table_t table;
@@ -763,6 +798,10 @@ int main(void)
     RUN(a_stuck_sensor_is_held_after_as_many_samples_as_the_table_says);
     RUN(a_table_that_accepts_any_number_of_identical_samples);
     RUN(missed_is_the_same_as_missing_samples);
+    RUN(a_part_that_a_table_does_not_name_is_refused);
+#ifndef GTC_CHECKED_H_INCLUDED
+    RUN(a_correction_that_is_no_number_is_the_fallback);
+#endif
     RUN(a_table_that_this_build_cannot_use_is_refused);
     RUN(a_state_is_not_started_for_a_table_beyond_the_options_of_the_build);
     RUN(bad_arguments_are_refused);

@@ -61,6 +61,26 @@ TEST(the_correction_is_that_of_the_whole_runtime)
     CHECK_INT(GTC_CLAMPED, FN(map)(&table, C(95.0), 0, &map));
 }
 
+TEST(a_correction_that_is_no_number_is_the_fallback)
+{
+    const table_t table = plain();
+    state_t state;
+    num_t temp = C(15.0);
+
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
+    (void)ramp(&state, &temp, C(0.015625), (int)N * 5);
+#if TEST_Q31
+    state.window[0] = GTC_TEMP_MISSING; /* a slope of the whole range from here to 0 */
+    state.input[0].base = 0;
+    state.input[0].sum = 0;
+    state.window_valid = 1U;
+#else
+    state.input[0].base = MISSING;
+#endif
+    (void)feed(&state, temp, 1);
+    CHECK(same(bias_of(&state), WORD_OF(table.fallback)));
+}
+
 TEST(a_call_is_a_period_and_null_is_a_missed_sample)
 {
     const table_t table = plain();
@@ -82,6 +102,7 @@ int main(void)
     RUN(a_table_that_needs_a_part_is_refused);
     RUN(a_table_with_more_channels_is_refused);
     RUN(the_correction_is_that_of_the_whole_runtime);
+    RUN(a_correction_that_is_no_number_is_the_fallback);
     RUN(a_call_is_a_period_and_null_is_a_missed_sample);
     return test_end();
 }

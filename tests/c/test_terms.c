@@ -834,6 +834,31 @@ TEST(a_slope_that_a_memory_makes_saturates)
 }
 #endif
 
+#ifndef GTC_CHECKED_H_INCLUDED
+/* No such table passes check() or open(); should one be used all the same, the term adds nothing. */
+TEST(a_kind_that_nobody_knows_adds_nothing)
+{
+    gtc_word_t terms[4U * GTC_TERM_WORDS];
+    table_t table = TERMS;
+    table_t none = TERMS;
+    state_t a;
+    state_t b;
+
+    memcpy(terms, TERMS.terms, TERMS.n_terms * GTC_TERM_WORDS * sizeof terms[0]);
+    terms[0].bits = GTC_N_KINDS + 1U;
+    table.terms = terms;
+    table.n_terms = 1U;
+    table.crc ^= 1U;
+    none.n_terms = 0U;
+    none.crc ^= 2U;
+    a = started_with(&table);
+    b = started_with(&none);
+    (void)samples(&a, C(15.0), C(12.0), 9);
+    (void)samples(&b, C(15.0), C(12.0), 9);
+    CHECK(same(bias_of(&a), bias_of(&b)));
+}
+#endif
+
 TEST(terms_of_an_unknown_kind_or_without_their_channel_are_refused)
 {
     gtc_word_t terms[4U * GTC_TERM_WORDS];
@@ -896,6 +921,9 @@ int main(void)
     RUN(an_auxiliary_channel_has_the_mean_of_its_extremes);
     RUN(what_terms_add_saturates);
     RUN(a_slope_that_a_memory_makes_saturates);
+#endif
+#ifndef GTC_CHECKED_H_INCLUDED
+    RUN(a_kind_that_nobody_knows_adds_nothing);
 #endif
     RUN(terms_of_an_unknown_kind_or_without_their_channel_are_refused);
     return test_end();

@@ -22,7 +22,7 @@ from .recursions import Course, NumberArray, TableKind, TermOutcome
 from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
 #: Words of a table's uncertainty behind its two grids, without those of the terms.
-RULES = 11
+RULES = 12
 
 _PART = 2**30  # its square and a few more fit 64 bits
 _LARGEST = 2**31 - 1  # of a word
@@ -149,7 +149,7 @@ SQUARES: dict[str, Squares] = {"f32": Squares(), "q31": _Q31()}
 class Rule:
     """Places of the rules behind the two grids, as in gtc_sigma.inl."""
 
-    HOLD, REST, SLOPE, START, BEYOND, BEYOND_SLOPE, FALLBACK, NONE, BETWEEN, NOISE, CORRELATION = range(RULES)
+    HOLD, REST, SLOPE, START, TURN, BEYOND, BEYOND_SLOPE, FALLBACK, NONE, BETWEEN, NOISE, CORRELATION = range(RULES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,7 +260,7 @@ def variances(table: Table, evidence: SigmaEvidence) -> NumberArray:
     """Variance of every correction without that of the constant of the power-on."""
     do, rules = SQUARES[table.numeric], _rules(table)
     total = do.plus(_of_map(table, evidence), _of_age(table, evidence))
-    total = do.plus(total, _of_start(table, evidence))
+    total = do.plus(total, _of_slope(table, evidence))
     total = do.plus(total, do.plus(*(_beyond(table, evidence, k) for k in (0, 1))))
     terms = do.squared(evidence.edge)
     for part in _of_terms(table, evidence):
@@ -303,11 +303,12 @@ def _without_readings(do: Squares, evidence: SigmaEvidence, x: Any) -> NumberArr
     return np.asarray(do.times(evidence.age, x) + do.part(evidence.missing, evidence.samples, x))
 
 
-def _of_start(table: Table, evidence: SigmaEvidence) -> NumberArray:
+def _of_slope(table: Table, evidence: SigmaEvidence) -> NumberArray:
     do, rules = SQUARES[table.numeric], _rules(table)
     known = do.squared(do.per_c(evidence.drift, rules.dtype.type(0), rules[Rule.SLOPE]))
     square = np.where(evidence.sure, known, do.squared(rules[Rule.START]))
-    return np.where((evidence.status & WARMING) != 0, square, np.zeros_like(square))
+    square = np.where((evidence.status & WARMING) != 0, square, np.zeros_like(square))
+    return np.where(evidence.age != 0, do.squared(rules[Rule.TURN]), square)
 
 
 def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> NumberArray:

@@ -71,6 +71,7 @@ def _rules(rules: Rules, block_s: float) -> list[float]:
         rules.rest_dph_per_min * per_min,
         rules.slope_dph_per_c_per_min / per_min,
         rules.start_dph,
+        rules.start_dph if rules.turn_dph is None else rules.turn_dph,
         rules.beyond_dph_per_c,
         rules.beyond_dph_per_c_per_min / per_min,
         rules.fallback_dph,

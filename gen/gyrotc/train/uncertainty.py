@@ -39,7 +39,7 @@ from .process import Process, fit_process
 from .result import Fit, predict
 
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
-_AT_REST_C_PER_MIN = 0.01  # a temperature at rest may go on like this: a tenth of what chambers hold
+_TURNS = 20000  # pairs of a place in training and a trained slope that are looked at
 _STEP = 0.05  # of a range, for gradients
 _BISECTIONS = 60  # leave less than the last digit of a float64
 _MOST = 20000  # samples that are looked at
@@ -67,13 +67,15 @@ def rules_of(known: UncertaintyInputs, block_s: float) -> dict[str, Any]:
     variance = known.sigma**2
     mean = float(np.average(variance, weights=s.weight))
     hold = _held(known, here, block_s)
+    turn, rest = _turned(known, hold, block_s)
     spread = float(np.average((here - fit.fallback_dph) ** 2, weights=s.weight))
     gradients = _gradients(known)
     return {
         "hold_dph_per_c": hold,
-        "rest_dph_per_min": hold * _AT_REST_C_PER_MIN,
+        "rest_dph_per_min": rest,
         "slope_dph_per_c_per_min": _balanced(lacking**2, s.slope_c_per_min**2, variance),
         "start_dph": float(np.sqrt(np.average(lacking**2, weights=s.weight))),
+        "turn_dph": turn,
         "beyond_dph_per_c": gradients[0],
         "beyond_dph_per_c_per_min": gradients[1],
         "fallback_dph": float(np.sqrt(spread + mean)),
@@ -174,9 +176,43 @@ def _held(known: UncertaintyInputs, here: FloatArray, block_s: float) -> float:
         k = k[(s.run[k] == s.run[k + age]) & (s.time_s[k + age] - s.time_s[k] < 1.5 * age * block_s)]
         minutes = age * block_s / 60.0
         squares.append((here[k + age] - here[k]) ** 2)
-        moved.append((s.slope_c_per_min[k] ** 2 + _AT_REST_C_PER_MIN**2) * minutes**2)
+        moved.append(s.slope_c_per_min[k] ** 2 * minutes**2)
         variance.append(known.sigma[k] ** 2)
     return _balanced(*(np.concatenate(parts) for parts in (squares, moved, variance)))
+
+
+def _turned(known: UncertaintyInputs, hold: float, block_s: float) -> tuple[float, float]:
+    """Return what a held correction is wrong by when the temperature turns to any trained slope: deg/h, deg/h/min.
+
+    Slopes are drawn evenly from the covered cells, places from training. The first number is the RMS change of the map
+    with the slope alone; with the second, which grows with the minutes, the squared change over 1 to 30 blocks is on
+    average what sigma says together with its other parts.
+    """
+    s, rng = known.samples, np.random.default_rng(0)
+    k, slope = rng.integers(0, len(s), _TURNS), rng.choice(known.covered[1], _TURNS)
+    t, here = s.temperature_c[k], predict(known.fit, s.temperature_c[k], s.slope_c_per_min[k])
+    low, high = known.fit.scaling.temperature_c
+    turn = float(np.sqrt(np.mean((predict(known.fit, t, slope) - here) ** 2)))
+    minutes = rng.choice(_AGES, _TURNS) * (block_s / 60.0)
+    there = predict(known.fit, np.clip(t + slope * minutes, low, high), slope)
+    variance = known.sigma[k] ** 2 + (hold * s.slope_c_per_min[k] * minutes) ** 2 + turn**2
+    return turn, _excess((there - here) ** 2 + known.sigma[k] ** 2, minutes**2, variance)
+
+
+def _excess(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
+    """Return the c with which squares / (variance + c² x) is 1 on average; 0 where the variance is enough."""
+    variance = np.maximum(variance, 1e-12 * float(np.mean(squares)))
+    if not squares.any() or np.mean(squares / variance) <= 1.0:
+        return 0.0
+    low, high = -30.0, 10.0
+    scale = float(np.mean(squares) / np.mean(x))
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if np.mean(squares / (variance + np.exp(middle) * scale * x)) > 1.0:
+            low = middle
+        else:
+            high = middle
+    return float(np.sqrt(np.exp(middle) * scale))
 
 
 def _balanced(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
