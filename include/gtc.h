@@ -199,9 +199,11 @@ GTC_MUST_CHECK int gtc_q31_snapshot(const gtc_q31_state_t *state, const gtc_q31_
  *   mean_rate  mean of (measured - bias) over the rest, Earth's rate along the axis taken off, deg/h (q31:
  *              2^-bias_frac_bits deg/h); 1 mrad of heading error at the equator is 0.015 deg/h
  *   seconds    length of the rest, s; 0: takes every re-zero back, whatever mean_rate is
- * The rest is weighed against the spread from power-on to power-on that training saw, the uncertainty of the
- * correction and the noise of the rate. All shifts together stay within the table's `rezero` (GTC_CLAMPED at its
- * edge). A mean rate beyond 4 sigma is refused. The shift is of this power-on: gtc_<n>_restore() keeps it over 0
+ * The rest is weighed against the spread from power-on to power-on that training saw, the
+ * uncertainty of the correction and the noise of the rate. All shifts together stay within the table's `rezero`
+ * (GTC_CLAMPED at its edge). A mean rate beyond 4 sigma is refused; what is within, a slow motion or Earth's rate that
+ * was left in, moves the correction by less than 4 sigma of the constant: 4 times the spread from power-on to power-on
+ * at first, less after each rest. The shift is of this power-on: gtc_<n>_restore() keeps it over 0
  * blocks without power, not over more.
  * Returns 0, GTC_CLAMPED, GTC_E_ARG, GTC_E_ID, GTC_E_ABSENT or GTC_E_REST; negative: nothing was changed. */
 #if GTC_WITH_F32

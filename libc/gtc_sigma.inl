@@ -160,8 +160,8 @@ static SQUARE variance_of_age(const STATE *state, const TABLE *table)
     return add_squares(square, squared(without_readings(state, rule(table, RULE_REST))));
 }
 
-/* Of a slope that the correction does not have: while it is held, as the temperature may then turn to any slope, and while
- * the window fills. */
+/* Of a slope that the correction does not have: while it is held, as the temperature may then turn to any slope, and
+ * while the window fills. */
 static SQUARE variance_of_slope(const STATE *state, const TABLE *table)
 {
     SQUARE square = NO_SQUARE;

@@ -408,7 +408,8 @@ def sigma_of(model: Model) -> tuple[list[float], int]:
     grids = [math.sqrt(max(s * s - r["between_dph"] ** 2, 0.0)) for s in covered + uncovered]
     rules = [
         r["hold_dph_per_c"], r["rest_dph_per_min"] * per_block, r["slope_dph_per_c_per_min"] / per_block,
-        r["start_dph"], r.get("turn_dph", r["start_dph"]), r["beyond_dph_per_c"], r["beyond_dph_per_c_per_min"] / per_block, r["fallback_dph"],
+        r["start_dph"], r.get("turn_dph", r["start_dph"]), r["beyond_dph_per_c"],
+        r["beyond_dph_per_c_per_min"] / per_block, r["fallback_dph"],
         r["none_dph"], r["between_dph"], r["noise_deg_per_sqrt_h"] * 60.0, r["correlation_s"],
     ]  # fmt: skip
     return grids + rules + list(r["terms"]), len(grids) + len(rules) - 1

@@ -159,9 +159,9 @@ class Rules(_Frozen):
 
     @model_serializer(mode="wrap")
     def _without_unknown(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is not known of power-ons: a model that states nothing of them has no such field."""
+        """Leave out what is not known: a model that states nothing of it has no such field."""
         content: dict[str, Any] = handler(self)
-        unknown = [name for name in ("turn_on_dph", "turn_on_freedom") if content[name] is None]
+        unknown = [name for name in ("turn_dph", "turn_on_dph", "turn_on_freedom") if content[name] is None]
         return {name: value for name, value in content.items() if name not in unknown}
 
 
@@ -488,11 +488,6 @@ class Model(_Frozen):
             del content["q31_bias_frac_bits"]
         if not self.left_out:
             del content["left_out"]
-        if self.uncertainty_dph is not None and self.uncertainty_dph.rules is not None:
-            rules = content["uncertainty_dph"]["rules"]
-            for name in ("turn_dph", "turn_on_dph", "turn_on_freedom"):
-                if rules[name] is None:
-                    del rules[name]
         return content
 
     def to_json(self) -> str:

@@ -639,6 +639,22 @@ TEST(a_part_that_a_table_does_not_name_is_refused)
     }
 }
 
+/* Without uncertainties and known answers a table is one. */
+TEST(a_table_with_the_map_alone_is_usable)
+{
+    table_t table = TABLE;
+
+    table.sigma_cells[0] = 0U;
+    table.sigma_cells[1] = 0U;
+    CHECK_INT(GTC_E_LAYOUT, checked(&table)); /* words, but no cells */
+    table.n_sigma = 0U;
+    table.sigma = NULL;
+    table.n_probes = 0U;
+    table.probes = NULL;
+    table.parts = GTC_PART_COVERAGE;
+    CHECK_INT(GTC_OK, checked(&table));
+}
+
 /* Of a state that was overwritten, so that the next correction would be no number: the constant correction. */
 #ifndef GTC_CHECKED_H_INCLUDED
 TEST(a_correction_that_is_no_number_is_the_fallback)
@@ -799,6 +815,7 @@ int main(void)
     RUN(a_table_that_accepts_any_number_of_identical_samples);
     RUN(missed_is_the_same_as_missing_samples);
     RUN(a_part_that_a_table_does_not_name_is_refused);
+    RUN(a_table_with_the_map_alone_is_usable);
 #ifndef GTC_CHECKED_H_INCLUDED
     RUN(a_correction_that_is_no_number_is_the_fallback);
 #endif

@@ -499,6 +499,36 @@ TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
     }
 }
 
+/* The most that a motion which was taken for a rest can do: the header says it. */
+TEST(a_false_rest_within_the_gate_moves_the_correction_by_less_than_four_sigma_of_the_constant)
+{
+    const uint_least32_t seconds[3] = {1U, 60U, 7200U};
+    int accepted = 0;
+    int i;
+    int k;
+
+    for (i = 0; i < 3; i++) {
+        for (k = -400; k <= 400; k++) {
+            state_t state = started();
+            num_t before;
+            num_t sigma;
+            num_t moved;
+
+            rest(&state, C(15), 60);
+            before = bias_of(&state);
+            sigma = state.shift_sigma;
+            if (rezero(&state, (num_t)(DPH(0.0005) * (num_t)k), seconds[i]) == GTC_OK) {
+                accepted++;
+                moved = (num_t)(bias_of(&state) - before);
+                moved = (moved < 0) ? (num_t)-moved : moved;
+                CHECK(moved < (num_t)(4 * sigma));
+                CHECK(state.shift_sigma <= sigma);
+            }
+        }
+    }
+    CHECK((accepted > 30) && (accepted < 2400));
+}
+
 /* Without noise and without an uncertain constant a rest says nothing. */
 TEST(a_table_that_is_sure_of_everything_takes_no_rest)
 {
@@ -618,6 +648,7 @@ int main(void)
     RUN(a_state_that_was_overwritten_gives_a_correction_within_the_authority_and_no_shift);
     RUN(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing);
     RUN(a_number_that_was_overwritten_never_makes_the_correction_sure);
+    RUN(a_false_rest_within_the_gate_moves_the_correction_by_less_than_four_sigma_of_the_constant);
     RUN(a_table_that_is_sure_of_everything_takes_no_rest);
     RUN(a_table_that_is_sure_of_all_but_the_constant_takes_the_whole_rest);
     RUN(a_state_without_uncertainties_is_kept_over_a_time_without_power);

@@ -8,14 +8,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from gyrotc.jobs import lot_from
-from gyrotc.recordings import METHODS
-from gyrotc.train import Fit, TrainingData, fit, predict, rezero_dph, start_sigma, uncertainty_of
+from gyrotc.recordings import METHODS, load
+from gyrotc.simulate import simulate
+from gyrotc.tables import quantise
+from gyrotc.train import (
+    Fit,
+    FitOptions,
+    TrainingData,
+    fit,
+    fit_dataset,
+    predict,
+    rezero_dph,
+    start_sigma,
+    uncertainty_of,
+)
 from gyrotc.train.prior import Learned, LotPrior, UnitMeans, learn_prior, prior_of
+from libc_build import runtime
 from numpy.typing import NDArray
 from training_data import samples, true_bias
 
@@ -204,3 +218,28 @@ def test_a_memory_may_begin_as_far_from_the_temperature_as_it_was_in_training() 
     parameters = {"tau_s": tau_s, "amplitude_dph_per_c": amplitude}
     stated = start_sigma("thermal_gradient", parameters, {}, data)
     assert stated == pytest.approx(expected, rel=1e-6)
+
+
+def test_sigma_of_a_held_correction_covers_a_turn_to_any_trained_slope(tmp_path: Path) -> None:
+    """The sensor is lost at rest, then the temperature moves at -2 to 2 C/min: RMS of the error over sigma is near 1.
+
+    Truth is the map at the temperature that is not read; to its change the error of before is added as stated.
+    """
+    build, squares = runtime(), []
+    for seed in (1, 2, 3):
+        data = tmp_path / f"gyro-{seed}"
+        simulate("paper", seed=seed, out=data)
+        model = fit_dataset(load(data), FitOptions()).model
+        table = quantise(model, "f32")
+        low, high = model.envelope.temperature_c
+        rng = np.random.default_rng(seed)
+        for rate in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0):
+            for start in rng.uniform(low + 15.0, high - 15.0, 6):
+                rest = start + 0.01 * rng.normal(size=400)
+                readings = np.concatenate([rest, np.full(290, np.nan)])[:, None]
+                lost = build.snapshots(table, table.encode_inputs(readings), np.zeros(690, dtype=np.uint32), 10)[1]
+                sigma = table.decode_bias(lost[:, 1])
+                for second in (15, 100, 200, 289):
+                    change = model.map_dph(start + rate * second / 60.0, rate) - model.map_dph(start, 0.0)
+                    squares.append((float(change) ** 2 + sigma[399] ** 2) / sigma[400 + second] ** 2)
+    assert 0.8 < np.sqrt(np.mean(squares)) < 1.2
