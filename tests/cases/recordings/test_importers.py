@@ -653,3 +653,12 @@ def test_a_column_of_text_that_should_hold_numbers_is_named(tmp_path: Path, run:
     assert "temp_c holds '20,29'" in error
     assert run(*command, "--set", "csv.decimal=,", "--set", "csv.thousands=.")[0] == 0
     assert load(tmp_path / "R").runs[0].rows().rate_dph[0] == 1400.0
+
+
+def test_columns_that_an_import_leaves_out_are_named_of_text_as_well(tmp_path: Path) -> None:
+    lines = ["time_s,temperature_c,rate_dph,Status,Volts"]
+    lines += [f"{k},20.{k},0.0{k},OK,5.0{k}" for k in range(100, 300)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    printed = run_gyrotc("import", tmp_path / "log.csv", "--serial", "A", "--out", tmp_path / "A").stdout
+    assert "left out: Volts ([channels] of the map" in printed
+    assert "left out: Status (no numbers; --set where" in printed

@@ -184,6 +184,7 @@ def sha256_of(path: Path) -> str:
 
 
 _NATIVE = {"time": "s", "temperature": "C", "rate": "deg/h"}
+_OF_TEXTS = "no numbers; --set where picks rows by what stands there"
 _MOST_NAMES = 12  # that are listed in a line of a terminal
 
 
@@ -205,9 +206,10 @@ def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator
         yield _line("rows", str(plan.where), "", "as stated")
     if plan.device:
         yield _line("device", plan.device.name, "", "its name, or as stated: one gyro in all rows")
-    if plan.left_out:
-        more = f" and {len(plan.left_out) - _MOST_NAMES} more" if len(plan.left_out) > _MOST_NAMES else ""
-        yield f"  left out: {', '.join(plan.left_out[:_MOST_NAMES])}{more} ([channels] of the map takes them)"
+    for left, words in ((plan.left_out, "[channels] of the map takes them"), (plan.texts, _OF_TEXTS)):
+        if left:
+            more = f" and {len(left) - _MOST_NAMES} more" if len(left) > _MOST_NAMES else ""
+            yield f"  left out: {', '.join(left[:_MOST_NAMES])}{more} ({words})"
 
 
 def preview(rows: ImportedRows) -> Iterator[str]:

@@ -181,6 +181,7 @@ class ImportPlan:
         where: The rows that are taken; None: all.
         device: Column that names the gyro of each row.
         left_out: Numeric columns of the main table that are not taken.
+        texts: Its other columns that are not taken.
     """
 
     main: LoggerTable
@@ -193,3 +194,4 @@ class ImportPlan:
     left_out: tuple[str, ...]
     where: Where | None = None
     device: Column | None = None
+    texts: tuple[str, ...] = ()

@@ -188,8 +188,9 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
     taken |= {c.column.name for c in channels}
     taken |= {name for name in (where and where.column, device and device.name) if name}
     left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
+    texts = tuple(c.name for c in main.columns if c.kind != "number" and c.name not in taken)
     return ImportPlan(
-        main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left, where, device
+        main, picked_time, picked_temperature, picked_values, channels, rate_hz, why_rate, left, where, device, texts
     )
 
 
