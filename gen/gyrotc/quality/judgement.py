@@ -37,8 +37,8 @@ REASONS = (
 # Steps of the temperature from row to row at their 95 % quantile, times this: an outlier of it is larger.
 _ABOVE_STEPS = 3.0
 _ON_RAMPS = 0.95
-# The largest step from row to row at an outlier of the temperature, as a share of its size, at least.
-_STEP = 0.75
+# The steps from row to row by which a temperature goes and comes back, as shares of the size of its outlier.
+_STEP = 0.5
 # Row periods between two rows that follow each other, at most.
 _TOGETHER = 1.5
 # Differences of neighbouring rates that the noise of a row is estimated from.
@@ -300,8 +300,10 @@ class _Columns:
         if found:
             temperature = temperature.copy()
         for one in found:
-            around = temperature[max(one.first - 1, 0) : one.end + 1]
-            if np.abs(np.diff(around)).max() < _STEP * abs(one.size):
+            step = np.diff(temperature[max(one.first - 1, 0) : one.end + 1])
+            there, back = float(step.max()), -float(step.min())
+            inside = one.first > 0 and one.end < len(temperature)
+            if (min(there, back) if inside else max(there, back)) < _STEP * abs(one.size):
                 continue  # it bends
             rows = usable.span(one.first, one.end)
             self._event("outlier", "temperature", rows, one.size, one.sigma, one.log_odds, "temperature outlier")
