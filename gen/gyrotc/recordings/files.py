@@ -1,9 +1,9 @@
-"""A file as it was when it was opened, with its hash, and CSV: blocks of whole lines, read fast by pyarrow, with a slow
-look at what cannot be read so.
+"""Files of rows as they were when they were opened, known by their hash; and those of CSV, in blocks of whole lines.
 
-Read are UTF-8 text with or without byte order mark, LF or CRLF, quotes and spaces around cells, empty lines,
-a last line without end. A last line that was torn off in the middle (a recording that still grows, a logger
-that lost power) is left out.
+Read are UTF-8 text with or without byte order mark, LF or CRLF, quotes and spaces around cells, empty lines, a last
+line without end. pyarrow reads the blocks; a block that it cannot make numbers of is read cell by cell, so that every
+fault is named with its line. A last line that was torn off in the middle is left out (a recording that still grows, a
+logger that lost power).
 """
 
 from __future__ import annotations
