@@ -127,13 +127,6 @@ def run_here(*args: str | Path) -> str:
     return done.output
 
 
-def packed(name: str, content: bytes) -> bytes:
-    """A file of what is kept, as gyrotc writes it under a name."""
-    from gyrotc.results.cache import _head
-
-    return _head(name, content) + content
-
-
 @pytest.fixture
 def few_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
     """Emit few known answers: where they follow a planted fault, few show it as well as all."""

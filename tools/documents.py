@@ -29,6 +29,7 @@ import textwrap
 import venv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -153,12 +154,12 @@ def copy_of_sources(folder: Path) -> Path:
     Whatever else is installed is found where it is. An editable installation finds its modules by a line of a `.pth`
     file, which Python does not read in folders that another such file names.
     """
-    import gyrotc._core
-
     work = folder / "gyrotc"
     ignored = shutil.ignore_patterns("build", "dist", ".venv", ".git", ".*_cache", "corpus", "*.png")
     shutil.copytree(ROOT, work, ignore=ignored, symlinks=True)
-    shutil.copy(gyrotc._core.__file__, work / "gen" / "gyrotc")
+    core = find_spec("gyrotc._core")
+    assert core is not None and core.origin is not None, "the C++ core is not built: tools/setup.sh"
+    shutil.copy(core.origin, work / "gen" / "gyrotc")
     venv.create(work / ".venv", symlinks=True)
     (own,) = (work / ".venv").glob("lib/python*/site-packages")
     (own / "gyrotc.pth").write_text(f"{work / 'gen'}\n{sysconfig.get_path('platlib')}\n", "utf-8")

@@ -21,9 +21,9 @@ import reference
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PLACE = "sources"  # of what lies beside docs/
-_LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^)\s#]+)(#[^)\s]*)?\)")
+LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^)\s#]+)(#[^)\s]*)?\)")
 _OUTSIDE = re.compile(r"[a-z]+:|//")
-_BLOCK = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"(^```.*?^```$|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
 _WORDS = re.compile(r"^(```[a-z]+) .*$", re.MULTILINE)
 
 
@@ -49,8 +49,8 @@ def source(name: str) -> Path:
 
 def targets(text: str, page: Path) -> set[Path]:
     """Files of the sources that a page links to."""
-    plain = _BLOCK.sub("", text)
-    return {(page.parent / t).resolve() for _, t, _ in _LINK.findall(plain) if not _OUTSIDE.match(t)}
+    plain = BLOCK.sub("", text)
+    return {(page.parent / t).resolve() for _, t, _ in LINK.findall(plain) if not _OUTSIDE.match(t)}
 
 
 def beside() -> set[Path]:
@@ -78,10 +78,10 @@ def linked(text: str, page: Path, name: str) -> str:
             return words.lstrip("!")[1:-1]
         return f"{words}({os.path.relpath(there, Path(name).parent)}{anchor})"
 
-    parts = _BLOCK.split(text)
+    parts = BLOCK.split(text)
     # a link may hold code in its words: blocks of several lines alone are left as they are
     whole = "".join(p if not p.startswith("```") else f"\0{k}\0" for k, p in enumerate(parts))
-    return re.sub(r"\0(\d+)\0", lambda m: parts[int(m[1])], _LINK.sub(link, whole))
+    return re.sub(r"\0(\d+)\0", lambda m: parts[int(m[1])], LINK.sub(link, whole))
 
 
 def prepared(text: str, page: Path, name: str) -> str:

@@ -157,7 +157,7 @@ def table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for name, goal, select, hit, bound, kind in CHECKS:
         out += proportion(name, goal, [hit(r) for r in rows if select(r)], bound, kind)
     out += _parameters_met(rows) + _sets(rows) + reliability(rows)
-    return out + _gains(rows) + _honesty(rows) + _time(rows)
+    return out + gains_of(rows) + _honesty(rows) + _time(rows)
 
 
 def proportion(name: str, goal: str, hits: Sequence[bool], bound: float, kind: str) -> list[dict[str, Any]]:
@@ -249,7 +249,7 @@ def _reported(row: Row) -> bool:
     return all(v <= d for s in row["separable"] for v in s.values())
 
 
-def _gains(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def gains_of(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Pooled share of the oracle's gain, and extensions shipped that made the exam worse."""
     chosen = [
         r["gain"]

@@ -84,62 +84,62 @@ def text(
     return outer
 
 
-def _rows(t: Truth, form: Callable[[int, float, float, list[float]], str]) -> list[str]:
+def lines_of(t: Truth, form: Callable[[int, float, float, list[float]], str]) -> list[str]:
     every = zip(t.time_s.tolist(), t.temperature_c.tolist(), t.rate_dph.tolist(), strict=True)
     return [form(k, *row) for k, row in enumerate(every)]
 
 
-def _de(value: float, digits: int = 9) -> str:
+def german_number(value: float, digits: int = 9) -> str:
     return f"{value:.{digits}f}".replace(".", ",")
 
 
-def _at(seconds: float) -> datetime:
+def instant_at(seconds: float) -> datetime:
     return START + timedelta(seconds=float(seconds))
 
 
 @text()
 def plain(t: Truth) -> list[str]:
-    return ["time_s,temperature_c,rate_dph", *_rows(t, lambda k, s, c, r: f"{s!r},{c!r},{r[0]!r}")]
+    return ["time_s,temperature_c,rate_dph", *lines_of(t, lambda k, s, c, r: f"{s!r},{c!r},{r[0]!r}")]
 
 
 @text("cp1252", "\r\n")
 def german(t: Truth) -> list[str]:
     return [
         "Zeit [s];Temperatur [°C];Drehrate [°/s]",
-        *_rows(t, lambda k, s, c, r: f"{_de(s)};{_de(c)};{_de(r[0] / 3600, 12)}"),
+        *lines_of(t, lambda k, s, c, r: f"{german_number(s)};{german_number(c)};{german_number(r[0] / 3600, 12)}"),
     ]
 
 
 @text("utf-8-sig", "\r\n")
 def german_stamps(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_at(s):%d.%m.%Y %H:%M:%S},000;{_de(c)};{_de(r[0])}"
+        return f"{instant_at(s):%d.%m.%Y %H:%M:%S},000;{german_number(c)};{german_number(r[0])}"
 
-    return ["Messung Klimaschrank 3", "Prüfer;A. Berg", "", "Datum;Temperatur/°C;Rate/°/h", *_rows(t, row)]
+    return ["Messung Klimaschrank 3", "Prüfer;A. Berg", "", "Datum;Temperatur/°C;Rate/°/h", *lines_of(t, row)]
 
 
 @text()
 def iso_stamps(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_at(s):%Y-%m-%dT%H:%M:%S}.000Z,{c + 273.15!r},{r[0] / 3600!r}"
+        return f"{instant_at(s):%Y-%m-%dT%H:%M:%S}.000Z,{c + 273.15!r},{r[0] / 3600!r}"
 
-    return ["# logger 4711", "# firmware 2.1", "timestamp,T_gyro (K),gyro (deg/s)", *_rows(t, row)]
+    return ["# logger 4711", "# firmware 2.1", "timestamp,T_gyro (K),gyro (deg/s)", *lines_of(t, row)]
 
 
 @text()
 def local_stamps(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_at(s) + timedelta(hours=1):%Y-%m-%d %H:%M:%S},{c!r},{r[0]!r}"
+        return f"{instant_at(s) + timedelta(hours=1):%Y-%m-%d %H:%M:%S},{c!r},{r[0]!r}"
 
-    return ["Date Time,Temperature (degC),Rate (deg/h)", *_rows(t, row)]
+    return ["Date Time,Temperature (degC),Rate (deg/h)", *lines_of(t, row)]
 
 
 @text()
 def american(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_at(s):%m/%d/%Y},{_at(s):%I:%M:%S %p},{c * 1.8 + 32!r},{r[0]!r}"
+        return f"{instant_at(s):%m/%d/%Y},{instant_at(s):%I:%M:%S %p},{c * 1.8 + 32!r},{r[0]!r}"
 
-    return ["Date,Time,Temp (degF),Rate (deg/hr)", *_rows(t, row)]
+    return ["Date,Time,Temp (degF),Rate (deg/hr)", *lines_of(t, row)]
 
 
 @text()
@@ -147,7 +147,7 @@ def units_row(t: Truth) -> list[str]:
     return [
         "Time\tTemperature\tRate",
         "ms\t°C\t°/s",
-        *_rows(t, lambda k, s, c, r: f"{s * 1e3:.0f}\t{c!r}\t{r[0] / 3600!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{s * 1e3:.0f}\t{c!r}\t{r[0] / 3600!r}"),
     ]
 
 
@@ -155,20 +155,20 @@ def units_row(t: Truth) -> list[str]:
 def sixteen(t: Truth) -> list[str]:
     return [
         "t [min]\tTemp [K]\tRate [rad/s]",
-        *_rows(t, lambda k, s, c, r: f"{s / 60!r}\t{c + 273.15!r}\t{radians(r[0] / 3600)!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{s / 60!r}\t{c + 273.15!r}\t{radians(r[0] / 3600)!r}"),
     ]
 
 
 @text()
 def savetxt(t: Truth) -> list[str]:
-    return ["# time_s temp_c gyro_dps", *_rows(t, lambda k, s, c, r: f"{s:.18e} {c:.18e} {r[0] / 3600:.18e}")]
+    return ["# time_s temp_c gyro_dps", *lines_of(t, lambda k, s, c, r: f"{s:.18e} {c:.18e} {r[0] / 3600:.18e}")]
 
 
 @text()
 def aligned(t: Truth) -> list[str]:
     return [
         "  time_s     temp_C      rate_dph",
-        *_rows(t, lambda k, s, c, r: f"{s:10.1f} {c:14.9f} {r[0]:14.9f}"),
+        *lines_of(t, lambda k, s, c, r: f"{s:10.1f} {c:14.9f} {r[0]:14.9f}"),
     ]
 
 
@@ -180,13 +180,13 @@ def micros(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{(begun + round(s * 1e6)) % 2**32},{c!r},{r[0] / 3600!r},{r[1] / 3600!r},{r[2] / 3600!r}"
 
-    return ["micros,imu_temp_degC,gx_dps,gy_dps,gz_dps", *_rows(t, row)]
+    return ["micros,imu_temp_degC,gx_dps,gy_dps,gz_dps", *lines_of(t, row)]
 
 
 @text()
 def arduino(t: Truth) -> list[str]:
     """No header, no times, raw counts: everything is stated."""
-    return _rows(t, lambda k, s, c, r: f"{c!r},{r[0] / 3600 * 131!r}")
+    return lines_of(t, lambda k, s, c, r: f"{c!r},{r[0] / 3600 * 131!r}")
 
 
 @text()
@@ -195,7 +195,7 @@ def fixed_rate(t: Truth) -> list[str]:
         "Serial: RLG-77",
         "Sample rate: 0.1 Hz",
         "Temperature [degC];Rate [deg/h]",
-        *_rows(t, lambda k, s, c, r: f"{c!r};{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{c!r};{r[0]!r}"),
     ]
 
 
@@ -208,41 +208,41 @@ def grouped(t: Truth) -> list[str]:
         ",,Accel,,,Gyro,,",
         "Time,Temp,X,Y,Z,X,Y,Z",
         "[s],[degC],[m/s^2],[m/s^2],[m/s^2],[deg/s],[deg/s],[deg/s]",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
 @text()
 def trailing(t: Truth) -> list[str]:
-    return ["time_ms,temp_degC,rate_dph,", *_rows(t, lambda k, s, c, r: f"{s * 1e3:.0f},{c!r},{r[0]!r},")]
+    return ["time_ms,temp_degC,rate_dph,", *lines_of(t, lambda k, s, c, r: f"{s * 1e3:.0f},{c!r},{r[0]!r},")]
 
 
 @text()
 def quoted(t: Truth) -> list[str]:
     return [
         '"Time (s)","Temperature (°C)","Rate (°/h)","Status"',
-        *_rows(t, lambda k, s, c, r: f'"{s!r}","{c!r}","{r[0]!r}","OK"'),
+        *lines_of(t, lambda k, s, c, r: f'"{s!r}","{c!r}","{r[0]!r}","OK"'),
     ]
 
 
 @text()
 def missing(t: Truth) -> list[str]:
     """Readings that were lost, a header in the middle, an unfinished last line."""
-    lines = _rows(t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}")
+    lines = lines_of(t, lambda k, s, c, r: f"{s!r},{c!r},{'' if k % 50 == 7 else 'NaN' if k % 50 == 9 else repr(r[0])}")
     head = "time_s,temp_c,rate_dph"
     return [head, *lines[:100], head, *lines[100:]]
 
 
 @text("utf-8", "\r")
 def old_mac(t: Truth) -> list[str]:
-    return ["time_s;temperature_c;rate_dph", *_rows(t, lambda k, s, c, r: f"{s!r};{c!r};{r[0]!r}")]
+    return ["time_s;temperature_c;rate_dph", *lines_of(t, lambda k, s, c, r: f"{s!r};{c!r};{r[0]!r}")]
 
 
 @text()
 def epoch(t: Truth) -> list[str]:
     return [
         "timestamp_ns|temperature_c|rate_dph",
-        *_rows(t, lambda k, s, c, r: f"{1772352000_000000000 + round(s * 1e9)}|{c!r}|{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{1772352000_000000000 + round(s * 1e9)}|{c!r}|{r[0]!r}"),
     ]
 
 
@@ -250,7 +250,7 @@ def epoch(t: Truth) -> list[str]:
 def days(t: Truth) -> list[str]:
     return [
         "excel time,temp K,rate",
-        *_rows(t, lambda k, s, c, r: f"{46082.0 + s / 86400:.12f},{c + 273.15!r},{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{46082.0 + s / 86400:.12f},{c + 273.15!r},{r[0]!r}"),
     ]
 
 
@@ -259,14 +259,14 @@ def midnight(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{START + timedelta(hours=15.7, seconds=float(s)):%H:%M:%S};{c!r};{r[0]!r}"
 
-    return ["Uhrzeit;Temp (C);Rate (deg/h)", *_rows(t, row)]
+    return ["Uhrzeit;Temp (C);Rate (deg/h)", *lines_of(t, row)]
 
 
 @text()
 def julian(t: Truth) -> list[str]:
     return [
         "stamp,T [degC],rate [deg/h]",
-        *_rows(t, lambda k, s, c, r: f"{_at(s):%Y-%j %H:%M:%S},{c!r},{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{instant_at(s):%Y-%j %H:%M:%S},{c!r},{r[0]!r}"),
     ]
 
 
@@ -277,7 +277,7 @@ def two_lines(t: Truth) -> list[str]:
         "% operator: B",
         "Elapsed Time;Housing Temp;Angular Rate;Supply",
         "(sec);(K);(arcsec/s);(mV)",
-        *_rows(t, lambda k, s, c, r: f"{s!r};{c + 273.15!r};{r[0]!r};{5000 + k}"),
+        *lines_of(t, lambda k, s, c, r: f"{s!r};{c + 273.15!r};{r[0]!r};{5000 + k}"),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import timedelta
 from math import radians
 
-from logger_files import Case, Truth, _at, _de, _rows, text
+from logger_files import Case, Truth, german_number, instant_at, lines_of, text
 
 _EPOCH_MS = 1_772_352_000_000
 _NARROW = "\u202f"  # no-break space of French thousands
@@ -18,22 +18,22 @@ def campbell(t: Truth) -> list[str]:
         '"TIMESTAMP","RECORD","BattV_Min","T_gyro_Avg","Rate_Avg"',
         '"TS","RN","Volts","Deg C","deg/h"',
         '"","","Min","Avg","Avg"',
-        *_rows(t, lambda k, s, c, r: f'"{_at(s):%Y-%m-%d %H:%M:%S}",{k},12.7,{c!r},{r[0]!r}'),
+        *lines_of(t, lambda k, s, c, r: f'"{instant_at(s):%Y-%m-%d %H:%M:%S}",{k},12.7,{c!r},{r[0]!r}'),
     ]
 
 
 @text("ascii", "\r\n")
 def keysight(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{k + 1},{_at(s):%m/%d/%Y %H:%M:%S}:000,{c!r},{r[0] / 40.0!r}"
+        return f"{k + 1},{instant_at(s):%m/%d/%Y %H:%M:%S}:000,{c!r},{r[0] / 40.0!r}"
 
-    return ["Sweep #,Time,Chan 101 (C),Chan 202 (VDC)", *_rows(t, row)]
+    return ["Sweep #,Time,Chan 101 (C),Chan 202 (VDC)", *lines_of(t, row)]
 
 
 @text("ascii", "\r\n")
 def benchlink(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{k + 1},{_at(s):%m/%d/%Y %H:%M:%S}:000,{c!r},0,{r[0] / 40.0!r},0"
+        return f"{k + 1},{instant_at(s):%m/%d/%Y %H:%M:%S}:000,{c!r},0,{r[0] / 40.0!r},0"
 
     return [
         "Name:,gyro 7", "Owner:,lab", "Comments:,", "Acquisition Date:,3/1/2026 8:00:00 AM",
@@ -42,7 +42,7 @@ def benchlink(t: Truth) -> list[str]:
         "101,T_gyro,Temp (Type K),,,1,0,C", "202,Rate,DC Voltage,AUTO,5.5,1,0,VDC",
         "Scan Control:", "Start Action:,Immediately", "",
         "Scan,Time,101 <T_gyro> (C),Alarm 101,202 <Rate> (VDC),Alarm 202",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]  # fmt: skip
 
 
@@ -62,25 +62,28 @@ def _lvm(separator: str, decimal: str) -> list[str]:
 
 @text("cp1252", "\r\n")
 def labview(t: Truth) -> list[str]:
-    return [*_lvm("\t", "."), *_rows(t, lambda k, s, c, r: f"{s:.6f}\t{c:.9f}\t{r[0] / 3600:.12f}\t")]
+    return [*_lvm("\t", "."), *lines_of(t, lambda k, s, c, r: f"{s:.6f}\t{c:.9f}\t{r[0] / 3600:.12f}\t")]
 
 
 @text("cp1252", "\r\n")
 def labview_german(t: Truth) -> list[str]:
-    return [*_lvm("\t", ","), *_rows(t, lambda k, s, c, r: f"{_de(s)}\t{_de(c)}\t{_de(r[0] / 3600, 12)}\t")]
+    return [
+        *_lvm("\t", ","),
+        *lines_of(t, lambda k, s, c, r: f"{german_number(s)}\t{german_number(c)}\t{german_number(r[0] / 3600, 12)}\t"),
+    ]
 
 
 @text("utf-8-sig", "\r\n")
 def hobo(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         logged = "Logged" if k == 0 else ""
-        return f"{k + 1},{_at(s):%m/%d/%y %I:%M:%S %p},{c * 1.8 + 32!r},{r[0]!r},{logged}"
+        return f"{k + 1},{instant_at(s):%m/%d/%y %I:%M:%S %p},{c * 1.8 + 32!r},{r[0]!r},{logged}"
 
     return [
         '"Plot Title: gyro"',
         '"#","Date Time, GMT+00:00","Temp, °F (LGR S/N: 10345, SEN S/N: 10345, LBL: gyro)",'
         '"Rate, deg/h (LGR S/N: 10345, SEN S/N: 10346)","Coupler Attached (LGR S/N: 10345)"',
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -95,7 +98,7 @@ def xsens(t: Truth) -> list[str]:
         "//  DeviceId: 00B42D4F", "//  ProductCode: MTI-670", "// Device settings:",
         "//  Filter Profile: human(46.1)", "// Coordinate system: ENU",
         "PacketCounter\tSampleTimeFine\tYear\tMonth\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tTemperature\t",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]  # fmt: skip
 
 
@@ -107,7 +110,7 @@ def vectornav(t: Truth) -> list[str]:
     return [
         "Time.TimeStartup [ns],Imu.UncompGyro.X [rad/s],Imu.UncompGyro.Y [rad/s],Imu.UncompGyro.Z [rad/s],"
         "Imu.Temp [C],Imu.Pres [kPa]",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -120,7 +123,7 @@ def sbg(t: Truth) -> list[str]:
     return [
         "timestamp\tstatus\taccelX\taccelY\taccelZ\tgyroX\tgyroY\tgyroZ\ttemperature",
         "(us)\t(na)\t(m.s^-2)\t(m.s^-2)\t(m.s^-2)\t(deg.s^-1)\t(deg.s^-1)\t(deg.s^-1)\t(degC)",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -131,7 +134,7 @@ def adis(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{k},{r[0] / 3600 * 655360 * 1000:.0f},{round(c * 10000)}"
 
-    return ["DATA_CNTR,Z_GYRO_OUT,TEMP_OUT", *_rows(t, row)]
+    return ["DATA_CNTR,Z_GYRO_OUT,TEMP_OUT", *lines_of(t, row)]
 
 
 @text("utf-16-le", "\r\n")
@@ -139,9 +142,9 @@ def excel(t: Truth) -> list[str]:
     """'Unicode text' of a German spreadsheet: UTF-16 with a mark, tabs, decimal commas."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_at(s):%d.%m.%Y %H:%M:%S}\t{_de(c)}\t{_de(r[0])}"
+        return f"{instant_at(s):%d.%m.%Y %H:%M:%S}\t{german_number(c)}\t{german_number(r[0])}"
 
-    return ["\ufeffDatum/Uhrzeit\tTemperatur Kreisel (°C)\tDrehrate (°/h)", *_rows(t, row)]
+    return ["\ufeffDatum/Uhrzeit\tTemperatur Kreisel (°C)\tDrehrate (°/h)", *lines_of(t, row)]
 
 
 @text("cp1252", "\r\n")
@@ -149,13 +152,15 @@ def chamber(t: Truth) -> list[str]:
     """The log of a climate chamber whose recorder also had the gyro."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        one = f"{_at(s):%d.%m.%Y};{_at(s):%H:%M:%S}"
-        return f"{one};{_de(c + 1.5, 1)};{_de(c + 1.0, 1)};{_de(c)};{_de(r[0])};"
+        one = f"{instant_at(s):%d.%m.%Y};{instant_at(s):%H:%M:%S}"
+        return (
+            f"{one};{german_number(c + 1.5, 1)};{german_number(c + 1.0, 1)};{german_number(c)};{german_number(r[0])};"
+        )
 
     return [
         "Archiv;VT 4020", "Anlagennummer;58566123", "Programm;Kreisel 5K/min", "",
         "Datum;Uhrzeit;Temperatur Sollwert [°C];Temperatur Istwert [°C];Pt100 Kreisel [°C];Drehrate [°/h];",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]  # fmt: skip
 
 
@@ -166,24 +171,24 @@ def _thousands(value: float, mark: str, digits: int) -> str:
 @text("utf-8", "\r\n")
 def german_thousands(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_thousands(s, '.', 1)};{_de(c)};{_de(r[0])}"
+        return f"{_thousands(s, '.', 1)};{german_number(c)};{german_number(r[0])}"
 
-    return ["Zeit [s];Temperatur [°C];Drehrate [°/h]", *_rows(t, row)]
+    return ["Zeit [s];Temperatur [°C];Drehrate [°/h]", *lines_of(t, row)]
 
 
 @text("utf-8", "\r\n")
 def french_thousands(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{_thousands(s, _NARROW, 1)};{_de(c)};{_de(r[0])}"
+        return f"{_thousands(s, _NARROW, 1)};{german_number(c)};{german_number(r[0])}"
 
-    return ["Temps (s);Température (°C);Vitesse angulaire (°/h)", *_rows(t, row)]
+    return ["Temps (s);Température (°C);Vitesse angulaire (°/h)", *lines_of(t, row)]
 
 
 @text()
 def epoch_ms(t: Truth) -> list[str]:
     return [
         "timestamp,temperature_c,rate_dph",
-        *_rows(t, lambda k, s, c, r: f"{_EPOCH_MS + round(s * 1e3)},{c!r},{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"{_EPOCH_MS + round(s * 1e3)},{c!r},{r[0]!r}"),
     ]
 
 
@@ -198,7 +203,7 @@ def gps(t: Truth) -> list[str]:
 
     return [
         "GPS Week,GPS TOW (s),Gyro X (deg/s),Gyro Y (deg/s),Gyro Z (deg/s),IMU Temperature (deg C)",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -207,7 +212,7 @@ def graphtec(t: Truth) -> list[str]:
     """Signs are separated from the digits, the milliseconds in a column of their own."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        return f"{k + 1},{_at(s):%Y/%m/%d %H:%M:%S},000,+ {c:.9f},+ {r[0]:.9f},LLLLLLLLLL,LLLL"
+        return f"{k + 1},{instant_at(s):%Y/%m/%d %H:%M:%S},000,+ {c:.9f},+ {r[0]:.9f},LLLLLLLLLL,LLLL"
 
     return [
         "Vendor,GRAPHTEC Corporation", "Model,GL840,Version,Ver1.10", "Sampling interval,10s",
@@ -216,7 +221,7 @@ def graphtec(t: Truth) -> list[str]:
         "Logic/Pulse,Off", "Data",
         "Number,Date&Time,ms,T_gyro,rate,Alarm1-10,AlarmOut",
         "NO.,Time,ms,degC,deg/h,A1234567890,A1234",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]  # fmt: skip
 
 
@@ -225,7 +230,7 @@ def mems_studio(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
         return f"{round(s * 1e6)}\t" + "\t".join(repr(v / 3.6) for v in r) + f"\t{c!r}"
 
-    return ["Time [us]\tG_X [mdps]\tG_Y [mdps]\tG_Z [mdps]\tTemperature [C]", *_rows(t, row)]
+    return ["Time [us]\tG_X [mdps]\tG_Y [mdps]\tG_Z [mdps]\tTemperature [C]", *lines_of(t, row)]
 
 
 @text()
@@ -239,7 +244,7 @@ def rostopic(t: Truth) -> list[str]:
     accel = ",".join(f"field.linear_acceleration.{axis}" for axis in "xyz")
     return [
         f"%time,field.header.seq,field.header.stamp,field.header.frame_id,{gyro},{accel},field.temperature",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -252,7 +257,7 @@ def ulog2csv(t: Truth) -> list[str]:
     return [
         "timestamp,timestamp_sample,device_id,x,y,z,temperature,error_count,clip_counter[0],clip_counter[1],"
         "clip_counter[2]",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -261,10 +266,10 @@ def fluke(t: Truth) -> list[str]:
     """A data acquisition unit: local stamps with a.m. and p.m., a column of status beside each channel."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        at = _at(s)
+        at = instant_at(s)
         return f"{k + 1},{at.month}/{at.day}/{at.year} {at:%I:%M:%S.}000 {at:%p},{c!r},OK,{r[0]!r},OK"
 
-    return ["Scan,Time,Ch101 T_gyro (Deg C),Ch101 Status,Ch102 Rate (Deg/Hr),Ch102 Status", *_rows(t, row)]
+    return ["Scan,Time,Ch101 T_gyro (Deg C),Ch101 Status,Ch102 Rate (Deg/Hr),Ch102 Status", *lines_of(t, row)]
 
 
 @text()
@@ -276,7 +281,7 @@ def honeywell(t: Truth) -> list[str]:
     return [
         "Message Count, Elapsed Time (sec), Angular Rate X (rad/sec), Angular Rate Y (rad/sec), "
         "Angular Rate Z (rad/sec), Gyro Temp (degC)",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -285,23 +290,23 @@ def keithley(t: Truth) -> list[str]:
     """Time of day with parts in brackets of its own, a relative time beside it."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        at = _at(s) + timedelta(milliseconds=0)
+        at = instant_at(s) + timedelta(milliseconds=0)
         return f"{k + 1},{r[0]!r},{s:.6f},{at:%m/%d/%Y},{at:%H:%M:%S},0.000000,{c!r}"
 
     return [
         '"Model","DMM6500"', '"Serial number","04450123"', '"Buffer","defbuffer1"', "",
         "Index,Rate (deg/h),Relative Time (s),Date,Time,Fractional Seconds,Temperature (Celsius)",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]  # fmt: skip
 
 
 @text()
 def parts(t: Truth) -> list[str]:
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        at = _at(s)
+        at = instant_at(s)
         return f"{at.year},{at.month},{at.day},{at.hour},{at.minute},{at.second},{c!r},{r[0]!r}"
 
-    return ["Year,Month,Day,Hour,Minute,Second,temp_c,rate_dph", *_rows(t, row)]
+    return ["Year,Month,Day,Hour,Minute,Second,temp_c,rate_dph", *lines_of(t, row)]
 
 
 @text("ascii", "\r\n")
@@ -309,10 +314,10 @@ def milliseconds(t: Truth) -> list[str]:
     """Two rows a second: whole seconds in the stamp, the rest in the next column."""
 
     def row(k: int, s: float, c: float, r: list[float]) -> str:
-        at = _at(s / 20.0)
+        at = instant_at(s / 20.0)
         return f"{k + 1},{at:%Y/%m/%d %H:%M:%S},{at.microsecond // 1000},{c!r},{r[0]!r}"
 
-    return ["Number,Date&Time,ms,T_gyro,rate", "NO.,Time,ms,degC,deg/h", *_rows(t, row)]
+    return ["Number,Date&Time,ms,T_gyro,rate", "NO.,Time,ms,degC,deg/h", *lines_of(t, row)]
 
 
 @text()
@@ -323,7 +328,7 @@ def imar(t: Truth) -> list[str]:
     return [
         "% IMU data, decoded",
         "%GPS-Time [s] omg_x[deg/s] omg_y[deg/s] omg_z[deg/s] acc_x [m/s2] Temp [degC]",
-        *_rows(t, row),
+        *lines_of(t, row),
     ]
 
 
@@ -332,7 +337,7 @@ def hexadecimal(t: Truth) -> list[str]:
     """Milliseconds of a counter as a debugger prints them; the unit of the rate behind a blank."""
     return [
         "tick_ms,Temp C,Rate deg/hr",
-        *_rows(t, lambda k, s, c, r: f"0x{round(1000 * s):08X},{c!r},{r[0]!r}"),
+        *lines_of(t, lambda k, s, c, r: f"0x{round(1000 * s):08X},{c!r},{r[0]!r}"),
     ]
 
 
@@ -341,7 +346,7 @@ def pipes(t: Truth) -> list[str]:
     return [
         "|time s|T degC|rate deg / h|",
         "|---|---|---|",
-        *_rows(t, lambda k, s, c, r: f"|{s!r}|{c!r}|{r[0]!r}|"),
+        *lines_of(t, lambda k, s, c, r: f"|{s!r}|{c!r}|{r[0]!r}|"),
     ]
 
 

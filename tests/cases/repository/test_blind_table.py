@@ -8,7 +8,7 @@ import pytest
 
 from tests.blind import both
 from tests.blind.grade import shipped_worse
-from tests.blind.table import _gains, ended
+from tests.blind.table import ended, gains_of
 
 
 def _answered(stratum: str, truth: list[str], k: float, named: list[str], p: float, **other: Any) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def _row(named: list[str], before2: float, after2: float) -> dict[str, object]:
 
 def test_what_is_gained_is_counted_over_all_that_was_hidden() -> None:
     """Over what was named rightly alone a cause that is never named gains nothing, and costs nothing."""
-    reported = {t["name"]: t for t in _gains([_row(["hysteresis"], 3.0, 1.0), _row([], 3.0, 3.0)])}
+    reported = {t["name"]: t for t in gains_of([_row(["hysteresis"], 3.0, 1.0), _row([], 3.0, 3.0)])}
     assert reported["held-out gain as share of the oracle's, k ≥ 1.7 (pooled)"]["value"] == pytest.approx(1.0)
     of_all = reported["... of all that hide hysteresis, named or not"]
     assert of_all["value"] == pytest.approx(0.5) and of_all["of"] == 2 and not of_all["met"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import packed, require
+from conftest import require
 from emitted import emitted
 from gyrotc.common import CheckFailed, InputError
 from gyrotc.results import cache
@@ -198,6 +198,12 @@ def test_another_compiler_of_the_same_name_makes_its_own_objects(
     assert compiled.count == 6, "a compiler that cannot be distinguished from others compiles each time"
 
 
+def _kept(path: Path, content: bytes) -> bytes:
+    """Return the file that keeps a content under the name of `path`."""
+    cache.keep(path.name, content)
+    return path.read_bytes()
+
+
 def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path, compiled: _Compiled) -> None:
     sound = _asked(source, tmp_path)
     [path] = cache.folder().glob("*.object")
@@ -213,8 +219,8 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
         whole[:-9] + bytes([whole[-9] ^ 1]) + whole[-8:],
         other.read_bytes(),  # of another text, sound in itself
         whole[:head] + whole[head:].replace(b"one", b"two", 1),
-        packed(path.name, b"{}\n" + sound.code),
-        packed(path.name, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
+        _kept(path, b"{}\n" + sound.code),
+        _kept(path, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
     )
     for k, content in enumerate(spoiled, 3):
         path.write_bytes(content)

@@ -44,7 +44,7 @@ def test_links_of_a_page_lead_to_what_the_site_has(page: Path) -> None:
     assert name is not None and site_pages.source(name) == page
     text = site_pages.prepared(page.read_text("utf-8"), page, name)
     assert not re.search(r"^```[a-z]+ ", text, re.MULTILINE)
-    for _, target, _ in site_pages._LINK.findall(site_pages._BLOCK.sub("", text)):
+    for _, target, _ in site_pages.LINK.findall(site_pages.BLOCK.sub("", text)):
         if not re.match(r"[a-z]+:|//", target):
             there = os.path.normpath(Path(name).parent / target)
             assert site_pages.source(there).is_file(), f"{target} is no file of the site"
@@ -54,9 +54,9 @@ def test_links_of_a_page_lead_to_what_the_site_has(page: Path) -> None:
 def test_no_link_of_a_page_that_is_made_is_lost(name: str) -> None:
     """A link to what the site does not have becomes its words alone."""
     text = reference.PAGES[name]()
-    links = site_pages._LINK.findall(site_pages._BLOCK.sub("", text))
+    links = site_pages.LINK.findall(site_pages.BLOCK.sub("", text))
     made = site_pages.prepared(text, ROOT / "docs" / name, name)
-    assert len(site_pages._LINK.findall(site_pages._BLOCK.sub("", made))) == len(links)
+    assert len(site_pages.LINK.findall(site_pages.BLOCK.sub("", made))) == len(links)
 
 
 class _References(HTMLParser):
