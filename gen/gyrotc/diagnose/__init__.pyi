@@ -56,6 +56,7 @@ from .profile_likelihood import best_of as best_of
 from .profile_likelihood import clear_pair as clear_pair
 from .profile_likelihood import makes_sense as makes_sense
 from .refinement import Refined as Refined
+from .refinement import cancelling as cancelling
 from .refinement import model_columns as model_columns
 from .refinement import parabola_top as parabola_top
 from .refinement import profile_interval as profile_interval

@@ -21,7 +21,7 @@ from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
 from .posterior import Rival, odds_of, probabilities_of, remaining
 from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
-from .refinement import Refined, model_columns, refine, sized
+from .refinement import Refined, cancelling, model_columns, refine, sized
 from .rivals import calibrated, kinds_of, ranked_rivals
 from .search import Search
 from .unexplained import Contest, Misfit, contest, explained, misfit
@@ -276,7 +276,7 @@ def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:
 def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ...]) -> _Stage:
     """The pair, or three causes, where these leave nothing; else the single cause with its remainder."""
     two = _stage(search, gains, pair)
-    if two is None:
+    if two is None or cancelling(two.refined):
         return one
     third = _third(two.found, pair) if two.remains else None
     if third is not None:
@@ -289,7 +289,7 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
 
 def _plausible(gains: Gains, causes: tuple[Refined, ...]) -> bool:
     """Whether no cause is larger than is accepted: the third one comes from the search, which asks for no size."""
-    return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate))
+    return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate)) and not cancelling(causes)
 
 
 def choose(search: Search, count: int) -> tuple[Refined, ...]:

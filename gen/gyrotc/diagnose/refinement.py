@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -117,6 +118,12 @@ class Refined:
 def model_columns(causes: Sequence[Refined]) -> FloatArray:
     """All columns that stand in the model when the causes are named: theirs, their tangents, masked edges."""
     return np.column_stack([b for c in causes for b in (c.columns, c.tangent, c.edges) if b is not None])
+
+
+def cancelling(causes: Sequence[Refined]) -> bool:
+    """Test whether two of the causes together do less than either alone: each is then there to take off the other."""
+    pairs = itertools.combinations([c.contribution for c in causes if sized(c.candidate)], 2)
+    return any(float((a + b).std()) < min(float(a.std()), float(b.std())) for a, b in pairs)
 
 
 def _columns(search: Search, candidate: Candidate) -> FloatArray:

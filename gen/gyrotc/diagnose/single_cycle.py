@@ -32,7 +32,7 @@ from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, price_of, searched, shape_parameter
 from .posterior import EQUIVALENT, Rival
 from .profile_likelihood import SEPARATION
-from .refinement import Interval, Refined
+from .refinement import Interval, Refined, cancelling
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
 _MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
@@ -264,7 +264,8 @@ class Cycle:
     @property
     def causes(self) -> tuple[Refined, ...]:
         """The states, where they are named: clearly better than these, and not refuted by branches left out."""
-        return self.able if self.chosen is not None and self.lead >= EQUIVALENT and not self.refuted else ()
+        clear = self.chosen is not None and self.lead >= EQUIVALENT
+        return self.able if clear and not self.refuted and not cancelling(self.states) else ()
 
     @property
     def lead(self) -> float:
@@ -282,6 +283,8 @@ class Cycle:
             )
         if self.chosen is None or self.causes:
             return ""
+        if cancelling(self.states):
+            return "two memories that take each other off explain this cycle: record the same cycle at another rate"
         if self.refuted:
             return "memory that explains this cycle fails on branches left out: record the same cycle at another rate"
         return (

@@ -36,6 +36,7 @@ from gyrotc.diagnose import (
     Whitener,
     attribute,
     best_of,
+    cancelling,
     centred_slope,
     choose,
     clear_pair,
@@ -528,6 +529,20 @@ def test_all_combinations_of_states_explain_what_least_squares_say(case: Case) -
         assert float(np.sum(fits.left(members) ** 2)) == pytest.approx(rest, rel=1e-6)
     same = fits.energies((kinds[0], kinds[0]))
     assert not same[np.tril_indices(len(same))].any(), "a state is not its own partner"
+
+
+def test_causes_that_take_each_other_off_are_no_pair() -> None:
+    """Two gradients of opposite sign were named on a measured cycle: the difference of two guesses is no cause."""
+    course = np.sin(np.arange(200.0) / 20.0)
+
+    def cause(contribution: Array) -> Refined:
+        candidate = Candidate("thermal_gradient", {"tau_s": 500.0}, "columns")
+        return Refined(candidate, contribution[:, None], None, {}, contribution, None, None)
+
+    assert cancelling([cause(course), cause(-0.9 * course)])
+    assert not cancelling([cause(course), cause(-0.4 * course)]), "together they are larger than the second"
+    assert not cancelling([cause(course), cause(0.9 * course)])
+    assert not cancelling([cause(course)])
 
 
 def test_nothing_is_taken_from_an_empty_model() -> None:

@@ -51,7 +51,6 @@ def built(tmp_path_factory: pytest.TempPathFactory, gyrotc: Command) -> Path:
     data = simulated(folder, GRADIENT)
     done = gyrotc("build", data, "--out", folder / "result", "--extend", *HOST)
     assert done.returncode == 0, done.stderr
-    (folder / "stdout").write_text(done.stdout)
     return folder
 
 
@@ -72,7 +71,6 @@ def test_the_cause_is_named_with_its_size(built: Path) -> None:
 def test_the_extended_model_is_emitted_and_verified(built: Path) -> None:
     folder = built / "result"
     assert [t["id"] for t in read_json(folder / "model.json")["terms"]] == ["thermal_gradient"]
-    assert "gtc_f32_term_memory" in (folder / "c" / "gtc_sim_0004.c").read_text()
     verification = read_json(folder / "verify.json")
     assert verification["failed"] == 0 and verification["passed"] > 0
     assert read_json(folder / "evaluate.json")["mismatches"] == 0
@@ -90,9 +88,7 @@ def test_the_compiled_code_gains_what_the_diagnosis_promises(built: Path) -> Non
     assert promised["forward_in_time"] is not None, "the exam runs are later than all training runs"
 
 
-def test_build_tells_what_was_added(built: Path) -> None:
-    text = (built / "stdout").read_text()
-    assert "added: thermal_gradient" in text
+def test_the_report_tells_what_was_added(built: Path) -> None:
     page = (built / "result" / "report.html").read_text("utf-8")
     assert "What was added, and what it gains" in page and 'href="diagnosis/report.html"' in page
 
@@ -124,9 +120,11 @@ def test_report_draws_the_same_page_again_from_the_two_results_alone(
     built: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
     folder = built / "result" / "diagnosis"
-    for name in ("diagnose.json", "series.json"):
-        shutil.copy(folder / name, tmp_path)
-    assert gyrotc("report", tmp_path).returncode == 0
+    for name in ("diagnose.json", "series.json", "SHA256SUMS"):
+        if (folder / name).exists():
+            shutil.copy(folder / name, tmp_path)
+    done = gyrotc("report", tmp_path)
+    assert done.returncode == 0, done.stderr
     assert (tmp_path / "report.html").read_bytes() == (folder / "report.html").read_bytes()
 
 
@@ -358,9 +356,9 @@ def test_every_run_is_followed_once_and_before_the_search(case: Case, monkeypatc
     order = []
     played, searched = refits.play_runs, stages.analyse
 
-    def playing(dataset: Any, runs: Any, front: Any, **options: Any) -> Any:
+    def playing(dataset: Any, runs: Any, front: Any, judged: Any, **options: Any) -> Any:
         order.extend(run.file for run in runs)
-        return played(dataset, runs, front, **options)
+        return played(dataset, runs, front, judged, **options)
 
     def searching(*arguments: Any) -> Any:
         order.append("search")
