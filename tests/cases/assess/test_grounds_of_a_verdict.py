@@ -18,7 +18,9 @@ from conftest import HOST, run_gyrotc
 from gyrotc.assess import LEAST_POWER_ONS
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from read_pictures import panels_of, pictures_of
 from recordings import write_csv
+from scipy.spatial import cKDTree
 
 Rows = dict[str, np.ndarray]
 PERIOD_S = 10.0
@@ -245,3 +247,17 @@ def test_a_limit_that_a_constant_keeps_is_named(tmp_path: Path) -> None:
     }  # fmt: skip
     page = (found["out"] / "report.html").read_text("utf-8")
     assert page.count("a constant keeps it, too") == sum(kept.values())
+
+
+def test_a_constant_moves_no_dot_of_the_first_picture(plain: dict[str, Any], tmp_path: Path) -> None:
+    """Each dot with an offset of 10 deg/h is where one is without, and the other way round."""
+    offset = all_rows(lambda rows: rows | {"rate_dph": rows["rate_dph"] + 10.0})(unit())
+    found = built(tmp_path, written(tmp_path / "RLG-1", offset))
+    drawn = []
+    for result in (plain, found):
+        (first, *_) = pictures_of((result["out"] / "report.html").read_text("utf-8"))
+        drawn.append([np.concatenate([s.pixels for s in p.series if s.kind == "dots"]) for p in panels_of(first)])
+    for before, after in zip(*drawn, strict=True):
+        for some, others in ((before, after), (after, before)):
+            away, _ = cKDTree(others).query(some, p=np.inf)
+            assert away.max() < 1.0, "a point of the picture"
