@@ -14,7 +14,7 @@ from gyrotc.mirror import Course, CourseChannel, TermOutcome
 from middle_values import middle_values
 
 PACKAGE = Path(__file__).resolve().parents[3] / "gen" / "gyrotc"
-MOST_LITERALS = 14  # of them three are fields of what a lot or a prior holds: no rule about a cause
+MOST_LITERALS = 15  # of them three are fields of what a lot or a prior holds: no rule about a cause
 
 
 def test_a_cause_has_its_own_id_and_rank() -> None:
