@@ -218,14 +218,14 @@ def test_slopes_of_the_bias_are_those_of_a_plane(demo: Path, page: str) -> None:
     assert digits(row_of(table, "slope in temperature rate, deg/h/(C/min)")[1], plane[2], share=0.1)
 
 
-def test_candidates_are_compared_with_a_constant_the_right_way_round(page: str, training: dict[str, Any]) -> None:
-    """A constant leaves so many times what this correction leaves: above 1 for a better one."""
-    table = table_with(page, "a constant leaves")[1:]
+def test_candidates_stand_with_what_they_leave_and_the_chosen_one_is_marked(
+    page: str, training: dict[str, Any]
+) -> None:
+    table = table_with(page, "loss: above the best, %")[1:]
     assert len(table) == len(training["candidates"])
-    rms = {row["id"]: row["left_out_rms_dph"] for row in training["candidates"]}
     for cells, row in zip(table, training["candidates"], strict=True):
         assert digits(cells[1], row["left_out_rms_dph"], share=0.06)
-        assert digits(cells[2], rms["constant"] / row["left_out_rms_dph"], share=0.05)
+        assert cells[2] == ("–" if row.get("loss") is None else f"{100.0 * row['loss']:.1f}")
         assert (cells[4] == "chosen") == row["chosen"]
 
 
