@@ -19,17 +19,19 @@ Stages = Sequence[tuple[str, float]]
 """How the text of a stage begins, and its share of the time; a later text never tells less than an earlier one."""
 
 # Shares of the time as `-v` tells it for `gyrotc simulate paper --seed 1`, two processors; a guess for other data.
-FIT: Stages = (("reading", 0.5), ("training", 0.3), ("leaving out span", 0.2))
+FIT: Stages = (("judging rows", 0.4), ("reading", 0.1), ("training", 0.4), ("leaving out span", 0.1))
 # Of a map of 512 centers; a usual one takes a tenth of a second
 EMIT: Stages = (("rounding to f32", 0.2), ("rounding to q31", 0.65), ("answering the vectors", 0.15))
 VERIFY: Stages = (("comparing files", 0.05), ("", 0.75), ("replaying", 0.1), ("every input", 0.1))
 DIAGNOSE: Stages = (
-    ("reading", 0.05), ("training", 0.02), ("leaving out span", 0.02), ("screening", 0.02),
+    ("judging rows", 0.03), ("reading", 0.02), ("training", 0.02), ("leaving out span", 0.02),
+    ("screening", 0.02),
     ("computing the signatures", 0.55), ("searching for causes", 0.07), ("comparing with the simulation", 0.06),
     ("measuring the gain", 0.08), ("drawing", 0.13),
 )  # fmt: skip
 BUILD: Stages = (
-    ("reading", 0.11), ("training", 0.07), ("leaving out span", 0.02), ("emitting C", 0.03), ("verifying", 0.6),
+    ("judging rows", 0.09), ("reading", 0.02), ("training", 0.07), ("leaving out span", 0.02),
+    ("emitting C", 0.03), ("verifying", 0.6),
     ("replaying", 0.09), ("drawing the report", 0.08),
 )  # fmt: skip
 COMPARE: Stages = (("reading", 0.05), ("", 0.95))
