@@ -352,7 +352,10 @@ def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None
     refuse_above("recording_mib", size / 2**20, str(path), "MiB")
     need_memory(_TRACE_COPIES * size / _LEAST_ROW_BYTES, str(path), "its rows")
     with file:
-        read = pacsv.read_csv(file, pacsv.ReadOptions(use_threads=False), convert_options=types)
+        try:
+            read = pacsv.read_csv(file, pacsv.ReadOptions(use_threads=False), convert_options=types)
+        except pa.ArrowException as error:
+            raise InputError(str(path), str(error).splitlines()[0], "a trace as gyrotc wrote it") from error
     columns = [[np.zeros(0), *map(numpy_of, column.chunks)] for column in read.columns]
     del read
     time_s = np.concatenate(columns[0])

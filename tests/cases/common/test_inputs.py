@@ -310,10 +310,13 @@ def test_a_programme_that_never_ends(steps: str, minutes: str, reported: str, tm
 
 @pytest.mark.parametrize("time", ["1e18", "nan", "5.0"])
 def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
-    rows = [f"{t},20.0,1.0,1.0" for t in ("0.0", "10.0", time, "30.0")]
-    (tmp_path / "a.csv").write_text("\n".join(["time_s,temperature_c,rate_dph,compensated_dph", *rows]) + "\n")
+    rows = [f"{t},20.0,1.0,1.0,0" for t in ("0.0", "10.0", time, "30.0")]
+    head = "time_s,temperature_c,rate_dph,compensated_dph,status"
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows]) + "\n")
     run = EvaluatedRun.model_construct(file="a.csv")
     assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))
+    (tmp_path / "a.csv").write_text(f"{head.removesuffix(',status')}\n0,20,1,1\n")
+    assert "status" in refused(lambda: report._trace(tmp_path, run, 100.0))
 
 
 def _without(package: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,6 +99,7 @@ from gyrotc.results import (
     Statistic,
     Unexplained,
     json_text,
+    result_folder,
 )
 from gyrotc.train import MOST_TERMS, FitOptions, TrainingData, cleaned_samples
 from hypothesis import assume, given
@@ -818,8 +819,9 @@ def gain_on_unseen(low: float, high: float) -> GainOnUnseen:
 def test_the_page_describes_structure_without_a_name_and_has_the_detection_limits(tmp_path: Path) -> None:
     left = Unexplained(p_value=1e-6, share_explained=0.4, best_partial_match=("hysteresis",), looks_like="a switch")
     found = result("unexplained").model_copy(update={"unexplained": left})
-    (tmp_path / "diagnose.json").write_text(json_text(found.content()), "utf-8")
-    page = write_diagnosis_page(tmp_path).read_text("utf-8")
+    with result_folder(tmp_path / "d", "diagnose") as stage:
+        (stage.folder / "diagnose.json").write_text(json_text(found.content()), "utf-8")
+    page = write_diagnosis_page(tmp_path / "d").read_text("utf-8")
     assert VERDICTS["unexplained"] in page
     assert "account for 40 % of the structure" in page and "It looks more like a switch" in page
     assert "1.00·10⁻³ deg/h" in page and "not visible in this gyro" in page, "the detection limits"

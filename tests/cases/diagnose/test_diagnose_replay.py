@@ -42,6 +42,7 @@ from gyrotc.diagnose import (
 )
 from gyrotc.mirror import FollowedHistory, evaluate_map, first_order, follow_history, missed_before, play
 from gyrotc.model import Model
+from gyrotc.quality import Judged, Judgement, judge
 from gyrotc.recordings import Dataset, Rows, Run, joined_runs, load
 from gyrotc.simulate import simulate
 from gyrotc.tables import quantise
@@ -135,7 +136,8 @@ def recorded(
     monkeypatch.setattr(Run, "rows", lambda _: rows)
     (run,) = dataset.runs
     front = front_end([run], BLOCK_S)
-    (played,) = play_runs(dataset, [run], front)
+    everything = Judged((Judgement(run, len(rows), (float(time[0]), float(time[-1])), (), (), 0.0),))
+    (played,) = play_runs(dataset, [run], front, everything)
     return run, front, played
 
 
@@ -271,7 +273,7 @@ def test_a_fallback_model_takes_what_map_and_other_terms_leave_and_is_of_channel
     simulate(tmp_path / "short.toml", seed=4, out=tmp_path / "data")
     dataset = load(tmp_path / "data")
     runs = [run for run in dataset.runs if run.role == "train"]
-    played = play_runs(dataset, runs, front_end(runs, 10.0))
+    played = play_runs(dataset, runs, front_end(runs, 10.0), judge(dataset))
     effects = [Effect(id, VALUES[id], "supply_v" if id == "auxiliary" else None) for id in VALUES]
     effects = [e for e in effects if e.id in ("hysteresis", "auxiliary")]
     plain = fit_dataset(dataset, FitOptions(method="linear")).model
@@ -315,7 +317,7 @@ def test_a_play_gets_a_strength_over_temperature_where_recordings_ask_for_it(see
         (folder := tmp_path / f"{strength:g}").mkdir()
         dataset, one = _loops(folder, strength, seed)
         runs = [run for run in dataset.runs if run.role == "train"]
-        played = play_runs(dataset, runs, front_end(runs, 10.0))
+        played = play_runs(dataset, runs, front_end(runs, 10.0), judge(dataset))
         (found,) = completed(played, [one])
         if strength == 0.0:
             assert found == one, "nothing asks for it"

@@ -397,7 +397,7 @@ def empty() -> Dataset:
 
 
 def test_a_method_that_is_not_known_makes_no_model() -> None:
-    with pytest.raises(InputError, match=r"--method: 'magic'; expected .*mrbf_paper"):
+    with pytest.raises(InputError, match=r"method: 'magic'; expected .*mrbf_paper"):
         FitOptions(method="magic")
 
 

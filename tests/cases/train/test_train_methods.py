@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Command
-from gyrotc.cli.main import application
 from gyrotc.common import InputError
 from gyrotc.fleet import load_manifest
 from gyrotc.model import Model
-from gyrotc.recordings import DEFAULTS, load
+from gyrotc.recordings import load
 from gyrotc.train import FitOptions, TrainingData, average_samples, fit, fit_dataset, front_end, predict
 from numpy.typing import NDArray
 from recordings import columns, toml, write_csv
 from training_data import NOISE_DPH, rms, samples, true_bias
-from typer.main import get_command
 
 
 def error_of(found: object, seed: int = 0) -> float:
@@ -188,11 +186,6 @@ BAD = [
     ("block_s", "0.0"), ("block_s", "3600.1"), ("centers", "513"), ("centers", "-1"), ("seed", "-1"),
     ("method", "magic"),
 ]  # fmt: skip
-TAKEN = {
-    "fit": {"method", "channels"},
-    "build": {"method", "channels"},
-    "diagnose": {"method"},
-}
 
 
 def one_run(folder: Path) -> Path:
@@ -204,16 +197,17 @@ def one_run(folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("command", TAKEN)
-def test_a_command_refuses_a_bad_value_in_one_line_before_it_reads_anything(
-    command: str, tmp_path: Path, gyrotc: Command
+@pytest.mark.parametrize(("name", "value"), BAD)
+def test_a_data_set_that_states_a_bad_value_is_refused_in_one_line(
+    name: str, value: str, tmp_path: Path, gyrotc: Command
 ) -> None:
-    for name, value in BAD:
-        if name in TAKEN[command]:
-            done = gyrotc(command, "recordings", "--out", "out", f"--{name}={value}", cwd=tmp_path)
-            assert done.returncode == 2, (name, value)
-            assert done.stderr.startswith(f"gyrotc: --{name}: ") and done.stderr.count("\n") == 1
-    assert not list(tmp_path.iterdir())
+    described = one_run(tmp_path / "RLG-1") / "dataset.toml"
+    quoted = f'"{value}"' if name == "method" else value
+    described.write_text(f"{described.read_text()}\n[fit]\n{name} = {quoted}\n")
+    done = gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "out")
+    assert done.returncode == 2 and not (tmp_path / "out").exists()
+    assert done.stderr.startswith(f"gyrotc: {described}, ") and f"fit.{name}: " in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)
@@ -226,15 +220,6 @@ def test_a_manifest_refuses_what_the_commands_refuse_and_names_the_field(name: s
         load_manifest(manifest)
     assert refused.value.where == f"{manifest}, field options.{name}"
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("command", TAKEN)
-def test_a_command_offers_these_options_with_the_defaults_of_the_class(command: str) -> None:
-    parameters = {p.name: p for p in get_command(application()).commands[command].params}  # type: ignore[attr-defined]
-    offered = {name for name in DEFAULTS.__dataclass_fields__ if name in parameters}
-    assert offered == TAKEN[command]
-    for name in offered:
-        assert parameters[name].default == getattr(DEFAULTS, name), name
 
 
 def test_a_manifest_without_options_and_one_with_all_of_them(tmp_path: Path) -> None:
