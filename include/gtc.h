@@ -64,10 +64,10 @@ extern "C" {
 #define GTC_FALLBACK 16  /* temperature missing too long; constant correction of the table. Report the sensor */
 #define GTC_CHANNEL_LOST 32 /* an auxiliary channel missing too long; its fallback model is used. Report the sensor */
 #define GTC_E_ARG (-1)       /* NULL, not a number, count or size out of range. Count it and go on */
-#define GTC_E_LAYOUT (-2)    /* table of another layout, or it needs more than this runtime has. Do not compensate, report */
+#define GTC_E_LAYOUT (-2)    /* another layout, or the table needs more than this runtime has. Do not compensate, report */
 #define GTC_E_SELF_TEST (-3) /* wrong arithmetic or known answer: flags, library, memory. Do not compensate, report */
 #define GTC_E_IMAGE (-4)     /* corrupted or torn. check: report; open: use the built-in table; restore: init */
-#define GTC_E_ID (-5)        /* image, state or saved state of another table. Start again with gtc_<n>_init(); find out why */
+#define GTC_E_ID (-5)        /* image, state or saved state of another table. Start again with gtc_<n>_init() */
 #define GTC_E_PERIOD (-6)    /* no whole number of samples of this period makes a block. Do not compensate, report */
 #define GTC_E_ABSENT (-7)    /* the table holds no uncertainties, or no re-zero. Go on without the call */
 #define GTC_E_REST (-8)      /* a re-zero beyond 4 sigma: the vehicle moved, or Earth's rate is in it. Rest again */
@@ -124,14 +124,14 @@ GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *t
  *   - A missing or stuck reading, one too far from those before it, and a temperature outside the guard's range are
  *     held; an auxiliary reading outside its range counts as the edge (GTC_CLAMPED).
  *   - After start, a jump or a loss, a reading is accepted if it is at least the third of readings that agree, and
- *     comes the guard's time (1 s by default) or more after the first of them. Missing ones in between are neither for nor
- *     against them, as long as two lie less than the time apart after which the channel is lost. One that is stuck or
- *     outside the range begins them anew: so hand over a lost reading as missing, not as a number.
+ *     comes the guard's time (1 s by default) or more after the first of them. Missing ones in between are neither
+ *     for nor against them, as long as two lie less than the time apart after which the channel is lost. One that
+ *     is stuck or outside the range begins them anew: so hand over a lost reading as missing, not as a number.
  *   - Missing too long: GTC_FALLBACK for the temperature, GTC_CHANNEL_LOST for an auxiliary channel.
  *   - Times are put on a grid of periods, and periods without a reading count as missed: jitter below half a period
  *     does no harm, lost samples leave the slope right. A reading whose period is taken, or that comes up to 268 s
- *     before the last one, is not used (GTC_HELD); after a block of such calls each counts as a missed period, so a stopped clock
- *     ends in GTC_FALLBACK. Longer than an hour: in several calls with NULL.
+ *     before the last one, is not used (GTC_HELD); after a block of such calls each counts as a missed period, so a
+ *     stopped clock ends in GTC_FALLBACK. Longer than an hour: in several calls with NULL.
  * Returns the status of the correction in force, with GTC_HELD if this temperature was not accepted; GTC_E_ARG for a
  * state that is NULL or was never started, GTC_E_ID for one of another table.
  * Cost: about 40 operations a channel; the first call of a block also makes the correction (one map, slope_blocks

@@ -1,7 +1,6 @@
 /* gtc_f32.c - the runtime in float32.
  *
- * The algorithm is written once for both arithmetics, in the .inl files, in the names of gtc_names_f32.h. Read from top
- * to bottom: each function is before its callers.
+ * The algorithm is the same text in both arithmetics. Read from top to bottom: each function is before its callers.
  *
  * SPDX-License-Identifier: MIT
  */

@@ -1,7 +1,6 @@
 /* gtc_num_f32.h - the numbers of the float32 runtime: types, names and primitives.
  *
- * The algorithm (gtc_map.inl, gtc_front.inl, ...) is written once in the names below; a second
- * header, gtc_num_q31.h, gives the same names in fixed point.
+ * The algorithm is written once in the names below, which fixed point has, too.
  *
  * Every IEEE operation is a statement of its own, assigned to a float. An assignment rounds to
  * float whatever FLT_EVAL_METHOD is, and a strict compiler contracts nothing across statements;

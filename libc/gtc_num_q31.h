@@ -1,6 +1,6 @@
 /* gtc_num_q31.h - the numbers of the fixed-point runtime: types, names and primitives.
  *
- * The same names as gtc_num_f32.h, in integers. Nothing here depends on the width of int, on byte
+ * The names of the float32 runtime, in integers. Nothing here depends on the width of int, on byte
  * order, on the right shift of a negative number, or on a conversion that wraps. No operation
  * can overflow with a table that the generator made: docs/numerics.md says which range each has,
  * and a test build asserts every one (GTC_ASSERT).

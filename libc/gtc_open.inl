@@ -15,7 +15,7 @@
 /* ---- whether this build can use a table -------------------------------------------------------------------------- */
 
 /* Everything that could make another function read outside the table, divide by zero, leave the range of a
- * number or make one that is none is refused here: words outside of gtc_limits.inl, and what relates
+ * number or make one that is none is refused here: words outside of their ranges, and what relates
  * several words. The tests call these "the conditions"; docs/FORMAT.md, section 3, lists them. */
 
 /* Whether n words are numbers in their ranges (false for a NaN, too). */

@@ -1,7 +1,6 @@
 /* gtc_q31.c - the runtime in fixed point.
  *
- * The algorithm is written once for both arithmetics, in the .inl files, in the names of gtc_names_q31.h. Read from top
- * to bottom: each function is before its callers.
+ * The algorithm is the same text in both arithmetics. Read from top to bottom: each function is before its callers.
  *
  * SPDX-License-Identifier: MIT
  */

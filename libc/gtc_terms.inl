@@ -169,7 +169,7 @@ static void harmonic_apply(const STATE *state, const TABLE *table, uint_least32_
 /* ---- functions of the block mean of an auxiliary channel
  *
  * The mean is that of the channel's last block with enough readings. While nothing of the channel is accepted a term
- * adds its fallback model; one that has none takes the guard's fallback for the mean (gtc_front.inl). */
+ * adds its fallback model; one that has none takes the guard's fallback for the mean. */
 
 /* What a term adds on average where its channel is not known: its fallback model, at the inputs of the map. Where
  * they are none (something else wrote over the state) the map says so. */
