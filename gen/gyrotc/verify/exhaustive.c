@@ -1,6 +1,6 @@
 /* exhaustive.c - every pair of positions of a fixed-point table through the emitted code.
  *
- * Compiled with gtc.c and the table; TABLE and HEADER name the table. For each of the 2^16 x 2^16
+ * Compiled with gtc_q31.c and the table; TABLE and HEADER name the table. For each of the 2^16 x 2^16
  * pairs of positions (those that an input can reach) it calls gtc_q31_map() and compares
  *   - status and bits with integers computed here from the words on standard input, written from
  *     docs/numerics.md and not from libc/;

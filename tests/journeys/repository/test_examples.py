@@ -161,5 +161,5 @@ def test_the_notebook_builds_a_result(tmp_path: Path, monkeypatch: pytest.Monkey
         shown.append(eval(compile(ast.Expression(last.value), "map.ipynb", "eval"), names))
     data, result, series, bias = shown
     assert isinstance(data, gyrotc.Dataset) and isinstance(result, gyrotc.Result)
-    assert result._repr_html_().count("<svg") == 4 and (tmp_path / "build" / "result" / "report.html").is_file()
+    assert result._repr_html_().count("<svg") == 3 and (tmp_path / "build" / "result" / "report.html").is_file()
     assert float(series["max"]) < 0.02 and len(bias) == 2  # type: ignore[index, arg-type]
