@@ -42,7 +42,16 @@ from gyrotc.model import Model, table_id
 from gyrotc.pages import Panel, drawing, report
 from gyrotc.pages import write_diagnosis_page as write_page
 from gyrotc.recordings import Problems, dataset_toml, load, parse_description
-from gyrotc.results import Diagnosed, Estimate, FleetEntry, VerifiedTarget, checked_result
+from gyrotc.results import (
+    Diagnosed,
+    Estimate,
+    FleetEntry,
+    Marker,
+    VerifiedTarget,
+    checked_result,
+    read_marker,
+    write_marker,
+)
 from gyrotc.tables import NUMERICS, emit_texts, quantise_all
 from gyrotc.verify import checked_sources, table_files, verify
 from hostile import hostile_strings
@@ -273,6 +282,12 @@ _MANIFEST = _HEAD | {
 }
 
 
+def _owned(folder: Path, marker: Marker) -> None:
+    """Makes a folder one of gyrotc's, so that a page may be written into it, once and again."""
+    if read_marker(folder) is None:
+        write_marker(folder, marker)
+
+
 def _write_unit(folder: Path, result: dict[str, Any], model_dict: dict[str, Any], text: Callable[[], str]) -> None:
     """Everything that `build --extend --limits --previous` leaves, with these texts in it."""
     finding = {"id": "text", "text": "text", "evidence": {}}
@@ -295,6 +310,7 @@ def _write_unit(folder: Path, result: dict[str, Any], model_dict: dict[str, Any]
         "diagnosis/diagnose": _DIAGNOSIS,
     }.items():
         (folder / f"{name}.json").write_text(json.dumps(_with(content, text)))
+    _owned(folder, Marker("result", "build"))
 
 
 def test_the_report_of_a_build_and_of_axes(
@@ -428,6 +444,7 @@ _DIAGNOSIS: dict[str, Any] = {
 def test_the_page_of_a_diagnosis(tmp_path: Path) -> None:
     def draw(text: Callable[[], str]) -> str:
         (tmp_path / "diagnose.json").write_text(json.dumps(_with(_DIAGNOSIS, text)))
+        _owned(tmp_path, Marker("diagnosis", "diagnose"))
         return write_page(tmp_path).read_text("utf-8")
 
     _same_page(draw)
@@ -589,7 +606,7 @@ def test_columns_of_a_recording_are_reported_as_they_are(tmp_path: Path, model_d
     texts = emit_texts(model, quantise_all(model, ["f32"]))
     for name, content in texts.items():
         (tmp_path / name).write_bytes(content)
-    assert checked_sources(tmp_path, tmp_path, table_files(tmp_path, model, NUMERICS)) == tmp_path
+    assert checked_sources(tmp_path, tmp_path, table_files(tmp_path, model, ["f32"])) == tmp_path
 
 
 # ---- file names and terminals ----

@@ -208,6 +208,7 @@ _DOOR = {
     "cli/fleet.py copytree",  # likewise
     "recordings/importers/job.py open",  # into a scratch folder that the job has just made
     "recordings/importers/csv_table.py open",  # likewise
+    "recordings/importers/formats/spreadsheet.py open",  # likewise
 }
 
 

@@ -46,7 +46,7 @@ _BLOCK_BYTES = 2**22  # of a read: bounds memory
 def kept_map(chosen: Map, file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Map:
     """The map with every choice that was made."""
     columns: dict[str, Any] = {choice.role: choice.source for choice in (*plan.values, plan.temperature)}
-    columns["device"] = plan.device.name if plan.device else chosen.columns.device
+    columns["device"] = next(iter(rows.device.names), chosen.columns.device)
     if plan.time:
         columns["time"] = tuple(choice.column.name for choice in plan.time)
     units = dict(chosen.units)
@@ -420,9 +420,9 @@ class _Import:
                 rows = ImportedRows(path.name, plan, self.kept)
                 for line in proposal(file, plan, rows):
                     self._tell(line)
-                self.kept = kept_map(self.kept, file, plan, rows)
                 chunks = rows.chunks()
                 first = next(chunks, None)
+                self.kept = kept_map(self.kept, file, plan, rows)  # the first rows tell whether a column names gyros
                 if not self.serial:
                     self.serial = serial_of(self._options.serial, self.kept, file, rows.device.name, self._out)
                     if stage is not None:

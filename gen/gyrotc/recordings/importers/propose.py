@@ -163,7 +163,6 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
     _check_weight(file, values[0], chosen)
     main = values[0][1]
     where = _where(file, main, chosen)
-    device = device_column(main, _stated_device(file, main, chosen), where)
     time, rate_hz, why_rate = _time(file, main, chosen)
     temperature = _temperature(file, tables, main, chosen)
     missing: list[_Missing] = []
@@ -184,9 +183,11 @@ def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
         options = dict.fromkeys(option for _, _, option in missing)
         raise InputError(file.path.name, "; ".join(said(missing)), " ".join(options))
     taken = {c.name for c, _ in time} | {v[2].name for v in values} | {temperature[1].name}
+    picking = {where.column} if where else set()
+    device = device_column(main, _stated_device(file, main, chosen), taken | picking)
     channels = tuple(_channels(file, main, chosen, taken))
     taken |= {c.column.name for c in channels}
-    taken |= {name for name in (where and where.column, device and device.name) if name}
+    taken |= picking | ({device.name} if device else set())
     left = tuple(c.name for c in main.columns if c.kind == "number" and c.name not in taken)
     texts = tuple(c.name for c in main.columns if c.kind != "number" and c.name not in taken)
     return ImportPlan(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,18 +49,17 @@ class Where:
         return codes == names.index(self.value) if self.value in names else np.zeros(len(codes), dtype=bool)
 
 
-def device_column(table: LoggerTable, stated: str | None, where: Where | None) -> Column | None:
+def device_column(table: LoggerTable, stated: str | None, taken: Collection[str]) -> Column | None:
     """The column that names the gyro of each row: as stated, else the first of such a name; None: there is none.
 
     Args:
         stated: Name of the column, or "none".
-        where: The rows that are taken; a column that picks them names nothing else.
+        taken: Columns that pick the rows or are measured; such a one names no gyro unless it is stated.
     """
     if stated is not None:
         return None if stated == NO_DEVICE else table.column(stated)
     for column in table.columns:
-        picks = where is not None and where.column == column.name
-        if names_device(column.name) and column.kind != "stamp" and not picks:
+        if names_device(column.name) and column.kind != "stamp" and column.name not in taken:
             return column
     return None
 
