@@ -13,7 +13,7 @@ from pathlib import Path
 from ..common.errors import GyrotcError, InputError
 from .destination import check_contents, check_separate, real_path
 from .exchange import exchange
-from .files import check_replaceable, sync_folder, unfinished, write_atomically
+from .files import check_replaceable, sha256, sync_folder, unfinished, write_atomically
 from .marker import (
     KINDS,
     MARKER,
@@ -261,6 +261,13 @@ def _recover(place: Path) -> None:
             clean(place / part)
 
 
+def _is_same(path: Path, other: Path) -> bool:
+    """Test whether a file of an earlier result went on into the new one."""
+    if path.is_symlink() or other.is_symlink() or not other.is_file():
+        return False
+    return path.samefile(other) or sha256(path) == sha256(other)
+
+
 def _is_whole(path: Path) -> bool:
     try:
         return not result_faults(path)
@@ -270,6 +277,9 @@ def _is_whole(path: Path) -> bool:
 
 def _remove(path: Path, place: Path) -> None:
     """Removes a folder of a job; what somebody else put into it is kept, under a name that can be seen."""
+    for name in list(walk(path)):
+        if not name.endswith("/") and _is_same(path / name, place / name):
+            (path / name).unlink()
     if remove_listed(path):
         return
     names = (place.with_name(f"{place.name}.left-{number}") for number in range(1, 1000))

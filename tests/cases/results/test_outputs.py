@@ -139,6 +139,7 @@ def test_an_edited_file_stops_who_replaces_it_and_nobody_else(out: Path) -> None
     (out / "model.json").write_text("edited")
     update(out, "c", text="two")
     assert content(out) == {"c/table.c": "two", "model.json": "edited"}
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
     assert result_faults(out) == ["model.json: missing or changed"]
     with pytest.raises(InputError, match=r"changed since gyrotc wrote it: model\.json"), result_folder(out, "build"):
         pytest.fail("began")

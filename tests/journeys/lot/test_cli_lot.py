@@ -84,7 +84,7 @@ def test_header_and_report_show_the_lot(world: Path) -> None:
     run_here("build", unit, "--lot", world / "lot.json", *HOST, "--out", out)
     assert "a lot of 5 units leaves" in next((out / "c").glob("gtc_lot*.h")).read_text()
     page = (out / "report.html").read_text()
-    assert "<h2>The lot</h2>" in page and "the lot alone, 5 units" in page
+    assert "<h3>The lot</h3>" in page and "the lot alone, 5 units" in page
     with pytest.raises(InputError, match="--extend"):
         run_here("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
 
