@@ -72,7 +72,7 @@ def delivery(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @examples(25, shrink=False)
 @given(data=st.data())
 def test_verify_refuses_any_changed_byte_of_what_is_delivered(data: st.DataObject, delivery: Path) -> None:
-    """Of every file of c/ but the example, and of model.json, but for a white space in place of another; the file is named."""
+    """Every file of c/ but the example, and model.json; white space in place of white space may stay. It is named."""
     files = sorted(path for path in (delivery / "c").iterdir() if path.suffix in (".c", ".h", ".bin", ".json"))
     files = [path for path in files if path.name != "main.c"]
     path = data.draw(st.sampled_from([delivery / "model.json", *files]))
