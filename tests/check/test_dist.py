@@ -170,7 +170,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     )
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
-    (clone / "libc" / "gtc_crc.c").write_text("not of the tag", "utf-8")
+    (clone / "libc" / "gtc_f32.c").write_text("not of the tag", "utf-8")
     _run("tools/release.sh", "archive", "v0.2.0", "--sdist", cwd=clone)
     made = clone / "build" / "release" / "0.2.0"
     names = {"gyrotc-0.2.0.tar.gz", "gyrotc-c-0.2.0.tar.gz", "sbom-c.cdx.json", "sbom-generator.cdx.json", "SHA256SUMS"}
@@ -180,7 +180,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
         assert {f"gyrotc-c-0.2.0/{name}" for name in ("LICENSE", "CMakeLists.txt", "zephyr/module.yml")} <= set(
             archive.getnames()
         )
-        source = archive.extractfile("gyrotc-c-0.2.0/libc/gtc_crc.c")
+        source = archive.extractfile("gyrotc-c-0.2.0/libc/gtc_f32.c")
         assert source is not None and b"not of the tag" not in source.read()
     page = "gyrotc-0.2.0/gyrotc/manual/reference-cli.md"
     assert "Print of the tag the JSON Schema of" in _run("tar", "-xzOf", "gyrotc-0.2.0.tar.gz", page, cwd=made)
@@ -188,7 +188,7 @@ def test_from_tag_to_archives(clone: Path) -> None:
     listed = {line.split(maxsplit=1)[1] for line in (made / "SHA256SUMS").read_text("ascii").splitlines()}
     files = {p.relative_to(made).as_posix() for p in made.rglob("*") if p.is_file()}
     assert listed == files - {"SHA256SUMS"}
-    (clone / "libc" / "gtc_crc.c").unlink()
+    (clone / "libc" / "gtc_f32.c").unlink()
     _run("git", "checkout", "-q", ".", cwd=clone)
     assert "there is a tag v0.2.0 already" in _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2)
 
