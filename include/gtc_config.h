@@ -119,29 +119,47 @@
 #endif
 
 /* What follows from the options above. */
-#define GTC_WITH_CHANNELS (GTC_WITH_AUXILIARY | GTC_WITH_CURVE | GTC_WITH_PRODUCT)
-#define GTC_WITH_RETAINED (GTC_WITH_MEMORY | GTC_WITH_PLAY) /* terms with a state */
-#define GTC_MAX_CHANNELS (1 + (GTC_MAX_TERMS * GTC_WITH_CHANNELS))
+#if GTC_WITH_AUXILIARY || GTC_WITH_CURVE || GTC_WITH_PRODUCT
+#define GTC_WITH_CHANNELS 1
+#else
+#define GTC_WITH_CHANNELS 0
+#endif
+#if GTC_WITH_MEMORY || GTC_WITH_PLAY /* terms with a state */
+#define GTC_WITH_RETAINED 1
+#else
+#define GTC_WITH_RETAINED 0
+#endif
+#define GTC_MAX_CHANNELS (1U + ((uint_least32_t)GTC_MAX_TERMS * (uint_least32_t)GTC_WITH_CHANNELS))
 
 /* Words of a saved state, see gtc_<n>_save(). */
 #define GTC_SAVE_WORDS                                                                                             \
-    (10 + (2 * GTC_WITH_TERMS) + GTC_MAX_SLOPE_BLOCKS + (GTC_MAX_CHANNELS * (13 + GTC_WITH_CHANNELS))              \
+    (10 + (2 * GTC_WITH_TERMS) + GTC_MAX_SLOPE_BLOCKS                                                              \
+     + ((1 + (GTC_MAX_TERMS * GTC_WITH_CHANNELS)) * (13 + GTC_WITH_CHANNELS))                                      \
      + (2 * GTC_MAX_TERMS * GTC_WITH_RETAINED) + (GTC_WITH_UNCERTAINTY * (9 + (5 * GTC_WITH_TERMS))))
 
 /* What of it sets the layout of a saved state. */
 #define GTC_SAVE_OPTIONS                                                                                           \
-    ((64UL * GTC_WITH_CHANNELS) + (128UL * GTC_WITH_UNCERTAINTY) + (256UL * GTC_MAX_TERMS)                         \
-     + (4096UL * GTC_WITH_RETAINED) + (65536UL * GTC_MAX_SLOPE_BLOCKS))
+    ((64UL * (uint_least32_t)GTC_WITH_CHANNELS)                                                                    \
+     + (128UL * (uint_least32_t)GTC_WITH_UNCERTAINTY)                                                              \
+     + (256UL * (uint_least32_t)GTC_MAX_TERMS)                                                                     \
+     + (4096UL * (uint_least32_t)GTC_WITH_RETAINED)                                                                \
+     + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
 
 /* What this runtime holds, in the bits of a table's `parts` (gtc_table.h). */
 #define GTC_PARTS                                                                                                  \
-    ((GTC_WITH_BANK * GTC_PART_BANK) | (GTC_WITH_MEMORY * GTC_PART_TERM(GTC_TERM_MEMORY))                          \
-     | (GTC_WITH_PLAY * GTC_PART_TERM(GTC_TERM_PLAY)) | (GTC_WITH_WARM_UP * GTC_PART_TERM(GTC_TERM_WARM_UP))       \
-     | (GTC_WITH_HARMONIC * GTC_PART_TERM(GTC_TERM_HARMONIC))                                                      \
-     | (GTC_WITH_AUXILIARY * GTC_PART_TERM(GTC_TERM_AUXILIARY)) | (GTC_WITH_CURVE * GTC_PART_TERM(GTC_TERM_CURVE)) \
-     | (GTC_WITH_PRODUCT * GTC_PART_TERM(GTC_TERM_PRODUCT)) | (GTC_WITH_COVERAGE * GTC_PART_COVERAGE)              \
-     | (GTC_WITH_UNCERTAINTY * GTC_PART_UNCERTAINTY) | (GTC_WITH_PROBES * GTC_PART_PROBES)                         \
-     | (GTC_WITH_NARROW * GTC_PART_NARROW) | (GTC_WITH_REZERO * GTC_PART_REZERO))
+    (((uint_least32_t)GTC_WITH_BANK * GTC_PART_BANK)                                                               \
+     | ((uint_least32_t)GTC_WITH_MEMORY * GTC_PART_TERM(GTC_TERM_MEMORY))                                          \
+     | ((uint_least32_t)GTC_WITH_PLAY * GTC_PART_TERM(GTC_TERM_PLAY))                                              \
+     | ((uint_least32_t)GTC_WITH_WARM_UP * GTC_PART_TERM(GTC_TERM_WARM_UP))                                        \
+     | ((uint_least32_t)GTC_WITH_HARMONIC * GTC_PART_TERM(GTC_TERM_HARMONIC))                                      \
+     | ((uint_least32_t)GTC_WITH_AUXILIARY * GTC_PART_TERM(GTC_TERM_AUXILIARY))                                    \
+     | ((uint_least32_t)GTC_WITH_CURVE * GTC_PART_TERM(GTC_TERM_CURVE))                                            \
+     | ((uint_least32_t)GTC_WITH_PRODUCT * GTC_PART_TERM(GTC_TERM_PRODUCT))                                        \
+     | ((uint_least32_t)GTC_WITH_COVERAGE * GTC_PART_COVERAGE)                                                     \
+     | ((uint_least32_t)GTC_WITH_UNCERTAINTY * GTC_PART_UNCERTAINTY)                                               \
+     | ((uint_least32_t)GTC_WITH_PROBES * GTC_PART_PROBES)                                                         \
+     | ((uint_least32_t)GTC_WITH_NARROW * GTC_PART_NARROW)                                                         \
+     | ((uint_least32_t)GTC_WITH_REZERO * GTC_PART_REZERO))
 
 /* 1: multiply 32 x 32 -> 64 bits in 16-bit halves. The bits are the same; it is faster on cores
  * without a long multiply (Cortex-M0, AVR) and slower on all others. */

@@ -1,12 +1,14 @@
 /* gtc_f32.c - the runtime in float32.
  *
- * The algorithm is the same text in both arithmetics. Read from top to bottom: each function is before its callers.
+ * Read from top to bottom: each function is before its callers.
+ *
+ * In the repository: the algorithm is written once for both arithmetics, in the .inl files, in the names of
+ * gtc_names_f32.h. MISRA 20.1 throughout: the texts use what is above them.
  *
  * SPDX-License-Identifier: MIT
  */
 #include "gtc_num_f32.h"
 
-/* MISRA 20.1: the texts use what is above them. */
 #include "gtc_map.inl"
 #include "gtc_terms.inl"
 #include "gtc_sigma.inl"

@@ -55,6 +55,31 @@ static NUM within_envelope(const TABLE *table, NUM temp, int_least32_t *remarks)
 }
 #endif
 
+#if GTC_WITH_TERMS
+/* What all terms do to the map's inputs, and add. */
+static void apply_terms(STATE *state, const TABLE *table, NUM temp, NUM slope, EFFECT *effect)
+{
+    NUM within;
+    uint_least32_t i;
+
+    effect->temp = temp;
+    effect->slope = slope;
+    effect->added = NUM_ZERO;
+#if GTC_WITH_UNCERTAINTY
+    effect->terms_known = state->uncertainty.terms_known;
+    effect->edge_effect = NUM_ZERO;
+#endif
+    within = within_envelope(table, temp, &effect->remarks);
+    for (i = 0U; i < table->n_terms; i++) {
+        apply_term(state, table, i, within, effect);
+    }
+#if GTC_WITH_UNCERTAINTY
+    state->uncertainty.terms_known = effect->terms_known;
+    state->uncertainty.edge_effect = effect->edge_effect;
+#endif
+}
+#endif
+
 /* Makes the correction for an input and puts it in force. Where something wrote over the state, so that the input is no
  * number, that is the fallback. */
 static void make_correction(STATE *state, const TABLE *table, NUM temp, NUM slope, int_least32_t remarks)
@@ -64,27 +89,11 @@ static void make_correction(STATE *state, const TABLE *table, NUM temp, NUM slop
     int status;
 #if GTC_WITH_TERMS
     EFFECT effect;
-    uint_least32_t i;
 
-    effect.temp = temp;
-    effect.slope = slope;
-    effect.added = NUM_ZERO;
     effect.remarks = remarks;
-#if GTC_WITH_UNCERTAINTY
-    effect.terms_known = state->uncertainty.terms_known;
-    effect.edge_effect = NUM_ZERO;
-#endif
-    {
-        const NUM within = within_envelope(table, temp, &effect.remarks);
-
-        for (i = 0U; i < table->n_terms; i++) {
-            apply_term(state, table, i, within, &effect);
-        }
-    }
+    apply_terms(state, table, temp, slope, &effect);
     status = map_value(table, effect.temp, effect.slope, &bias);
 #if GTC_WITH_UNCERTAINTY
-    state->uncertainty.terms_known = effect.terms_known;
-    state->uncertainty.edge_effect = effect.edge_effect;
     uncertainty_input(state, table, effect.temp, effect.slope, slope, effect.remarks);
 #endif
     total = bias;
@@ -404,12 +413,18 @@ static void miss_reading(INPUT *in, NUM x, uint_least32_t us)
     add_gap(in, us);
 }
 
+/* 1 before the first reading, and after a gap for which nothing is remembered. */
+static int has_no_past(const INPUT *in)
+{
+    return (in->next_gap_us == 0U) ? 1 : 0;
+}
+
 /* One temperature. Returns GTC_OK or GTC_HELD. */
 static int take_temperature(STATE *state, const TABLE *table, NUM x)
 {
     INPUT *const in = &state->input[0];
     const gtc_word_t *const guard = table->guards;
-    const int nothing_before = (in->next_gap_us == 0U) ? 1 : 0;
+    const int nothing_before = has_no_past(in);
     int verdict = IS_HELD;
 
     if (is_missing(x) || is_stuck(in, guard, x, state->period_us)
@@ -465,16 +480,20 @@ static int end_block(const STATE *state, INPUT *in, const gtc_word_t *guard)
         in->mean = mean_of(in->base, in->sum, in->valid);
         in->held_blocks = 0U;
 #if GTC_WITH_CHANNELS
-        in->clamped = ((in->clamped & CLAMPED_NOW) != 0U) ? CLAMPED_MEAN : 0U;
+        if ((in->clamped & CLAMPED_NOW) != 0U) {
+            in->clamped = CLAMPED_MEAN;
+        } else {
+            in->clamped = 0U;
+        }
 #endif
     } else {
 #if GTC_WITH_CHANNELS
         in->clamped &= CLAMPED_MEAN;
 #endif
-        if (!is_lost(in, guard)) {
+        if (is_lost(in, guard) == 0) {
             in->held_blocks++;
         }
-        if (is_lost(in, guard)) {
+        if (is_lost(in, guard) != 0) {
             in->next_gap_us = 0U;
         }
     }
@@ -502,7 +521,7 @@ static void close_channels(STATE *state, const TABLE *table)
 /* A block with too few valid samples: the last correction stays, but not for ever. */
 static void close_without_mean(STATE *state, const TABLE *table)
 {
-    if (is_lost(&state->input[0], table->guards)) {
+    if (is_lost(&state->input[0], table->guards) != 0) {
 #if GTC_WITH_RETAINED
         reset_terms(state);
 #endif
@@ -540,7 +559,7 @@ static void close_block(STATE *state, const TABLE *table)
 #if GTC_WITH_CHANNELS
     close_channels(state, table);
 #endif
-    if (end_block(state, &state->input[0], table->guards)) {
+    if (end_block(state, &state->input[0], table->guards) != 0) {
         NUM temp;
         NUM slope;
         int_least32_t remarks;
@@ -571,7 +590,7 @@ static int fits_runtime(const TABLE *table)
             && (table->bias_frac_bits == FRAC_BITS)
             && (table->slope_blocks <= (uint_least32_t)GTC_MAX_SLOPE_BLOCKS)
             && (table->n_terms <= (uint_least32_t)GTC_MAX_TERMS)
-            && (table->n_channels <= (uint_least32_t)GTC_MAX_CHANNELS)) ? 1 : 0;
+            && (table->n_channels <= GTC_MAX_CHANNELS)) ? 1 : 0;
 }
 
 /* Samples in a block of the table, if so many of this period make one to a thousandth of it; else 0. */
@@ -647,7 +666,7 @@ static void clear_front_end(STATE *state)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         state->window[i] = NUM_ZERO;
     }
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
+    for (i = 0U; i < GTC_MAX_CHANNELS; i++) {
         clear_input(&state->input[i]);
     }
 }
@@ -682,7 +701,7 @@ static void start_state(STATE *state, const TABLE *table, uint_least32_t period_
 #if GTC_WITH_RETAINED
     reset_terms(state);
 #endif
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
+    for (i = 0U; i < GTC_MAX_CHANNELS; i++) {
         state->input[i].near = LIMIT_ZERO;
         if (i < table->n_channels) {
             state->input[i].near = largest_change(guard_of(table, i), period_us);
@@ -789,7 +808,7 @@ static int pass_slots(STATE *state, const TABLE *table, uint_least32_t count)
         if (state->position >= state->samples_per_block) {
             close_block(state, table);
         }
-        if (all_lost(state, table)) {
+        if (all_lost(state, table) != 0) {
             rest = skip_lost_blocks(state, table, rest);
         }
         step = state->samples_per_block - state->position;
@@ -866,7 +885,7 @@ int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, 
     if (channels != NULL) {
         return take_slot(state, table, channels);
     }
-    for (c = 0U; c < (uint_least32_t)GTC_MAX_CHANNELS; c++) {
+    for (c = 0U; c < GTC_MAX_CHANNELS; c++) {
         nothing[c] = missing_number();
     }
     return take_slot(state, table, nothing);

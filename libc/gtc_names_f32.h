@@ -16,12 +16,11 @@
 #define INPUT gtc_f32_input_t
 #define SNAPSHOT gtc_f32_snapshot_t
 #define ANGLE gtc_f32_angle_t
-#define POINT point_t
-#define EFFECT effect_t
-#define BLEND blend_t
+#define POINT f32_point_t
+#define EFFECT f32_effect_t
+#define BLEND f32_blend_t
 #define NUM float    /* a number */
 #define WIDE float   /* a sum of numbers */
-#define LIMIT float  /* a largest change */
 #define SHARE float  /* 0 ... 1 */
 #define SQUARE float /* (deg/h)^2 */
 #define NUM_ZERO 0.0F
@@ -31,7 +30,7 @@
 #define MEMBER(member) member.value
 #define ELEMENT(word) word.value
 
-/* A row of gtc_limits.inl. */
+/* A row of gtc_limits.inl. MISRA 20.7: the arguments are between commas. */
 #define RANGE(f32_least, f32_most, q31_least, q31_most) {f32_least, f32_most}
 
 #endif /* GTC_NAMES_F32_H_INCLUDED */

@@ -16,12 +16,11 @@
 #define INPUT gtc_q31_input_t
 #define SNAPSHOT gtc_q31_snapshot_t
 #define ANGLE gtc_q31_angle_t
-#define POINT point_t
-#define EFFECT effect_t
-#define BLEND blend_t
+#define POINT q31_point_t
+#define EFFECT q31_effect_t
+#define BLEND q31_blend_t
 #define NUM int_least32_t     /* a number */
 #define WIDE int_least64_t    /* a sum of numbers */
-#define LIMIT uint_least32_t  /* a largest change */
 #define SHARE int_least32_t   /* 0 ... 1 in 2^-24 */
 #define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
 #define NUM_ZERO 0
@@ -31,7 +30,7 @@
 #define MEMBER(member) member
 #define ELEMENT(word) word.integer
 
-/* A row of gtc_limits.inl. */
+/* A row of gtc_limits.inl. MISRA 20.7: the arguments are between commas. */
 #define RANGE(f32_least, f32_most, q31_least, q31_most) {q31_least, q31_most}
 
 #endif /* GTC_NAMES_Q31_H_INCLUDED */

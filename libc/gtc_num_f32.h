@@ -1,6 +1,6 @@
-/* gtc_num_f32.h - the numbers of the float32 runtime: types, names and primitives.
+/* gtc_num_f32.h - the numbers of the float32 runtime: types and primitives.
  *
- * The algorithm is written once in the names below, which fixed point has, too.
+ * In the repository: a second header, gtc_num_q31.h, gives the same names in fixed point.
  *
  * Every IEEE operation is a statement of its own, assigned to a float. An assignment rounds to
  * float whatever FLT_EVAL_METHOD is, and a strict compiler contracts nothing across statements;
@@ -103,7 +103,7 @@ typedef struct {
     float slope;
     float z_temp;
     float z_slope;
-} point_t;
+} f32_point_t;
 
 /* Adding and subtracting 8 leaves a multiple of 2^-21; every center is one of 2^-20, so that
  * differences from centers are exact. */
@@ -241,7 +241,7 @@ static inline void cells_of(const TABLE *table, const POINT *in, const uint_leas
 typedef struct {
     float total;
     float share;
-} blend_t;
+} f32_blend_t;
 
 static inline void get_edges(const TABLE *table, float edges[4])
 {

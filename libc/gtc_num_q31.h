@@ -1,6 +1,8 @@
-/* gtc_num_q31.h - the numbers of the fixed-point runtime: types, names and primitives.
+/* gtc_num_q31.h - the numbers of the fixed-point runtime: types and primitives.
  *
- * The names of the float32 runtime, in integers. Nothing here depends on the width of int, on byte
+ * In the repository: the same names as in gtc_num_f32.h, in integers.
+ *
+ * Nothing here depends on the width of int, on byte
  * order, on the right shift of a negative number, or on a conversion that wraps. No operation
  * can overflow with a table that the generator made: docs/numerics.md says which range each has,
  * and a test build asserts every one (GTC_ASSERT).
@@ -31,7 +33,7 @@
 #define NUM_PLAUSIBLE_MAX (200L * 65536L)
 #endif
 #define NUM_MISSING_BITS 0x80000000UL
-#define FRAC_BITS GTC_BIAS_FRAC_BITS
+#define FRAC_BITS ((uint_least32_t)GTC_BIAS_FRAC_BITS)
 #define ARITHMETIC 2U /* in the second word of an image */
 
 /* Parts of a table's scale. */
@@ -240,7 +242,7 @@ static inline int_least32_t exp2_of_minus(uint_least32_t u)
 typedef struct {
     uint_least32_t x_temp;
     uint_least32_t x_slope;
-} point_t;
+} q31_point_t;
 
 /* Position of an input in its range, clamped; gain in 2^-27. Returns GTC_OK, GTC_CLAMPED or, for the
  * mark of a missing number, which lies below every range, GTC_E_ARG. */
@@ -386,7 +388,7 @@ static inline int_least64_t rounded_quotient(int_least64_t num, uint_least32_t d
 typedef struct {
     int_least64_t total;
     uint_least32_t share;
-} blend_t;
+} q31_blend_t;
 
 /* Regions are in positions; so are the edges of the envelope. */
 static inline void get_edges(const TABLE *table, int_least32_t edges[4])

@@ -4,6 +4,7 @@
  *
  * MISRA 15.5 throughout: wrong arguments, and cases that end early, leave a function at once; what
  * follows need not be indented for them.
+ * MISRA 5.9 throughout: the two arithmetics are one text, so that their functions have the same names.
  *
  * SPDX-License-Identifier: MIT
  */

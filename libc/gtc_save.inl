@@ -132,7 +132,7 @@ static void carry_front(cursor_t *at, STATE *state, const TABLE *table)
     for (i = 0U; i < (uint_least32_t)GTC_MAX_SLOPE_BLOCKS; i++) {
         carry_temp(at, &state->window[i]);
     }
-    for (i = 0U; i < (uint_least32_t)GTC_MAX_CHANNELS; i++) {
+    for (i = 0U; i < GTC_MAX_CHANNELS; i++) {
         const uint_least32_t channel = (i < table->n_channels) ? i : 0U;
 
         carry_input(at, &state->input[i], guard_of(table, channel), state->position);

@@ -27,7 +27,7 @@ typedef struct {
     uint_least32_t terms_known; /* as of an uncertainty */
     NUM edge_effect;            /* as of an uncertainty */
 #endif
-} effect_t;
+} EFFECT;
 
 static const gtc_word_t *term_of(const TABLE *table, uint_least32_t i)
 {
@@ -401,14 +401,13 @@ static void apply_term(const STATE *state, const TABLE *table, uint_least32_t i,
 /* 1 if a term has a memory that goes on over a time without power. */
 static int is_retained_term(const TABLE *table, uint_least32_t i)
 {
-    int is_retained = 0;
+    uint_least32_t kind;
 
-    if (i < table->n_terms) {
-        const uint_least32_t kind = term_of(table, i)[TERM_KIND].bits;
-
-        is_retained = ((kind == GTC_TERM_MEMORY) || (kind == GTC_TERM_PLAY)) ? 1 : 0;
+    if (i >= table->n_terms) {
+        return 0;
     }
-    return is_retained;
+    kind = term_of(table, i)[TERM_KIND].bits;
+    return ((kind == GTC_TERM_MEMORY) || (kind == GTC_TERM_PLAY)) ? 1 : 0;
 }
 #endif
 #endif

@@ -155,7 +155,7 @@ def _constants(options: Options) -> str:
         " * and which has no options itself. */",
         f"#define GTC_MAX_SLOPE_BLOCKS {options['GTC_MAX_SLOPE_BLOCKS']}",
         f"#define GTC_MAX_TERMS {options['GTC_MAX_TERMS']}",
-        f"#define GTC_MAX_CHANNELS {options['GTC_MAX_CHANNELS']}",
+        f"#define GTC_MAX_CHANNELS {options['GTC_MAX_CHANNELS']}U",
         *_comment(f"Parts: {', '.join(held) or 'the map alone'}."),
         f"#define GTC_PARTS 0x{options['GTC_PARTS']:x}UL",
     ]
@@ -231,10 +231,13 @@ _LICENCE = " *\n * SPDX-License-Identifier: MIT\n"
 def _without_file_name(text: str, *, keep_licence: bool) -> str:
     """A file whose head does not speak of files that are not emitted."""
     match = _HEAD.match(text)
-    if match is None or keep_licence:
+    if match is None:
         return text
-    head = re.sub(r" \*\n(?= \*\n| ?\Z)", "", _OWN.sub("", match[2].replace(_LICENCE, "")))
+    head = _OWN.sub("", match[2] if keep_licence else match[2].replace(_LICENCE, ""))
+    head = re.sub(r" \*\n(?= \*\n| ?\Z)", "", head)
     rest = text[match.end() :]
+    if keep_licence:
+        return f"/* {match[1]} - {head}*/\n{rest}"
     return f"/* ==== {head[0].upper()}{head[1:].rstrip()} */\n{rest}"
 
 
