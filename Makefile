@@ -4,6 +4,8 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 override PYTHON := .venv/bin/python
 override GYROTC := .venv/bin/gyrotc
+# Of tests/check what takes minutes; the rest takes half an hour.
+override QUICK_CHECKS := tests/check/test_eighty_recordings.py
 override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.
@@ -63,7 +65,7 @@ prove:
 	@tools/setup.sh prove
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/prove --results docs
 
-## style and types (ruff, mypy), imports; the C library's warnings, symbols, fused operations, MISRA, analysers; tests/check
+## style and types (ruff, mypy), imports; the C library's warnings, symbols, fused operations, MISRA, analysers; eighty diagnoses
 check:
 	@tools/setup.sh check
 	@.venv/bin/ruff check --config gen/pyproject.toml gen tests tools bench
@@ -72,7 +74,7 @@ check:
 	@$(PYTHON) tools/check_libc
 	@$(PYTHON) -m bench.paper.page docs --check
 	@GYROTC_PAPER_GYROS=10 $(PYTHON) -m pytest -q tests/cases/paper/test_paper_reference.py
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/check
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal $(QUICK_CHECKS)
 
 ## branch coverage of libc/ by the C tests: 100 %, or it fails
 cov:
@@ -111,8 +113,10 @@ bench:
 	@$(PYTHON) -m bench --real="$$SET_REAL" $${SET_SEED:+"--seed=$$SET_SEED"} $${SET_SETS:+"--sets=$$SET_SETS"} \
 	  $${SET_BASE:+"--base=$$SET_BASE"} $${SET_QUICK:+--quick} -- $${SET_ONLY:+"$$SET_ONLY"}
 
-## hidden effects found again, two fresh seeds of both worlds, an hour: docs/results.md (SEED="n m" goes on or repeats)
-blind: setup
+## tests of the tools and archives; hidden effects found again, two fresh seeds of both worlds, an hour and a half: docs/results.md (SEED="n m" goes on or repeats)
+blind:
+	@tools/setup.sh check
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/check $(addprefix --ignore=,$(QUICK_CHECKS))
 	@$(PYTHON) -m tests.blind --workers 2 --docs docs $${SET_SEED:+"--seed=$$SET_SEED"}
 
 ## sdist, wheel, C archive, bills of materials and checksums of this commit, or of TAG=v0.2.0; tried without a network
