@@ -23,26 +23,26 @@ static float of_bits(uint32_t bits)
 /* What tests/prove/eva/arithmetic.h believes of a range, of a square and of the root of anything but plus infinity. */
 static int breaks_contract(float x)
 {
-    const float most[] = {1.0F, 7.0F, 3.6e9F}, root = gtc_f32_root(x), square = gtc_f32_square_or(x, 4.0F);
+    const float most[] = {1.0F, 7.0F, 3.6e9F}, root = square_root(x), square = square_or(x, 4.0F);
     int wrong = !(isinf(x) && (x > 0.0F)) && !(isfinite(root) && (root >= 0.0F));
     wrong |= !((square >= 0.0F) && (square <= 1.0e38F));
     unsigned k;
     for (k = 0; k < 3U; k++) {
         const float least = (k == 0U) ? -1.0F : 0.0F;
         int_least32_t remarks = 0;
-        const float y = gtc_f32_saturate(x, least, most[k], &remarks);
+        const float y = saturate(x, least, most[k], &remarks);
         wrong |= !((y >= least) && (y <= most[k])) || ((remarks != 0) && (remarks != GTC_CLAMPED));
     }
     return wrong;
 }
 
-/* What the step functions believe of gtc_f32_is_missing() (tests/prove/eva/step.c), for every float32. */
+/* What the step functions believe of is_missing() (tests/prove/eva/step.c), for every float32. */
 static uint64_t missing(uint32_t every)
 {
     uint64_t wrong = 0, bits;
     for (bits = 0; bits <= 0xFFFFFFFFU; bits += every) {
         const float x = of_bits((uint32_t)bits);
-        wrong += (gtc_f32_is_missing(x) != (isfinite(x) ? 0 : 1)) || breaks_contract(x);
+        wrong += (is_missing(x) != (isfinite(x) ? 0 : 1)) || breaks_contract(x);
     }
     return wrong;
 }
@@ -92,9 +92,9 @@ static void curve(uint32_t every)
         }
         for (bits = 0; bits <= 0xFFFFFFFFU; bits += every) {
             const float x = of_bits((uint32_t)bits);
-            const float found = gtc_f32_gaussians_of_channel(x, words);
+            const float found = gaussians_of_channel(x, words);
             const float want = rounded((double)one_bell(x, r[0], r[1], r[2]) + one_bell(x, r[0], r[3], r[4]));
-            wrong += (gtc_f32_bits(found) != gtc_f32_bits(want)) || !isfinite(found);
+            wrong += (bits_of(found) != bits_of(want)) || !isfinite(found);
             if (isfinite(x) && (visited % 16U == 0U)) {
                 const double a = ((double)x - r[1]) * r[0], b = ((double)x - r[3]) * r[0];
                 const double exact = r[2] * exp2(-a * a / 64.0) + r[4] * exp2(-b * b / 64.0);
@@ -126,7 +126,7 @@ int main(int argc, char **argv)
     }
     for (bits = 0; bits < 0x45800000U; bits += every) { /* 0 ... 4096 */
         const float u = of_bits(bits);
-        const float got = gtc_f32_exp2(u);
+        const float got = exp2_of_minus(u);
         const int n = (int)rint(u);
         const double x = u * (0.6931471805599453094 / 64.0);
         float want = 0.0F;
@@ -136,11 +136,11 @@ int main(int argc, char **argv)
             const float f3 = rounded((double)f2 + g);
             want = rounded(ldexp((double)table[n % 64], -(n / 64)) * f3);
         }
-        wrong += (gtc_f32_bits(got) != gtc_f32_bits(want));
+        wrong += (bits_of(got) != bits_of(want));
         worst = fmax(worst, fabs((double)got - exp(-x)));
         visited++;
     }
     printf("gauss %" PRIu64 " %" PRIu64 " %.6e\n", visited, wrong, worst);
-    printf("missing %" PRIu64 " %" PRIu64 "\n", (0xFFFFFFFFULL + every) / every, missing(every));
+    printf("missing %" PRIu64 " %" PRIu64 "\n", (uint64_t)((0xFFFFFFFFULL + every) / every), missing(every));
     return 0;
 }

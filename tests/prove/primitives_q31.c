@@ -40,7 +40,7 @@ static void gauss(uint64_t every)
         const uint64_t v = 1557473452U - 64U * f;
         const uint64_t square = (v * v) / 4294967296U + 558709134U;
         const uint64_t want = ((table[(u / 262144U) % 64U] * square) / 4294967296U) >> (u / 16777216U);
-        const int32_t got = (int32_t)gtc_q31_exp2((uint_least32_t)u, 558709134U);
+        const int32_t got = (int32_t)exp2_of_minus((uint_least32_t)u);
         /* 2^(-f/64) at both ends by the exponential's series: f ln2/64 <= 0.011 */
         const double x0 = (double)f * (0.6931471805599453094 / 64.0 / 262144.0);
         const double x1 = (double)(f + 1U) * (0.6931471805599453094 / 64.0 / 262144.0);
@@ -60,7 +60,7 @@ static void products(void)
                                         0x7FFF0000, 0x7FFFFFFE, 0x7FFFFFFF };
     const uint64_t n = sizeof corners / sizeof corners[0];
     uint64_t wrong = 0, k;
-    gtc_q31_sum_t sum = { 0 };
+    sum_t sum = { 0 };
     int64_t exact = 0;
     for (k = 0; k < n * n + 100000000U; k++) {
         const uint64_t pair = draw();
@@ -70,18 +70,18 @@ static void products(void)
         const int32_t q = (pair & 0x100000000U) ? (int32_t)b : -(int32_t)b;
         const int32_t w = p / 2;
         const int32_t e = (int32_t)(b / 2U);
-        wrong += (gtc_q31_high(a, b) != (uint32_t)(((uint64_t)a * b) >> 32));
-        wrong += (gtc_q31_high_of_square(a) != (uint32_t)(((uint64_t)a * a) >> 32));
-        wrong += (gtc_q31_high_of_squares(p, q)
+        wrong += (high_word(a, b) != (uint32_t)(((uint64_t)a * b) >> 32));
+        wrong += (high_of_square(a) != (uint32_t)(((uint64_t)a * a) >> 32));
+        wrong += (high_of_squares(p, q)
                   != (uint32_t)(((uint64_t)((int64_t)p * p) + (uint64_t)((int64_t)q * q)) >> 32));
         if (llabs(exact) > 0x0E00000000000000LL) {
-            const gtc_q31_sum_t zero = { 0 };
+            const sum_t zero = { 0 };
             sum = zero;
             exact = 0;
         }
-        sum = gtc_q31_accumulate(sum, w, e);
+        sum = accumulate(sum, w, e);
         exact += (int64_t)w * e;
-        wrong += (gtc_q31_units(sum)
+        wrong += (units(sum)
                   != (uint32_t)(exact / 536870912 - ((exact % 536870912) < 0)));
     }
     printf("products %" PRIu64 " %" PRIu64 "\n", n * n + 100000000U, wrong);
@@ -96,18 +96,18 @@ static void one_range(int32_t low, uint32_t span, uint64_t *visited, uint64_t *w
     uint64_t offset;
     uint_least32_t x = 0;
     for (offset = 0; offset <= span; offset++) {
-        const int status = gtc_q31_position((int32_t)(low + (int64_t)offset), range, (int_least32_t)gain, &x);
+        const int status = position_of((int32_t)(low + (int64_t)offset), range, (int_least32_t)gain, &x);
         const uint64_t want = (offset * gain) / 134217728U;
         *wrong += (status != GTC_OK) || (x != want) || (want > 65535U);
     }
     *visited += offset;
     if (low > -2147483647) {
-        *wrong += gtc_q31_position(low - 1, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
-        *wrong += gtc_q31_position(-2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
+        *wrong += position_of(low - 1, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
+        *wrong += position_of(-2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED || x != 0U;
     }
-    *wrong += gtc_q31_position(2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED
+    *wrong += position_of(2147483647, range, (int_least32_t)gain, &x) != GTC_CLAMPED
               || x != ((uint64_t)span * gain) / 134217728U;
-    *wrong += gtc_q31_position(GTC_TEMP_MISSING, range, (int_least32_t)gain, &x) != GTC_E_ARG;
+    *wrong += position_of(GTC_TEMP_MISSING, range, (int_least32_t)gain, &x) != GTC_E_ARG;
     *visited += 4;
 }
 
@@ -132,7 +132,7 @@ static void quotients(void)
         const uint64_t bits = draw();
         const int64_t num = (int64_t)(draw() >> (8U + bits % 40U)) * ((bits & 0x10000U) ? 1 : -1);
         const uint32_t den = (uint32_t)((draw() >> (32U + bits / 64U % 31U)) | 1U);
-        const int64_t q = gtc_q31_divided(num, den);
+        const int64_t q = rounded_quotient(num, den);
         /* |2 (num - q den)| <= den, and at a tie |q den| > |num| */
         const __int128 left = 2 * ((__int128)num - (__int128)q * den);
         const __int128 size = left < 0 ? -left : left;
@@ -162,7 +162,7 @@ static void shifts(void)
                 linear = (int64_t)values[b] * in.x_temp + (int64_t)values[(a + b) % n] * in.x_slope;
                 want = values[a] + linear / 65536 - ((linear % 65536) < 0);
                 if ((want >= -2147483647) && (want <= 2147483647)) {
-                    wrong += gtc_q31_network(&table, network, network, &in) != want;
+                    wrong += network_value(&table, network, network, &in) != want;
                     visited++;
                 }
             }
@@ -212,7 +212,7 @@ static void curve(uint64_t every)
         }
         for (reading = -2147483647; reading <= 2147483647; reading += (int64_t)every) {
             const int64_t x = reading > 1073741824 ? 1073741824 : reading < -1073741824 ? -1073741824 : reading;
-            const int64_t found = gtc_q31_gaussians_of_channel((int32_t)x, words);
+            const int64_t found = gaussians_of_channel((int32_t)x, words);
             const int64_t sum = r[2] * one_bell(table, x - r[1], r[0]) + r[4] * one_bell(table, x - r[3], r[0]);
             wrong += (found != sum / 536870912 - ((sum % 536870912) < 0));
             if (visited % 16U == 0U) {
