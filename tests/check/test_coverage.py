@@ -10,7 +10,7 @@ from pathlib import Path
 
 from conftest import require
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_without_the_tests_of_a_file_its_lines_are_reported(tmp_path: Path) -> None:
