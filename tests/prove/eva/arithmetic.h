@@ -5,8 +5,15 @@
 #include "__fc_builtin.h"
 #include "gtc_rlg_0042.h"
 
+/* The text under analysis has no options; what it was made with is on the command line. */
+#define WITH_TERMS (GTC_MAX_TERMS > 0)
+#define WITH_CHANNELS (GTC_MAX_CHANNELS > 1U)
+#define WITH_RETAINED (GTC_WITH_MEMORY || GTC_WITH_PLAY)
+
 #if defined(F32)
+#define RUNTIME "gtc_f32.c"
 #define NAME(x) gtc_f32_##x
+#define EFFECT f32_effect_t
 #define THE_TABLE gtc_rlg_0042_f32
 typedef float num_t;
 typedef float wide_t;
@@ -23,25 +30,27 @@ typedef float wide_t;
     behavior number: assumes \is_finite(x); ensures \result == 0;
     behavior missing: assumes !\is_finite(x); ensures \result == 1;
     complete behaviors; */
-static inline int gtc_f32_is_missing(float x);
+static inline int is_missing(float x);
 #if defined(RANGES_BY_CONTRACT) /* Eva lets a NaN through `x >= least`; these for every float32, too */
 /*@ assigns \result \from x, least, most;
     assigns *remarks \from *remarks, x, least, most;
     ensures \is_finite(\result);
     ensures least <= most ==> least <= \result <= most;
     ensures *remarks == \old(*remarks) || *remarks == (\old(*remarks) | GTC_CLAMPED); */
-static inline float gtc_f32_saturate(float x, float least, float most, int_least32_t *remarks);
+static inline float saturate(float x, float least, float most, int_least32_t *remarks);
 /*@ requires !(x > 0x1.fffffep127);
     assigns \result \from x;
     ensures \is_finite(\result) && \result >= 0; */
-static inline float gtc_f32_root(float x);
+static inline float square_root(float x);
 /*@ requires 0 <= other <= 1.0e38;
     assigns \result \from square, other;
     ensures \is_finite(\result) && 0 <= \result <= 1.0e38F; */
-static inline float gtc_f32_square_or(float square, float other);
+static inline float square_or(float square, float other);
 #endif
 #else
+#define RUNTIME "gtc_q31.c"
 #define NAME(x) gtc_q31_##x
+#define EFFECT q31_effect_t
 #define THE_TABLE gtc_rlg_0042_q31
 typedef int_least32_t num_t;
 typedef int_least64_t wide_t;

@@ -1,8 +1,8 @@
 /* follow.c - one step of a memory from every state that it follows on from, for every plausible argument and every
- * gain, and its power. */
+ * gain, and its share after any number of blocks. */
 #include "arithmetic.h"
 
-#include "gtc.c"
+#include RUNTIME
 
 int main(void)
 {
@@ -16,7 +16,7 @@ int main(void)
     z[0] = (int_least32_t)Frama_C_long_interval(-FOLLOWED, FOLLOWED);
     z[1] = any_number(0);
 #endif
-    NAME(follow)(z, ANY_PLAUSIBLE(), gain);
-    (void)NAME(power)(gain, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
+    follow_memory(z, ANY_PLAUSIBLE(), gain);
+    (void)relaxed_share(gain, Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
     return 0;
 }

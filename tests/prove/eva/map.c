@@ -5,18 +5,18 @@
 /* What the conditions on several words of a table give, which no interval can say: docs/proof.md, section 2. */
 #if defined(F32)
 /*@ requires n >= 1; assigns \result \from x, range[0 .. 1], n; ensures \result <= n - 1; */
-static inline uint_least32_t gtc_f32_cell(float x, const gtc_word_t *range, uint_least32_t n);
+static inline uint_least32_t cell_of(float x, const gtc_word_t *range, uint_least32_t n);
 #else
 /*@ assigns \result \from x, range[0 .. 1];
     assigns *position \from x, range[0 .. 1], gain;
     ensures \initialized(position) && *position <= 65535;
     ensures \result == 0 || \result == 2 || \result == -1; */
-static inline int gtc_q31_position(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
-                                   uint_least32_t *position);
+static inline int position_of(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+                              uint_least32_t *position);
 #endif
 #endif
 
-#include "gtc.c"
+#include RUNTIME
 #include "any_table.h"
 
 int main(void)

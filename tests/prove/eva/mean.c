@@ -1,7 +1,7 @@
 /* mean.c - the mean of a block: |sum| <= valid * 290 C, valid in slices by powers of two. */
 #include "arithmetic.h"
 
-#include "gtc.c"
+#include RUNTIME
 
 int main(void)
 {
@@ -16,7 +16,7 @@ int main(void)
 #else
         const wide_t sum = Frama_C_long_long_interval(-(290LL * 65536LL * (long long)most), 290LL * 65536LL * (long long)most);
 #endif
-        (void)NAME(mean)(base, sum, valid);
+        (void)mean_of(base, sum, valid);
     }
     return 0;
 }

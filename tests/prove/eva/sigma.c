@@ -8,19 +8,19 @@
 
 #if defined(F32)
 /*@ requires n >= 1; assigns \result \from x, range[0 .. 1], n; ensures \result <= n - 1; */
-static inline uint_least32_t gtc_f32_cell(float x, const gtc_word_t *range, uint_least32_t n);
+static inline uint_least32_t cell_of(float x, const gtc_word_t *range, uint_least32_t n);
 #define BOUND 1.0F
 #else
 /*@ assigns \result \from x, range[0 .. 1];
     assigns *position \from x, range[0 .. 1], gain;
     ensures \initialized(position) && *position <= 65535;
     ensures \result == 0 || \result == 2 || \result == -1; */
-static inline int gtc_q31_position(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
-                                   uint_least32_t *position);
+static inline int position_of(int_least32_t x, const int_least32_t range[2], int_least32_t gain,
+                              uint_least32_t *position);
 #define BOUND 1048576L
 #endif
 
-#include "gtc.c"
+#include RUNTIME
 #include "any_table.h"
 
 #define CELLS 6U
@@ -33,7 +33,7 @@ static void any_uncertainty(void)
     unsigned i;
     /*@ loop unroll 32; */
     for (i = 0; i < ((2U * CELLS) + GTC_SIGMA_RULES + GTC_MAX_TERMS); i++) {
-        NUMBER(any_sigma[i]) = ANY_IN(NAME(sigma_limits)[0]);
+        NUMBER(any_sigma[i]) = ANY_IN(sigma_limits[0]);
     }
     any.sigma = any_sigma;
     any.sigma_cells[0] = 3U;
@@ -45,7 +45,7 @@ static void any_uncertainty(void)
 static void any_state(void)
 {
     unsigned i;
-    state.table = &THE_TABLE;
+    state.table_crc = THE_TABLE.crc;
     state.period_us = Frama_C_unsigned_long_interval(1, 0xFFFFFFFFUL);
     state.samples_per_block = Frama_C_unsigned_long_interval(1, MAX_BLOCK);
     state.status = Frama_C_interval(0, 63);
@@ -64,6 +64,8 @@ static void any_state(void)
     state.uncertainty.lowest = ANY_PLAUSIBLE();
     state.uncertainty.highest = ANY_PLAUSIBLE();
     state.uncertainty.unshifted = any_number(0);
+    state.uncertainty.edge_effect = any_number(0);
+    state.uncertainty.missing = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     state.uncertainty.terms_since = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
     state.uncertainty.terms_known = Frama_C_unsigned_long_interval(0, 15);
     state.uncertainty.slope_known = Frama_C_unsigned_long_interval(0, 2);
@@ -83,13 +85,13 @@ int main(void)
         NAME(snapshot_t) snapshot;
         int status;
         any_state();
-        status = NAME(snapshot)(&state, &snapshot);
+        status = NAME(snapshot)(&state, &THE_TABLE, &snapshot);
         //@ check status >= 0;
         //@ check snapshot.sigma >= 0;
-        status = NAME(rezero)(&state, any_number(kind), Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
+        status = NAME(rezero)(&state, &THE_TABLE, any_number(kind), Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL));
         //@ check status == -8 || status == -1 || status == 0 || status == 2;
         //@ check -BOUND <= state.shift <= BOUND;
-        status = NAME(rezero)(&state, any_number(kind), 0U);
+        status = NAME(rezero)(&state, &THE_TABLE, any_number(kind), 0U);
         //@ check status == 0 && state.shift == 0;
     }
     return 0;

@@ -1,7 +1,7 @@
 /* slope.c - the slope over every window: any pattern of holes, any block means. */
 #include "arithmetic.h"
 
-#include "gtc.c"
+#include RUNTIME
 
 int main(void)
 {
@@ -9,13 +9,12 @@ int main(void)
     num_t slope = 0;
     unsigned k;
     int_least32_t remark;
-    state.table = &THE_TABLE;
     state.filled = Frama_C_unsigned_long_interval(0, THE_TABLE.slope_blocks);
     state.window_valid = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     for (k = 0; k < GTC_MAX_SLOPE_BLOCKS; k++) {
         state.window[k] = ANY_PLAUSIBLE();
     }
-    remark = NAME(window_slope)(&state, &slope);
+    remark = window_slope(&state, &THE_TABLE, &slope);
     //@ check remark == 0 || remark == 1;
     //@ check FINITE(slope) && -STEEPEST <= slope <= STEEPEST;
     return (int)remark;
