@@ -94,10 +94,10 @@ def diagnose(
     """
     say = progress or (lambda _: None)
     say("reading")
-    whole = replace(dataset, runs=joined_runs(dataset.runs))
     judged = judged or judge(dataset)
     events = found_events(dataset, judged)
-    found = _diagnosed(whole, judged, options or FitOptions(), say)
+    stretches = replace(dataset, runs=judged.cut(joined_runs(dataset.runs)))
+    found = _diagnosed(stretches, judged, options or FitOptions(), say)
     reported = {"events": tuple(events)}
     steps = (*_about(events), *found.result.next)
     return replace(found, result=found.result.model_copy(update=reported | {"next": steps}))
@@ -199,7 +199,7 @@ def _extended_model(
     fallback_models = fallback_models_of(plain, extension.samples, played, extension.shipped)
     entries = _entries(extension.shipped, fallback_models)
     left_out = extension.after if extension.measured_on == "left out" else ()
-    training = training_of(dataset, extension.samples, extension.extended, front, options, left_out)
+    training = training_of(dataset, runs, extension.samples, extension.extended, front, options, left_out)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
     guards = {name: channel_guard(runs, name, HOLD_S) for name in sorted(recorded)}
     low, high = added_range(played, extension.shipped)

@@ -55,7 +55,8 @@ _ROUNDING_S = 1e-6  # of times that are compared
 class Refitting:
     """Training runs after the front end, and the options of every fit.
 
-    Of a single cycle the map beside any effect is one of T alone (see `cycle`).
+    The runs of the data set are those that `Judged.cut` returns. For a single cycle the map that is fitted with any
+    effect depends on T alone (see `cycle`).
     """
 
     def __init__(
@@ -92,6 +93,7 @@ class Refitting:
     def read(self) -> Read:
         """The training runs as `fit_dataset` reads them."""
         return Read(
+            tuple(self.runs),
             joined([run.data for run in self.train]),
             {name: np.concatenate([run.seen[name] for run in self.train]) for name in self.train[0].seen},
             rows_used(self._judged, self.runs),

@@ -117,12 +117,17 @@ class Judged:
                 return one
         return judge_runs([run]).runs[0]
 
-    def split(self, runs: Sequence[Run]) -> tuple[Run, ...]:
-        """Return the runs, cut where the gyro was switched on anew."""
+    def cut(self, runs: Sequence[Run]) -> tuple[Run, ...]:
+        """Return the runs, cut where the gyro was switched on anew.
+
+        Training, diagnosis and the comparison of methods take what follows as a run of its own.
+        """
         found: list[Run] = []
         for run in runs:
             rest = run
             for time_s in self.of(run).power_ons_s:
+                if not in_limits(np.asarray(time_s), run.from_s, run.to_s, ()):
+                    continue
                 found.append(replace(rest, to_s=time_s))
                 rest = replace(rest, from_s=time_s, power_on_s=time_s)
             found.append(rest)

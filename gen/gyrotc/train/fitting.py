@@ -187,12 +187,12 @@ def fit_dataset(
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     say = progress or (lambda _: None)
     front = front_end(runs, options.block_s)
-    if judged is None:
-        say("judging rows")
-        judged = judge(dataset)
-    stretches = judged.split(joined_runs(runs)) if read is None else joined_runs(runs)
-    read = read or _read(dataset, stretches, front, judged, say, channels=options.channels)
-    data = read.data
+    if read is None:
+        if judged is None:
+            say("judging rows")
+            judged = judge(dataset)
+        read = _read(dataset, judged.cut(joined_runs(runs)), front, judged, say, channels=options.channels)
+    data, power_on = read.data, power_ons(read.runs)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
             str(dataset.folder),
@@ -202,13 +202,13 @@ def fit_dataset(
     say("training")
     choice = None
     if options.channels:
-        choice = chosen_channels(dataset, data, power_ons(stretches), read.channels, options.average_s)
+        choice = chosen_channels(dataset, data, power_on, read.channels, options.average_s)
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
-    fitted = _judged(data, _fit(data, options, power_on=power_ons(stretches), serial=dataset.serial), options.average_s)
+    fitted = _judged(data, _fit(data, options, power_on=power_on, serial=dataset.serial), options.average_s)
     front = replace(front, stuck_s=stuck_after_s(read.longest_same_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
-    training = training_of(dataset, data, fitted, front, options)
+    training = training_of(dataset, read.runs, data, fitted, front, options)
     content: dict[str, Any] = {
         "rows": read.rows,
         "means": _means(data, fitted),
@@ -227,12 +227,14 @@ class Read:
     """What the front end made of the training runs.
 
     Attributes:
+        runs: The runs that the samples number, as `Judged.cut` gives them.
         data: Training samples.
         channels: What the target would see of each recorded channel, shape (samples,).
         rows: Count of the rows that were used and left out.
         longest_same_s: Longest time for which a reading of the thermometer stayed the same, s.
     """
 
+    runs: tuple[Run, ...]
     data: TrainingData
     channels: dict[str, FloatArray]
     rows: RowsUsed
@@ -240,12 +242,12 @@ class Read:
 
 
 def _read(
-    dataset: Dataset, stretches: Sequence[Run], front: FrontEnd, judged: Judged, say: Progress, *, channels: bool
+    dataset: Dataset, runs: tuple[Run, ...], front: FrontEnd, judged: Judged, say: Progress, *, channels: bool
 ) -> Read:
     """Reads the training runs."""
     parts, columns = [], []
     longest_s = 0.0
-    for k, run in enumerate(stretches):
+    for k, run in enumerate(runs):
         say(f"reading {run.file}")
         rows = run.rows()
         blocks = front.blocks(run, rows, judged)
@@ -255,7 +257,7 @@ def _read(
         columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
         del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
     whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
-    return Read(joined(parts), whole, rows_used(judged, stretches), longest_s)
+    return Read(runs, joined(parts), whole, rows_used(judged, runs), longest_s)
 
 
 def map_method(method: str) -> str:
@@ -409,6 +411,7 @@ def _data_file(run: Run) -> dict[str, Any]:
 
 def training_of(
     dataset: Dataset,
+    runs: Sequence[Run],
     data: TrainingData,
     fitted: Fit,
     front: FrontEnd,
@@ -418,10 +421,10 @@ def training_of(
     """Return what `training.json` holds.
 
     Args:
+        runs: The runs that samples and folds number, as `Judged.cut` gives them.
         left_out: What the correction leaves on pieces that it has not seen, if it is known better than to the fit.
     """
     left_out = fitted.left_out if left_out is None else left_out
-    runs = joined_runs([run for run in dataset.runs if run.role == "train"])
     return Training(
         gyrotc_version=__version__,
         serial=dataset.serial,

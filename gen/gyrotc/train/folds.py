@@ -8,7 +8,7 @@ branch or part are not trained on while it is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, Protocol
@@ -87,7 +87,7 @@ class Fold:
         """Return which samples are not trained on: those left out, and those in the guard gap."""
         return np.asarray(np.any([span.contains(samples, self.guard_s) for span in self.spans], axis=0))
 
-    def results(self, runs: tuple[Run, ...] | list[Run]) -> Iterator[SpanLeftOut]:
+    def results(self, runs: Sequence[Run]) -> Iterator[SpanLeftOut]:
         """Yield the spans as `training.json` has them; `runs`: the training runs."""
         for span in self.spans:
             yield SpanLeftOut(
