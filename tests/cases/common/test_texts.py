@@ -658,12 +658,14 @@ def test_a_refusal_is_one_line_whatever_the_name(tmp_path: Path, gyrotc: Command
         assert "\ngyrotc: all" not in done.stdout + done.stderr
 
 
-def test_progress_shows_names_with_brackets(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("text", ["[red]a[/bold].csv", ":smile:", "a\x1b[2J.csv", "a\u202eb.csv", "[/]" * 20])
+def test_a_line_of_progress_shows_a_name_and_obeys_none(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     stream = io.StringIO()
-    monkeypatch.setattr(progress, "ERR", type(output.ERR)(file=stream, force_terminal=True, width=200))
+    console = type(output.ERR)(file=stream, force_terminal=True, color_system=None, width=10**4)
+    monkeypatch.setattr(progress, "ERR", console)
     with progress.progress() as say:
-        for text in HOSTILE:
-            say(f"replaying {text}")
+        say(f"replaying {text}")
+    assert f"replaying {terminal_text(text)}" in stream.getvalue()
 
 
 # ---- one place ----

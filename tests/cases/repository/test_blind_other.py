@@ -1,6 +1,6 @@
-"""The other blind world: its own physics, checked by what physics says, and a few of its recordings diagnosed.
+"""The other blind world: its own physics, checked by what physics says.
 
-`make blind` measures the figures. Here three recordings show that every stage of it still runs.
+`make blind` measures the figures; `tests/check/test_blind_other.py` runs every stage of it on a few recordings.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tests.blind.other.mechanisms import Scene, draw_map  # noqa: E402
 from tests.blind.other.yardstick import Yardstick  # noqa: E402
 
 WORLD = ("heat", "noise", "mechanisms", "grammar", "yardstick", "record")
-SEED, RECORDS = 20261122, 3  # always the same: what is drawn anew is for `make blind`
+SEED = 20261122  # always the same: what is drawn anew is for `make blind`
 
 
 def test_the_world_imports_nothing_of_the_tool_nor_of_the_sibling() -> None:
