@@ -63,8 +63,8 @@ PARTS = {
         ("cases/tables", "cases/mirror", "cases/model", "cases/verify", "journeys/repository/test_examples.py"),
     ),
     "choice": Part(
-        ("train/selection.py", "train/objection.py"),
-        ("cases/train/test_choice_thresholds.py", "cases/train", "properties/train"),
+        ("train/choice.py", "train/candidates.py", "train/folds.py", "train/objection.py"),
+        ("cases/train/test_choice.py", "cases/train", "properties/train"),
     ),
     "sigma": Part(
         ("train/uncertainty.py", "mirror/sigma.py"),
@@ -81,14 +81,15 @@ def measure(settings: Settings) -> Record:
     """Plant drawn faults in each part, and list those that no test finds.
 
     Raises:
-        SystemExit: a part does not exist, or its tests fail without a fault.
+        SystemExit: a part does not exist, a pattern of one fits no file, or its tests fail without a fault.
     """
     names = list(settings.only or PARTS)
     if unknown := [name for name in names if name not in PARTS]:
         raise SystemExit(f"no part is called {', '.join(unknown)}; there are {', '.join(PARTS)}")
     seed = _SEED if settings.seed is None else settings.seed
     count = QUICK_FAULTS if settings.quick else FAULTS
-    return {"seed": seed, "parts": [_tried(name, count, seed, settings.workers) for name in names]}
+    paths = {name: _paths(PARTS[name]) for name in names}  # a wrong pattern ends the campaign before its first hour
+    return {"seed": seed, "parts": [_tried(name, *paths[name], count, seed, settings.workers) for name in names]}
 
 
 def table(record: Record) -> ResultsTable:
@@ -101,10 +102,16 @@ def table(record: Record) -> ResultsTable:
     return ResultsTable(__doc__.split("\n\n", 1)[1], ("part", "faults, and those that no test finds", "found "), rows)
 
 
-def _tried(name: str, count: int, seed: int, workers: int) -> dict[str, Any]:
-    part = PARTS[name]
-    tests = [str(path.relative_to(ROOT)) for pattern in part.tests for path in _there(ROOT / "tests", pattern)]
+def _paths(part: Part) -> tuple[list[Path], list[str]]:
+    """Return the modules of a part, and its tests as pytest takes them."""
     modules = [path for pattern in part.modules for path in _there(ROOT / "gen" / "gyrotc", pattern)]
+    tests = [str(path.relative_to(ROOT)) for pattern in part.tests for path in _there(ROOT / "tests", pattern)]
+    return modules, tests
+
+
+def _tried(
+    name: str, modules: Sequence[Path], tests: Sequence[str], count: int, seed: int, workers: int
+) -> dict[str, Any]:
     faults = drawn(modules, count, np.random.default_rng([seed, *name.encode()]))
     missed: list[Fault] = []
     with tempfile.TemporaryDirectory(prefix="gyrotc-mutation-") as folder, ThreadPoolExecutor(workers) as threads:
