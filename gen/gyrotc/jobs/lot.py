@@ -72,7 +72,7 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
         InputError: Fewer than three units, or units of several axes and none is named.
     """
     say = progress or (lambda _: None)
-    units = _units(fleet, axis)
+    units, left_out = _units(fleet, axis)
     means, envelope = [u.means for u in units], _envelope([u.model for u in units])
     found = learn_prior(means, envelope, say)
     kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
@@ -85,27 +85,35 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
         axis=units[0].model.axis,
         mean_s=float(np.median([u.mean_s for u in kept])),
         between_dph=float(np.sqrt(np.mean([u.model.between_dph**2 for u in kept]))),
+        left_out=left_out,
     )
 
 
-def _units(fleet: Path, axis: str | None) -> list[_Calibrated]:
-    """Units of one axis, in the order of their folders; one under two names counts once, one that is barred not."""
+def _units(fleet: Path, axis: str | None) -> tuple[list[_Calibrated], str]:
+    """Return the units of one axis in the order of their folders, and how many others were left out and why."""
     if not fleet.is_dir():
         raise InputError(str(fleet), "is no folder", "what gyrotc fleet wrote")
     summary = read_optional(fleet / "fleet.json", FleetSummary)
     barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
-    places = sorted(p.parent for p in fleet.glob("*/training.json") if p.parent.name not in barred)
-    units = [_unit(place) for place in places]
+    places = sorted(p.parent for p in fleet.glob("*/training.json"))
+    units = [_unit(place) for place in places if place.name not in barred]
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:
         raise InputError("--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own")
-    chosen = [u for u in units if u.model.axis == axis and u.by_itself]
+    of_axis = [u for u in units if u.model.axis == axis]
+    chosen = [u for u in of_axis if u.by_itself]
     distinct = {u.model.serial: u for u in chosen}
+    counts = {
+        "barred by a finding of the fleet": len(places) - len(units),
+        "of another axis": len(units) - len(of_axis),
+        "calibrated with a lot or an earlier model": len(of_axis) - len(chosen),
+        "with the serial of another folder": len(chosen) - len(distinct),
+    }
+    left_out = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
     if len(distinct) < LEAST_UNITS:
-        others = f", {len(units) - len(chosen)} of another axis or calibrated with a lot or an earlier model"
-        found = f"{len(distinct)} calibrated units{others if units else ''}"
+        found = f"{len(distinct)} calibrated units" + (f", {left_out}" if left_out else "")
         raise InputError(str(fleet), found, f"{LEAST_UNITS} at least")
-    return [*distinct.values()]
+    return [*distinct.values()], left_out
 
 
 def _unit(place: Path) -> _Calibrated:
@@ -133,6 +141,7 @@ def lot_from(
     axis: str | None = None,
     mean_s: float = MEAN_S,
     between_dph: float = 0.0,
+    left_out: str = "",
 ) -> Lot:
     """The file of a lot that was learnt.
 
@@ -144,6 +153,7 @@ def lot_from(
         axis: Of the gyros.
         mean_s: Length of the means behind `units`, s.
         between_dph: Standard deviation of the constant from power-on to power-on, deg/h.
+        left_out: How many units of the folder the lot was not learnt from, and why; empty: it was from all.
     """
     state, cluster = found.state, iter(found.state.cluster.tolist())
     inside = [u for u, kept in zip(units, found.inside, strict=True) if kept]
@@ -154,7 +164,7 @@ def lot_from(
             LotUnit(serial=serial, model_hash=model_hash, cluster=next(cluster) if kept else None, p_value=float(p))
             for (serial, model_hash), kept, p in zip(names, found.inside, found.p_values, strict=True)
         ),
-        text=_in_words(names, found),
+        text=_in_words(names, found) + (f"; left out: {left_out}" if left_out else ""),
         temperature_c=envelope[0],
         slope_c_per_min=envelope[1],
         occupancy=tuple(file_numbers(row) for row in _occupancy(inside, envelope)),

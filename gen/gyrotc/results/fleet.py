@@ -296,7 +296,7 @@ class Lot(Result):
     schema_: Annotated[Literal["gyrotc.lot/1"], Field(alias="schema")] = "gyrotc.lot/1"
     axis: Axis = Field(description="of the gyros; null where their recordings have one axis")
     units: tuple[LotUnit, ...] = Field(description="fully calibrated units, in the order of their folders")
-    text: str = Field(description="in words: how much is shared, clusters, outliers")
+    text: str = Field(description="in words: how much is shared, clusters, outliers, and how many units were left out")
     temperature_c: tuple[PlottedCelsius, PlottedCelsius] = Field(description="envelope of the lot, C")
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
     occupancy: tuple[Figures, ...] = Field(

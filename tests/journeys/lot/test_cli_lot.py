@@ -64,6 +64,23 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
     assert lot.at_rest.temperature_c[0] == pytest.approx(lot.temperature_c[0], rel=1e-5)
 
 
+def test_how_many_units_were_left_out_is_said_with_the_reasons(world: Path, tmp_path: Path) -> None:
+    fleet = Path(shutil.copytree(world / "fleet", tmp_path / "fleet"))
+    shutil.copytree(fleet / "LOT-0005-002", fleet / "under another name")
+    run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", fleet / "LOT-0005-006")
+    summary = json.loads((fleet / "fleet.json").read_text())
+    (barred,) = (one for one in summary["serials"] if one["name"] == "LOT-0005-001")
+    barred["findings"] = ["sign_reversed"]
+    (fleet / "fleet.json").write_text(json.dumps(summary))
+    expected = (
+        "left out: 1 barred by a finding of the fleet, 1 calibrated with a lot or an earlier model, "
+        "1 with the serial of another folder"
+    )
+    assert expected in run_here("lot", fleet, "--out", tmp_path / "lot.json")
+    lot = load_lot(tmp_path / "lot.json")
+    assert expected in lot.text and [u.serial for u in lot.units] == [f"LOT-0005-00{k}" for k in range(2, 6)]
+
+
 def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
     reported = run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
     apart = Path(shutil.copytree(world / "short" / "LOT-0005-006", world / "apart" / "LOT-0005-006"))
