@@ -104,6 +104,23 @@ class Envelope(_Frozen):
     temperature_c: Annotated[tuple[Celsius, Celsius], AfterValidator(_ordered)]
     slope_c_per_min: Annotated[tuple[CelsiusPerMin, CelsiusPerMin], AfterValidator(_ordered)]
 
+    def cells_at(
+        self, cells: tuple[int, int], temperature_c: ArrayLike, slope_c_per_min: ArrayLike
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return row and column of inputs in a grid over the range; beyond it they are negative or too large.
+
+        Args:
+            cells: Numbers of columns (T) and rows (dT/dt).
+            temperature_c, slope_c_per_min: Inputs of shapes that broadcast together.
+        """
+        column, row = (
+            np.floor((np.asarray(x, dtype=np.float64) - low) / (high - low or 1.0) * n).astype(np.int64)
+            for x, (low, high), n in zip(
+                (temperature_c, slope_c_per_min), (self.temperature_c, self.slope_c_per_min), cells, strict=True
+            )
+        )
+        return row, column
+
 
 class Coverage(_Frozen):
     """Where training data was: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
@@ -411,6 +428,28 @@ class Model(_Frozen):
         every_t, every_r = (grid.ravel() for grid in np.meshgrid(t, r))
         seen = np.array([c == "1" for row in self.coverage.rows for c in row]) if self.coverage else np.ones(0, bool)
         return (every_t[seen], every_r[seen]) if seen.any() else (every_t, every_r)
+
+    def sigma_dph(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64] | None:
+        """Return 1 sigma of the correction as the table's cells state it, deg/h; None if the model states none.
+
+        Where training was not, the cells of `uncovered` count. Inputs beyond the envelope are limited to it.
+        """
+        known, seen = self.uncertainty_dph, self.coverage
+        if known is None:
+            return None
+        sigma = np.array(known.rows)[self._cells_within(known.cells, temperature_c, slope_c_per_min)]
+        if seen is None or known.uncovered is None:
+            return np.asarray(sigma)
+        trained = np.array([[cell == "1" for cell in row] for row in seen.rows])
+        uncovered = np.array(known.uncovered)[self._cells_within(known.cells, temperature_c, slope_c_per_min)]
+        covered = trained[self._cells_within(seen.cells, temperature_c, slope_c_per_min)]
+        return np.asarray(np.where(covered, sigma, uncovered))
+
+    def _cells_within(
+        self, cells: tuple[int, int], temperature_c: ArrayLike, slope_c_per_min: ArrayLike
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        row, column = self.envelope.cells_at(cells, temperature_c, slope_c_per_min)
+        return np.clip(row, 0, cells[1] - 1), np.clip(column, 0, cells[0] - 1)
 
     def network_dph(
         self, network: Network, temperature_c: ArrayLike, slope_c_per_min: ArrayLike

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..common.arrays import FloatArray
 from ..common.errors import GyrotcError, InputError
 from ..model import Model, load_model
 from ..recordings.records import Dataset
@@ -251,9 +250,9 @@ def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None
     worst = np.unravel_index(int(np.argmax(np.abs(difference))), difference.shape)
     floor = new.noise_floor_dph
     rms = float(np.sqrt(np.mean(difference**2)))
-    before, after = (_variance(model, t, slope) for model in (old, new))
+    before, after = (model.sigma_dph(t, slope) for model in (old, new))
     # RMS that the uncertainties of both maps give although nothing has moved
-    expected = of_means if before is None or after is None else float(np.sqrt(np.mean(before + after)))
+    expected = of_means if before is None or after is None else float(np.sqrt(np.mean(before**2 + after**2)))
     return MapDifference(
         rms_dph=rms,
         mean_dph=float(np.mean(difference)),
@@ -264,17 +263,6 @@ def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None
         # Errors of a map hang together over its envelope, at most all of them: then the ratio is one normal number.
         significant=None if expected is None else rms > 2.0 * expected,
     )
-
-
-def _variance(model: Model, t: FloatArray, slope: FloatArray) -> FloatArray | None:
-    if model.uncertainty_dph is None:
-        return None
-    rows, place = np.array(model.uncertainty_dph.rows), []
-    spans = (model.envelope.slope_c_per_min, model.envelope.temperature_c)
-    for x, (low, high), n in zip((slope, t), spans, rows.shape, strict=True):
-        share = (x - low) / (high - low) if high > low else np.zeros_like(x)
-        place.append(np.clip((share * n).astype(np.int64), 0, n - 1))
-    return np.asarray(rows[place[0], place[1]] ** 2)
 
 
 def _figures(earlier: Earlier, model: Model, evaluation: Evaluation) -> Iterator[tuple[str, FigureChange | str]]:

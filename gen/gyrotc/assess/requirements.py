@@ -67,13 +67,11 @@ def _visited(model: Model, exam: Sequence[Averages]) -> float:
     cells = coverage.cells if coverage else (32, 12)
     trained = np.array([[c == "1" for c in row] for row in coverage.rows]) if coverage else np.ones(cells[::-1], bool)
     visited: BoolArray = np.zeros(trained.shape, dtype=bool)
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     for a in exam:
         if a.time_s.size:
             t = a.temperature_c
             rate = np.gradient(t, a.time_s / 60.0) if t.size > 1 else np.zeros(1)
-            column = np.floor((t - t0) / (t1 - t0 or 1.0) * cells[0]).astype(np.int64)
-            row = np.floor((rate - r0) / (r1 - r0 or 1.0) * cells[1]).astype(np.int64)
+            row, column = model.envelope.cells_at(cells, t, rate)
             # Means just outside the envelope count at its edge, not farther than the neighbour of a cell.
             near = (np.abs(column - np.clip(column, 0, cells[0] - 1)) <= 1) & (
                 np.abs(row - np.clip(row, 0, cells[1] - 1)) <= 1

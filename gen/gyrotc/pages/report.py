@@ -18,7 +18,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
 from ..common.arrays import BoolArray, FloatArray, numpy_of
@@ -450,7 +449,7 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
     t0, t1 = model.envelope.temperature_c
     t = np.linspace(t0, t1, 160) if t1 > t0 else np.array([t0 - 0.5, t0 + 0.5])
     rest = model.map_dph(t, np.zeros_like(t)) - model.fallback_dph
-    sigma = _sigma_at_rest(model, t)
+    sigma = model.sigma_dph(t, np.zeros_like(t))
     if sigma is not None:
         panel.band(t, rest - COVERAGE * sigma, rest + COVERAGE * sigma, ACCENT, "U, k = 2")
     panel.line(t, rest, ACCENT, "map at rest", width=1.4)
@@ -459,26 +458,6 @@ def _fit(panel: Panel, model: Model, kinds: Sequence[tuple[str, str, BoolArray]]
             rate = float(np.median(slope[of]))
             words = f"{rate:+.2g} C/min".replace("-", "−")
             panel.line(t, model.map_dph(t, np.full_like(t, rate)) - model.fallback_dph, color, words, dash="5 3")
-
-
-def _sigma_at_rest(model: Model, t: FloatArray) -> FloatArray | None:
-    """1 sigma of the correction at dT/dt = 0, deg/h, as the table's cells have it; None where it has none."""
-    (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
-
-    def cell(cells: tuple[int, int]) -> tuple[int, NDArray[np.int64]]:
-        columns, rows = cells
-        column = np.clip(((t - t0) / (t1 - t0 or 1.0) * columns).astype(np.int64), 0, columns - 1)
-        return min(max(int((0.0 - r0) / (r1 - r0 or 1.0) * rows), 0), rows - 1), column
-
-    known, seen = model.uncertainty_dph, model.coverage
-    if known is None:
-        return None
-    at, covered = cell(known.cells), np.ones(t.shape, dtype=bool)
-    if seen is not None:
-        row, columns = cell(seen.cells)
-        covered = np.array([seen.rows[row][k] == "1" for k in columns])
-    cells = np.where(covered, np.array(known.rows)[at], np.array(known.uncovered or known.rows)[at])
-    return np.asarray(cells, dtype=np.float64)
 
 
 def allan_deviation(noise: NoiseTerms) -> Markup | None:

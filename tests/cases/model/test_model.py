@@ -71,6 +71,16 @@ def test_inputs_outside_the_envelope_give_the_value_at_its_edge(model_dict: dict
     assert model.map_dph(500.0, -9.0) == model.map_dph(60.0, -1.0)
 
 
+def test_sigma_is_that_of_the_cell_and_of_no_training_where_none_was(model_dict: dict[str, Any]) -> None:
+    """The coverage has four by two cells, sigma two by one: that of -15 to 10 C and rising T was not trained."""
+    known = {"cells": [2, 1], "rows": [[0.001, 0.002]], "uncovered": [[0.01, 0.02]]}
+    model = Model.from_dict(model_dict | {"uncertainty_dph": known})
+    t, slope = np.array([-99.0, -20.0, -5.0, -5.0, 99.0]), np.array([-9.0, -0.5, -0.5, 0.5, 0.0])
+    sigma = model.sigma_dph(t, slope)
+    assert sigma is not None and sigma.tolist() == [0.001, 0.001, 0.001, 0.01, 0.002]
+    assert Model.from_dict(model_dict).sigma_dph(t, slope) is None
+
+
 def test_zeroed_at_gives_zero_there_and_shifts_nothing_else(model_dict: dict[str, Any]) -> None:
     model = Model.from_dict(model_dict)
     zeroed = model.zeroed_at(20.0)
