@@ -13,8 +13,6 @@ sys.path.insert(0, str(ROOT / "tests" / "support"))
 from browser import browser  # noqa: E402
 from lot import Lot  # noqa: E402
 
-#: Width of the narrowest phones that are common, in points.
-_PHONE = 390
 _PLANTED = ("sign_reversed", "axes_exchanged", "step", "noise", "thermometer_offset", "outliers")
 _LIMITS = """schema = 1
 product = "NAV"
@@ -27,11 +25,12 @@ improvement = 1.1
 
 
 def main(docs: Path = ROOT / "docs") -> None:
-    """Make a result, a diagnosis and a fleet, and write pictures of their pages, bright and dark, wide and narrow."""
+    """Make a result, a diagnosis and a fleet, and write pictures of their pages, bright and dark."""
     with tempfile.TemporaryDirectory(prefix="gyrotc-pictures-") as folder:
         work = Path(folder)
         (work / "product.toml").write_text(_LIMITS)
         _gyrotc("simulate", "paper", "--seed", "1", "--out", work / "data")
+        _gyrotc("build", work / "data", "--out", work / "demo")
         _gyrotc("build", work / "data", "--limits", work / "product.toml", "--out", work / "unit")
         _gyrotc("simulate", "thermal-gradient", "--seed", "3", "--out", work / "gradient")
         _gyrotc("diagnose", work / "gradient", "--out", work / "diagnosis")
@@ -40,7 +39,6 @@ def main(docs: Path = ROOT / "docs") -> None:
         with browser(work / "profile") as tab:
             for page, name, width, height, dark, above in (
                 (unit, "report.png", 1120, 720, False, "html"),
-                (unit, "report-phone.png", _PHONE, 844, True, "html"),
                 (diagnosis, "diagnosis.png", 1120, 720, False, "html"),
                 (fleet, "fleet.png", 1120, 940, False, "html"),
                 (fleet, "fleet-curves.png", 1120, 830, True, "h2:has(+ figure)"),
@@ -48,6 +46,8 @@ def main(docs: Path = ROOT / "docs") -> None:
                 tab.open(page, width=width, height=height, dark=dark)
                 tab.value(f"document.querySelector('{above}').scrollIntoView()")
                 tab.picture(docs / name, whole=False)
+            tab.open(work / "demo" / "report.html", width=1120, height=720)
+            tab.picture_of("figure", docs / "bias.png")
 
 
 def _gyrotc(*words: object) -> None:
