@@ -26,7 +26,7 @@ _WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # times the square root of the number of i
 _CANDIDATES = 300  # samples as centers, drawn at random: bounds time and memory of the normal equations
 _MOST_CENTERS = 60  # bounds the time of a fit
 _SAMPLES_PER_COLUMN = 5  # at least: with fewer the size is chosen by noise
-# Times the number of samples: slight, for candidates that nearly coincide (docs/training.md, section 3)
+# Times the number of samples: slight, for candidates that nearly coincide (docs/training.md, section 5)
 _RIDGE = 1e-8
 
 

@@ -31,7 +31,7 @@ RIDGE = 1e-8
 
 # Widths that are tried, in half ranges, each about 1.5 times the one before.
 _WIDTHS = (0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.6)
-# Centers of T and of dT/dt of the grid (docs/training.md, section 3).
+# Centers of T and of dT/dt of the grid (docs/training.md, section 5).
 _GRID = (21, 13)
 # Random samples, or nodes: as many centers as the largest of the paper's networks has.
 _NODES = 135
