@@ -5,13 +5,14 @@ What is done with a block stands behind the language of its fence:
 - ```` ```console run ````: a line that begins with `$ ` is a command of bash (one that ends in a backslash goes on in
   the next line), the lines behind it are what it prints; `...` stands for anything, as a part of a line or, alone in a
   line, for any lines. A command whose exit status is not 0 is wrong unless the page says `$? = N` behind its output.
-- ```` ```c file: lab/main.c ```` (any language): the block is that file.
+- ```` ```c file: lab/main.c ```` (any language): the block is that file; its folder has to be there.
 - ```` ```diff file: gen/a.py ````: the block is a change of that file. The file must contain the lines without `+`
   exactly once and without others between them.
 - ```` ```sh not run: REASON ```` (any language): the block is only shown.
 
-The blocks of a page run in order in one folder, a copy of the sources with `.venv` in it. `gyrotc` and `import gyrotc`
-are those of the copy, so that a page may add to the package.
+The blocks of a page run in order, from a copy of the sources with `.venv` in it; a `cd` holds for the commands and
+files behind it, as it does for a reader. `gyrotc` and `import gyrotc` are those of the copy, so that a page may add to
+the package.
 
     python tools/documents.py docs/tutorial.md    runs a page; exit status 1 and the difference if it is wrong
 """
@@ -127,21 +128,25 @@ def run(page: Path, folder: Path) -> Iterator[str]:
         "PATH": f"{work / '.venv' / 'bin'}:{Path(sys.executable).parent}:{os.environ['PATH']}",
         "COLUMNS": "120", "LC_ALL": "C.UTF-8",
     }  # fmt: skip
+    here, left_in = work, folder / "left_in"
     for step in steps(page.read_text("utf-8")):
         where = f"{page.name}:{step.line}"
         if step.text is not None:
-            path = work / step.command
+            path = here / step.command
+            if not path.parent.is_dir():
+                yield f"{where}: there is no folder for {step.command}"
+                continue
             text = changed(path.read_text("utf-8"), step.text) if step.changes else step.text
             if text is None:
                 yield f"{where}: the lines around the change are not, or not once, in {step.command}"
                 continue
-            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, "utf-8")
             continue
         done = subprocess.run(
-            ["bash", "-c", step.command], cwd=work, env=environment, text=True, check=False, timeout=600,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            ["bash", "-c", f"trap 'pwd >\"$0\"' EXIT\n{step.command}", left_in], cwd=here, env=environment, text=True,
+            check=False, timeout=600, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
+        here = Path(left_in.read_text("utf-8").strip())
         if done.returncode != step.status:
             yield f"{where}: {step.command}\n  ends with {done.returncode}, not {step.status}:\n{done.stdout}"
         elif not agrees(done.stdout, step.output):

@@ -84,7 +84,20 @@ def test_a_page_that_says_something_else_is_seen(tmp_path: Path, monkeypatch: py
 def test_a_block_that_is_a_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(documents, "copy_of_sources", lambda folder: folder)
     page = tmp_path / "page.md"
-    page.write_text("```c file: a/main.c\nint x;\n```\n```console run\n$ cat a/main.c\nint x;\n```\n")
+    file = "```c file: a/main.c\nint x;\n```\n"
+    page.write_text("```console run\n$ mkdir a\n```\n" + file + "```console run\n$ cat a/main.c\nint x;\n```\n")
+    assert list(documents.run(page, tmp_path)) == []
+    page.write_text(file.replace("a/", "b/"))
+    assert list(documents.run(page, tmp_path)) == ["page.md:1: there is no folder for b/main.c"]
+
+
+def test_a_change_of_the_folder_holds_as_for_a_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documents, "copy_of_sources", lambda folder: folder)
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```console run\n$ mkdir a && cd a\n$ false\n$? = 1\n```\n```c file: main.c\nint x;\n```\n"
+        "```console run\n$ cat main.c\nint x;\n$ cd .. && cat a/main.c\nint x;\n```\n"
+    )
     assert list(documents.run(page, tmp_path)) == []
 
 
