@@ -66,18 +66,18 @@ class Campaign:
 
 
 CAMPAIGNS = {
-    "accuracy": Campaign("Accuracy, size and speed of training, beside other libraries", "an hour", peers=True),
-    "runtime": Campaign("Instructions and bytes of the C runtime", "ten minutes"),
-    "growth": Campaign("Cost of whole commands as recordings, models and fleets grow", "an hour", peers=True),
-    "splits": Campaign("Measured gyros, judged on parts of their history that were left out", "ten minutes"),
+    "accuracy": Campaign("Accuracy and training time", "an hour", peers=True),
+    "runtime": Campaign("Instructions, flash and RAM of the C runtime", "ten minutes"),
+    "growth": Campaign("CPU time and memory of commands", "an hour", peers=True),
+    "splits": Campaign("Measured gyros: error on held-out history", "ten minutes"),
     "rows": Campaign("Events and faults planted in recordings", "an hour"),
-    "faults": Campaign("Faults in service: is sigma true, and does the status say so", "half an hour"),
-    "sigma": Campaign("Uncertainty that the runtime states", "half an hour"),
+    "faults": Campaign("Faults in service: stated sigma and status", "half an hour"),
+    "sigma": Campaign("Uncertainty stated by the runtime", "half an hour"),
     "signals": Campaign("Channels as inputs of the map", "half an hour"),
-    "lot": Campaign("Many units: faults among them, new units from one run, units that return", "two hours"),
-    "budget": Campaign("Uncertainty that the page states", "half an hour"),
-    "kills": Campaign("Jobs that are killed, signalled or let down by the disk", "an hour"),
-    "invariance": Campaign("The same recordings, handed over in other ways", "half an hour"),
+    "lot": Campaign("Many units: planted faults, new units, returned units", "two hours"),
+    "budget": Campaign("Uncertainty stated by the report", "half an hour"),
+    "kills": Campaign("Jobs interrupted by signals and disk errors", "an hour"),
+    "invariance": Campaign("Diagnosis of equivalent recordings", "half an hour"),
     "mutation": Campaign("Small faults planted in the generator, and whether its tests find them", "a day"),
     "oracle": Campaign(
         "Results that differ from those of another commit (BASE=commit)", "half an hour", keeps_record=False

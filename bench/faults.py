@@ -337,19 +337,19 @@ def _figures(found: list[list[Outcome]]) -> Iterator[dict[str, Any]]:
 
 
 _TEXT = """
-True bias less correction in units of the sigma that the runtime states, over {gyros} simulated gyros with a supply
-voltage among their inputs, from the beginning of a fault on, for two and a half hours with ramps of 3 and 5 C/min; the
-compiled runtime in float32, a sample a second. Late: gyros whose first correction beyond twice the largest error
-without a fault came with status 0; then the longest time until it was another, and gyros that never said so.
+Error of the correction divided by the sigma that the runtime states, from the start of a fault on, for {gyros}
+simulated gyros with a supply voltage as an input: two and a half hours with ramps of 3 and 5 C/min, the compiled
+runtime in float32, one sample a second. Silent: gyros whose error exceeded twice the largest error without a fault
+while the status was 0. Longest: the longest time until the status changed. Never: gyros whose status did not change.
 """
 
 
 def table(record: Record) -> ResultsTable:
     """Return error over sigma and delay of the status for every class of faults."""
-    head = ("fault", "RMS (≤ 1.5) ", "95 % ", "worst ", "RMS, worst gyro ", "late ", "longest, s ", "never ")
+    head = ("fault", "RMS (≤ 1.5) ", "95 % ", "worst ", "RMS, worst gyro ", "silent ", "longest, s ", "never ")
     rows = [
         (
-            row["name"],
+            row["name"].replace("thermometer", "temperature sensor"),
             Figure(row["rms"], ".2f", at_most=1.5),
             *(f"{row[key]:.2f}" for key in ("p95", "worst", "worst_gyro")),
             row["silent"],

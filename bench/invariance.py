@@ -8,6 +8,7 @@ parameters and figures move.
 
 from __future__ import annotations
 
+import math
 import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -322,9 +323,9 @@ def rows_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 _TEXT = """
-Packaged scenarios and axes of measured recordings ({sets} sets), each diagnosed as it is and then handed over in
-another way. Verdict and causes must stay; parameters may move by 1 % (with another length of a block: 5 %), figures by
-2 %. But for the delay: RMS figures may move by what that much delay changes.
+{sets} data sets (built-in scenarios and axes of measured recordings) are diagnosed as they are and in an equivalent
+form. Verdict and causes must not change; parameters may change by 1 % (5 % for another block length) and figures by
+2 %. Except delay: RMS figures may in addition change by what the other delay of the correction explains.
 """
 
 
@@ -340,12 +341,12 @@ def table(record: Record) -> ResultsTable:
     """Return for each variation how many sets keep verdict, causes, parameters and figures."""
     head = (
         "variation",
-        "sets ",
+        "data sets ",
         "same verdict and causes ",
         "all within bounds ",
-        "but for the delay ",
-        "parameters, worst ",
-        "figures, worst ",
+        "within bounds except delay ",
+        "largest change of a parameter ",
+        "of a figure ",
     )
     rows = [
         (
@@ -355,7 +356,7 @@ def table(record: Record) -> ResultsTable:
             r["kept"],
             Figure(r["late"], at_least=r["sets"]),
             f"{r['parameters']:.1%}",
-            f"{r['figures']:.1%}",
+            f"{r['figures']:.1%}" if math.isfinite(r["figures"]) else "missing in one",
         )
         for r in record["rows"]
     ]

@@ -1,8 +1,9 @@
-"""docs/results.md: one table for each record, with the command that makes it again."""
+"""Make docs/results.md: an overview of the records, and a table for each with the command that measures it again."""
 
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,12 @@ from .records import Record, measured_with, read_record, rounded, write_record
 
 _HEAD = """# Results
 
-Each table is made from one record in [results/](results), by the command in its heading. A figure that does not reach
-its aim is marked as missed.
+This page answers how accurate gyrotc is, what its code costs on the target, how often its statements are true, and what
+was verified. You can measure every figure again with the command of its record; `make bench` lists the campaigns and
+their duration. A figure that misses its aim is marked **(missed)**.
+
+RMS is that of compensated means over 100 s, and the noise floor is the RMS of the noise alone. No recording of a laser
+gyro is public: the measured gyros are small MEMS gyros ([real.md](real.md)), and all others are simulated.
 """
 
 
@@ -46,24 +51,48 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
+class Count:
+    """So many of so many cases, as a share that may have an aim."""
+
+    hits: int
+    of: int
+    is_missed: bool = False
+
+    def __str__(self) -> str:
+        text = f"{self.hits} of {self.of}"
+        return f"**{text}** (missed)" if self.is_missed else text
+
+
+@dataclass(frozen=True, slots=True)
 class ResultsTable:
-    """A table of docs/results.md and the sentences above it; columns whose title ends in a blank are numbers."""
+    """A table of docs/results.md and the sentences above it; columns whose title ends in a blank are numbers.
+
+    Attributes:
+        text: Sentences above the table.
+        head: Titles of the columns.
+        rows: Cells of each row.
+        more: Tables of the same record that follow.
+    """
 
     text: str
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
+    more: Sequence[ResultsTable] = ()
 
     def markdown(self) -> str:
-        """Return sentences and table."""
+        """Return sentences and table, and those that follow."""
         rule = ["---:" if title.endswith(" ") else "---" for title in self.head]
         lines = [[title.strip() for title in self.head], rule, *([str(cell) for cell in row] for row in self.rows)]
-        return f"{self.text.strip()}\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+        own = f"{self.text.strip()}\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+        return "\n".join([own, *(table.markdown() for table in self.more)])
 
     def missed(self) -> Iterator[str]:
         """Yield the rows that have a figure that misses its aim."""
         for row in self.rows:
-            if any(isinstance(cell, Figure) and cell.is_missed for cell in row):
+            if any(isinstance(cell, Figure | Count) and cell.is_missed for cell in row):
                 yield " | ".join(map(str, row))
+        for table in self.more:
+            yield from table.missed()
 
 
 def figures_table(text: str, figures: Iterable[tuple[str, Figure]]) -> ResultsTable:
@@ -82,16 +111,25 @@ def write(docs: Path) -> None:
     from .campaigns import CAMPAIGNS
 
     sources = {name: (f"make bench ONLY={name}", c.title, f"bench.{name}") for name, c in CAMPAIGNS.items()} | {
-        "targets": ("make targets", "Every target, bit for bit", "tests.targets.targets_page"),
-        "prove": ("make prove", "Every input, run-time errors, rounding", "tests.prove.prove_page"),
-        "blind": ("make blind", "Hidden effects of fresh seeds, found and named", "tests.blind.both"),
+        "targets": ("make targets", "Targets compared bit for bit", "tests.targets.targets_page"),
+        "prove": ("make prove", "Proofs: all inputs, run-time errors, rounding", "tests.prove.prove_page"),
+        "blind": ("make blind", "Blind test: hidden effects of fresh seeds", "tests.blind.both"),
     }
-    parts = [_HEAD]
+    overview, parts = [], []
     for name, (command, title, module) in sources.items():
         record = read_record(docs, name)
         if record is not None:
             table: ResultsTable = importlib.import_module(module).table(record)
             with_ = record["measured"]
-            made = f"Measured on {with_['commit']}, {with_['date']}; {with_['machine']}."
-            parts.append(f"## {title} (`{command}`)\n\n{table.markdown()}\n{made}\n")
-    (docs / "results.md").write_text("\n".join(parts), "utf-8")
+            missed = len(list(table.missed())) or "none"
+            place = f"[{title}](#{_anchor(title)})"
+            overview.append((place, f"`{command}`", with_["commit"], with_["date"], missed))
+            made = f"Measured by `{command}` on commit {with_['commit']}, {with_['date']}; {with_['machine']}."
+            parts.append(f"## {title}\n\n{table.markdown()}\n{made}\n")
+    head = ("what", "command", "commit", "date", "lines with a missed aim ")
+    (docs / "results.md").write_text("\n".join([ResultsTable(_HEAD, head, overview).markdown(), *parts]), "utf-8")
+
+
+def _anchor(title: str) -> str:
+    """Return the anchor that GitHub and mkdocs give a heading."""
+    return re.sub(r"[^\w\s-]", "", title.lower()).replace(" ", "-")

@@ -372,10 +372,11 @@ def cost() -> list[dict[str, Any]]:
 
 
 _TEXT = """
-True bias less correction in units of the 1 sigma of the same moment's snapshot, on {gyros} simulated gyros that nothing
-was tuned on, every block of 10 s. Held: outages of 10 s to 5 min; warming: started again at random places; fallen back:
-outages of up to 10 min. A normal error has 68.3 and 95.4 %. By gyro: RMS of error over sigma that 10 and 90 % of the
-gyros stay below.
+Error of the correction divided by the standard uncertainty (sigma) of the snapshot of the same moment, for every block
+of 10 s of {gyros} simulated gyros that were not used in development. Held: outages of 10 s to 5 min. Warming: restarts
+at random places. Fallen back: outages of up to 10 min. A normal error is within 1 sigma in 68.3 % and within 2 sigma in
+95.4 % of all blocks. Squared: mean of (error/sigma)², ideally 1. By gyro: 10 % and 90 % quantiles of the RMS of
+error/sigma.
 """
 
 

@@ -267,23 +267,24 @@ def measure(settings: Settings) -> Record:
 
 _OWN = {"gyrotc, one thermometer": "plain", "gyrotc with channels": "channels"}
 _TEXT = """
-{worlds} simulated gyros with three further thermometers and two signals of the laser, each with conductances,
-thermometers and laser of its own, trained on six runs and judged on six others two weeks later. Gain: share of the
-reachable reduction of the mean square that was reached, compared with one thermometer. Over the noise: RMS of
-compensated 100-s means over the RMS of the noise, median; peers get the same channels, temperature and rate.
+{worlds} simulated gyros with three further temperature sensors and two signals of the laser are trained on six runs and
+judged on six others two weeks later. The heat conductances, sensors and laser of each gyro are random. Gain: share of
+the possible reduction of the mean square error, compared with one temperature sensor.
 """
 
 
 def table(record: Record) -> ResultsTable:
     """Return what channels gain, what a lost channel costs, and other methods."""
     rows = [
-        ("gain, mean", Figure(record["gain"], ".1%", at_least=_AIM)),
-        ("gyros that reach the aim", Figure(record["reached"], at_least=record["worlds"])),
-        ("useless channels taken", Figure(record["useless_taken"], at_most=0)),
+        ("mean gain", Figure(record["gain"], ".1%", at_least=_AIM)),
+        (f"gyros that reach this gain, of {record['worlds']}", Figure(record["reached"], at_least=record["worlds"])),
+        ("channels without information that are used", Figure(record["useless_taken"], at_most=0)),
         (
-            "a channel lost for the whole test: RMS against one thermometer, worst",
+            "RMS with a channel lost for the whole test, against one temperature sensor, worst",
             Figure(record["lost_worst"], "+.1%", at_most=0.02),
         ),
     ]
-    rows += [(f"over the noise: {name}", Figure(ratio, ".3f")) for name, ratio in record.get("over_oracle", {}).items()]
+    rows += [
+        (f"RMS ÷ noise, median: {name}", Figure(ratio, ".3f")) for name, ratio in record.get("over_oracle", {}).items()
+    ]
     return figures_table(_TEXT.format(**record), rows)

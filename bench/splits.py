@@ -273,9 +273,9 @@ def measure(settings: Settings) -> Record:
 
 
 _TEXT = """
-Every axis of four public sets ([real.md](real.md)) with each run, branch or end left out in turn. The best trivial
-correction is that of a constant, a cubic, and a cubic with dT/dt that is smallest on the part left out: a choice in
-hindsight.
+Each run, branch or end of every axis of four public data sets ([real.md](real.md)) is left out in turn, and the
+correction of `gyrotc build` is judged on it. The best trivial correction is the best of a constant, a cubic and a cubic
+with dT/dt on the held-out part, which is known only in hindsight.
 """
 
 
@@ -286,14 +286,14 @@ def table(record: Record) -> ResultsTable:
         _TEXT,
         [
             ("splits", Figure(count["splits"])),
-            ("at most 1.03 times the best trivial correction", Figure(count["good"])),
-            ("beyond, with a constant emitted and reported", Figure(count["constant"])),
-            ("neither", Figure(count["neither"], at_most=5)),
-            ("beyond 1.10 times through more than a constant", Figure(count["bad_through_richer"], at_most=4)),
-            ("worse than a constant by more than 3 %", Figure(count["worse_than_constant"], at_most=4)),
-            ("ratio to the best trivial correction, geometric mean", Figure(count["geometric_mean"], ".3f")),
-            ("diagnoses that end in a fault", Figure(count["faults"], at_most=0)),
-            ("extended by states", Figure(count["with_states"])),
+            ("splits with at most 1.03 times the best trivial RMS", Figure(count["good"])),
+            ("splits above that, with a constant that is reported", Figure(count["constant"])),
+            ("splits above that, without", Figure(count["neither"], at_most=5)),
+            ("splits above 1.10 times with more than a constant", Figure(count["bad_through_richer"], at_most=4)),
+            ("splits worse than a constant by more than 3 %", Figure(count["worse_than_constant"], at_most=4)),
+            ("RMS over the best trivial RMS, geometric mean", Figure(count["geometric_mean"], ".3f")),
+            ("diagnoses that end with an internal error", Figure(count["faults"], at_most=0)),
+            ("splits extended by states with `--extend`", Figure(count["with_states"])),
             ("... of these with the verdict not_testable", Figure(count["states_at_not_testable"], at_most=0)),
             ("... of these more than 1.05 times worse than without", Figure(count["states_harm"], at_most=0)),
         ],

@@ -19,8 +19,7 @@ from .importing import importing
 
 _SERIALS, _MEGABYTES = 1000, 2000.0
 _TEXT = """
-Whole commands, interpreter and imports included, at the largest size of each series. Slope: of the logarithm of the
-cost over that of the size, between the two largest sizes; 1 is in proportion.
+Whole commands with interpreter and imports, at the largest size of each series.
 """
 _PEAK_MIB = 477.0
 _CPU_S = {("runs", "fit"): 3.0, ("centers", "fit"): 4.0, ("rows", "fit"): 30.0}
@@ -41,18 +40,30 @@ def measure(settings: Settings) -> Record:
 
 def table(record: Record) -> ResultsTable:
     """Return CPU seconds and peak memory with their aims."""
-    figures = [figure for row in record["rows"] for figure in _of_command(row)]
-    return figures_table(_TEXT, [*figures, *_of_a_build(record), *_of_a_fleet(record), *_of_an_import(record)])
+    head = ("command", "size", "CPU seconds ", "aim ", "peak MiB ", "aim ")
+    rest = figures_table(_REST, [*_of_slopes(record), *_of_a_build(record), *_of_a_fleet(record)])
+    return ResultsTable(_TEXT, head, [_of_command(row) for row in record["rows"]], [rest, _of_an_import(record)])
 
 
-def _of_command(row: dict[str, Any]) -> Iterator[tuple[str, Figure]]:
+_REST = """
+The exponent is that of the CPU seconds as a power of the size, between the two largest sizes.
+"""
+
+
+def _of_command(row: dict[str, Any]) -> tuple[object, ...]:
     what, command, largest = row["what"], row["command"], row["sizes"][-1]
-    words = f"`{command}` of {largest['size']:,.0f} {'rows with a state' if what == 'gradient' else what}"
-    yield f"{words}, CPU seconds", Figure(largest["seconds"], ".1f", at_most=_CPU_S.get((what, command)))
-    if what in ("rows", "gradient"):
-        yield f"{words}, peak MiB", Figure(largest["peak_mib"], ".0f", at_most=_PEAK_MIB)
-    if what in _SLOPE:
-        yield f"{words}, slope of CPU seconds", Figure(slope(row["sizes"], "seconds"), ".2f", at_most=_SLOPE[what])
+    words = f"{largest['size']:,.0f} {'rows, with a state in the table' if what == 'gradient' else what}"
+    seconds = Figure(largest["seconds"], ".1f", at_most=_CPU_S.get((what, command)))
+    memory = Figure(largest["peak_mib"], ".0f", at_most=_PEAK_MIB if what in ("rows", "gradient") else None)
+    return f"`{command}`", words, seconds, seconds.aim, memory, memory.aim
+
+
+def _of_slopes(record: Record) -> Iterator[tuple[str, Figure]]:
+    for row in record["rows"]:
+        what = row["what"]
+        if what in _SLOPE:
+            exponent = Figure(slope(row["sizes"], "seconds"), ".2f", at_most=_SLOPE[what])
+            yield f"exponent of `{row['command']}` over {what}", exponent
 
 
 def _of_a_build(record: Record) -> Iterator[tuple[str, Figure]]:
@@ -78,11 +89,12 @@ def _of_a_fleet(record: Record) -> Iterator[tuple[str, Figure]]:
     yield f"`lot` of {fleet['serials']:,} units, peak MiB", Figure(fleet["lot_mib"], ".0f", at_most=381.0)
 
 
-def _of_an_import(record: Record) -> Iterator[tuple[str, Figure]]:
+def _of_an_import(record: Record) -> ResultsTable:
     found = record["import"]
+    rows = []
     for name, one in found["readers"].items():
         if "failed" not in one:
-            words = f"a CSV file of {found['rows']:,} rows by {name}"
-            yield f"{words}, elapsed seconds", Figure(one["elapsed_s"], ".0f")
-            aim = 1024.0 if name == "gyrotc import" else None
-            yield f"{words}, peak MiB", Figure(one["peak_mib"], ".0f", at_most=aim)
+            memory = Figure(one["peak_mib"], ".0f", at_most=1024.0 if name == "gyrotc import" else None)
+            rows.append((name, f"{one['elapsed_s']:.0f}", memory, memory.aim))
+    text = f"A CSV file of {found['rows']:,} rows, read by `gyrotc import` and by other readers:"
+    return ResultsTable(text, ("reader", "elapsed seconds ", "peak MiB ", "aim "), rows)

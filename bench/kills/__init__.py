@@ -22,10 +22,11 @@ from .driver import ACTIONS, compiled_shim
 
 _COMMANDS = 300
 _TEXT = """
-Jobs that end by a signal (KILL, TERM, INT), or that the disk lets down (EIO; ENOSPC from then on), at one of their
-calls that change a file; commands also by a signal at a random time, `fleet` also in the processes that it starts. Each
-way of writing (a folder, one entry, several entries, a part in a folder, a file) is ended at every call. {ended:,} jobs
-ended. Wrong is whatever is neither the earlier result nor the new one. Commands: {commands}.
+{ended:,} jobs are interrupted by a signal (KILL, TERM, INT) or by a disk error (EIO; ENOSPC from then on) at one of
+their calls that change a file; commands also by a signal at a random time, and `fleet` in its worker processes too.
+Each way of writing (a folder, one entry, several entries, a part of a folder, a file) is interrupted at {calls}, with
+and without an exchange of names. Wrong: a result that is neither the earlier one nor the new one, or anything left
+after the next job. Interrupted commands: {commands}.
 """
 
 
@@ -40,7 +41,7 @@ def measure(settings: Settings) -> Record:
         done = subprocess.run(
             [*command, "--seed", str(seed)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, check=True
         )
-    record: Record = json.loads(done.stdout)
+    record: Record = json.loads(done.stdout) | {"every": every}
     return record
 
 
@@ -53,5 +54,7 @@ def table(record: Record) -> ResultsTable:
     for name, counted in record["counts"].items():
         ended = (counted.get(action, 0) for action in ACTIONS)
         rows.append((name, counted.get("calls", ""), *ended, Figure(counted["wrong"], at_most=0)))
-    head = ("what", "calls ", *(f"{action} " for action in ACTIONS), "wrong ")
-    return ResultsTable(_TEXT.format(ended=record["ended"], commands=words), head, rows)
+    head = ("interrupted", "calls ", *(f"{action} " for action in ACTIONS), "wrong ")
+    every = record.get("every", 1)
+    calls = "every call" if every == 1 else f"one call in {every}"
+    return ResultsTable(_TEXT.format(ended=record["ended"], calls=calls, commands=words), head, rows)

@@ -230,11 +230,11 @@ def _one(job: tuple[Case, int, int]) -> dict[str, Any]:
 
 WAYS = {
     "lot": "with the lot",
-    "auto": "without, by model selection",
-    "mrbf": "without, by a map",
+    "auto": "without: model selection",
+    "mrbf": "without: a map",
     "mean curve + offset": "mean curve and offset",
     "PCA regression": "PCA regression",
-    "pooled GPR": "pooled process of scikit-learn",
+    "pooled GPR": "pooled GPR",
 }
 
 

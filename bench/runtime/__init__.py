@@ -12,9 +12,9 @@ from .instructions import CORES, instructions
 from .sizes import sizes
 
 _TEXT = """
-{compiler}. Instructions are counted in QEMU for maps of 6 and 64 Gaussians with individual widths, as means over random
-inputs, each core with the level of the compiler that serves it best. Flash is everything that is linked with a table of
-{centers} Gaussians in float32 that holds uncertainties, coverage and known answers.
+{compiler}. Instructions are means over random inputs, counted in QEMU, for maps of 6 and 64 Gaussians with individual
+widths; each core has the optimisation level that is best for it. Flash is everything that is linked with a table of
+{centers} Gaussians in float32 with uncertainties, coverage and known answers.
 """
 _PROGRAMS = "Cortex-M4F -Os"
 _AIMS = {"init, sample, bias": 4096, "every function, whole runtime": 12288}
@@ -45,7 +45,7 @@ def _of_map(record: Record) -> Iterator[tuple[str, Figure]]:
         ("float32, 64 Gaussians, Cortex-M4F and M7", "f32", 64, (_M4, _M7), 2000),
     ):
         count = _largest(record, numeric, centers, cores, lambda cost: cost["map"]["mean"])
-        yield f"instructions of one map: {words}", Figure(count, ".0f", at_most=aim)
+        yield f"instructions of a map, {words}", Figure(count, ".0f", at_most=aim)
     for words, key, aim in (
         ("bytes of the map's function", "map_bytes", 340),
         ("bytes of its lookup table", "lookup_bytes", 256),
@@ -55,9 +55,9 @@ def _of_map(record: Record) -> Iterator[tuple[str, Figure]]:
         count = _largest(record, "q31", 6, (_M3, _M4, _M7), lambda cost, key=key: cost[key])
         yield f"fixed point, {words}", Figure(count, ".0f", at_most=aim)
     for words, key, against, aim in (
-        ("proved error of the Gaussians ÷ Σ\\|w\\|", "gaussian_bound_dph", "sum_abs_weights_dph", 3.5e-8),
-        ("largest error found ÷ proved bound", "worst_dph", "bound_dph", 1.0),
-        ("error of the arithmetic ÷ that of naive float32", "arithmetic_dph", "naive_float32_dph", 1.0),
+        ("proved error of the Gaussians over Σ\\|w\\|", "gaussian_bound_dph", "sum_abs_weights_dph", 3.5e-8),
+        ("largest error found over proved bound", "worst_dph", "bound_dph", 1.0),
+        ("error of the arithmetic over that of plain float32", "arithmetic_dph", "naive_float32_dph", 1.0),
     ):
         ratio = max(e[key] / e[against] for e in record["errors"] if e["numeric"] == "q31")
         yield f"fixed point, {words}", Figure(ratio, ".3g", at_most=aim)

@@ -13,7 +13,7 @@ from typing import Any
 from gyrotc.pages import AFTER, BEFORE, COVERED, HALF, Panel, drawing
 from gyrotc.results import write_atomically
 
-from bench.page import ResultsTable, keep
+from bench.page import Count, ResultsTable, keep
 from bench.records import Record, rounded
 
 from . import table as own
@@ -28,13 +28,14 @@ _SURE, _LEAST = 0.95, 0.01  # of stated probabilities: where a name is sure, and
 _STEEP = 1.2  # exponent of a spectrum from which on flicker noise, 1/f, no longer stands for it
 _DETAILS = {"own": own.table, "other": other.table}
 _TEXT = """
-Seeds {seeds}, drawn after the method was finished; {recordings} recordings of each world. k = d / 6, d the
-matched-filter signal-to-noise ratio of the hidden effect after the best static map is taken out. Own world
-(tests/blind): an integration, maps, hysteresis and noise that use nothing of gyrotc's simulation. Other world
-(tests/blind/other, which imports nothing of gyrotc): heat by finite volumes, relays, waves, noise of other spectra,
-noise that is declared wrong in half of the recordings, and effects that the catalogue does not have.
+`gyrotc diagnose` on {recordings} recordings of each of two worlds, with seeds {seeds} that were drawn after the method
+was finished. k = d/6, where d is the signal-to-noise ratio of the hidden effect after the best static map is removed.
+The own world (tests/blind) has the causes of the catalogue, but its own integration, maps, hysteresis and noise. The
+other world (tests/blind/other) has heat conduction by finite volumes, relays, ripples, other noise spectra, noise that
+is declared wrong in half of the recordings, and effects that are not in the catalogue ("foreign"). A clean recording
+has no effect.
 
-![Stated probability against the share that is true, both worlds](reliability.svg)
+![Stated probability of a cause and share that is true, both worlds](reliability.svg)
 """
 
 
@@ -145,11 +146,8 @@ def table(record: Record) -> ResultsTable:
     return ResultsTable(text, ("question", *(f"{WORLDS[name][0]} " for name in worlds), "aim "), rows)
 
 
-def _counted(one: dict[str, Any] | None) -> str:
-    if one is None:
-        return ""
-    text = f"{one['hits']} of {one['of']}"
-    return text if one["met"] in (True, None) else f"**{text}** (missed)"
+def _counted(one: dict[str, Any] | None) -> Count | str:
+    return "" if one is None else Count(one["hits"], one["of"], one["met"] is False)
 
 
 def reliability_diagram(record: Record) -> str:

@@ -6,10 +6,10 @@ from bench.page import Figure, ResultsTable, figures_table
 from bench.records import Record
 
 _TEXT = """
-What is proved by which tool and what it adds up to: [proof.md](proof.md). Every pair of positions of a fixed-point
-table is visited: the emitted C against integers that are not compiled from `libc/`, and against the model in float64.
-Alarms: places that Frama-C Eva could not show free of run-time errors for any input; [proof.md](proof.md) has the
-argument for each.
+[proof.md](proof.md) explains what each tool proves. Every pair of positions of a fixed-point table is computed by the
+generated C, by integers that are not compiled from `libc/`, and by the model in float64. An alarm is a place that
+Frama-C Eva could not prove free of run-time errors for every input; [proof.md](proof.md) argues each. The proof is of
+the sources of the commit that is named below, not of later ones.
 """
 
 
@@ -20,15 +20,15 @@ def table(record: Record) -> ResultsTable:
     return figures_table(
         _TEXT,
         [
-            ("inputs of a fixed-point table visited", Figure(max(v["inputs"] for v in visits), ",d", at_least=2**32)),
+            ("inputs of a fixed-point table computed", Figure(max(v["inputs"] for v in visits), ",d", at_least=2**32)),
             ("answers that differ from the reference", Figure(sum(v["mismatches"] for v in visits), at_most=0)),
             (
-                "largest departure from the model ÷ printed bound",
+                "largest deviation from the model over the printed bound",
                 Figure(max(v["worst_dph"] / v["bound_dph"] for v in visits), ".2f", at_most=1.0),
             ),
             ("arguments of primitives that differ", Figure(sum(p["differ"] for p in primitives), at_most=0)),
             ("error of a Gaussian in fixed point", Figure(gauss, ".2e")),
-            ("parts of the emitted C without an alarm", Figure(sum(not p["alarms"] for p in parts))),
+            ("parts of the C code without an alarm", Figure(sum(not p["alarms"] for p in parts))),
             ("parts with alarms that have an argument", Figure(sum(bool(p["alarms"]) for p in parts))),
             ("claims about rounding that are proved", Figure(len(record["rounding"]))),
         ],

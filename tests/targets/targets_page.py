@@ -8,10 +8,10 @@ from bench.page import Figure, ResultsTable, figures_table
 from bench.records import Record
 
 _TEXT = """
-{combinations} combinations of architecture, compiler and optimisation, {entries} with their arithmetics. Every result
-word of the emitted C (map, step functions, statuses) is compared with the reference computed from `model.json`;
-recordings are streamed through the step functions. Negative controls are builds that are wrong on purpose. The
-self-test (`gtc_<n>_check`) is tried on {tables} tables under {builds} sets of flags that may break float32.
+{combinations} combinations of architecture, compiler and optimisation; {entries} with each arithmetic counted. Every
+result word of the generated C (map, step functions, status) is compared with the reference that is computed from
+`model.json`, and recordings are streamed through the step functions. Negative controls are builds with a planted fault.
+The self-test (`gtc_<n>_check`) runs on {tables} tables under {builds} sets of flags that may break float32.
 """
 
 
@@ -30,16 +30,19 @@ def table(record: Record) -> ResultsTable:
         text,
         [
             ("targets × arithmetics × models that pass", Figure(sum(m["passed"] for m in models), at_least=targets)),
-            ("result words compared on each, least", Figure(min(m["smallest_vectors"] for m in models))),
+            ("result words compared on each, minimum", Figure(min(m["smallest_vectors"] for m in models))),
             ("result words that differ", Figure(sum(m["mismatches"] for m in models), at_most=0)),
-            ("rows of recordings replayed that differ", Figure(sum(m["rows_that_differ"] for m in models), at_most=0)),
+            ("rows of replayed recordings that differ", Figure(sum(m["rows_that_differ"] for m in models), at_most=0)),
             (
                 f"negative controls caught, of {len(controls)}",
                 Figure(sum(c["mismatches"] > 0 for c in controls), at_least=len(controls)),
             ),
-            ("builds whose results differ, of all tables", Figure(sum(b["differ"] for b in builds))),
-            ("... that pass the self-test", Figure(sum(b["differ"] - b["refused"] for b in builds), at_most=0)),
-            ("`examples/nav_loop` on the board against the host, lines that differ", Figure(nav, at_most=0)),
+            ("tables and builds with a wrong result", Figure(sum(b["differ"] for b in builds))),
+            (
+                "... of these that pass the self-test",
+                Figure(sum(b["differ"] - b["refused"] for b in builds), at_most=0),
+            ),
+            ("lines of `examples/nav_loop` that differ between board and host", Figure(nav, at_most=0)),
         ],
     )
 
