@@ -28,6 +28,7 @@ __all__ = [
     "Averages",
     "ReadParts",
     "average_rows",
+    "cell_length_s",
     "median",
     "median_of_parts",
     "median_step",
@@ -164,10 +165,20 @@ def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e
     return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e)))
 
 
+def cell_length_s(length_s: float, period_s: float) -> float:
+    """Return the length of the cells of means over `length_s`, of rows or samples that last `period_s`.
+
+    The number of them in a mean is the whole number that is nearest to the quotient: if one is nearer than two, each is
+    a mean.
+    """
+    return period_s if period_s > length_s / 1.5 else length_s
+
+
 class Averager:
     """Means of the scored rows of one run over `average_s`, of rows that come part by part.
 
-    Bins begin at `from_s`, at or before the first row; None: at the first row. Those less than half full are left out.
+    Bins begin at `from_s`, at or before the first row; None: at the first row. A row belongs to the bin that holds its
+    middle, so time stamps may be off by half a row period. Bins less than half full are left out.
 
     Args:
         time_s: Times of all rows, shape (n,), increasing.
@@ -177,16 +188,15 @@ class Averager:
 
     def __init__(self, time_s: FloatArray, average_s: float, from_s: float | None = None) -> None:
         self._period = median_step(time_s) if time_s.size > 1 else average_s
-        self._average_s = max(average_s, self._period)
+        self._average_s = cell_length_s(average_s, self._period)
         self._from_s = (float(time_s[0]) if time_s.size else 0.0) if from_s is None else from_s
         bins = int(self._bins(time_s[-1:])[0]) + 1 if time_s.size else 0
         need_memory(_BIN_BYTES * float(bins), "the recording", f"its means over {average_s:g} s")
         self._count, self._sums = np.zeros(bins, dtype=np.int64), np.zeros((4, bins))
 
     def _bins(self, time_s: FloatArray) -> NDArray[np.int64]:
-        # Rows of a uniform recording fall into bins of equal size in spite of rounded time stamps.
         passed = time_s - self._from_s
-        passed += 1e-3 * self._period
+        passed += 0.5 * self._period
         passed /= self._average_s
         return np.floor(passed, out=passed).astype(np.int64)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.metrics import median
+from ..common.metrics import cell_length_s, median
 
 # Floors of the scale, so that a constant input is not divided by 0.
 MIN_HALF_RANGE_C = 1.0
@@ -179,22 +179,16 @@ class MeanCells:
 
 
 def mean_cells(data: TrainingData, length_s: float) -> MeanCells:
-    """Cells of `average_samples`."""
-    if _mostly_above(data.duration_s, 0.5 * length_s):
+    """Cells of `average_samples`: a sample belongs to that which holds its middle, whatever its clock's jitter."""
+    usual_s = median(data.duration_s)
+    if cell_length_s(length_s, usual_s) == usual_s:
         return MeanCells(None, data.weight, data.weight)
     next_run = data.run[1:] != data.run[:-1]
     starts = np.concatenate([[0], next_run.nonzero()[0] + 1])
     origin = np.repeat(data.time_s[starts], np.diff(starts, append=len(data)))
-    cell = np.floor((data.time_s - origin) / length_s + 1e-9)
+    cell = np.floor((data.time_s + 0.5 * data.duration_s - origin) / length_s)
     edges = np.concatenate([[0], (next_run | (cell[1:] != cell[:-1])).nonzero()[0] + 1])
     return MeanCells(edges, data.weight, np.add.reduceat(data.weight, edges))
-
-
-def _mostly_above(values: FloatArray, bound: float) -> bool:
-    """Whether the median is above a bound; most often all values are one."""
-    if values.min() > bound:
-        return True
-    return bool(values.max() > bound and median(values) > bound)
 
 
 def weighted_mean(values: FloatArray, weight: FloatArray) -> float:

@@ -1,0 +1,52 @@
+"""Figures are of means over 100 s, whatever the distance of the rows and however uneven the clock is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Command
+from gyrotc.recordings import load
+from gyrotc.train import FitOptions, fit_dataset
+from recordings import toml, write_csv
+
+SEED, HOURS, NOISE_DPH = 20261129, 30, 0.01
+AVERAGE_S = 100.0
+
+
+def recorded(folder: Path, row_s: float, jitter_s: float, *roles: str) -> Path:
+    """White noise on ramps; `jitter_s`: largest departure of a time stamp from its even place."""
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    even = np.arange(0.0, 3600.0 * HOURS, row_s)
+    for k, _ in enumerate(roles):
+        temperature = 20.0 + 30.0 * np.sin(even / 4000.0)
+        rate = 0.5 + 1e-3 * temperature + NOISE_DPH * np.sqrt(10.0 / row_s) * rng.standard_normal(even.size)
+        time = np.round(even + rng.uniform(-jitter_s, jitter_s, even.size) + jitter_s, 4)
+        write_csv(folder / f"{k}.csv", {"time_s": time, "temperature_c": temperature, "rate_dph": rate})
+    runs = (f'file = "{k}.csv"\nrole = "{role}"' for k, role in enumerate(roles))
+    (folder / "dataset.toml").write_text(toml(*runs), "utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 0.8])
+@pytest.mark.parametrize("row_s", [9.999, 10.0, 10.0005, 10.02])
+def test_a_mean_holds_all_rows_of_its_hundred_seconds(tmp_path: Path, row_s: float, jitter_s: float) -> None:
+    training = fit_dataset(load(recorded(tmp_path, row_s, jitter_s, "train", "train")), FitOptions()).training
+    expected = NOISE_DPH / np.sqrt(AVERAGE_S / 10.0)
+    assert training.left_out is not None and training.left_out.after.rms_dph is not None
+    assert training.left_out.samples == pytest.approx(2 * 3600 * HOURS / AVERAGE_S, rel=0.01)
+    assert training.left_out.after.rms_dph == pytest.approx(expected, rel=0.15)
+    assert training.noise_floor_dph == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize("row_s", [10.0005, 60.0, 70.0])
+def test_the_residual_of_white_noise_is_the_floor(tmp_path: Path, gyrotc: Command, row_s: float) -> None:
+    """Training and evaluation make means of the same rows, so that nothing lies below the floor."""
+    done = gyrotc("build", recorded(tmp_path / "data", row_s, 0.0, "train", "train", "exam"), "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "evaluate.json").read_text())
+    after = found["exam"]["after"]["rms_dph"]
+    assert after / found["noise_floor_dph"] == pytest.approx(1.0, abs=0.12)
