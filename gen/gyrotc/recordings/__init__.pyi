@@ -7,7 +7,6 @@ from .files import CsvFile as CsvFile
 from .fingerprints import fingerprints_of as fingerprints_of
 from .fingerprints import windows_in_common as windows_in_common
 from .fit_options import COMPARED as COMPARED
-from .fit_options import DEFAULTS as DEFAULTS
 from .fit_options import METHODS as METHODS
 from .fit_options import SIMPLE as SIMPLE
 from .loading import axes_of as axes_of

@@ -57,7 +57,9 @@ def open_in_child(opener: Opener, path: Path) -> LoggerFile:
     try:
         content = child.ask({"do": "open"})
         tables = tuple(_ChildTable.of(child, k, one) for k, one in enumerate(content["tables"]))
-        return LoggerFile(path, content["format"], tables, content["facts"], close=child.close)
+        return LoggerFile(
+            path, content["format"], tables, content["facts"], close=child.close, unread=tuple(content["unread"])
+        )
     except BaseException:
         child.close()
         raise
@@ -280,7 +282,9 @@ class _Reading:
         if request["do"] == "open":
             file = self._opener(Path(request["path"]))
             self._tables = file.tables
-            return _Answer({"format": file.format, "facts": file.facts, "tables": [_stated(t) for t in file.tables]})
+            tables = [_stated(table) for table in file.tables]
+            stated = {"format": file.format, "facts": file.facts, "tables": tables, "unread": file.unread}
+            return _Answer(stated)
         if request["do"] == "place":
             return _Answer({"place": self._tables[request["table"]].place(request["row"])})
         if request["do"] == "start":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -24,6 +24,8 @@ from ..common.errors import InputError, install_command
 from ..common.inputs import refuse_above
 
 CHUNK_ROWS = 2**18  # read at once: 2 MiB a column of float64
+MAX_COLUMNS = 64
+"""Of a matrix whose columns are read; a wider one is a picture or a spectrum."""
 Array = NDArray[Any]
 ColumnKind = Literal["number", "stamp", "text"]
 
@@ -144,6 +146,7 @@ class LoggerFile:
         csv: What a map keeps of how a CSV file is written, as keys of `[csv]`; empty for other formats.
         close: Ends the reading: after it no chunk comes.
         joined: Files whose tables stand behind its own.
+        unread: What else the file holds: the name of each, with the reason in brackets.
     """
 
     path: Path
@@ -153,6 +156,7 @@ class LoggerFile:
     csv: dict[str, str] = field(default_factory=dict)
     close: Callable[[], object] = lambda: None
     joined: tuple[Path, ...] = ()
+    unread: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuses tables of more rows or columns than are allowed.
@@ -215,21 +219,51 @@ def part_of(values: Any) -> ReadPart:
     return lambda first, last: values[first:last]
 
 
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A column in a file of named arrays.
+
+    Attributes:
+        group: Columns of one group and one length are a table.
+        table: Name of that table.
+        rows: Number of values.
+        column: Name, unit and kind.
+        part: Reads its values.
+    """
+
+    group: str
+    table: str
+    rows: int
+    column: Column
+    part: ReadPart
+
+
+def unread(name: str, why: str) -> str:
+    """Return an entry of `LoggerFile.unread`."""
+    return f"{name} ({why})"
+
+
 def grouped(
-    columns: Sequence[tuple[str, str, int, Column, ReadPart]], rates: Mapping[str, tuple[float, str]]
-) -> tuple[LoggerTable, ...]:
-    """Tables of columns of one group and one length.
+    entries: Iterable[Vector | str], rates: Mapping[str, tuple[float, str]]
+) -> tuple[tuple[LoggerTable, ...], tuple[str, ...]]:
+    """Return the tables of columns of one group and one length, and what is in none of them.
 
     Args:
-        columns: Group, name of the table, number of rows, column, and what reads it.
+        entries: Columns, and what `unread` said of the other contents.
         rates: Rows per second by group, with the reason.
     """
+    left: list[str] = []
     found: dict[tuple[str, int], list[tuple[Column, ReadPart]]] = {}
     names: dict[tuple[str, int], str] = {}
-    for group, name, rows, column, part in columns:
-        if rows > 1:
-            found.setdefault((group, rows), []).append((column, part))
-            names[group, rows] = name
+    for one in entries:
+        if isinstance(one, str):
+            left.append(one)
+            continue
+        if one.rows < 2:
+            left.append(unread(one.column.name, "one value" if one.rows else "no values"))
+            continue
+        found.setdefault((one.group, one.rows), []).append((one.column, one.part))
+        names[one.group, one.rows] = one.table
     lengths: dict[str, int] = {}
     for group, _ in found:
         lengths[group] = lengths.get(group, 0) + 1
@@ -240,7 +274,7 @@ def grouped(
         parts = {column.name: part for column, part in members}
         columns_of = tuple(column for column, _ in members)
         tables.append(ArrayTable(name, columns_of, rate, why, rows=rows, parts=parts))
-    return tuple(tables)
+    return tuple(tables), tuple(left)
 
 
 def rate_of(name: str, value: float) -> tuple[float, str] | None:

@@ -14,10 +14,13 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import h5py
+import nptdms
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import scipy.io
+import xarray
 from conftest import Command, run_gyrotc
 from gyrotc.quality import check
 from gyrotc.recordings import load, units
@@ -662,3 +665,53 @@ def test_columns_that_an_import_leaves_out_are_named_of_text_as_well(tmp_path: P
     printed = run_gyrotc("import", tmp_path / "log.csv", "--serial", "A", "--out", tmp_path / "A").stdout
     assert "left out: Volts ([channels] of the map" in printed
     assert "left out: Status (no numbers; --set where" in printed
+
+
+def _hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in columns.items():
+            file[name] = values
+        file["note"] = "of the operator"
+        file["gone"] = h5py.SoftLink("/nowhere")
+
+
+def _mat(path: Path, columns: dict[str, np.ndarray]) -> None:
+    more: dict[str, object] = {"note": "of the operator", "gone": np.array(["a", 1.0], dtype=object)}
+    scipy.io.savemat(path, columns | more)
+
+
+def _netcdf(path: Path, columns: dict[str, np.ndarray]) -> None:
+    dimensions = {"picture": ("t", "u"), "cube": ("a", "b", "c")}
+    shaped = {name: (dimensions.get(name, "t"), values) for name, values in columns.items()}
+    more = {"note": ("t", np.array(["x"] * 300)), "gone": ((), 3.0)}
+    xarray.Dataset(shaped | more).to_netcdf(path, engine="h5netcdf")
+
+
+def _tdms(path: Path, columns: dict[str, np.ndarray]) -> None:
+    vectors = {name: values for name, values in columns.items() if values.ndim == 1}
+    more = {"note": ["of", "the", "operator"], "gone": np.array([1.0]), "picture": ["one"], "cube": np.zeros(0)}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.ChannelObject("log", name, values) for name, values in (vectors | more).items()])
+
+
+def _parquet(path: Path, columns: dict[str, np.ndarray]) -> None:
+    vectors = {name: pa.array(values) for name, values in columns.items() if values.ndim == 1}
+    n = len(vectors["time_s"])
+    more = {"note": [[1]] * n, "gone": [True] * n, "picture": [b"x"] * n, "cube": [{"a": 1}] * n}
+    pq.write_table(pa.table(vectors | {name: pa.array(values) for name, values in more.items()}), path)
+
+
+@pytest.mark.parametrize(
+    ("file", "write"),
+    [("a.h5", _hdf5), ("a.mat", _mat), ("a.nc", _netcdf), ("a.tdms", _tdms), ("a.parquet", _parquet)],
+)
+def test_whatever_a_file_holds_besides_is_named(
+    file: str, write: Callable[[Path, dict[str, np.ndarray]], None], tmp_path: Path, run: Run
+) -> None:
+    k = np.arange(300.0)
+    columns = {"time_s": 10.0 * k, "temperature_c": 20.0 + k / 10.0, "rate_dph": np.sin(k)}
+    write(tmp_path / file, columns | {"picture": np.zeros((300, 70)), "cube": np.zeros((3, 4, 5))})
+    status, printed, error = run("import", tmp_path / file, "--serial", "A", "--out", tmp_path / "R", "--trust-units")
+    assert status == 0, error
+    (line,) = (line for line in (printed + error).splitlines() if line.startswith("  left out: "))
+    assert all(name in line for name in ("note", "gone", "picture", "cube"))

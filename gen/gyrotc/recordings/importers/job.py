@@ -206,10 +206,14 @@ def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator
         yield _line("rows", str(plan.where), "", "as stated")
     if plan.device:
         yield _line("device", plan.device.name, "", "its name, or as stated: one gyro in all rows")
-    for left, words in ((plan.left_out, "[channels] of the map takes them"), (plan.texts, _OF_TEXTS)):
+    for left, words in (
+        (plan.left_out, " ([channels] of the map takes them)"),
+        (plan.texts, f" ({_OF_TEXTS})"),
+        (file.unread, ""),
+    ):
         if left:
             more = f" and {len(left) - _MOST_NAMES} more" if len(left) > _MOST_NAMES else ""
-            yield f"  left out: {', '.join(left[:_MOST_NAMES])}{more} ({words})"
+            yield f"  left out: {', '.join(left[:_MOST_NAMES])}{more}{words}"
 
 
 def preview(rows: ImportedRows) -> Iterator[str]:

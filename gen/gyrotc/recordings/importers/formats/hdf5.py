@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from ....common.errors import InputError
-from ...tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, rate_of
+from ...tables import (
+    MAX_COLUMNS,
+    Column,
+    LoggerFile,
+    ReadPart,
+    Vector,
+    grouped,
+    numbers,
+    optional_library,
+    rate_of,
+    unread,
+)
 from ..format import Format
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNITS", "unit_string")
-_MOST_COLUMNS = 64  # of a two-dimensional set that is split into columns: wider ones are pictures
 
 
 def open_hdf5(path: Path) -> LoggerFile:
@@ -28,28 +39,9 @@ def open_hdf5(path: Path) -> LoggerFile:
     except OSError as error:
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as HDF5 ({what})", "a whole HDF5 file") from error
-    columns: list[tuple[str, str, int, Column, ReadPart]] = []
-    rates: dict[str, tuple[float, str]] = {}
-
-    matlab = False
-
-    def visit(name: str, node: Any) -> None:
-        nonlocal matlab
-        matlab = matlab or ("/" not in name and "MATLAB_class" in node.attrs)
-        if isinstance(node, h5py.Dataset):
-            _refuse_elsewhere(path, name, node)
-        if not isinstance(node, h5py.Dataset) or name.startswith("#"):
-            return
-        group = name.rpartition("/")[0]
-        if node.size == 1 and node.dtype.kind in "iuf":
-            found = rate_of(name, float(np.asarray(node).reshape(-1)[0]))
-            rates.update({group: found} if found else {})
-        columns.extend(_set_columns(name, group, node))
-        rates.update({group: found} if (found := _stated_rate(node)) else {})
-
     try:
-        file.visititems(visit)
-        rates.update({"": found} if (found := _stated_rate(file)) else {})
+        contents = _Contents(h5py, path)
+        contents.read(file)
     except InputError:
         file.close()
         raise
@@ -57,11 +49,63 @@ def open_hdf5(path: Path) -> LoggerFile:
         file.close()
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"is damaged ({what})", "a whole HDF5 file") from error
-    tables = grouped(columns, rates)
+    tables, left = grouped(contents.entries, contents.rates)
     if not tables:
         raise InputError(path.name, "no numeric vectors", "vectors, matrices or tables of numbers")
     facts = {str(k).lower(): _text(v) for k, v in file.attrs.items() if isinstance(v, str | bytes)}
-    return LoggerFile(path, "MATLAB 7.3 file" if matlab else "HDF5 file", tables, facts, close=file.close)
+    form = "MATLAB 7.3 file" if contents.matlab else "HDF5 file"
+    return LoggerFile(path, form, tables, facts, close=file.close, unread=left)
+
+
+class _Contents:
+    """What a file holds.
+
+    Attributes:
+        entries: Its columns, and what is not read.
+        rates: Rows per second by group, with the reason.
+        matlab: MATLAB wrote it.
+    """
+
+    def __init__(self, h5py: ModuleType, path: Path) -> None:
+        self._h5py, self._path = h5py, path
+        self.entries: list[Vector | str] = []
+        self.rates: dict[str, tuple[float, str]] = {}
+        self.matlab = False
+
+    def read(self, file: Any) -> None:
+        """Visit every group and data set. Links are not followed: they may lead anywhere."""
+        self._links(file, "")
+        file.visititems(self._visit)
+        self._add_rate("", _stated_rate(file))
+
+    def _visit(self, name: str, node: Any) -> None:
+        self.matlab = self.matlab or ("/" not in name and "MATLAB_class" in node.attrs)
+        is_data = isinstance(node, self._h5py.Dataset)
+        if is_data:
+            _refuse_elsewhere(self._path, name, node)
+        if name.startswith("#"):
+            return
+        if isinstance(node, self._h5py.Group):
+            self._links(node, f"{name}/")
+        if not is_data:
+            return
+        group = name.rpartition("/")[0]
+        if node.size == 1 and node.dtype.kind in "iuf":
+            found = rate_of(name, float(np.asarray(node).reshape(-1)[0]))
+            self._add_rate(group, found)
+            self.entries += [] if found else [unread(name, "one value")]
+        else:
+            self.entries += _vectors(name, group, node)
+        self._add_rate(group, _stated_rate(node))
+
+    def _links(self, node: Any, above: str) -> None:
+        for name in node:
+            if not isinstance(node.get(name, getlink=True), self._h5py.HardLink):
+                self.entries.append(unread(f"{above}{name}", "a link"))
+
+    def _add_rate(self, group: str, found: tuple[float, str] | None) -> None:
+        if found:
+            self.rates[group] = found
 
 
 def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
@@ -74,27 +118,37 @@ def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
         raise InputError(f"{path.name}, {name}", found, "values in the file itself (h5repack makes it so)")
 
 
-def _set_columns(name: str, group: str, node: Any) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
+def _vectors(name: str, group: str, node: Any) -> Iterator[Vector | str]:
+    """Yield the columns of a data set, and what of it is not read."""
     last = name.rpartition("/")[2]
-    if node.dtype.names:
+    if node.dtype.names and node.ndim == 1:
         for field in node.dtype.names:
             if node.dtype[field].kind in "iuf" and node.dtype[field].shape == ():
                 unit = _field_unit(node, field)
                 column = Column(field, unit, "an attribute" if unit else "")
-                yield name, name, node.shape[0], column, _part_of_field(node, field)
+                yield Vector(name, name, node.shape[0], column, _part_of_field(node, field))
+            else:
+                yield unread(f"{name}/{field}", "no numbers")
         return
-    if node.dtype.kind not in "iuf" or node.ndim not in (1, 2) or node.attrs.get("MATLAB_class") == b"char":
+    if node.dtype.kind not in "iuf" or node.attrs.get("MATLAB_class") == b"char":
+        yield unread(name, "no numbers")
+        return
+    if node.ndim not in (1, 2):
+        yield unread(name, f"{node.ndim} dimensions")
         return
     unit = next((_text(node.attrs[k]) for k in _UNIT_KEYS if k in node.attrs), None)
     why = "an attribute" if unit else ""
     if node.ndim == 1:
-        yield group, group, node.shape[0], Column(last, unit, why), _part_of(node, None, True)
+        yield Vector(group, group, node.shape[0], Column(last, unit, why), _part_of(node, None, True))
         return
     tall = node.shape[0] >= node.shape[1]
     width, rows = min(node.shape), max(node.shape)
-    for k in range(width) if width <= _MOST_COLUMNS else ():
+    if width > MAX_COLUMNS:
+        yield unread(name, f"{width} columns, more than {MAX_COLUMNS}")
+        return
+    for k in range(width):
         label = last if width == 1 else f"{last}_{'xyz'[k]}" if width == 3 else f"{last}_{k + 1}"
-        yield group, group, rows, Column(label, unit, why), _part_of(node, k, tall)
+        yield Vector(group, group, rows, Column(label, unit, why), _part_of(node, k, tall))
 
 
 def _part_of_field(node: Any, field: str) -> ReadPart:

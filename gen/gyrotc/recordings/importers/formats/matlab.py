@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ import numpy as np
 
 from ....common.errors import InputError
 from ....common.inputs import need_memory
-from ...tables import Column, LoggerFile, ReadPart, grouped, numbers, part_of, rate_of
+from ...tables import MAX_COLUMNS, Column, LoggerFile, Vector, grouped, numbers, part_of, rate_of, unread
 from ..format import Format
 from .hdf5 import open_hdf5
 
 _NUMBER_BYTES = 8  # of a float64, the widest number that is read
+_IN_FILE = "{} in the file"  # why a column has its unit
 _DEEPEST = 4  # structures within one another: deeper ones are no tables
 
 
@@ -40,27 +42,30 @@ def open_mat(path: Path) -> LoggerFile:
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as MATLAB file ({what})", "a whole .mat file") from error
-    columns: list[tuple[str, str, int, Column, ReadPart]] = []
+    entries: list[Vector | str] = []
     rates: dict[str, tuple[float, str]] = {}
     units: dict[str, str] = {}
-    opaque: list[str] = []
     for name, value in content.items():
         if not name.startswith("__"):
             for full, leaf in _leaves(name, value, _DEEPEST):
                 if isinstance(leaf, str):
                     units[full] = leaf
-                elif isinstance(leaf, np.ndarray) and leaf.dtype.kind in "iufb" and leaf.ndim in (1, 2):
-                    columns += list(_columns(full, leaf))
+                elif isinstance(leaf, np.ndarray):
+                    entries += _vectors(full, leaf)
                 elif np.isscalar(leaf) and isinstance(leaf, int | float | np.number):
                     found = rate_of(full, float(leaf))
                     rates |= {"": found} if found else {}
+                    entries += [] if found else [unread(full, "one value")]
                 else:
-                    opaque.append(full)
-    tables = grouped([_with_unit(c, units) for c in columns], rates)
+                    entries.append(unread(full, f"a {type(leaf).__name__} of MATLAB"))
+    entries = [_with_unit(one, units) if isinstance(one, Vector) else one for one in entries]
+    known = {one.column.why for one in entries if isinstance(one, Vector)}
+    texts = [unread(name, "text") for name in units if _IN_FILE.format(name) not in known]
+    tables, left = grouped([*entries, *texts], rates)
     if not tables:
         hint = "arrays: in MATLAB, save('file.mat', '-struct', 'S') of plain vectors, or a timetable by table2struct"
-        raise InputError(path.name, f"no numeric vectors (there is {', '.join(opaque[:6]) or 'nothing'})", hint)
-    return LoggerFile(path, "MATLAB file", tables)
+        raise InputError(path.name, f"no numeric vectors (there is {', '.join(left[:6]) or 'nothing'})", hint)
+    return LoggerFile(path, "MATLAB file", tables, unread=left)
 
 
 def _need_memory(path: Path) -> None:
@@ -83,33 +88,39 @@ def _leaves(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def _columns(name: str, values: np.ndarray) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
+def _vectors(name: str, values: np.ndarray) -> Iterator[Vector | str]:
+    """Yield the columns of an array, or what keeps it from being read."""
+    if values.dtype.kind not in "iufb":
+        yield unread(name, "no numbers")
+        return
+    if values.ndim not in (1, 2):
+        yield unread(name, f"{values.ndim} dimensions")
+        return
     if values.ndim == 1:
         flat = numbers(values)
-        yield "", "", len(flat), Column(name), part_of(flat)
+        yield Vector("", "", len(flat), Column(name), part_of(flat))
         return
     tall = values if values.shape[0] >= values.shape[1] else values.T
-    if tall.shape[1] > 64:
+    if tall.shape[1] > MAX_COLUMNS:
+        yield unread(name, f"{tall.shape[1]} columns, more than {MAX_COLUMNS}")
         return
     for k in range(tall.shape[1]):
         axis = f"_{'xyz'[k]}" if tall.shape[1] == 3 else f"_{k + 1}"
         flat = numbers(tall[:, k])
-        yield "", "", len(flat), Column(name + axis), part_of(flat)
+        yield Vector("", "", len(flat), Column(name + axis), part_of(flat))
 
 
-def _with_unit(
-    entry: tuple[str, str, int, Column, ReadPart], units: dict[str, str]
-) -> tuple[str, str, int, Column, ReadPart]:
-    """The unit that a text beside a vector states: `rate_unit`, `units.rate`, `rate.unit`."""
-    group, table, rows, column, part = entry
+def _with_unit(vector: Vector, units: dict[str, str]) -> Vector:
+    """Return a vector with the unit that a text beside it states: `rate_unit`, `units.rate`, `rate.unit`."""
+    column = vector.column
     base = column.name.removesuffix("_x").removesuffix("_y").removesuffix("_z")
     head, _, last = base.rpartition(".")
     keys = [f"{base}_unit", f"{base}_units", f"units.{base}", f"unit.{base}", f"{head}.units.{last}"]
     keys += [f"{head}.unit", f"{head}.units", f"{base}.unit", f"{head}.Units"]
     key = next((k for k in keys if k in units), None)
-    if key is not None:
-        column = Column(column.name, units[key], f"{key} in the file")
-    return group, table, rows, column, part
+    if key is None:
+        return vector
+    return replace(vector, column=Column(column.name, units[key], _IN_FILE.format(key)))
 
 
 FORMAT = Format(open_mat, (b"MATLAB 5.0",), endings=(".mat",), nameable=True)

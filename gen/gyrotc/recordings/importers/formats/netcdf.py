@@ -9,10 +9,19 @@ from typing import Any
 import numpy as np
 
 from ....common.errors import InputError
-from ...tables import Column, LoggerFile, ReadPart, grouped, numbers, optional_library, rate_of
+from ...tables import (
+    MAX_COLUMNS,
+    Column,
+    LoggerFile,
+    ReadPart,
+    Vector,
+    grouped,
+    numbers,
+    optional_library,
+    rate_of,
+    unread,
+)
 from ..format import Format
-
-_MOST_COLUMNS = 64  # of a variable that is split into columns: wider ones are pictures
 
 
 def open_netcdf(path: Path) -> LoggerFile:
@@ -31,21 +40,26 @@ def open_netcdf(path: Path) -> LoggerFile:
     except Exception as error:  # whatever a damaged file makes of the parser
         what = " ".join(str(error).split())[:100]
         raise InputError(path.name, f"cannot be read as NetCDF ({what})", "a whole NetCDF file") from error
-    columns = [entry for name in data.variables for entry in _columns(str(name), data[name])]
+    entries = [entry for name in data.variables for entry in _vectors(str(name), data[name])]
     rates: dict[str, tuple[float, str]] = {}
     for key, value in data.attrs.items():
         if isinstance(value, int | float | np.number) and (found := rate_of(str(key), float(value))):
             rates = dict.fromkeys(map(str, data.sizes), found)
-    tables = grouped(columns, rates)
+    tables, left = grouped(entries, rates)
     if not tables:
         raise InputError(path.name, "no numeric variables over a dimension", "variables over time")
     facts = {str(k).lower(): v for k, v in data.attrs.items() if isinstance(v, str)}
-    return LoggerFile(path, "NetCDF file", tables, facts, close=data.close)
+    return LoggerFile(path, "NetCDF file", tables, facts, close=data.close, unread=left)
 
 
-def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, ReadPart]]:
+def _vectors(name: str, variable: Any) -> Iterator[Vector | str]:
+    """Yield the columns of a variable, or what keeps it from being read."""
     kind = variable.dtype.kind
-    if kind not in "iufMm" or variable.ndim not in (1, 2):
+    if kind not in "iufMm":
+        yield unread(name, "no numbers")
+        return
+    if variable.ndim not in (1, 2):
+        yield unread(name, f"{variable.ndim} dimensions" if variable.ndim else "one value")
         return
     group, rows = str(variable.dims[0]), variable.shape[0]
     unit = variable.attrs.get("units")
@@ -56,12 +70,15 @@ def _columns(name: str, variable: Any) -> Iterator[tuple[str, str, int, Column, 
     else:
         column = Column(name, str(unit) if unit is not None else None, "an attribute" if unit else "")
     if variable.ndim == 1:
-        yield group, group, rows, column, _part(variable, None)
+        yield Vector(group, group, rows, column, _part(variable, None))
         return
     width = variable.shape[1]
-    for k in range(width) if width <= _MOST_COLUMNS and kind not in "Mm" else ():
+    if width > MAX_COLUMNS or kind in "Mm":
+        yield unread(name, "a matrix of times" if kind in "Mm" else f"{width} columns, more than {MAX_COLUMNS}")
+        return
+    for k in range(width):
         label = f"{name}_{'xyz'[k]}" if width == 3 else f"{name}_{k + 1}"
-        yield group, group, rows, Column(label, column.unit, column.why), _part(variable, k)
+        yield Vector(group, group, rows, Column(label, column.unit, column.why), _part(variable, k))
 
 
 def _part(variable: Any, index: int | None) -> ReadPart:

@@ -13,7 +13,7 @@ import pyarrow as pa
 from ....common.arrays import numpy_of
 from ....common.errors import InputError
 from ...parquet import ParquetBatches, is_text
-from ...tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers
+from ...tables import CHUNK_ROWS, Chunk, Column, LoggerFile, LoggerTable, numbers, unread
 from ..cells import kind_of_cells
 from ..format import Format
 
@@ -29,7 +29,8 @@ def open_parquet(path: Path) -> LoggerFile:
     """
     file = ParquetBatches(path.name, path)
     columns = tuple(_column_of(field, file) for field in file.schema if _is_readable(field.type))
-    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file, rows=file.rows),))
+    left = tuple(unread(field.name, str(field.type)) for field in file.schema if not _is_readable(field.type))
+    return LoggerFile(path, "Parquet file", (ParquetTable("", columns, file=file, rows=file.rows),), unread=left)
 
 
 @dataclass(frozen=True, kw_only=True)

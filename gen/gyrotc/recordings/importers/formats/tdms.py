@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....common.errors import InputError
-from ...tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library
+from ...tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library, unread
 from ..format import Format
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "units")
@@ -34,6 +34,7 @@ def open_tdms(path: Path) -> LoggerFile:
         try:
             file = nptdms.TdmsFile.open(stream)
             tables = tuple(table for group in file.groups() for table in _tables(group, path.name))
+            left = tuple(entry for group in file.groups() for entry in _unread(group))
         except Exception as error:  # whatever a damaged file makes of the parser
             what = " ".join(str(error).split())[:100]
             raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
@@ -42,7 +43,7 @@ def open_tdms(path: Path) -> LoggerFile:
         facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
         if _SHORT in said.getvalue():
             tables = tuple(replace(table, notes=(_CUT,)) for table in tables)
-        opened = LoggerFile(path, "TDMS file", tables, facts)
+        opened = LoggerFile(path, "TDMS file", tables, facts, unread=left)
         return replace(opened, close=stack.pop_all().close)
 
 
@@ -67,7 +68,7 @@ def _tables(group: Any, file: str) -> Iterator[LoggerTable]:
     """A table for each rhythm of a group: channels of one length, one increment and one time of the first sample."""
     rhythms: dict[_Rhythm, list[Any]] = {}
     for channel in group.channels():
-        if len(channel) > 1 and _column(channel) is not None:
+        if not _why_unread(channel):
             rhythms.setdefault(_rhythm(channel), []).append(channel)
     for rhythm, channels in rhythms.items():
         step = rhythm.increment_s
@@ -82,6 +83,19 @@ def _tables(group: Any, file: str) -> Iterator[LoggerTable]:
             rows=rhythm.rows,
             parts={channel.name: _part(channel, file) for channel in channels},
         )
+
+
+def _unread(group: Any) -> Iterator[str]:
+    """Yield the channels that are in no table."""
+    for channel in group.channels():
+        if why := _why_unread(channel):
+            yield unread(f"{group.name}/{channel.name}", why)
+
+
+def _why_unread(channel: Any) -> str:
+    if _column(channel) is None:
+        return "no numbers"
+    return "" if len(channel) > 1 else "one value" if len(channel) else "no values"
 
 
 @dataclass(frozen=True, slots=True)
