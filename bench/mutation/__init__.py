@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from tools.documents import copy_of_sources
 from ..campaigns import Settings, say
 from ..page import Figure, ResultsTable
 from ..records import ROOT, Record
-from .faults import Fault, drawn, planted
+
+if TYPE_CHECKING:
+    from .faults import Fault  # needs cosmic-ray, as only a measurement does
 
 #: Faults that are drawn of each part, and of each with QUICK=1.
 FAULTS, QUICK_FAULTS = 300, 20
@@ -112,6 +114,8 @@ def _paths(part: Part) -> tuple[list[Path], list[str]]:
 def _tried(
     name: str, modules: Sequence[Path], tests: Sequence[str], count: int, seed: int, workers: int
 ) -> dict[str, Any]:
+    from .faults import drawn
+
     faults = drawn(modules, count, np.random.default_rng([seed, *name.encode()]))
     missed: list[Fault] = []
     with tempfile.TemporaryDirectory(prefix="gyrotc-mutation-") as folder, ThreadPoolExecutor(workers) as threads:
@@ -144,6 +148,8 @@ def _there(folder: Path, pattern: str) -> list[Path]:
 
 def _finding(copy: Path, fault: Fault | None, tests: Sequence[str]) -> str:
     """Return the tests that fail with a fault; empty if none does."""
+    from .faults import planted
+
     with planted(copy, fault):
         for test in tests:
             try:

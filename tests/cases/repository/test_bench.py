@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from bench.campaigns import CAMPAIGNS
+from bench.mutation import PARTS
 from bench.oracle.compare import differences
 from bench.oracle.normalise import content_of
 from bench.page import Figure, figures_table
@@ -92,3 +93,14 @@ def test_every_figure_that_moves_is_listed_with_both_values(tmp_path: Path) -> N
         ("old", "only in the earlier commit"),
         ("new", "only in this tree"),
     ]
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    sorted(
+        {f"gen/gyrotc/{pattern}" for part in PARTS.values() for pattern in part.modules}
+        | {f"tests/{pattern}" for part in PARTS.values() for pattern in part.tests}
+    ),
+)
+def test_every_pattern_of_the_mutation_campaign_fits_a_file(pattern: str) -> None:
+    assert list(ROOT.glob(pattern))
