@@ -139,6 +139,9 @@ def verify_notes(result: Verification) -> Iterator[str]:
         yield from (f"{who}: {text}" for text in found if text)
     yield from file_notes(result)
     yield from _log_notes(result.log) if result.log else ()
+    if result.outdated_boards:
+        names = ", ".join(result.outdated_boards)
+        yield f"{names}: ran another model or other code, so these results are dropped; run the board test again"
     yield from rounding_lines(result.errors)
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)

@@ -371,6 +371,9 @@ class Verification(_Counted):
     c_hash: str = Field(description="SHA-256 over names and contents of the emitted files")
     targets: tuple[VerifiedTarget, ...] = Field(description="every target that was tried, and boards")
     log: ReadLog | None = Field(default=None, description="of a board test that ran elsewhere")
+    outdated_boards: tuple[str, ...] = Field(
+        default=(), description="boards whose entries were dropped, because they ran another model or other code"
+    )
     options: EmittedWith | None = Field(default=None, description="of `emit`")
     errors: tuple[MapError, ...] = Field(description="one for each arithmetic")
     error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")

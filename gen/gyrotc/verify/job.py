@@ -76,11 +76,13 @@ def verify(
         progress: Called with the name of each target before it is tried.
 
     Raises:
-        InputError: No emitted code, an unknown target, an unreadable log, no table to visit all inputs of.
+        InputError: No emitted code, an unknown target, an unreadable log or earlier `verify.json`, no table to visit
+            all inputs of.
         CheckFailed: The log is not whole, or of another model.
     """
     say = progress or (lambda _: None)
     model = load_model(folder / "model.json")
+    earlier = read_optional(folder / "verify.json", Verification)
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
     say("comparing files")
     options, emission = made_again(folder / "c", model)
@@ -97,11 +99,15 @@ def verify(
     wrong = [file.file for file in emitted if file.status == "fail"]
     barred = wrong and not trust_code
     identity = (model.hash, c_hash(folder / "c"))
+    same = earlier is not None and (earlier.model_hash, earlier.c_hash) == identity
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
     entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
     if dataset is not None and not barred:
         entries = replay_dataset(job, entries, chosen, dataset, say)
-    entries = _merged(_earlier(folder, identity, boards_only=log is None), entries)
+    before = earlier.targets if earlier is not None else ()
+    boards = [entry for entry in before if entry.log is not None]
+    if same:
+        entries = _merged(boards if log is None else before, entries)
     exact = options.shifted(model)
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     if exhaustive and not barred:
@@ -118,6 +124,7 @@ def verify(
         missing=missing,
         targets=tuple(entries),
         log=brought,
+        outdated_boards=() if same else tuple(dict.fromkeys(entry.name for entry in boards)),
         options=EmittedWith(numeric=options.numeric, zero_at_c=options.zero_at_c),
         emitted=tuple(emitted),
         errors=tuple(errors),
@@ -178,18 +185,7 @@ def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[V
             raise
 
 
-def _earlier(folder: Path, identity: tuple[str, str], *, boards_only: bool) -> list[VerifiedTarget]:
-    """Entries of an earlier `verify.json` that still hold: same model, same code."""
-    try:
-        earlier = read_optional(folder / "verify.json", Verification)
-    except InputError:
-        return []
-    if earlier is None or (earlier.model_hash, earlier.c_hash) != identity:
-        return []
-    return [entry for entry in earlier.targets if entry.log is not None or not boards_only]
-
-
-def _merged(earlier: list[VerifiedTarget], entries: list[VerifiedTarget]) -> list[VerifiedTarget]:
+def _merged(earlier: Sequence[VerifiedTarget], entries: list[VerifiedTarget]) -> list[VerifiedTarget]:
     new = {(entry.name, entry.numeric) for entry in entries}
     return [entry for entry in earlier if (entry.name, entry.numeric) not in new] + entries
 

@@ -187,9 +187,18 @@ def test_log_of_a_board_is_checked_and_kept(copy: Path, gyrotc: Command) -> None
     # A later run keeps what a board has shown of the same model and code ...
     verify_again = verify(copy, targets=[FAST]).content()
     assert any(e["name"] == "bench 7, iar 9" for e in verify_again["targets"])
-    # ... and drops it with the code.
+    # ... and drops it with the code, which it says.
     spoil(copy / "c" / "main.c", "return 1;", "return 3;")
-    assert {e["name"] for e in verify(copy, targets=[FAST]).content()["targets"]} == {FAST}
+    found = verify(copy, targets=[FAST]).content()
+    assert {e["name"] for e in found["targets"]} == {FAST} and found["outdated_boards"] == ["bench 7, iar 9"]
+    assert "bench 7, iar 9: ran another model or other code" in gyrotc("verify", copy, "--target", FAST).stdout
+
+
+def test_a_damaged_earlier_result_is_not_dropped_without_a_word(copy: Path) -> None:
+    """It may hold what a board printed, which nobody can make again from the folder."""
+    (copy / "verify.json").write_text('{"schema": "gyrotc.verify/1", "targets": ')
+    with pytest.raises(InputError, match=r"verify\.json"):
+        verify(copy, targets=[FAST])
 
 
 @pytest.mark.parametrize("crc", [False, True], ids=["all", "crc"])
