@@ -451,12 +451,6 @@ class Model(_Frozen):
         row, column = self.envelope.cells_at(cells, temperature_c, slope_c_per_min)
         return np.clip(row, 0, cells[1] - 1), np.clip(column, 0, cells[0] - 1)
 
-    def network_dph(
-        self, network: Network, temperature_c: ArrayLike, slope_c_per_min: ArrayLike
-    ) -> NDArray[np.float64]:
-        """One network alone, as a fallback model is: float64, deg/h; inputs as for the map."""
-        return self._network_dph(network, self.normalise(temperature_c, slope_c_per_min))
-
     def _network_dph(self, network: Network, z: NDArray[np.float64]) -> NDArray[np.float64]:
         bias = network.w0 + z @ np.array(network.linear)
         center, half = self.scale.temperature_c

@@ -1,7 +1,6 @@
 from .budget import budget_of as budget_of
 from .budget import combined as combined
 from .budget import figure_uncertainties as figure_uncertainties
-from .budget import positive_mean as positive_mean
 from .changes import Earlier as Earlier
 from .changes import changes_since as changes_since
 from .changes import earlier_models as earlier_models
@@ -19,5 +18,3 @@ from .limits import last_day as last_day
 from .limits import load_limits as load_limits
 from .product_guards import guarded as guarded
 from .requirements import LEAST_POWER_ONS as LEAST_POWER_ONS
-from .requirements import power_ons_of as power_ons_of
-from .requirements import requirements_of as requirements_of

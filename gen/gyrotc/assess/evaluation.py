@@ -106,7 +106,6 @@ def evaluate(
     training: Training | None = None,
     judged: Judged | None = None,
     compiled: bool = True,
-    trust_code: bool = False,
     progress: Progress | None = None,
     watch: Watch | None = None,
 ) -> Evaluation:
@@ -121,7 +120,6 @@ def evaluate(
             recordings. Without an exam run its figures of spans left out count.
         judged: Judgement of the rows of the runs; None: they are judged here.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
-        trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
         watch: Called with each run and its means.
 
     Raises:
@@ -137,7 +135,7 @@ def evaluate(
     window = average_s or model.average_s
     judged = judged or judge(dataset)
     parts = []
-    compiling = _program(folder / "c", model, table, trusted=trust_code) if compiled else nullcontext()
+    compiling = _program(folder / "c", model, table) if compiled else nullcontext()
     with compiling as program:
         for k, run in enumerate(dataset.runs, 1):
             if progress:
@@ -157,7 +155,7 @@ def evaluate(
             )
             if watch:
                 watch(run, parts[-1].averages)
-    sizes = footprint(folder / "c", model, table, trusted=trust_code) if compiled else None
+    sizes = footprint(folder / "c", model, table) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
     training = training or _training_of(folder, dataset, model)
     if result.exam is None and training:
@@ -235,12 +233,12 @@ def _training_of(folder: Path, dataset: Dataset, model: Model) -> Training | Non
 
 
 @contextmanager
-def _program(c_folder: Path, model: Model, table: Table, *, trusted: bool) -> Iterator[tuple[Target, Path]]:
+def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Target, Path]]:
     """The replay program of a table, compiled for the host."""
     target = all_targets()[_HOST]
     if target.missing():
         raise GyrotcError(f"no C compiler: install {target.package}")
-    with replay_program(c_folder, model, table, target, trusted=trusted) as program:
+    with replay_program(c_folder, model, table, target) as program:
         yield target, program
 
 

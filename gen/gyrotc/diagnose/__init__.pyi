@@ -44,7 +44,6 @@ from .pipeline import needs_finer as needs_finer
 from .pipeline import screen as screen
 from .pipeline import search_of as search_of
 from .posterior import EQUIVALENT as EQUIVALENT
-from .posterior import PRIOR_ODDS as PRIOR_ODDS
 from .posterior import Rival as Rival
 from .posterior import odds_of as odds_of
 from .posterior import probabilities_of as probabilities_of
@@ -97,7 +96,6 @@ from .unexplained import Misfit as Misfit
 from .unexplained import contest as contest
 from .unexplained import misfit as misfit
 from .verdict import VERDICTS as VERDICTS
-from .verdict import deciding_run as deciding_run
 from .verdict import holds as holds
 from .verdict import looks_like as looks_like
 from .verdict import next_steps as next_steps

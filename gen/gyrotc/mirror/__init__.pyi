@@ -23,7 +23,6 @@ from .recursions import Q31 as Q31
 from .recursions import Course as Course
 from .recursions import CourseChannel as CourseChannel
 from .recursions import Recursion as Recursion
-from .recursions import TableKind as TableKind
 from .recursions import TermOutcome as TermOutcome
 from .recursions import delayed as delayed
 from .recursions import first_order as first_order

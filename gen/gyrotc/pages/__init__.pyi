@@ -16,7 +16,6 @@ from .comparison import comparison_picture as comparison_picture
 from .comparison import comparison_tables as comparison_tables
 from .comparison import with_published as with_published
 from .diagnosis import write_diagnosis_page as write_diagnosis_page
-from .display import CONSTANT_PASSES as CONSTANT_PASSES
 from .display import digits_of as digits_of
 from .display import rounded as rounded
 from .display import sci as sci

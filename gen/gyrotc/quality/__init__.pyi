@@ -1,8 +1,6 @@
 from .changes import Change as Change
 from .changes import changes_of as changes_of
 from .curves import curve_findings as curve_findings
-from .event_findings import row_count as row_count
-from .event_findings import row_findings as row_findings
 from .events import found_events as found_events
 from .findings import finding as finding
 from .findings import run_facts as run_facts
@@ -17,9 +15,6 @@ from .judgement import Judgement as Judgement
 from .judgement import judge as judge
 from .judgement import judge_runs as judge_runs
 from .jumps import jumps as jumps
-from .noise import noise_parts as noise_parts
 from .odds import Event as Event
-from .outlying import outlying as outlying
-from .repeats import piles as piles
 from .repeats import stuck as stuck
 from .thermometers import thermometer_findings as thermometer_findings

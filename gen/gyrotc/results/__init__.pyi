@@ -6,12 +6,9 @@ from .base import read_optional as read_optional
 from .base import read_result as read_result
 from .cache import input_hashes as input_hashes
 from .cache import program_of as program_of
-from .decision import decision_of as decision_of
 from .decision import failed_checks as failed_checks
 from .decision import worst_of as worst_of
-from .destination import check_separate as check_separate
 from .diagnosed import NOTHING as NOTHING
-from .diagnosed import SURE as SURE
 from .diagnosed import UNNAMED as UNNAMED
 from .diagnosed import ConsideredCause as ConsideredCause
 from .diagnosed import DetectionLimit as DetectionLimit
@@ -51,7 +48,6 @@ from .fleet import Lot as Lot
 from .fleet import LotCluster as LotCluster
 from .fleet import Reason as Reason
 from .folder import result_folder as result_folder
-from .folder import scratch_folder as scratch_folder
 from .folder import write_result as write_result
 from .json_text import json_text as json_text
 from .marker import MARKER as MARKER

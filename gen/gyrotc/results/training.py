@@ -264,7 +264,10 @@ class Manifest(UnitResult):
     units: DeclaredUnits = Field(description="of the recordings")
     sources: tuple[Any, ...] = Field(description="`[source]` of recordings that were imported")
     program: str = Field(default="", description="SHA-256 of the program; empty: of a gyrotc that did not state it")
-    files: dict[str, str] = Field(description="SHA-256 of every file, by its path in the folder")
+    files: dict[str, str] = Field(
+        description="SHA-256 of the files that the build wrote before this one, by their paths in the folder; "
+        "`SHA256SUMS` has all files as they are now"
+    )
     firmware: dict[str, Count] = Field(
         default={}, description="files of `c/` that a firmware is built with, by their names, and their bytes"
     )

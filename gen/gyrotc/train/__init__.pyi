@@ -1,12 +1,9 @@
 from .candidates import CANDIDATES as CANDIDATES
-from .candidates import CandidateComparison as CandidateComparison
-from .candidates import compare_candidates as compare_candidates
 from .channels import MOST_TERMS as MOST_TERMS
 from .channels import SHAPES as SHAPES
 from .channels import chosen_channels as chosen_channels
 from .channels import seen_by_target as seen_by_target
 from .channels import shape_of as shape_of
-from .choice import CandidateChoice as CandidateChoice
 from .choice import choose as choose
 from .data import TrainingData as TrainingData
 from .data import average_samples as average_samples
@@ -14,7 +11,6 @@ from .data import cleaned_samples as cleaned_samples
 from .data import gather as gather
 from .data import joined as joined
 from .data import scaling_of as scaling_of
-from .data import weighted_mean as weighted_mean
 from .estimator import RBFNetworkRegressor as RBFNetworkRegressor
 from .fitting import FitOptions as FitOptions
 from .fitting import Fitted as Fitted
@@ -46,7 +42,6 @@ from .objection import objection_to as objection_to
 from .plausibility import channel_guard as channel_guard
 from .plausibility import longest_same_s as longest_same_s
 from .plausibility import stuck_after_s as stuck_after_s
-from .process import Asked as Asked
 from .process import TrainingHistory as TrainingHistory
 from .process import fit_process as fit_process
 from .result import Fit as Fit
@@ -56,7 +51,6 @@ from .samples import Blocks as Blocks
 from .samples import run_blocks as run_blocks
 from .simple import design as design
 from .simple import fit_simple as fit_simple
-from .simple import powers_of as powers_of
 from .simple import solve_least_squares as solve_least_squares
 from .uncertainty import coverage as coverage
 from .uncertainty import rezero_dph as rezero_dph

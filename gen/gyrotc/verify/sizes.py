@@ -35,14 +35,14 @@ class Footprint:
     ram_bytes: int
 
 
-def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = False) -> Footprint | None:
+def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
     """Links self-test, init, sample and bias of a table for a Cortex-M4F, or the host where there is none.
 
     Returns:
         The sizes; None where nothing can be compiled.
 
     Raises:
-        CheckFailed: The compiler refused the emitted code, or it is not gyrotc's and not `trusted`.
+        CheckFailed: The compiler refused the emitted code, or it is not gyrotc's.
     """
     target = next((t for name in _TARGETS if (t := all_targets()[name]).missing() is None), None)
     if target is None:
@@ -61,8 +61,8 @@ def footprint(c_folder: Path, model: Model, table: Table, *, trusted: bool = Fal
     with scratch_folder() as work:
         source = work / "footprint.c"
         write_own(source, text)
-        c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)), trusted=trusted)
-        runtime = runtime_object(target, c, table.numeric, work, fresh=trusted)
+        c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)))
+        runtime = runtime_object(target, c, table.numeric, work)
         objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
         link(target, [runtime.put(work / "gtc.o"), *objects], work / "footprint")
         own = {symbol.name for symbol in (*runtime.symbols, *symbols(target, objects[1]))}
