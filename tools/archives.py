@@ -33,15 +33,6 @@ PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name !
 LIBRARIES = (
     # In the wheel: name, licence, where it comes from, how it is there.
     ("Eigen", "MPL-2.0", "pkg:generic/eigen", "compiled into the core"),
-    (
-        "NLopt",
-        "MIT AND LGPL-2.1-or-later AND BSD-3-Clause",
-        "pkg:generic/nlopt",
-        "a shared library of its own, linked whole with all its algorithms: luksan (LGPL-2.1-or-later), slsqp "
-        "(BSD-3-Clause), and auglag, bobyqa, cdirect, cobyla, crs, direct, esch, isres, mlsl, mma, neldermead, newuoa, "
-        "praxis, and where it was built as C++ ags and stogo (MIT); "
-        "the core calls L-BFGS of luksan alone (NLOPT_LD_LBFGS)",
-    ),
     ("nanobind", "BSD-3-Clause", "pkg:pypi/nanobind", "compiled into the core"),
     ("robin-map", "MIT", "pkg:generic/robin-map", "compiled into the core, a part of nanobind"),
 )
@@ -143,7 +134,7 @@ def wheel(archive: Path, out: Path) -> Path:
         command = ["-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(made), str(top)]
         subprocess.run([python, *command], env=environment, check=True)
         (plain,) = made.glob("*.whl")
-        # NLopt's library goes into the wheel, under a name of its own, and the tag says which systems can load it.
+        # The tag of the repaired wheel says which systems can load it.
         repair = [python, "-m", "auditwheel", "repair", "-w", str(out), str(plain)]
         path = f"{python.parent}:{os.environ['PATH']}"
         subprocess.run(repair, env=environment | {"PATH": path}, check=True, capture_output=True)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what gyrotc needs: system packages (Debian, Ubuntu) that are missing, then the virtual environment .venv.
 #
-#   tools/setup.sh            for `make demo`: compiler, Python, Eigen, NLopt; the ARM compiler and its emulator
+#   tools/setup.sh            for `make demo`: compiler, Python, Eigen; the ARM compiler and its emulator
 #   tools/setup.sh test       besides, what `make test` uses, Chromium for the pages among it
 #   tools/setup.sh check      besides, the cross compilers of `make check`
 #   tools/setup.sh targets    besides, the cross compilers and emulators of `make targets`
@@ -18,7 +18,7 @@ level=${1:-demo}
 locked=${2:-}
 [ -z "$locked" ] || [ "$locked" = locked ] || { echo "setup: unknown word '$locked' (locked)" >&2; exit 2; }
 
-base=(g++ make python3 python3-dev python3-venv libeigen3-dev libnlopt-cxx-dev)
+base=(g++ make python3 python3-dev python3-venv libeigen3-dev)
 arm=(gcc-arm-none-eabi qemu-system-arm)
 test=(clang cmake cppcheck gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user
       clang-tidy pkg-config strace git chromium)
