@@ -69,14 +69,7 @@ TEST(a_correction_that_is_no_number_is_the_fallback)
 
     CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
     (void)ramp(&state, &temp, C(0.015625), (int)N * 5);
-#if TEST_Q31
-    state.window[0] = GTC_TEMP_MISSING; /* a slope of the whole range from here to 0 */
-    state.input[0].base = 0;
-    state.input[0].sum = 0;
-    state.window_valid = 1U;
-#else
-    state.input[0].base = MISSING;
-#endif
+    spoil_input(&state);
     (void)feed(&state, temp, 1);
     CHECK(same(bias_of(&state), WORD_OF(table.fallback)));
 }

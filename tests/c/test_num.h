@@ -70,6 +70,19 @@ static inline int same(num_t a, num_t b)
     return (memcmp(&a, &b, sizeof a) == 0) ? 1 : 0;
 }
 
+/* Overwrites what a state has read, as lost memory does, so that its next correction would be no number. */
+static inline void spoil_input(state_t *state)
+{
+#if TEST_Q31
+    state->window[0] = GTC_TEMP_MISSING; /* a slope of the whole range from here to 0 */
+    state->input[0].base = 0;
+    state->input[0].sum = 0;
+    state->window_valid = 1U;
+#else
+    state->input[0].base = MISSING;
+#endif
+}
+
 /* The tables that states were started with, the last one first: a state knows its table by the checksum alone. A test that
  * changes a table and goes on with states of the table as it was gives it another checksum. */
 #define KNOWN_TABLES 8
