@@ -5,7 +5,7 @@ SHELL := /bin/bash
 override PYTHON := .venv/bin/python
 override GYROTC := .venv/bin/gyrotc
 # Of tests/check what takes minutes; the rest takes half an hour.
-override QUICK_CHECKS := tests/check/test_eighty_recordings.py
+override QUICK_CHECKS := $(addprefix tests/check/test_,eighty_recordings.py import_order.py coverage.py check_libc.py)
 override FUZZERS := map check open image step restore
 # What a user sets reaches programs as it is, through the environment and quoted: $(value) keeps make, the quotes keep
 # the shell from reading it, and unexport keeps make from expanding it for the environment.

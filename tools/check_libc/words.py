@@ -1,4 +1,4 @@
-"""Words that must not occur in libc/ and include/: types of 8 bits, double, the heap, libraries, writable data."""
+"""Words that must not occur in libc/ and include/: types of 8 bits, double, octals, heap, libraries, writable data."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ WORDS = {
     r"\b(goto|setjmp|longjmp|asm|__asm__)\b": "a jump or assembly",
     r"(?<![\w.])(\d+\.\d*|\.\d+)(e[+-]?\d+)?(?![\d.eFf])": "a constant of type double",
     r"\b0x[0-9a-f.]+p[+-]?\d+(?![\dF])": "a constant of type double",
+    # cppcheck looks for these (MISRA C:2012, rule 7.1) in the files that it is called with, not in what they include.
+    r"(?<![\w.])0[0-7]+[uUlL]*\b(?!\.)": "an octal constant",
     r"^static (?!inline\b|const\b)[^(\n]*(=|;)": "writable static data",
 }
 _NOT_CODE = re.compile(r"/\*.*?\*/|\"(\\.|[^\"\\\n])*\"|'(\\.|[^'\\\n])*'", re.DOTALL)
