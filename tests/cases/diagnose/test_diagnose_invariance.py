@@ -33,6 +33,7 @@ from gyrotc.diagnose import (
 from gyrotc.diagnose.joined import _root
 from gyrotc.recordings import Dataset, joined_runs, load
 from gyrotc.train import FitOptions
+from numpy.typing import NDArray
 
 from bench.invariance import VARIATIONS, averaged
 from bench.splits import splits
@@ -139,6 +140,37 @@ def test_rates_and_noise_in_another_unit_give_the_same_answer(made: Callable[[st
     was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
     assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-3)
     assert now["amplitude_dph_per_c"].value == pytest.approx(1000.0 * was["amplitude_dph_per_c"].value, rel=1e-3)
+
+
+def test_a_rate_of_the_other_sign_has_the_same_cause_with_the_other_sign(made: Callable[[str], Case]) -> None:
+    case = made("hysteresis")
+    found = answer(changed(case.records, lambda r: replace(r, rate_dph=-r.rate_dph)), case.declared)
+    assert (found.verdict, found.causes) == (case.answer.verdict, case.answer.causes)
+    was, now = (a.analysis.attribution.causes[0].parameters for a in (case.answer, found))
+    assert now["width_c"].value == pytest.approx(was["width_c"].value, rel=1e-6)
+    assert now["amplitude_dph_per_c"].value == pytest.approx(-was["amplitude_dph_per_c"].value, rel=1e-6)
+
+
+def test_a_channel_whose_readings_belong_to_another_time_or_run_loses_its_name(made: Callable[[str], Case]) -> None:
+    """The same readings with the same spread: shifted by half a run, or exchanged between the runs."""
+    case = made("auxiliary")
+    (name,) = case.records.runs[0].channels
+    shifted = changed(case.records, lambda r: _with_channel(r, name, np.roll(r.channels[name], len(r.rate_dph) // 2)))
+    readings = [run.channels[name] for run in case.records.runs]
+    others = [*readings[1:], readings[0]]
+    exchanged = Records(
+        tuple(
+            _with_channel(run, name, np.resize(other, len(run.rate_dph)))
+            for run, other in zip(case.records.runs, others, strict=True)
+        ),
+        case.records.block_s,
+    )
+    for records in (shifted, exchanged):
+        assert "auxiliary" not in answer(records, case.declared).causes
+
+
+def _with_channel(run: RunRecord, name: str, readings: NDArray[np.float64]) -> RunRecord:
+    return replace(run, channels={name: readings})
 
 
 def answer_of(dataset: Dataset) -> Answer:

@@ -331,6 +331,37 @@ def test_a_play_gets_a_strength_over_temperature_where_recordings_ask_for_it(see
         assert completed(played[:1], [one]) == [one], "a single run does not say it"
 
 
+def test_the_strength_of_a_play_over_temperature_is_shipped_and_gains_on_the_exam(tmp_path: Path) -> None:
+    dataset, _ = _loops(tmp_path, 1.0, 1)
+    found = diagnose(dataset)
+    assert found.model is not None
+    (term,) = found.model.terms
+    parameters = term.parameters
+    assert term.id == "hysteresis"
+    middle = parameters.get("reference_c", 0.0)
+    assert parameters["amplitude_dph_per_c_per_c"] == pytest.approx(2e-4 / 55.0, rel=0.2)
+    at_15 = parameters["amplitude_dph_per_c"] + parameters["amplitude_dph_per_c_per_c"] * (15.0 - middle)
+    assert at_15 == pytest.approx(2e-4, rel=0.1)
+    assert found.result.extended is not None and found.result.extended.gain is not None
+    assert found.result.extended.gain.rms_removed_dph.low > 0.0
+
+
+def test_a_gap_in_every_run_costs_the_term_of_a_channel_next_to_nothing(tmp_path: Path) -> None:
+    """200 s without rows, in which the channel has no reading."""
+    (tmp_path / "short.toml").write_text(SCENARIO)
+    simulate(tmp_path / "short.toml", seed=3, out=tmp_path / "data")
+    left = []
+    for gap in (0, 20):
+        for path in (tmp_path / "data").glob("run-*.csv"):
+            lines = path.read_text().splitlines(keepends=True)
+            middle = len(lines) // 2
+            path.write_text("".join(lines[:middle] + lines[middle + gap :]))
+        result = diagnose(load(tmp_path / "data")).result.content()
+        assert (result["verdict"], result["extended"]["terms"]) == ("explained", ["auxiliary"])
+        left.append(result["extended"]["gain"]["exam_rms_after_dph"])
+    assert left[1] < 1.02 * left[0]
+
+
 WIDTH_C = 6.0
 
 
@@ -361,6 +392,21 @@ def relays(records: Records, seed: int) -> Array:
         return out
 
     return records.columns(mean)[:, 0]
+
+
+def test_relays_need_no_second_cause(campaign: Campaign) -> None:
+    """A lag and a finer map beside a play come as near to these, and must not stand with it."""
+    found = attribute(measured(campaign, relays(campaign.records, 0), 25.0, 0))
+    assert named(found) == ["hysteresis"]
+
+
+def test_a_wave_beside_a_play_is_a_cause_of_its_own(campaign: Campaign) -> None:
+    def wave(history: History) -> Array:
+        return np.sin(2.0 * np.pi * history.temperature_c / 9.0)[:, None]
+
+    effect = campaign.records.columns(lambda history: loop(history) / 6.0 + wave(history))[:, 0]
+    found = attribute(measured(campaign, effect, 40.0, 3))
+    assert set(named(found)) == {"hysteresis", "path_length_periodicity"}
 
 
 def local_loop(history: History) -> Array:
