@@ -120,6 +120,35 @@ def test_recordings_without_changes_have_none_though_temperatures_are_followed_l
     assert alarms == 0
 
 
+@pytest.mark.parametrize(
+    "habit",
+    [
+        lambda t, c: 0.02 * np.exp(-t / 600.0),  # warm-up after each power-on
+        lambda t, c: 0.012 * (c > 30.0),  # a step of the map
+        lambda t, c: 0.006 * np.sign(np.gradient(c, t)) * (np.abs(np.gradient(c, t)) > 1e-3),  # of heating and cooling
+    ],
+    ids=["warm-up", "step of the map", "sign of the slope"],
+)
+def test_what_a_gyro_does_in_every_run_is_no_event(habit: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]) -> None:
+    rng = np.random.default_rng(SEED + 4)
+    runs = [recording(rng, k) for k in (1, 2, 4)]
+    for run in runs:
+        run["rate_dph"] = run["rate_dph"] + habit(run["time_s"], run["temperature_c"])
+    assert changes(*runs) == []
+
+
+def test_noise_makes_hardly_any_event() -> None:
+    """The search has a level of one set in two hundred; of thirty at most one may have a change."""
+    rng = np.random.default_rng(SEED + 5)
+    time = np.arange(0.0, 3.0 * 3600.0, ROW_S)
+    ramps = np.interp(time, [0.0, 3600.0, 7200.0, 10800.0], [0.0, 0.0, 50.0, 20.0])
+    alarms = 0
+    for _ in range(30):
+        rates = [0.01 + 2e-4 * ramps + NOISE_DPH * rng.standard_normal(time.size) for _ in range(2)]
+        alarms += bool(changes_of([(time, ramps, rate) for rate in rates]))
+    assert alarms <= 1
+
+
 def test_a_drift_that_begins_has_its_run_time_and_slope(tmp_path: Path) -> None:
     """At a constant temperature, after five of eight hours; it is left out to the end."""
     time = np.arange(0.0, 3600.0 * HOURS, ROW_S)

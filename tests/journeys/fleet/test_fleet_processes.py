@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import re
+import shutil
 import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -83,3 +88,84 @@ def test_a_unit_whose_process_is_killed_is_done_again(
     entries: Any = run_fleet(load_manifest(lot / "d"), tmp_path / "out", jobs=1)
     assert (tmp_path / "out" / "RLG-1.died").exists()
     assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+
+
+def _dies(task: Task) -> FleetEntry:
+    if task.unit.name == "RLG-1":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return do_unit(task)
+
+
+def reported(out: Path, entries: list[FleetEntry], why: str) -> None:
+    """Check that the deadly gyro and the one without recordings have failed, each with its reason in fleet.json."""
+    assert [entry.status for entry in entries] == ["done", "failed", "done", "failed"]
+    units = {unit["name"]: unit for unit in json.loads((out / "fleet.json").read_text())["serials"]}
+    assert why in units["RLG-1"]["reason"] and "run-01.csv" in units["RLG-3"]["reason"]
+    for name, unit in units.items():
+        assert (unit["status"] == "done") == (out / name / "model.json").is_file()
+
+
+def test_a_gyro_that_kills_every_process_has_failed_and_the_others_are_done(
+    lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pools, "do_unit", _dies)
+    entries = run_fleet(load_manifest(lot / "d"), tmp_path / "out", jobs=2)
+    reported(tmp_path / "out", entries, "its process died")
+
+
+def test_a_gyro_that_kills_workers_of_a_cluster_has_failed_and_the_others_are_done(
+    lot: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One gyro at a time: Dask suspects every task that a lost worker had."""
+    import dask
+    import distributed
+
+    monkeypatch.setattr(pools, "do_unit", _dies)
+    one_by_one = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
+    with (
+        dask.config.set(one_by_one),
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local,
+    ):
+        cluster = Cluster(local.scheduler_address, 60.0)
+        entries = run_fleet(load_manifest(lot / "d"), tmp_path / "out", cluster=cluster)
+    reported(tmp_path / "out", entries, "2 workers died with it")
+
+
+def _held(task: Task) -> FleetEntry:
+    folder = task.unit.dataset.parents[1]
+    (folder / "begun").touch()
+    while not (folder / "go").exists():
+        time.sleep(0.05)
+    return do_unit(task)
+
+
+CLIENT = """
+import sys
+from pathlib import Path
+sys.path[:] = sys.argv[3].split(":")
+import test_fleet_processes as held
+held.pools.do_unit = held._held
+held.run_fleet(held.load_manifest(Path("d")), Path(sys.argv[1]), cluster=held.Cluster(sys.argv[2], 60.0))
+"""
+
+
+def test_a_killed_client_of_a_cluster_leaves_no_half_result_and_the_next_call_goes_on(
+    lot: Path, tmp_path: Path
+) -> None:
+    import distributed
+
+    out = tmp_path / "out"
+    shutil.copytree(lot / "d", tmp_path / "d")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local:
+        address = local.scheduler_address
+        command = [sys.executable, "-c", CLIENT, str(out), address, ":".join(sys.path)]
+        with subprocess.Popen(command, cwd=tmp_path) as client:
+            while not (tmp_path / "begun").exists():
+                assert client.poll() is None
+                time.sleep(0.05)
+            client.kill()
+        (tmp_path / "go").touch()
+        entries = run_fleet(load_manifest(tmp_path / "d"), out, cluster=Cluster(address, 60.0))
+    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+    assert not [path.name for path in out.iterdir() if path.name.startswith(".")], "no half result, no lock"
+    assert contents(out) == contents(lot / "whole")
