@@ -2,6 +2,7 @@ from .candidates import CANDIDATES as CANDIDATES
 from .channels import MOST_TERMS as MOST_TERMS
 from .channels import SHAPES as SHAPES
 from .channels import chosen_channels as chosen_channels
+from .channels import fallback_model_of as fallback_model_of
 from .channels import seen_by_target as seen_by_target
 from .channels import shape_of as shape_of
 from .choice import choose as choose

@@ -112,6 +112,15 @@ def test_units_as_the_model_says_are_unchanged_and_move_within_u() -> None:
     assert 0.7 < np.mean(squares) < 1.3, "U is twice the RMS by which an unchanged unit's map moves"
 
 
+@pytest.mark.parametrize(("stated", "expected"), [(0.3, 1.0), (1.0, 1.0), (3.0, 3.0)])
+def test_an_earlier_map_is_known_no_better_than_its_table_states(stated: float, expected: float) -> None:
+    """Runs left out have calibrated what the table states; the earlier means alone may claim less."""
+    known = means(recorded(np.random.default_rng(1), CALIBRATION))
+    own = posterior_of_means(known, ENVELOPE, 0.0).rms_sigma_dph()
+    found = posterior_of_means(known, ENVELOPE, 0.0, stated * own)
+    assert found.rms_sigma_dph() == pytest.approx(expected * own, rel=1e-9)
+
+
 def test_an_answer_never_contradicts_the_significance_of_the_move() -> None:
     print("seed", SEED)
     rng = np.random.default_rng(SEED)

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from gyrotc.jobs import lot_from
+from gyrotc.model import Model
 from gyrotc.recordings import METHODS, load
 from gyrotc.simulate import simulate
 from gyrotc.tables import quantise
@@ -21,6 +23,7 @@ from gyrotc.train import (
     Fit,
     FitOptions,
     TrainingData,
+    fallback_model_of,
     fit,
     fit_dataset,
     predict,
@@ -31,6 +34,7 @@ from gyrotc.train import (
 from gyrotc.train.prior import Learned, LotPrior, UnitMeans, learn_prior, prior_of
 from libc_build import runtime
 from numpy.typing import NDArray
+from scipy import stats
 from training_data import samples, true_bias
 
 Floats = NDArray[np.float64]
@@ -122,6 +126,32 @@ def test_repeatability_has_one_degree_of_freedom_less_than_there_are_power_ons(
     assert rules["turn_on_freedom"] == freedom
 
 
+@pytest.mark.parametrize(
+    ("power_on", "freedom"), [(None, 5), (np.array([0, 0, 1, 1, 2, 3]), 3), (np.array([0, 0, 0, 1, 1, 1]), 3)]
+)
+def test_the_constant_of_the_next_power_on_has_the_quantile_of_student_s_t(
+    power_on: NDArray[np.int64] | None, freedom: int
+) -> None:
+    """68 % of power-ons; with fewer than three degrees of freedom, which are of no use in the field, as with three."""
+    data = gyro(3, 6e-4)
+    rules = uncertainty_of(data, fit(data, method="linear", power_on=power_on), CELLS)["rules"]
+    quantile = stats.t.ppf(stats.norm.cdf(1.0), freedom)
+    assert rules["between_dph"] == pytest.approx(quantile * rules["turn_on_dph"], rel=1e-3)
+
+
+def test_beyond_the_envelope_sigma_grows_with_the_gradient_of_the_map() -> None:
+    """That of a plane is the same everywhere."""
+    data = gyro(3, 0.0)
+    found = fit(data, method="linear")
+    known = uncertainty_of(data, found, CELLS)["rules"]
+    at, step = (np.array([20.0]), np.array([0.5])), (10.0, 0.5)
+    by_t, by_r = (
+        predict(found, at[0] + dt, at[1] + dr) - predict(found, *at) for dt, dr in ((step[0], 0.0), (0.0, step[1]))
+    )
+    assert known["beyond_dph_per_c"] == pytest.approx(abs(by_t[0]) / step[0], rel=1e-3)
+    assert known["beyond_dph_per_c_per_min"] == pytest.approx(abs(by_r[0]) / step[1], rel=1e-3)
+
+
 @pytest.mark.parametrize("method", ["constant", "cubic_slope", "mrbf"])
 def test_an_offset_of_each_run_is_in_what_is_stated_for_the_next_one(method: str) -> None:
     between = 6e-4
@@ -197,6 +227,21 @@ def test_a_lost_channel_may_be_off_by_what_it_differed_in_training() -> None:
     parameters = {"slope_dph_per_unit": -2e-3, "reference": 12.0}
     stated = start_sigma("auxiliary", parameters, {}, samples(0), channel=[volts[:900], volts[900:]])
     assert stated == pytest.approx(2e-3 * np.sqrt(np.mean((volts - 12.0) ** 2)))
+
+
+@pytest.mark.parametrize("runs", [4, 6])
+def test_what_stands_for_a_lost_channel_states_the_error_of_the_next_run(runs: int, model_dict: dict[str, Any]) -> None:
+    """Spread within runs, and of the mean of a run more: Student's t about the mean of few, by pandas and scipy."""
+    model, data, rng = Model.from_dict(model_dict), gyro(7, 0.0), np.random.default_rng(7)
+    data = data.select(data.run < runs)
+    data = replace(data, bias_dph=model.map_dph(data.temperature_c, data.slope_c_per_min))
+    effect = rng.normal(0.0, 2e-3, runs)[data.run] + rng.normal(0.0, 1e-3, len(data))
+    found = fallback_model_of(model, data, effect)
+    assert found is not None
+    left = pd.DataFrame({"run": data.run, "left": effect - found.added}).groupby("run")["left"]
+    between = left.mean().var(ddof=1) * (1.0 + 1.0 / runs) * stats.t(runs - 1).var()
+    within = np.average(left.var(ddof=0), weights=left.count())
+    assert found.sigma_dph == pytest.approx(np.sqrt(within + between))
 
 
 def lagged(x: Floats, step_s: float, tau_s: float, start: float) -> Floats:

@@ -6,7 +6,6 @@ import json
 import os
 import pickle
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -145,7 +144,7 @@ from pathlib import Path
 sys.path[:] = sys.argv[3].split(":")
 import test_fleet_processes as held
 held.pools.do_unit = held._held
-held.run_fleet(held.load_manifest(Path("d")), Path(sys.argv[1]), cluster=held.Cluster(sys.argv[2], 60.0))
+held.run_fleet(held.load_manifest(Path(sys.argv[4])), Path(sys.argv[1]), cluster=held.Cluster(sys.argv[2], 60.0))
 """
 
 
@@ -155,17 +154,17 @@ def test_a_killed_client_of_a_cluster_leaves_no_half_result_and_the_next_call_go
     import distributed
 
     out = tmp_path / "out"
-    shutil.copytree(lot / "d", tmp_path / "d")
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local:
         address = local.scheduler_address
-        command = [sys.executable, "-c", CLIENT, str(out), address, ":".join(sys.path)]
-        with subprocess.Popen(command, cwd=tmp_path) as client:
-            while not (tmp_path / "begun").exists():
+        command = [sys.executable, "-c", CLIENT, str(out), address, ":".join(sys.path), str(lot / "d")]
+        with subprocess.Popen(command) as client:
+            while not (lot / "begun").exists():
                 assert client.poll() is None
                 time.sleep(0.05)
             client.kill()
-        (tmp_path / "go").touch()
-        entries = run_fleet(load_manifest(tmp_path / "d"), out, cluster=Cluster(address, 60.0))
-    assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
+        (lot / "go").touch()
+        entries = run_fleet(load_manifest(lot / "d"), out, cluster=Cluster(address, 60.0))
+    statuses = [entry.status for entry in entries]
+    assert statuses == ["done", "done", "done", "failed"], [entry.reason for entry in entries]
     assert not [path.name for path in out.iterdir() if path.name.startswith(".")], "no half result, no lock"
     assert contents(out) == contents(lot / "whole")
