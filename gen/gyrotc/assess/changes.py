@@ -31,7 +31,7 @@ from ..results.evaluation import (
 )
 from ..results.release import Verification
 from ..results.training import Manifest, Training
-from .evaluation import evaluate
+from .evaluation import evaluate, name_of
 from .limits import Limits, held_against
 
 
@@ -46,9 +46,6 @@ def as_found(earlier: Earlier, dataset: Dataset, limits: Limits | None, average_
         return None, "the earlier correction was made from recordings that are among these"
     try:
         found = evaluate(earlier.folder, dataset, average_s=average_s, compiled=False)
-        known = earlier.evaluation  # of its training: the new recordings say nothing about it
-        update = {"generalises": known.generalises, "rows_left_out": known.rows_left_out} if known else {}
-        found = found.model_copy(update=update)
         verification = read_optional(earlier.folder / "verify.json", Verification)
         held = held_against(limits, earlier.model, found, verification) if limits else None
     except (GyrotcError, OSError) as error:
@@ -123,7 +120,7 @@ def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--p
     earlier = Earlier(folder)
     old = earlier.model
     if (old.serial, old.axis) != (serial, axis):
-        raise InputError(f"{option} {folder}", f"is of {_name(old.serial, old.axis)}", _name(serial, axis))
+        raise InputError(f"{option} {folder}", f"is of {name_of(old.serial, old.axis)}", name_of(serial, axis))
     return earlier
 
 
@@ -195,10 +192,6 @@ def started_on(dataset: Dataset | None) -> str | None:
     """Day of the last recording, where the recordings carry dates."""
     days = [run.started for run in dataset.runs if run.started is not None] if dataset else []
     return max(days).date().isoformat() if days else None
-
-
-def _name(serial: str, axis: str | None) -> str:
-    return f"gyro {serial}" + (f", axis {axis}" if axis else "")
 
 
 def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..common.arrays import FloatArray, Progress
-from ..common.errors import CheckFailed, GyrotcError
+from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..common.metrics import Averager, Averages, statistics_of, time_statistics
 from ..common.texts import file_stem
 from ..mirror.history import Replay
@@ -31,8 +31,9 @@ from ..quality.findings import RunFacts, run_facts
 from ..quality.inspection import findings_of_run
 from ..quality.judgement import Judged, judge
 from ..quality.thermometers import late_findings
+from ..recordings.description import FILE
 from ..recordings.records import Dataset, Rows, Run
-from ..results.base import Finding, read_result
+from ..results.base import Finding, read_optional
 from ..results.evaluation import (
     EvaluatedRun,
     Evaluation,
@@ -123,10 +124,11 @@ def evaluate(
         watch: Called with each run and its means.
 
     Raises:
-        InputError: No emitted code of the model, or the data lack a channel it needs.
+        InputError: No emitted code of the model, recordings of another gyro, or the data lack a channel it needs.
         CheckFailed: The C code does not compile, or is not gyrotc's.
     """
     model = load_model(folder / "model.json")
+    refuse_another_gyro(folder, model, dataset)
     tables = emitted_tables(folder / "c", model)
     chosen = numeric or next(iter(tables))
     if chosen not in tables:
@@ -157,14 +159,39 @@ def evaluate(
                 watch(run, parts[-1].averages)
     sizes = footprint(folder / "c", model, table) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
-    training = training or _training_of(folder, dataset, model)
+    trained = training or read_optional(folder / "training.json", Training)
+    training = training or (trained if _is_trained_on(model, dataset) else None)
     if result.exam is None and training:
         result = result.model_copy(update={"left_out": training.left_out})
-    result = _with_what_is_known(result, parts, training)
+    result = _with_what_is_known(result, parts, trained)
     of_runs = [found for p in parts for found in p.findings]
     found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), training)
     found += [*beyond_noise(result), *late_findings([(p.run, p.averages) for p in parts])]
     return result.model_copy(update={"findings": tuple(found)})
+
+
+def refuse_another_gyro(folder: Path, model: Model, dataset: Dataset) -> None:
+    """Refuse recordings of another gyro, or of another axis, than the model in `folder`.
+
+    Raises:
+        InputError: They are; the message says what to do if the recordings have only the wrong name.
+    """
+    if (model.serial, model.axis) == (dataset.serial, dataset.axis):
+        return
+    remedy = f"recordings of {name_of(model.serial, model.axis)}"
+    if model.serial != dataset.serial:
+        remedy += f'; if they are of this gyro, write serial = "{model.serial}" into {dataset.folder / FILE}'
+    raise InputError(
+        str(dataset.folder),
+        f"holds {name_of(dataset.serial, dataset.axis)}, and the table in {folder} is of "
+        f"{name_of(model.serial, model.axis)}",
+        remedy,
+    )
+
+
+def name_of(serial: str, axis: str | None) -> str:
+    """Return the name of a gyro, or of one of its axes, for messages."""
+    return f"gyro {serial}" + (f", axis {axis}" if axis else "")
 
 
 def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Training | None) -> Evaluation:
@@ -223,13 +250,10 @@ def _residual_test(result: Evaluation, parts: Sequence[_Part]) -> ResidualTest |
     )
 
 
-def _training_of(folder: Path, dataset: Dataset, model: Model) -> Training | None:
-    """What `fit` wrote into the folder, where these are the recordings that it was made from."""
+def _is_trained_on(model: Model, dataset: Dataset) -> bool:
+    """Test whether a model was made from these recordings."""
     known = {(d.file, d.sha256) for d in model.data}
-    path = folder / "training.json"
-    if not path.is_file() or not all((run.file, run.sha256) in known for run in dataset.runs):
-        return None
-    return read_result(path, Training)
+    return all((run.file, run.sha256) in known for run in dataset.runs)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Compute again what can be computed of stored results, and refuse a result that says something else.
+"""Compute again what follows from stored results: to judge new figures, and to refuse results that contradict this.
 
 This finds a decision or an uncertainty that was edited, also where the hashes of its file were made again. Figures of
 recordings that were edited together with all that follows from them stay unseen: only hashes kept elsewhere show these.
@@ -107,10 +107,26 @@ def _check_limits(
 ) -> None:
     """Every limit says what its bound and the figures give, by the decision rule.
 
-    What targets answered is taken as it stood then: `verify` may have been called with others since.
-
     Raises:
         InputError: One does not.
+    """
+    again = held_again(held, model, evaluation, verification, where)
+    found = again.model_copy(update={"gyrotc_version": held.gyrotc_version})
+    _refuse_departure(held.content(), found.content(), where)
+
+
+def held_again(
+    held: HeldLimits, model: Model, evaluation: Evaluation, verification: Verification | None, where: str
+) -> HeldLimits:
+    """Decide the same limits by other figures.
+
+    What targets answered is taken as it stood then: `verify` may have been called with others since.
+
+    Args:
+        where: The file that holds the limits; messages name it.
+
+    Raises:
+        InputError: They are no limits that a limits file can state.
     """
     parts: dict[str, Any] = defaultdict(dict)
     for one in held.limits:
@@ -126,9 +142,7 @@ def _check_limits(
         for status in one.measured
     )
     then = verification.model_copy(update={"targets": targets}) if verification else None
-    again = held_against(limits, model, evaluation, then)
-    found = again.model_copy(update={"gyrotc_version": held.gyrotc_version})
-    _refuse_departure(held.content(), found.content(), where)
+    return held_against(limits, model, evaluation, then)
 
 
 def _check_budget(
@@ -142,10 +156,33 @@ def _check_budget(
 ) -> None:
     """Its parts follow from the other results, and U from its parts.
 
-    Instruments, interval and a drift that is stated come from the limits file, which is not in a result.
-
     Raises:
         InputError: They do not.
+    """
+    again = budget_again(budget, model, training, evaluation, verification, changes, where)
+    found = again.model_copy(update={"gyrotc_version": budget.gyrotc_version})
+    _refuse_departure(budget.content(), found.content(), where)
+
+
+def budget_again(
+    budget: Budget,
+    model: Model,
+    training: Training | None,
+    evaluation: Evaluation,
+    verification: Verification | None,
+    changes: Changes | None,
+    where: str,
+) -> Budget:
+    """Compute a budget by other figures.
+
+    Instruments, interval and a drift that is stated come from the limits file, which is not in a result; the earlier
+    budget has them.
+
+    Args:
+        where: The file that holds the budget; messages name it.
+
+    Raises:
+        InputError: There is no training, or what the budget states can come from no limits file.
     """
     if training is None:
         raise InputError(where, "stands without training.json", _EXPECTED)
@@ -153,9 +190,7 @@ def _check_budget(
     stated = {"drift_dph_per_year": drift.standard_uncertainty * math.sqrt(3.0)} if drift else {}
     interval = {"interval": {"days": budget.interval_days} | stated} if budget.interval_days else {}
     limits = _limits(interval, where).model_copy(update={"instrument": budget.instruments})
-    again = budget_of(model, training, evaluation, verification, limits=limits, changes=changes)
-    found = again.model_copy(update={"gyrotc_version": budget.gyrotc_version})
-    _refuse_departure(budget.content(), found.content(), where)
+    return budget_of(model, training, evaluation, verification, limits=limits, changes=changes)
 
 
 def _limits(content: dict[str, Any], where: str) -> Limits:

@@ -213,15 +213,16 @@ def built_lines(unit: UnitResults, dataset: str) -> Iterator[str]:
 
 
 def verdict_words(unit: UnitResults) -> str:
-    """Return the verdict with what it rests on: each limit that did not pass, and what the recordings lack."""
+    """Return the verdict with its reasons: limits that did not pass, what the recordings lack, what remains."""
+    doubt = f"; {unit.doubt[0].lower()}{unit.doubt[1:]}" if unit.doubt else ""
     if not unit.verdict:
-        return "no limits given"
+        return f"no limits given{doubt}"
     product = f" for {unit.limits.product}" if unit.limits and unit.limits.product else ""
     reasons = [*unit.failures]
     for one in unit.held:
         if one.verdict == "FAIL" or (one.verdict != "PASS" and not one.capped):
             reasons.append(f"{limit_words(one.limit)} {bound_words(one)}: {measured_words(one)}, {one.verdict}")
-    return f"{unit.verdict}{product}" + "".join(f"; {why}" for why in (*reasons, *unit.capped))
+    return f"{unit.verdict}{product}" + "".join(f"; {why}" for why in (*reasons, *unit.capped)) + doubt
 
 
 def size_line(sizes: ModelSizes) -> str:

@@ -36,6 +36,7 @@ from .results import (
     prediction_line,
     rounding_lines,
     training_lines,
+    verdict_words,
     verify_notes,
     verify_table,
 )
@@ -43,20 +44,21 @@ from .results import (
 
 @contextmanager
 def evaluation_folders(folder: Path, trace: Path | None, recordings: Path) -> Iterator[tuple[Path, Path | None]]:
-    """Where to write `evaluate.json` and the traces, so that both take their places when the block ends well.
+    """Where to write the figures and the traces, so that both take their places when the block ends well.
 
     Args:
-        folder: The result folder, which gets `evaluate.json`.
+        folder: The result folder, which gets `evaluate.json` and the decisions that follow from it.
         trace: Folder for the traces: inside it, elsewhere, or None.
         recordings: The data set; the traces are not written into it.
 
     Raises:
         InputError: As `result_folder`; or the traces would take the place of another part of the result.
     """
+    from ..jobs.evaluation import FILES
     from ..results.folder import result_folder
 
     inside = _inside(folder, trace)
-    entries = ("evaluate.json", *([inside.parts[0]] if inside else []))
+    entries = (*FILES.values(), *([inside.parts[0]] if inside else []))
     with ExitStack() as stack:
         stage = stack.enter_context(result_folder(folder, "evaluate", entries=entries))
         if trace is None or inside:
@@ -260,43 +262,56 @@ def evaluate(
     folder: DirArg,
     dataset: DatasetArg,
     numeric: NumericOption = None,
-    trace: Annotated[Path | None, typer.Option("--trace", help="Folder for one CSV per run.")] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            "--trace",
+            help="Folder for one CSV per run, every row; default: only the traces of the page, where DIR has them.",
+        ),
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code and measure.
 
-    Every step is compared with the reference.
+    Every step is compared with the reference. The limits of the result are held against the new figures.
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """
-    from ..assess.evaluation import evaluate as run
     from ..jobs.applied import applied_in
+    from ..jobs.evaluation import TRACE_ROWS, evaluate_again
     from ..model import load_model
+    from ..pages.unit import unit_in
     from ..recordings.loading import load
-    from ..results.files import write_atomically
-    from ..results.json_text import json_text
 
     axis = load_model(folder / "model.json").axis
     recordings = load(dataset, axis=axis, applied=applied_in(dataset), exam_only=True)
+    rows = None
+    if trace is None and (folder / "trace").is_dir():  # what the page is drawn from
+        trace, rows = folder / "trace", TRACE_ROWS
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
-        result = run(folder, recordings, numeric=numeric, trace=traces, progress=say)
-        write_atomically(stage / "evaluate.json", json_text(result.content()))
+        result = evaluate_again(folder, recordings, stage, numeric=numeric, trace=traces, trace_rows=rows, progress=say)
     write_json(json_file, result.content())
     show(evaluation_table(result))
-    if result.mismatches:
-        raise CheckFailed(f"{result.mismatches} steps differ from the reference")
+    unit = unit_in(folder)
+    if unit.limits is not None:
+        tell(f"{unit.model.serial}: {verdict_words(unit)}")
+    if (folder / "report.html").is_file():
+        tell(f"{folder / 'report.html'} shows the figures of before: gyrotc report {folder} draws it again")
+    if unit.failed:
+        raise CheckFailed("; ".join(unit.failed))
 
 
 @app.command()
 def report(folder: DirArg) -> None:
     """Draw DIR/report.html from the results in DIR.
 
-    DIR is what build or diagnose wrote, or the folder of a gyro of a fleet.
+    DIR is what build or diagnose wrote, or the folder of a gyro of a fleet. Results that were changed, or that do not
+    follow from one another, are refused.
 
     Example: gyrotc report result
     """
     from ..jobs.axes import axes_in, refuse_parts_of_two
-    from ..model import load_model
+    from ..jobs.certification import unit_of
     from ..pages.diagnosis import is_diagnosis, write_diagnosis_page
     from ..pages.report import axes_page, write_page, write_report
 
@@ -305,8 +320,9 @@ def report(folder: DirArg) -> None:
         if is_diagnosis(folder):
             path = write_diagnosis_page(folder)
         elif axes := axes_in(folder):
-            refuse_parts_of_two(folder, {axis: load_model(folder / axis / "model.json") for axis in axes})
+            refuse_parts_of_two(folder, {axis: unit_of(folder / axis).model for axis in axes})
             path = write_page(folder, axes_page(folder, axes))
         else:
+            unit_of(folder)
             path = write_report(folder)
     tell(f"report: {path}")

@@ -38,9 +38,9 @@ from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify.job import chosen_targets, verify
 from .applied import applied_in
 from .axes import join_axes
+from .evaluation import TRACE_ROWS
 from .recalibration import refuse_together, with_prior
 
-_TRACE_ROWS = 2**18  # of a run: thousands for each point of a picture
 _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 
 
@@ -65,8 +65,7 @@ class Built:
     @property
     def failures(self) -> tuple[str, ...]:
         """The checks that failed, those of the limits among them; none: exit 0."""
-        limits = self.limits.limits if self.limits else ()
-        return (*self.unit.failures, *(f"limit {check.failure()}" for check in limits if not check.met))
+        return self.unit.failed
 
     @property
     def unit(self) -> UnitResults:
@@ -215,7 +214,7 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
         dataset,
         average_s=options.average_s,
         trace=None if order.in_fleet else work / "trace",
-        trace_rows=_TRACE_ROWS,
+        trace_rows=TRACE_ROWS,
         training=fitted.training,
         judged=judged,
         compiled=not order.in_fleet,

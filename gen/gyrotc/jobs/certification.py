@@ -202,8 +202,8 @@ def unit_of(folder: Path) -> UnitResults:
     Raises:
         InputError: It does not; or as `unit_in`.
     """
-    check_intact(folder, STATED)
     unit = unit_in(folder)
+    check_intact(folder, STATED)
     model, evaluation = unit.model, unit.evaluation
     named = {
         "evaluate.json": evaluation, "training.json": unit.training, "verify.json": unit.verification,

@@ -83,6 +83,12 @@ class UnitResults:
         return list(failed_checks(self.verification, self.evaluation))
 
     @property
+    def failed(self) -> tuple[str, ...]:
+        """Checks that failed, those of the limits among them; a command that finds some ends with status 1."""
+        limits = self.limits.limits if self.limits else ()
+        return (*self.failures, *(f"limit {one.failure()}" for one in limits if not one.met))
+
+    @property
     def held(self) -> list[Limit]:
         """The limits, those that are not met first."""
         limits = self.limits.limits if self.limits else ()
@@ -113,6 +119,14 @@ class UnitResults:
         return f"On {self.judged_on} the table leaves {left} deg/h RMS; a constant leaves {gain} times as much."
 
     @property
+    def doubt(self) -> str:
+        """Why the table is not all that the recordings show; empty where what remains is noise."""
+        found = self.evaluation.residual_words
+        return (
+            f"The table does not explain these recordings: what remains is more than noise ({found})" if found else ""
+        )
+
+    @property
     def lacking(self) -> str:
         """What the recordings lack for a PASS, the gravest; empty where they lack nothing."""
         lacking = [one for one in self.evaluation.requirements if not one.met]
@@ -121,8 +135,7 @@ class UnitResults:
     @property
     def quiet(self) -> bool:
         """Test whether there is nothing that a person should know of the data."""
-        evaluation = self.evaluation
-        return not (evaluation.findings or evaluation.structure_left or self.model.warnings)
+        return not (self.evaluation.findings or self.model.warnings)
 
     @property
     def firmware(self) -> dict[str, int]:

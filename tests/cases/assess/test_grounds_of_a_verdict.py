@@ -7,6 +7,7 @@ figures, so that the figures alone would pass each case.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -261,3 +262,54 @@ def test_a_constant_moves_no_dot_of_the_first_picture(plain: dict[str, Any], tmp
         for some, others in ((before, after), (after, before)):
             away, _ = cKDTree(others).query(some, p=np.inf)
             assert away.max() < 1.0, "a point of the picture"
+
+
+def reversed_bias(rows: Rows) -> Rows:
+    return rows | {"rate_dph": 2.0 - rows["rate_dph"]}
+
+
+def test_recordings_of_another_gyro_are_refused(plain: dict[str, Any], tmp_path: Path) -> None:
+    """The table of RLG-1 is evaluated on recordings of RLG-2; nothing of the result changes."""
+    out = shutil.copytree(plain["out"], tmp_path / "out")
+    other = written(tmp_path / "RLG-2", unit(), serial="RLG-2")
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    done = run_gyrotc("evaluate", out, other)
+    assert done.returncode == 2 and "gyro RLG-2" in done.stderr and 'serial = "RLG-1"' in done.stderr, done.stderr
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_new_figures_are_held_against_the_limits_of_the_result(plain: dict[str, Any], tmp_path: Path) -> None:
+    """A PASS, evaluated on recordings with the opposite bias and then on those that it was built from."""
+    out = shutil.copytree(plain["out"], tmp_path / "out")
+    limits = (out / "limits.json").read_text()
+    other = written(tmp_path / "other", all_rows(reversed_bias)(unit()))
+    done = run_gyrotc("evaluate", out, other)
+    assert done.returncode == 1 and "RLG-1: FAIL" in done.stdout, done.stdout + done.stderr
+    assert run_gyrotc("report", out).returncode == 0
+    assert "<strong>FAIL</strong>" in (out / "report.html").read_text("utf-8")
+    again = run_gyrotc("evaluate", out, written(tmp_path / "same", unit()))
+    assert again.returncode == 0 and "RLG-1: PASS" in again.stdout
+    assert (out / "limits.json").read_text() == limits
+
+
+def test_no_page_is_drawn_of_limits_of_other_figures(plain: dict[str, Any], tmp_path: Path) -> None:
+    out = shutil.copytree(plain["out"], tmp_path / "out")
+    passed = (out / "limits.json").read_bytes()
+    run_gyrotc("evaluate", out, written(tmp_path / "other", all_rows(reversed_bias)(unit())))
+    (out / "limits.json").write_bytes(passed)
+    page = (out / "report.html").read_bytes()
+    done = run_gyrotc("report", out)
+    assert done.returncode == 2 and "limits.json" in done.stderr, done.stderr
+    assert (out / "report.html").read_bytes() == page
+
+
+def test_a_pass_of_a_table_that_does_not_fit_its_exam_says_so(plain: dict[str, Any], tmp_path: Path) -> None:
+    """In the exam the bias has three times the noise more than in training: within the limits, and no noise."""
+    words = "what remains is more than noise"
+    wave = 3.0 * SIGMA_DPH * np.sin(np.linspace(0.0, 8.0 * np.pi, ROWS))
+    shifted = exam_rows(lambda rows: rows | {"rate_dph": rows["rate_dph"] + wave})(unit())
+    found = built(tmp_path, written(tmp_path / "RLG-1", shifted))
+    assert found["limits"]["verdict"] == "PASS"
+    for result, said in ((plain, False), (found, True)):
+        head = (result["out"] / "report.html").read_text("utf-8").partition("</header>")[0]
+        assert (words in result["done"].stdout, words in head) == (said, said)

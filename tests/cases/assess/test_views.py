@@ -158,8 +158,9 @@ def test_structure_that_is_left_leads_to_a_diagnosis(
     assert evaluation.structure_left == left
     assert bool(evaluation.residual_words) == left
     shown = UnitResults(Model.from_dict(model_dict), evaluation, None, VERIFICATION, None, None, None, None, None)
-    page = page_environment().get_template("parts.html.j2").module.messages(shown)
-    assert ("gyrotc diagnose DATASET" in page) == left
+    page = page_environment().get_template("parts.html.j2").module.verdict(shown)
+    assert ("what remains is more than noise" in page) == left
+    assert ("gyrotc diagnose DATASET" in shown.next_step) == left
 
 
 def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(model_dict: dict[str, Any]) -> None:
