@@ -54,7 +54,7 @@ def test_it_holds_generator_core_runtime_templates_targets_pages_and_licence(unp
     for name in tracked.stdout.splitlines():
         inside = name.removeprefix("gen/") if name.startswith("gen/") else f"gyrotc/runtime/{name}"
         assert (unpacked / inside).read_bytes() == (ROOT / name).read_bytes(), name
-    for name in ("LICENSE", "README.md", "PKG-INFO", "gyrotc/manual/porting.md", "gyrotc/runtime/LICENSE"):
+    for name in ("LICENSE", "README.md", "PKG-INFO", "gyrotc/manual/howto-firmware.md", "gyrotc/runtime/LICENSE"):
         assert (unpacked / name).is_file()
     for name in reference.PAGES:
         page = unpacked / "gyrotc" / "manual" / name
