@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from gyrotc.recordings import load
 from gyrotc.train import FitOptions, TrainingData, front_end, samples_of
 
 from ..paper.page import filled
+from ..records import Record, read_record, rounded, write_record
 from .page import with_exam
 
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
@@ -74,62 +74,31 @@ def cubic(data: Path, axis: str) -> float:
     return float(np.sqrt(np.mean((exam.bias_dph - columns(exam) @ weights) ** 2)))
 
 
-def gains(results: dict[str, Result], spreads: dict[str, list[float]], cubics: dict[str, float]) -> Iterator[str]:
-    """A row for each axis: unseen branch without and with what was named, over the sizes of the map."""
-    yield (
-        "| axis | verdict | cubic in T with dT/dt | map of (T, dT/dt) alone, default size "
-        "| with the states, default size | removed, 95 % | median over map sizes | smallest … largest |"
-    )
-    yield "| --- " * 8 + "|"
-    for axis, first in results.items():
-        spread = spreads[axis]
-        gain = first["single_cycle"]["gain"]
-        removed = gain["rms_removed_dph"] if gain else {"low": 0.0, "high": 0.0}
-        cells = [
-            axis, first["verdict"], f"{cubics[axis]:.0f}", f"{first['baseline']['exam_rms_dph']:.0f}",
-            f"{after(first):.0f}", f"{removed['low']:.0f} … {removed['high']:.0f}", f"{np.median(spread):.0f}",
-            f"{min(spread):.0f} … {max(spread):.0f}",
-        ]  # fmt: skip
-        yield "| " + " | ".join(cells) + " |"
+def parts(record: Record) -> dict[str, str]:
+    """Return the table and the sentence of docs/real.md that a record gives."""
+    head = "| axis | verdict | cubic in T with dT/dt | map of (T, dT/dt) | map of T with states | over map sizes |"
+    lines = [head, "| --- | --- | ---: | ---: | ---: | --- |"]
+    for axis, of in record["cycle"].items():
+        rms = (f"{of[name]:.0f}" for name in ("cubic_dph", "map_dph", "states_dph"))
+        sizes = f"{min(of['sizes_dph']):.0f} to {max(of['sizes_dph']):.0f}"
+        lines.append("| " + " | ".join((axis, f"`{of['verdict']}`", *rms, sizes)) + " |")
+    still = ", ".join(f"`{verdict}` on {axis}" for axis, verdict in record["isothermal"].items())
+    return {"gains": "\n".join(lines), "isothermal": f"The verdict is {still}."}
 
 
-def tried(results: dict[str, Result]) -> Iterator[str]:
-    """What was tried beside a map of T on the first 3130 s."""
-    yield "| axis | beside a map of T | parameters (95 %) | RMS left in training, deg/h | criterion | resolved | |"
-    yield "| --- " * 7 + "|"
-    for axis, result in results.items():
-        named = sorted(c["id"] for c in result["causes"] if c["family"] != "noise")
-        cycle = result["single_cycle"]
-        yield f"| {axis} | nothing | | {cycle['map_rms_dph']:.0f} | 0 | | |"
-        best = cycle["static"][0]
-        powers = ", ".join(_product(*power) for power in best["powers"])
-        yield f"| {axis} | no memory: {powers} | | {best['rms_dph']:.0f} | {best['criterion']:.1f} | | |"
-        for t in cycle["tried"]:
-            ids = [s["id"] for s in t["states"]]
-            cells = [
-                axis, " + ".join(f"`{i}`" for i in ids), "; ".join(map(_parameters, t["states"])),
-                f"{t['rms_dph']:.0f}", f"{t['criterion']:.1f}", "yes" if t["resolved"] else "no",
-                "**named**" if sorted(ids) == named else "",
-            ]  # fmt: skip
-            yield "| " + " | ".join(cells) + " |"
-
-
-def _product(of_t: int, of_rate: int) -> str:
-    """A product of powers of T and r = dT/dt."""
-    factors = [f"{name}^{power}" if power > 1 else name for name, power in (("T", of_t), ("r", of_rate)) if power]
-    return " ".join(factors)
-
-
-def _parameters(state: Result) -> str:
-    return ", ".join(f"{n} {p['value']:.3g} ({p['low']:.3g} … {p['high']:.3g})" for n, p in state.items() if n != "id")
-
-
-def isothermal(results: dict[str, Result]) -> Iterator[str]:
-    """What is said where nothing can be learnt."""
-    yield "| axis | verdict | in words |"
-    yield "| --- | --- | --- |"
-    for axis, result in results.items():
-        yield f"| {axis} | `{result['verdict']}` | {result['text']} |"
+def entry(result: Result, cubic_dph: float, sizes_dph: list[float]) -> Result:
+    """Return what the record keeps of the diagnosis of an axis."""
+    cycle = result["single_cycle"]
+    return {
+        "verdict": result["verdict"],
+        "cubic_dph": cubic_dph,
+        "map_dph": result["baseline"]["exam_rms_dph"],
+        "states_dph": after(result),
+        "sizes_dph": sizes_dph,
+        "gain": cycle["gain"],
+        "static": cycle["static"],
+        "tried": cycle["tried"],
+    }
 
 
 def _data(source: Path, work: Path, name: str) -> Path:
@@ -147,20 +116,17 @@ def main(source: Path, docs: Path, work: Path) -> None:
         print(f"{', '.join(absent)} absent in {source}: skipped")
         return
     data = _data(source, work, CYCLE)
-    cycles: dict[str, Result] = {}
-    for axis in "xyz":
-        cycles[axis] = diagnosed(data, axis, work / f"diagnosis-{axis}")
+    cycles = {axis: diagnosed(data, axis, work / f"diagnosis-{axis}") for axis in "xyz"}
     rest = _data(source, work, ISOTHERMAL)
     still = {axis: diagnosed(rest, axis, work / f"diagnosis-still-{axis}") for axis in "xyz"}
-    page = docs / "real.md"
-    cubics = {axis: cubic(data, axis) for axis in cycles}
-    parts: dict[str, Sequence[str]] = {
-        "gains": list(gains(cycles, {axis: of_sizes(data, axis) for axis in cycles}, cubics)),
-        "tried": list(tried(cycles)),
-        "isothermal": list(isothermal(still)),
+    found = {
+        "cycle": {axis: entry(r, cubic(data, axis), of_sizes(data, axis)) for axis, r in cycles.items()},
+        "isothermal": {axis: result["verdict"] for axis, result in still.items()},
     }
-    text = filled(page.read_text("utf-8"), {name: "\n".join(lines) for name, lines in parts.items()})
-    page.write_text(text, "utf-8")
+    record = (read_record(docs, "real") or {}) | rounded(found)
+    write_record(docs, "real", record)
+    page = docs / "real.md"
+    page.write_text(filled(page.read_text("utf-8"), parts(record)), "utf-8")
 
 
 if __name__ == "__main__":

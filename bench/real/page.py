@@ -1,16 +1,15 @@
-"""Measured recordings with whole runs or spans left out: docs/real.md, pictures into docs/real/ (`make real`).
+"""Measured recordings with whole runs or spans left out: docs/results/real.json, docs/real.md and its pictures.
 
-Every axis of every set is judged: what plain `gyrotc build` emits against a constant, a cubic in T and a cubic with a
-slope in dT/dt, fitted to the same block samples, and against a Gaussian process of scikit-learn.
+Every axis of every set is judged: the correction of `gyrotc build` against a constant, a cubic in T and a cubic with a
+slope in dT/dt, fitted to the same block samples, and against a Gaussian process of scikit-learn (`make real`).
 
 usage: python -m bench.real.page FOLDER-OF-DATA-SETS DOCS WORK
 """
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,8 @@ from matplotlib.figure import Figure
 
 from ..paper.experiment import AFTER, BEFORE, png
 from ..paper.page import filled
-from .peers import AVERAGE_S, BLOCK_S, GPR, LSTM, TRIVIAL, of_others
+from ..records import Record, measured_with, rounded, write_record
+from .peers import AVERAGE_S, BLOCK_S, GPR, TRIVIAL, of_others
 
 CYCLE, ISOTHERMAL = "mpu6000-chamber-cycle", "mpu6050-isothermal"
 SPANS = (CYCLE, ISOTHERMAL, "pan-lsm6dsm-cold")  # one run each: its branches, or parts, are left out
@@ -137,70 +137,79 @@ def judged(case: Case, work: Path) -> Iterator[Result]:
         yield Result(case, axis, fitted.model.method, said, result, of_others(dataset, result["exam"]["samples"]), out)
 
 
-def table(results: Sequence[Result]) -> str:
-    """A row for each axis; RMS on what was left out, deg/h, means over 100 s."""
-    head = (
-        "set",
-        "left out",
-        "axis",
-        "emitted",
-        "ours",
-        *TRIVIAL,
-        GPR,
-        LSTM,
-        "ours ÷ best trivial",
-        "noise floor",
-        "findings",
+def parts(record: Record) -> dict[str, str]:
+    """Return the tables and the summary of docs/real.md that a record gives."""
+    splits = [Split.of(row) for row in record["splits"]]
+    return {"summary": _summary(record, splits), "results": _by_axis(splits), "worse": _worse(splits)}
+
+
+@dataclass(frozen=True)
+class Split:
+    """A held-out part of one axis: names, method, and RMS of the correction and of others on it, deg/h."""
+
+    name: str
+    left_out: str
+    axis: str
+    method: str
+    rms: float
+    others: Mapping[str, float]
+
+    @staticmethod
+    def of(row: Mapping[str, Any]) -> Split:
+        """Return the split of an entry of the record."""
+        rms = float(row["rms_dph"])
+        return Split(row["set"], row["left_out"], row["axis"], row["method"], rms, row["others_rms_dph"])
+
+    @property
+    def ratio(self) -> float:
+        """RMS over that of the best trivial correction."""
+        return self.rms / min(self.others[name] for name in TRIVIAL)
+
+    @property
+    def verdict(self) -> str:
+        """Return whether the correction is as good as the best trivial one, a constant, or neither."""
+        return "good" if self.ratio <= ALLOWED else "constant" if self.method == "constant" else "neither"
+
+
+def _summary(record: Record, splits: Sequence[Split]) -> str:
+    counts = {verdict: sum(s.verdict == verdict for s in splits) for verdict in ("good", "constant", "neither")}
+    of_constant = sum(s.rms > ALLOWED * s.others["constant"] for s in splits)
+    gpr = sum(s.others[GPR] > ALLOWED * s.rms / s.ratio for s in splits)
+    with_ = record["measured"]
+    return (
+        f"Of {len(splits)} held-out parts, the correction of gyrotc is as good as the best trivial one (within "
+        f"{ALLOWED - 1:.0%}) on {counts['good']}. On {counts['constant']} more a constant was all that the training "
+        f"data supported, and the report says so. On {counts['neither']} a richer correction is worse than the best "
+        f"trivial one. On {of_constant} the correction is worse than a constant by more than {ALLOWED - 1:.0%}. "
+        f"A Gaussian process of scikit-learn is worse than the best trivial correction on {gpr}.\n\n"
+        f"Measured by `make real` on commit {with_['commit']}, {with_['date']}."
     )
-    lines = ["| " + " | ".join(head) + " |", "| --- " * len(head) + "|"]
-    for r in results:
-        others = [f"{r.others[n]:.1f}" if n in r.others else "-" for n in (*TRIVIAL, GPR, LSTM)]
-        cells = [
-            *(r.case.name, r.case.left_out, r.axis, r.method, f"{r.rms:.1f}"),
-            *others,
-            f"{r.rms / r.best_trivial:.2f}",
-            f"{r.evaluation['noise_floor_dph']:.1f}",
-            ", ".join(f"`{name}`" for name in r.said),
-        ]
-        lines.append("| " + " | ".join(cells) + " |")
+
+
+def _by_axis(splits: Sequence[Split]) -> str:
+    lines = [
+        "| set | axis | parts | as good | constant, reported | neither | RMS over the best trivial: median, worst |",
+        "| --- | --- | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for name, axis in dict.fromkeys((s.name, s.axis) for s in splits):
+        own = [s for s in splits if (s.name, s.axis) == (name, axis)]
+        counts = (sum(s.verdict == verdict for s in own) for verdict in ("good", "constant", "neither"))
+        ratios = [s.ratio for s in own]
+        cells = (name, axis, len(own), *counts, f"{np.median(ratios):.2f}, {max(ratios):.2f}")
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines)
 
 
-def summary(results: Sequence[Result]) -> str:
-    """How many axes keep the promise, and which do not."""
-    good = [r for r in results if r.rms <= ALLOWED * r.best_trivial]
-    constant = [r for r in results if r not in good and r.method == "constant"]
-    harmed = [r for r in results if r not in good and r not in constant]
-    worse = [r for r in results if r.rms > ALLOWED * r.others["constant"]]
-    return (
-        f"Each axis of each set is judged with each part left out: {len(results)} in all. On {len(good)} ours is at "
-        f"most {ALLOWED} × the best of constant, cubic, and cubic with dT/dt; on {len(constant)} more a constant is "
-        f"emitted, and said. Neither holds on {len(harmed)}{_list(harmed, 'best trivial')}. Worse than a constant by "
-        f"more than 2 %: {len(worse)}{_list(worse, 'constant')}.\n"
-        + "\n".join(_of_peer(results, peer) for peer in (GPR, LSTM))
-    )
-
-
-def _of_peer(results: Sequence[Result], peer: str) -> str:
-    """How a peer does beside the best trivial correction and beside ours."""
-    known = [r for r in results if peer in r.others]
-    if not known:
-        return f"{peer}: not run, PyTorch is absent (`pip install -e 'gen[lstm]'`)."
-    worse = sum(r.others[peer] > ALLOWED * r.best_trivial for r in known)
-    than_ours = sum(r.others[peer] > r.rms for r in known)
-    return (
-        f"{peer} is worse than the best trivial correction by more than 2 % on {worse} of {len(known)}, at worst "
-        f"{max(r.others[peer] / r.best_trivial for r in known):.1f} times; worse than ours on {than_ours}."
-    )
-
-
-def _list(results: Sequence[Result], beside: str) -> str:
-    """Names with the ratio to another correction, in brackets."""
-    if not results:
-        return ""
-    under = [r.best_trivial if beside == "best trivial" else r.others[beside] for r in results]
-    named = (f"{_named(r)}: {r.rms / u:.2f}" for r, u in zip(results, under, strict=True))
-    return f" ({'; '.join(named)}; × {beside})"
+def _worse(splits: Sequence[Split]) -> str:
+    lines = [
+        "| set | axis | held-out part | correction | its RMS, deg/h | best trivial | constant |",
+        "| --- | --- | --- | --- | ---: | ---: | ---: |",
+    ]
+    for s in splits:
+        if s.verdict == "neither":
+            figures = (f"{rms:.1f}" for rms in (s.rms, s.rms / s.ratio, s.others["constant"]))
+            lines.append("| " + " | ".join((s.name, s.axis, s.left_out, s.method, *figures)) + " |")
+    return "\n".join(lines)
 
 
 def _named(r: Result) -> str:
@@ -260,10 +269,10 @@ def main(source: Path, docs: Path, work: Path) -> None:
             (docs / "real" / f"{case.name}.png").write_bytes(png(picture(of_case), dpi=125))
         results += of_case
     if results:
-        (work / "real.json").write_text(json.dumps([_entry(r) for r in results], indent=1) + "\n", "utf-8")
+        record = {"measured": measured_with(), **rounded({"splits": [_entry(r) for r in results]})}
+        write_record(docs, "real", record)
         page = docs / "real.md"
-        parts = {"results": table(results), "summary": summary(results)}
-        page.write_text(filled(page.read_text("utf-8"), parts), "utf-8")
+        page.write_text(filled(page.read_text("utf-8"), parts(record)), "utf-8")
 
 
 def _entry(r: Result) -> dict[str, Any]:
@@ -274,6 +283,7 @@ def _entry(r: Result) -> dict[str, Any]:
         "method": r.method,
         "rms_dph": r.rms,
         "others_rms_dph": r.others,
+        "noise_floor_dph": r.evaluation["noise_floor_dph"],
         "findings": list(r.said),
     }
 

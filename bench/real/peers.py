@@ -1,8 +1,6 @@
 """Peers of `page`: what is fitted to the same block samples and judged on the same rows.
 
-A constant, a cubic in T, a cubic with a slope in dT/dt; a Gaussian process of scikit-learn; and, where PyTorch is
-installed (`pip install -e "gen[lstm]"`), a small LSTM over the whole history of temperature. The last is a bench: it
-is no candidate for a target.
+A constant, a cubic in T, a cubic with a slope in dT/dt, and a Gaussian process of scikit-learn.
 """
 
 from __future__ import annotations
@@ -24,8 +22,7 @@ TRIVIAL = {
     "cubic": ((0, 0), (1, 0), (2, 0), (3, 0)),
     "cubic + dT/dt": ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1)),
 }
-GPR, LSTM = "GPR", "LSTM"
-_LSTM_STEP_S, _LSTM_CELLS, _LSTM_EPOCHS = 50.0, 12, 300
+GPR = "GPR"
 Correction = Callable[[Blocks], np.ndarray]  # deg/h of every block of a run
 
 
@@ -35,7 +32,7 @@ def of_others(dataset: Dataset, scored: int) -> dict[str, float]:
     front = front_end(runs, BLOCK_S)
     train = joined([samples_of(front.blocks(run), front.block_s, k) for k, run in enumerate(runs)])
     peers: dict[str, Correction] = {n: _least_squares(train, powers) for n, powers in TRIVIAL.items()}
-    peers |= {GPR: _gaussian_process(train)} | _recurrent(train, [front.blocks(run) for run in runs])
+    peers[GPR] = _gaussian_process(train)
     exam = [_rows_of(front, run) for run in dataset.runs if run.role == "exam"]
     found = {name: _rms(exam, peer) for name, peer in peers.items()}
     judged = sum(_means(part, np.zeros(len(part.blocks.start_s))).size for part in exam)
@@ -130,53 +127,3 @@ def _gaussian_process(train: TrainingData) -> Correction:
             scaled(means.temperature_c, means.slope_c_per_min), means.bias_dph
         )
     return lambda blocks: np.asarray(model.predict(np.nan_to_num(scaled(*_in_force(blocks)))))
-
-
-def _recurrent(train: TrainingData, histories: Sequence[Blocks]) -> dict[str, Correction]:
-    """An LSTM of 12 cells over (T, dT/dt) in steps of 50 s from the start of each file; none without PyTorch.
-
-    Least squares on the training blocks only, Adam, 300 epochs, weight decay 1e-4; seed 0.
-    """
-    try:
-        import torch
-    except ImportError:
-        return {}
-    torch.manual_seed(0)
-    torch.set_num_threads(1)
-    scaled = _scaled(train)
-    center, spread = float(train.bias_dph.mean()), float(train.bias_dph.std()) or 1.0
-
-    def steps(blocks: Blocks) -> tuple[torch.Tensor, int]:
-        every = max(1, round(_LSTM_STEP_S * 1e6 / blocks.settings.block_us))
-        inputs = np.nan_to_num(scaled(*_in_force(blocks)))[every - 1 :: every]
-        return torch.tensor(inputs, dtype=torch.float32)[None], every
-
-    lstm = torch.nn.LSTM(2, _LSTM_CELLS, batch_first=True)
-    head = torch.nn.Linear(_LSTM_CELLS, 1)
-    optimiser = torch.optim.Adam([*lstm.parameters(), *head.parameters()], lr=0.02, weight_decay=1e-4)
-    sequences = []
-    for blocks in histories:
-        x, every = steps(blocks)
-        n = x.shape[1]
-        used = blocks.used[: n * every].reshape(n, every)
-        rate = np.where(used, np.nan_to_num(blocks.rate_dph[: n * every].reshape(n, every)), 0.0)
-        count = used.sum(1)
-        y = (rate.sum(1) / np.maximum(count, 1) - center) / spread * (count > 0)
-        sequences.append((x, torch.tensor(y, dtype=torch.float32), torch.tensor(count, dtype=torch.float32)))
-    total = sum(float(count.sum()) for _, _, count in sequences)
-    for _ in range(_LSTM_EPOCHS):
-        optimiser.zero_grad()
-        loss = sum((count * (head(lstm(x)[0])[0, :, 0] - y) ** 2).sum() / total for x, y, count in sequences)
-        loss.backward()
-        optimiser.step()
-
-    def correction(blocks: Blocks) -> np.ndarray:
-        x, every = steps(blocks)
-        if x.shape[1] == 0:
-            return np.full(len(blocks.start_s), center)
-        with torch.no_grad():
-            held = head(lstm(x)[0])[0, :, 0].numpy().repeat(every)
-        missing = len(blocks.start_s) - len(held)
-        return center + spread * np.concatenate([held, np.full(missing, held[-1])])
-
-    return {LSTM: correction}
