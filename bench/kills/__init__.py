@@ -26,7 +26,8 @@ _TEXT = """
 their calls that change a file; commands also by a signal at a random time, and `fleet` in its worker processes too.
 Each way of writing (a folder, one entry, several entries, a part of a folder, a file) is interrupted at {calls}, with
 and without an exchange of names. Wrong: a result that is neither the earlier one nor the new one, or anything left
-after the next job. Interrupted commands: {commands}.
+after the next job. Without an exchange of names, a disk that is full between the two renames leaves the place empty
+until the next job, which counts as wrong. Interrupted commands: {commands}.
 """
 
 

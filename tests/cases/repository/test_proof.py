@@ -11,7 +11,6 @@ from eva_parts import PARTS, SOURCES, preprocessor_options, text_of
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "proof.md").read_text("utf-8")
-FAULTS = re.findall(r"^\| ([^|]+) \| (`tests/[^|]+::[^|]+) \|$", PAGE.partition("\n## 6.")[2], re.MULTILINE)
 REQUIREMENTS = re.findall(r"^\| (R-[A-Z]+-\d+) \| (.+?) \| (.+) \|$", PAGE, re.MULTILINE)
 ANSWER = re.compile(r"`(tests/[\w/]+\.(?:py|c))::(\w+)`")
 
@@ -26,16 +25,7 @@ def _names(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("requirement", REQUIREMENTS, ids=[r[0] for r in REQUIREMENTS])
 def test_what_answers_for_a_requirement_exists(requirement: tuple[str, str, str]) -> None:
-    _exist(requirement[2])
-
-
-@pytest.mark.parametrize("fault", FAULTS, ids=[f[0] for f in FAULTS])
-def test_what_was_left_by_a_fault_exists(fault: tuple[str, str]) -> None:
-    _exist(fault[1])
-
-
-def _exist(answers: str) -> None:
-    found = ANSWER.findall(answers)
+    found = ANSWER.findall(requirement[2])
     assert found
     for file, name in found:
         assert (ROOT / file).is_file(), file
