@@ -86,7 +86,7 @@ class ImportedFiles(Result):
     schema_: Annotated[Literal["gyrotc.import/1"], Field(alias="schema")] = "gyrotc.import/1"
     serial: str = Field(description="gyro serial")
     axis: Axis = Field(description="null: an import is of all axes")
-    map: dict[str, Any] = Field(description="the map that was kept; its keys: docs/import.md, section 5")
+    map: dict[str, Any] = Field(description="the map that was kept; its keys: docs/import.md")
     runs: tuple[ImportedFile, ...] = Field(description="every run, in the order of the files")
     findings: tuple[Finding, ...] = Field(default=(), description="what a person should look at, as `check` writes it")
 
