@@ -264,7 +264,7 @@ static int_least32_t window_slope(const STATE *state, const TABLE *table, NUM *s
     }
     n_sum_kd = scaled(n, sum_kd);
     sum_k_sum_d = scaled(sum_k, sum_d);
-    *slope = divide(diff(n_sum_kd, sum_k_sum_d), (n * sum_kk) - (sum_k * sum_k));
+    *slope = (NUM)rounded_quotient(diff(n_sum_kd, sum_k_sum_d), (n * sum_kk) - (sum_k * sum_k));
     return GTC_OK;
 }
 

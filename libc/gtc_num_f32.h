@@ -362,7 +362,7 @@ static inline float mean_of(float base, float sum, uint_least32_t n)
 }
 
 /* num / den */
-static inline float divide(float num, uint_least32_t den)
+static inline float rounded_quotient(float num, uint_least32_t den)
 {
     const float divisor = (float)den;
     float q;

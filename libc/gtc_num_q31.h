@@ -476,13 +476,6 @@ static inline int_least32_t mean_of(int_least32_t base, int_least64_t sum, uint_
     return (int_least32_t)mean;
 }
 
-/* num / den */
-static inline int_least32_t divide(int_least64_t num, uint_least32_t den)
-{
-    GTC_ASSERT(IS_32_BITS(rounded_quotient(num, den)));
-    return (int_least32_t)rounded_quotient(num, den);
-}
-
 /* The nearest number of 32 bits, the mark of a missing one left out. */
 static inline int_least32_t narrowed(int_least64_t x)
 {

@@ -104,7 +104,7 @@ static void uncertainty_input(STATE *state, const TABLE *table, NUM temp, NUM as
         if ((filled >= 2U) && (filled < table->slope_blocks)) {
             const WIDE d = diff(state->input[0].mean, state->uncertainty.first_temp);
 
-            state->uncertainty.slope = divide(scaled(2U, d), (2U * filled) - 1U);
+            state->uncertainty.slope = (NUM)rounded_quotient(scaled(2U, d), (2U * filled) - 1U);
         } else {
             state->uncertainty.slope_known = 1U;
         }
@@ -143,7 +143,7 @@ static WIDE without_readings(const STATE *state, WIDE x)
     const uint_least32_t samples = state->samples_per_block;
     const uint_least32_t missing = (state->uncertainty.missing < samples) ? state->uncertainty.missing : samples;
 
-    return add(scaled(state->input[0].held_blocks, x), divide(scaled(missing, x), samples));
+    return add(scaled(state->input[0].held_blocks, x), rounded_quotient(scaled(missing, x), samples));
 }
 
 /* Of an input that went on while nothing was read. */
