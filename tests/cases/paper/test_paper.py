@@ -86,18 +86,17 @@ def test_a_page_or_a_figure_of_another_record_is_reported(tmp_path: Path) -> Non
 def test_the_table_prints_what_the_record_has() -> None:
     """Row by row, without the code that makes the page: RMS after of every method of the first gyro."""
     text = PAGE.read_text("utf-8")
-    for mark, noise in (("table-1", "paper"), ("table-1-class", "class")):
-        part = text.split(f"<!-- {mark} -->")[1].split(f"<!-- /{mark} -->")[0]
-        cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in part.strip().splitlines()]
-        rows = {row[0]: row[1:] for row in cells}
-        of = RECORD["gyros"][noise]["1"]
-        for method, label in METHODS.items():
-            after = [1e3 * of["after"][method][name]["rms_dph"] for name in ENVIRONMENTS]
-            assert rows[f"after, {label}"] == [f"{value:.3f}" for value in after]
-        sigma = [1e3 * of["before"][name]["std_dph"] for name in ENVIRONMENTS]
-        assert rows["before: σ about the mean"] == [f"{value:.3f}" for value in sigma]
-        gain = [of["before"][n]["rms_dph"] / of["after"]["mrbf_paper"][n]["rms_dph"] for n in ENVIRONMENTS]
-        assert rows["improvement, modified RBFNN"] == [f"{value:.1f}" for value in gain]
+    part = text.split("<!-- table-1 -->")[1].split("<!-- /table-1 -->")[0]
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in part.strip().splitlines()]
+    rows = {row[0]: row[1:] for row in cells}
+    of = RECORD["gyros"]["paper"]["1"]
+    for method, label in METHODS.items():
+        after = [1e3 * of["after"][method][name]["rms_dph"] for name in ENVIRONMENTS]
+        assert rows[f"after, {label}"] == [f"{value:.3f}" for value in after]
+    sigma = [1e3 * of["before"][name]["std_dph"] for name in ENVIRONMENTS]
+    assert rows["before: σ about the mean"] == [f"{value:.3f}" for value in sigma]
+    gain = [of["before"][n]["rms_dph"] / of["after"]["mrbf_paper"][n]["rms_dph"] for n in ENVIRONMENTS]
+    assert rows["improvement, modified RBFNN"] == [f"{value:.1f}" for value in gain]
 
 
 def test_series_and_figures_are_of_one_experiment(first: tuple[dict[str, Any], Series]) -> None:
