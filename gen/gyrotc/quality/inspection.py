@@ -188,7 +188,8 @@ def _run_line(axis: str | None, f: RunFacts, count: RowsCount) -> str:
         f"{f.file}{'' if f.from_s is None else f' from {f.from_s:.6g} s'}{f', axis {axis}' if axis else ''} "
         f"({f.role}): {count.words()}; a row every {f.row_period_s:.4g} s, "
         f"{f.temperature_c[0]:.4g} ... {f.temperature_c[1]:.4g} C, "
-        f"mean {f.mean_dph:.4g} deg/h, noise {f.noise_dph:.2g} deg/h a row{earth}"
+        f"mean {f.mean_dph:.4g} deg/h, noise {f.noise_dph:.2g} deg/h a row "
+        f"({f.noise_dph * np.sqrt(f.row_period_s / 3600.0):.2g} deg/sqrt(h)){earth}"
     )
 
 

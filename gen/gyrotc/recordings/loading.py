@@ -215,7 +215,7 @@ def judge(suspicions: Sequence[Suspected], trust: bool, problems: Problems) -> l
         if trust:
             trusted.append((where, one.found))
         else:
-            expected = f'[units] {one.kind} = "{one.likely}" in {FILE}, or trust_units = true if it is right as it is'
+            expected = f"[units] {one.kind} = {one.unit} in {FILE}, or trust_units = true if it is right as it is"
             problems.add(InputError(where, one.found, expected))
     return trusted
 

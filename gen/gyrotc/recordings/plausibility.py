@@ -13,7 +13,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..common.metrics import median
+from ..common.metrics import MAD_TO_SIGMA, median
 from .description import Description, Layout, RunEntry
 from .reading import Evidence, Recording
 from .records import Curve, EarthRate, Run
@@ -124,6 +124,8 @@ _LARGEST_STEP = 0.4  # share of the rise: of six even steps each is 0.17, of a j
 _NEARLY = 0.999  # of a bound: a sum of six steps and the difference of the ends differ by rounding
 _FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
 _QUIETEST = 0.1 * _FLOWN  # ten times quieter than the quietest gyro is no gyro
+_NOISY = 6.0  # deg/sqrt(h), 0.1 deg/s/sqrt(Hz): the noisiest gyros sold, vibrating structures for cameras and toys
+_NOISIEST = 10.0 * _NOISY  # ten times noisier than the noisiest gyro is no gyro at rest
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
 _FEWEST_CELLS = 30  # less is not judged
 _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
@@ -142,13 +144,19 @@ class Suspicion:
         kind: "time", "temperature" or "rate".
         column: The column.
         found: What the values look like.
-        likely: The unit that would explain them.
+        likely: The unit that would explain them; None: no usual one would.
     """
 
     kind: str
     column: str
     found: str
-    likely: str
+    likely: str | None
+
+    @property
+    def unit(self) -> str:
+        """The unit to declare, in quotes; where none is known, what to look for."""
+        scale = '"..." with the scale of the logger, such as "deg/s/131"'
+        return f'"{self.likely}"' if self.likely is not None else scale
 
 
 def suspicions(
@@ -281,11 +289,14 @@ def _of_triad(rates: FloatArray, column: str, units: Mapping[str, Conversion]) -
 def _of_noise(
     time: FloatArray, rate: FloatArray, column: str, noise: float | None, units: Mapping[str, Conversion]
 ) -> Suspicion | None:
-    """Noise below that of every gyro; where noise is declared, nearer to what another unit makes of that."""
-    walk = _random_walk(time, rate)
+    """Noise below or above that of every gyro; where noise is declared, nearer to what another unit makes of that."""
+    walks = _random_walks(time, rate)
     unit = units.get(column)
-    if walk == 0.0:
+    if not walks:
         return None
+    walk, robust = max(one for one, _ in walks), min(one for _, one in walks)
+    if robust > _NOISIEST:
+        return _too_noisy(robust, rate, column, unit)
     larger = [(likely, factor) for likely, factor in _other_rates(unit) if factor > 1.0]
     for least in (_FLOWN, _QUIETEST):
         for likely, factor in larger:
@@ -300,20 +311,38 @@ def _of_noise(
     return None
 
 
-def _random_walk(time: FloatArray, rate: FloatArray) -> float:
-    """Largest angle random walk, deg/sqrt(h), of Allan deviations of cells up to 100 s (or of the cells as they are).
+def _too_noisy(walk: float, rate: FloatArray, column: str, unit: Conversion | None) -> Suspicion:
+    """Noise above that of every gyro, with the unit that makes it that of one."""
+    mean = np.median(rate)
+    found = (
+        f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of any gyro at rest, and a mean of "
+        f"{mean:.4g} deg/h"
+    )
+    for likely, factor in _other_rates(unit):
+        if factor < 1.0 and _FLOWN <= walk * factor <= _NOISY:
+            found += f"; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and {mean * factor:.4g} deg/h"
+            return Suspicion("rate", column, found, likely)
+    return Suspicion("rate", column, found, None)
 
-    The largest, because a logger's filter makes neighbouring rows alike: the noise shows on longer means only.
+
+def _random_walks(time: FloatArray, rate: FloatArray) -> list[tuple[float, float]]:
+    """Return angle random walks, deg/sqrt(h), of cells up to 100 s (or of the cells as they are): by Allan, and robust.
+
+    The largest tells what is too quiet, because a logger's filter makes neighbouring rows alike: the noise shows on
+    longer means only. The smallest robust one tells what is too noisy: it sees neither wild rows nor the quantisation
+    of pulses. None is returned of rates that are all the same.
     """
-    largest = 0.0
+    walks: list[tuple[float, float]] = []
     while len(rate) >= _FEWEST_CELLS:
         tau = median(np.diff(time))
-        if largest > 0.0 and tau > _QUIET_TAU_S:
+        if walks and tau > _QUIET_TAU_S:
             break
-        deviation = np.sqrt(np.mean(np.diff(rate) ** 2) / 2.0)
-        largest = max(largest, float(deviation * np.sqrt(max(tau, 0.0) / 3600.0)))
+        steps = np.diff(rate)
+        scale = float(np.sqrt(max(tau, 0.0) / 3600.0 / 2.0))
+        if steps.any():
+            walks.append((scale * float(np.sqrt(np.mean(steps**2))), scale * MAD_TO_SIGMA * median(np.abs(steps))))
         time, rate = _of_pairs(time), _of_pairs(rate)
-    return largest
+    return walks
 
 
 def _other_rates(unit: Conversion | None) -> Iterator[tuple[str, float]]:

@@ -246,6 +246,38 @@ def test_a_noisy_gyro_a_fast_board_and_wild_readings_are_not_suspected(tmp_path:
     assert load(made(tmp_path / "R", table)).trusted == ()
 
 
+@pytest.mark.parametrize(
+    ("factor", "declared", "words"),
+    [
+        (1e6, "", ("above that of any gyro", '[units] rate = "..."')),  # a scale that was left out
+        (10.0, 'rate = "rad/s"', ("above that of any gyro", "in deg/h it is", '[units] rate = "deg/h"')),
+    ],
+)
+def test_noise_above_that_of_any_gyro_is_refused_unless_trusted(
+    factor: float, declared: str, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Laser gyros of 1e-4 and of 1e-3 deg/sqrt(h): no gyro has a million or 206,265 times that at rest."""
+    table = columns(600)
+    table["rate_dph"] = 7.6e-3 + np.random.default_rng(5).normal(0.0, 2e-3, 600)
+    table["rate_dph"] *= factor
+    folder = made(tmp_path / "R", table, declared)
+    with pytest.raises(InputError) as refused:
+        load(folder)
+    assert all(word in str(refused.value) for word in (*words, "trust_units = true")), refused.value
+    assert load(state(folder, "trust_units = true")).trusted
+
+
+def test_gyros_of_every_class_are_taken_in_the_unit_that_is_declared(tmp_path: Path) -> None:
+    """From a hemispherical resonator to the noisiest of vibrating gyros, some of them with a wild row."""
+    rng = np.random.default_rng(6)
+    for k, walk in enumerate((1e-4, 3e-3, 0.1, 0.6, 6.0)):
+        table = columns(600)
+        period = float(table["time_s"][1] - table["time_s"][0])
+        table["rate_dph"] = 1e3 * walk + rng.normal(0.0, walk * np.sqrt(3600.0 / period), 600)
+        table["rate_dph"][300] = 1e6
+        assert load(made(tmp_path / f"R{k}", table)).trusted == ()
+
+
 def test_the_command_refuses_and_takes_the_users_word(tmp_path: Path, gyrotc: Command) -> None:
     folder = made(tmp_path / "R", dps(columns(600)))
     with (folder / "dataset.toml").open("a") as file:

@@ -547,7 +547,7 @@ def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOp
     )
     for one in found:
         if not options.trust_units:
-            expected = f'--{one.kind}-unit "{one.likely}", or --trust-units if the values are right as they are'
+            expected = f"--{one.kind}-unit {one.unit}, or --trust-units if the values are right as they are"
             raise InputError(f"{file.path.name}, column {one.column}", one.found, expected)
     return [f"{one.column}: {one.found}" for one in found]
 
