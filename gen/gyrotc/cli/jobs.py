@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
     """Return what the simulation gets wrong, the verdict, events with the lines that leave them out, and what is next.
 
-    The page and the JSON have the rest.
+    The page and the JSON have the rest: where nothing was found also the largest discrepancy, which is chance.
     """
     axis = f" {result.axis}" if result.axis else ""
-    if result.discrepancy:
+    if result.discrepancy and result.verdict != "consistent":
         yield f"{result.serial}{axis} against the simulation: {result.discrepancy}"
     yield f"{result.serial}{axis}: {result.verdict.replace('_', ' ')}. {result.text}"
     if result.lot is not None:
@@ -52,7 +52,7 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
         yield from _cause_lines(cause)
     if result.physical and result.extended is None:
         yield _not_shipped(result)
-    yield from (f"next: {step}" for step in result.next)
+    yield from (f"next: {step}" for step in result.next[:1])
 
 
 def _not_shipped(result: Diagnosed) -> str:
@@ -122,7 +122,7 @@ def build(
     for result in results:
         if result.verification.failed:
             show(verify_table(result.verification))
-        for line in built_lines(result.unit, shlex.quote(str(dataset))):
+        for line in built_lines(result.unit, shlex.quote(str(dataset)), shlex.quote(str(out))):
             tell(line)
     tell(f"report: {out / 'report.html'}")
     failures = [(f"axis {r.model.axis}: " if r.model.axis else "") + text for r in results for text in r.failures]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +15,9 @@ from .application import app
 from .options import AxisOption, DatasetArg, JsonOption, OutOption, SeedOption
 from .output import tell, write_json
 from .progress import progress
+
+if TYPE_CHECKING:
+    from ..quality.inspection import CheckResult
 
 
 class RunFormat(str, Enum):
@@ -271,5 +275,19 @@ def check(
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))
+    tell(f"next: {_after_check(result, shlex.quote(str(dataset)))}")
     if result.problems:
         raise typer.Exit(2)
+
+
+def _after_check(result: CheckResult, dataset: str) -> str:
+    """Return the one step that comes after a check.
+
+    Args:
+        dataset: The data set as a shell takes it.
+    """
+    if result.problems:
+        return f"mend the problems above, the first one first, and check again: gyrotc check {dataset}"
+    if result.warnings:
+        return f"look at the warnings above; if they are as they should be: gyrotc build {dataset} --out result"
+    return f"gyrotc build {dataset} --out result"

@@ -59,6 +59,11 @@ def training_lines(training: Training) -> Iterator[str]:
         yield f"correction {training.method}: {training.reason}"
     for tried in training.channels or ():
         yield f"channel {tried.name}: {tried.verdict}" + ("" if tried.verdict == "taken" else f": {tried.reason}")
+    yield from prior_lines(training)
+
+
+def prior_lines(training: Training) -> Iterator[str]:
+    """Return what a lot or an earlier model says of the unit, and what became of it; a line each."""
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
     if training.prior is not None:
@@ -189,11 +194,11 @@ def _difference_text(file: VerifiedFile) -> str:
     )
 
 
-def built_lines(unit: UnitResults, dataset: str) -> Iterator[str]:
-    """Return the verdict, the gain, what remains, sizes, proof, findings by id and the next step: nine lines at most.
+def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
+    """Return the verdict, the gain, what remains, what is known from elsewhere, sizes, proof, findings, the next step.
 
     Args:
-        dataset: The data set as a shell takes it.
+        dataset, folder: The data set and the result as a shell takes them.
     """
     evaluation = unit.evaluation
     axis = f" {unit.model.axis}" if unit.model.axis else ""
@@ -202,6 +207,8 @@ def built_lines(unit: UnitResults, dataset: str) -> Iterator[str]:
     if kept := [one for one in unit.held if one.constant_passes]:
         bounds = "; ".join(f"{limit_words(one.limit)} {bound_words(one)}" for one in kept)
         yield f"a constant keeps {bounds}, too: {'they ask' if len(kept) > 1 else 'it asks'} nothing of the map"
+    if unit.training:
+        yield from prior_lines(unit.training)
     yield size_line(evaluation.model)
     if unit.verification:
         yield verified_line(unit.verification)
@@ -209,7 +216,7 @@ def built_lines(unit: UnitResults, dataset: str) -> Iterator[str]:
         yield "; ".join(change_lines(unit.changes))
     if evaluation.findings:
         yield f"findings: {', '.join(dict.fromkeys(one.id for one in evaluation.findings))}"
-    yield f"next: {unit.next_step.replace('DATASET', dataset)}"
+    yield f"next: {unit.next_step.replace('DATASET', dataset).replace('DIR', folder)}"
 
 
 def verdict_words(unit: UnitResults) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import date
@@ -120,6 +121,9 @@ def fit(
         tell(f"finding {finding.id}: {finding.text}")
     tell(prediction_line(training))
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
+    advised = [finding.next for finding in training.findings if finding.next]
+    quoted = shlex.quote(str(out))
+    tell(f"next: {advised[0] if advised else f'gyrotc emit {quoted}/model.json --out {quoted}'}")
 
 
 def _map_place(path: Path | None) -> Path | None:

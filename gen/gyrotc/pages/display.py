@@ -209,3 +209,11 @@ def bound_words(limit: Limit) -> str:
             mantissa = mantissa.rstrip("0").rstrip(".")
         return sign + mantissa + (f"·{power(int(exponent))}" if exponent else "")
     return sign + plain(limit.bound).replace("_", " ")
+
+
+def failure_words(limit: Limit) -> str:
+    """Why a limit is not met, by its key in the limits file; figures are printed as everywhere."""
+    name = f"limit {limit.limit} {bound_words(limit)}"
+    if limit.verdict == "NOT TESTABLE":
+        return f"{name} is not testable: {'; '.join(limit.capped)}"
+    return f"{name} is not met: {measured_words(limit)}"

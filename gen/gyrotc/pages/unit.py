@@ -14,7 +14,7 @@ from ..results.evaluation import PARTS, Changes, Evaluation
 from ..results.release import VERDICTS, Budget, HeldLimits, Limit, Verdict, Verification
 from ..results.rows import LeftOutRows
 from ..results.training import Manifest, Training
-from .display import limit_words, plain, with_uncertainty, words
+from .display import failure_words, limit_words, plain, with_uncertainty, words
 
 _JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
 _RULES = {
@@ -86,7 +86,7 @@ class UnitResults:
     def failed(self) -> tuple[str, ...]:
         """Checks that failed, those of the limits among them; a command that finds some ends with status 1."""
         limits = self.limits.limits if self.limits else ()
-        return (*self.failures, *(f"limit {one.failure()}" for one in limits if not one.met))
+        return (*self.failures, *(failure_words(one) for one in limits if not one.met))
 
     @property
     def held(self) -> list[Limit]:

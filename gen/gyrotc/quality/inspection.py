@@ -74,11 +74,12 @@ class CheckResult:
         """For a person: a line for each problem, warning, open question and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
-        for kind, found in (("warning", self.warnings), ("not testable", self.not_testable)):
+        advised = (("warning", "advice", self.warnings), ("not testable", "to test it", self.not_testable))
+        for kind, advice, found in advised:
             for one in found:
                 yield f"{kind}: {one}"
                 if one.next:
-                    yield f"  next: {one.next}"
+                    yield f"  {advice}: {one.next}"
                 if one.exclude:
                     yield f"  paste: {one.exclude}"
         for (axis, f), count in zip(self.facts, self.counts, strict=True):

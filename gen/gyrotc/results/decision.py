@@ -22,6 +22,8 @@ def decision_of(limits: HeldLimits | None, verification: Verification | None, ev
 def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool, *, diagnosed: bool) -> str:
     """Return what to do next with a unit, one step: what stands in the way comes before what would be better.
 
+    DATASET stands for the recordings, DIR for the result.
+
     Args:
         failures: Whether a check of its code failed.
         diagnosed: Whether it was diagnosed already.
@@ -36,12 +38,14 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
     if evaluation.structure_left and not diagnosed:
         return "gyrotc diagnose DATASET: the residual is more than noise, and it names the cause."
     broken = [one for one in limits.limits if one.verdict == "FAIL"] if limits else []
-    if broken:
-        return (
-            "Reject the unit, or state another limit: what remains is noise, which no map takes off."
-            if any(one.part for one in broken)
-            else "See the limits below: what is not met does not depend on the recordings."
+    if any(one.part for one in broken):
+        remains = (
+            "what the diagnosis does not explain" if evaluation.structure_left else "noise, which no map takes off"
         )
+        return f"Reject the unit, or state another limit: what remains is {remains}."
+    if broken:
+        names = ", ".join(dict.fromkeys(one.limit for one in broken))
+        return f"Look at {names} in the limits file: what is not met there does not depend on the recordings."
     advised = [one.next for one in evaluation.findings if one.next]
     if advised:
         return advised[0]
@@ -49,7 +53,7 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
         return "State the limits of the product in a file, and build again with --limits."
     if limits.verdict != "PASS":
         return "Record more or longer test runs: the figures are within the limits, their uncertainty is not."
-    return "Build the files below into the firmware; gyrotc certificate writes the certificate."
+    return "Build the files in DIR/c/ into the firmware; gyrotc certificate DIR --out CERT writes the certificate."
 
 
 def failed_checks(verification: Verification | None, evaluation: Evaluation) -> Iterator[str]:

@@ -88,13 +88,6 @@ Value = bool | int | float | str | tuple[float, ...] | tuple[str, ...] | None
 """A bound, or what was measured of it; null: not measured."""
 
 
-def _in_words(value: Value) -> str:
-    """A bound or a figure on one line."""
-    if isinstance(value, tuple):
-        return ", ".join(str(v) for v in value) or "none"
-    return "not measured" if value is None else str(value)
-
-
 class Limit(Part):
     """One limit with what was measured."""
 
@@ -136,15 +129,6 @@ class Limit(Part):
     constant_passes: bool = Field(
         default=False, description="whether that is within the bound, so that the limit asks nothing of the map"
     )
-
-    def failure(self) -> str:
-        """What is reported of a limit that is not met."""
-        bound, measured = (_in_words(v) for v in (self.bound, self.measured))
-        if self.verdict == "CONDITIONAL PASS":
-            return f"{self.limit} = {bound} is met by less than the guard band: {measured}"
-        if self.verdict == "NOT TESTABLE":
-            return f"{self.limit} = {bound} is not testable: {'; '.join(self.capped)}"
-        return f"{self.limit} = {bound} is not met: {measured}"
 
 
 class HeldLimits(UnitResult):

@@ -186,7 +186,7 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     assert [unit.name for unit in fleet.units] == ["RLG-1", "IMU-x", "IMU-y"]
     entries = run_fleet(fleet, tmp_path / "out", jobs=2)
     assert [entry.status for entry in entries] == ["failed"] * 3
-    assert "limit at_most.table_bytes = 8.0 is not met" in (entries[0].reason or "")
+    assert "limit at_most.table_bytes ≤ 8 is not met" in (entries[0].reason or "")
     assert json.loads((tmp_path / "out" / "IMU-x" / "model.json").read_text())["block_s"] == 20.0
     assert json.loads((tmp_path / "out" / "IMU-y" / "limits.json").read_text())["met"] is False
 
