@@ -213,7 +213,7 @@ def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
     if unit.verification:
         yield verified_line(unit.verification)
     if unit.changes:
-        yield "; ".join(change_lines(unit.changes))
+        yield "; ".join(line.strip() for line in change_lines(unit.changes))
     if evaluation.findings:
         yield f"findings: {', '.join(dict.fromkeys(one.id for one in evaluation.findings))}"
     yield f"next: {unit.next_step.replace('DATASET', dataset).replace('DIR', folder)}"
