@@ -235,7 +235,7 @@ Figures = tuple[float, ...]
 
 
 class LotFunctions(Part):
-    """The functions that maps are written in: docs/lot.md, section 7."""
+    """The functions that maps are written in: docs/lot.md."""
 
     center_c: PlottedCelsius = Field(description="z_T = (T - center)/half range")
     half_range_c: Positive = Field(description="of T, C")
@@ -355,7 +355,7 @@ class KnownMap(Part):
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
     center_dph: float = Field(description="0 of the coefficients, deg/h")
     unit_dph: Positive = Field(description="1 of the coefficients, deg/h")
-    functions: LotFunctions = Field(description="what maps are written in: docs/lot.md, section 7")
+    functions: LotFunctions = Field(description="what maps are written in: docs/lot.md")
     mean: Figures = Field(description="coefficients of the map")
     covariance: tuple[Figures, ...] = Field(description="of the coefficients: lower triangle, row by row")
     rest: LotProcess = Field(description="the smooth process behind it")
