@@ -222,7 +222,7 @@ def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     """
     from gyrotc.verify import toolchain
 
-    compiled = toolchain._command
+    compiled = toolchain.printed_by_compiler
     kept = made_once(tmp_path_factory, "objects", lambda folder: None)
 
     def command(target: toolchain.Target, words: list[str], folder: Path) -> None:
@@ -237,7 +237,7 @@ def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         shutil.copyfile(known, words[-1])
         return None
 
-    with mock.patch.object(toolchain, "_command", command):
+    with mock.patch.object(toolchain, "printed_by_compiler", command):
         yield
 
 

@@ -359,7 +359,7 @@ def _trace(result: Path, folder: Path) -> Callable[[bytes], None]:
         work = _fresh(folder, "trace")
         (work / "run-01.csv").write_bytes(data)
         with pages.page_from(work):
-            pages._trace(work, run, 100.0)
+            pages.trace_means(work, run, 100.0)
 
     return read
 
@@ -382,7 +382,7 @@ def _bank_bytes(seeds: Path, folder: Path) -> bytes:
         large = {f.name: getattr(bank, f.name) for f in fields(bank)}
         small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
         content = pickle.dumps(replace(bank, **small), protocol=5)
-        path.write_bytes(kept._head("a.bank", content) + content)
+        path.write_bytes(kept.head_of_content("a.bank", content) + content)
     return path.read_bytes()
 
 
@@ -390,7 +390,7 @@ def _bank(seeds: Path, folder: Path) -> Callable[[bytes], None]:
     def read(data: bytes) -> None:
         path = folder / "a.bank"
         path.write_bytes(data)
-        bank = kept._read(path, signature_bank._bank)
+        bank = kept.content_in(path, signature_bank.bank_from_bytes)
         if data != (seeds / "bank").read_bytes() and bank is not None:
             raise AssertionError("a damaged bank was taken")
         if bank is None:

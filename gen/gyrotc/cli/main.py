@@ -87,7 +87,7 @@ def main() -> None:
 
     raise_on_signals()
     try:
-        status = _flushed(run(sys.argv[1:]))
+        status = flushed(run(sys.argv[1:]))
     except Interrupted as end:
         with contextlib.suppress(OSError):  # the terminal may be gone
             print(f"gyrotc: interrupted ({end})", file=sys.stderr, flush=True)
@@ -131,7 +131,7 @@ def _quiet_start() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _flushed(status: int) -> int:
+def flushed(status: int) -> int:
     """What is still to be printed is: the command's status, or that of what went wrong, which is reported once."""
     try:
         sys.stdout.flush()
@@ -175,7 +175,7 @@ def _without_warnings() -> None:
 _ANYWHERE = ("-q", "--quiet", "-v", "--verbose")
 
 
-def _hoisted(arguments: list[str]) -> list[str]:
+def hoisted(arguments: list[str]) -> list[str]:
     """The arguments with what concerns the whole program in front; what stands behind `--` is left alone."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
     front = [a for a in arguments[:end] if a in _ANYWHERE]
@@ -196,7 +196,7 @@ def run(arguments: list[str]) -> int:
     Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
     """
     try:
-        application()(_hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
+        application()(hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
     except GyrotcError as error:
         # Compilers say more than a line
         shown = terminal_line if isinstance(error, InputError) else terminal_text

@@ -225,11 +225,11 @@ def _record(
         usable &= np.isfinite(rows.channels[name])
     group = max(round(min(block_s, 10.0) / run.row_period_s), 1) if run.row_period_s < _ROW_S else 1
     if group > 1:
-        rows, usable = _thinned(rows, usable, group)
-    temperature = _bridged(rows.time_s, rows.temperature_c)
+        rows, usable = grouped_rows(rows, usable, group)
+    temperature = without_gaps(rows.time_s, rows.temperature_c)
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
-    values = {name: _bridged(rows.time_s, rows.channels[name]) for name in channels}
+    values = {name: without_gaps(rows.time_s, rows.channels[name]) for name in channels}
     outliers = judged.of(run).count().get("rate outlier", 0)
     rate = np.where(usable, rows.rate_dph, 0.0)
     return RunRecord(name_of(run), history, rate, usable, run.environment, outliers, values)
@@ -240,7 +240,7 @@ def name_of(run: Run) -> str:
     return run.file if run.from_s is None else f"{run.file}@{run.from_s:g}"
 
 
-def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, NDArray[np.bool_]]:
+def grouped_rows(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, NDArray[np.bool_]]:
     """Means over `group` rows; a mean counts when half of its rows do."""
     n = len(rows.time_s) // group * group
     use = usable[:n].reshape(-1, group)
@@ -264,7 +264,7 @@ def _thinned(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, N
     return filled, 2 * use.sum(axis=1) >= group
 
 
-def _bridged(time_s: FloatArray, values: FloatArray) -> FloatArray:
+def without_gaps(time_s: FloatArray, values: FloatArray) -> FloatArray:
     """Straight lines over missing values: operators need some history; the rows themselves do not count."""
     good = np.isfinite(values)
     if good.all():

@@ -83,7 +83,7 @@ def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
     for tau in _LAGS_S:
         yield "another memory of the temperature", [late(h, tau) for h in runs]
     for up, down in _TWO_SIDED_S:
-        yield "memory that differs between warming and cooling", [_two_sided_lag(h, up, down) for h in runs]
+        yield "memory that differs between warming and cooling", [two_sided_lag(h, up, down) for h in runs]
     yield "a memory of dT/dt", [first_order(_RATE_S, h.time_s, r) for h, r in zip(runs, rates, strict=True)]
     for tau in _HEATS_S:
         yield "what heat has done so far", [_gathered(h, h.temperature_c - low, tau) for h in runs]
@@ -148,11 +148,11 @@ def _one_sided(records: Records) -> Iterator[Shape]:
     for quick in _QUICK_S:
         for slower in _SLOWER:
             for up, down in ((quick, slower * quick), (slower * quick, quick)):
-                column = records.average([_two_sided_lag(r.history, up, down) for r in records.runs])
+                column = records.average([two_sided_lag(r.history, up, down) for r in records.runs])
                 yield Shape("memory that differs between warming and cooling", 2, column[:, None])
 
 
-def _two_sided_lag(history: History, up: float, down: float) -> FloatArray:
+def two_sided_lag(history: History, up: float, down: float) -> FloatArray:
     """z − T of a node with one time constant while T > z and another while T < z, shape (n,)."""
     t = history.temperature_c
     step = np.diff(history.time_s, prepend=history.time_s[0])
@@ -174,7 +174,7 @@ def _switched(records: Records) -> Iterator[Shape]:
         for upper in np.arange(low + gap + _SWITCH_C / 2, high, _SWITCH_C):
 
             def hats(h: History, on: float = float(upper), off: float = float(upper) - gap) -> FloatArray:
-                state = _switch(h.temperature_c, on, off)
+                state = switch_state(h.temperature_c, on, off)
                 near = np.maximum(0.0, 1.0 - np.abs(h.temperature_c[:, None] - nodes) / _HAT_C)
                 return np.asarray(near * state[:, None])
 
@@ -185,7 +185,7 @@ def _switched(records: Records) -> Iterator[Shape]:
                 yield Shape("a map that a switch changes", 2, columns[:, used], common=True, texture=True)
 
 
-def _switch(t: FloatArray, on: float, off: float) -> FloatArray:
+def switch_state(t: FloatArray, on: float, off: float) -> FloatArray:
     """State 0 or 1: the last threshold that was passed, 0 before any."""
     event = np.where(t > on, 1, np.where(t < off, -1, 0))
     last = np.maximum.accumulate(np.where(event != 0, np.arange(len(t)), -1))

@@ -197,7 +197,7 @@ def _extended_model(
     front = replace(refitting.front, stuck_s=stuck_after_s(max(run.longest_same_s for run in played)))
     plain = model_of(dataset, runs, extension.samples, extension.extended, front, options, extension.added)
     fallback_models = fallback_models_of(plain, extension.samples, played, extension.shipped)
-    entries = _entries(extension.shipped, fallback_models)
+    entries = model_entries(extension.shipped, fallback_models)
     left_out = extension.after if extension.measured_on == "left out" else ()
     training = training_of(dataset, runs, extension.samples, extension.extended, front, options, left_out)
     recorded = {effect.channel for effect in extension.shipped if effect.channel is not None}
@@ -223,7 +223,7 @@ def _as_emitted(
     return replace(extension, total=total, before=before, after=after)
 
 
-def _entries(shipped: Sequence[Effect], fallback_models: Mapping[str, FallbackModel]) -> list[dict[str, Any]]:
+def model_entries(shipped: Sequence[Effect], fallback_models: Mapping[str, FallbackModel]) -> list[dict[str, Any]]:
     """Terms as a model has them, those of channels last: a fallback model is fitted to what all others leave."""
     entries = []
     for effect in sorted(terms_of(shipped), key=lambda e: e.channel is not None):

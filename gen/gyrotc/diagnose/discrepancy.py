@@ -55,7 +55,7 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
     best = search.likeliest
     if declared is not None:
         ratio = view.scale
-        p = _two_sided(ratio**2 * freedom, freedom)
+        p = p_value_of_energy(ratio**2 * freedom, freedom)
         if p < _LEVEL_P and abs(np.log(ratio)) > _LEVEL_RATIO:
             text = f"the noise is {ratio:.2f} times the declared level"
             found.append(NoiseFinding("noise_level", p, {"ratio": ratio}, text))
@@ -67,7 +67,8 @@ def noise_findings(search: Search, declared: Declared | None, *, causes: bool) -
     return found
 
 
-def _two_sided(energy: float, freedom: int) -> float:
+def p_value_of_energy(energy: float, freedom: int) -> float:
+    """Return the two-sided p-value of a sum of squares of as many standard normal numbers."""
     return float(min(1.0, 2.0 * min(chdtrc(freedom, energy), chdtr(freedom, energy))))
 
 
@@ -151,12 +152,12 @@ def ensemble_of(
     for name, statistic in _statistics(search).items():
         values = statistic(both)
         if np.all(np.isfinite(values)):
-            found.append(_discrepancy(name, float(values[0]), values[1:], rounding))
+            found.append(compared_statistic(name, float(values[0]), values[1:], rounding))
     found.sort(key=lambda d: d.p_value)
     return Ensemble(measured, records.size - model.shape[1], simulated[:, :100], tuple(found))
 
 
-def _discrepancy(name: str, measured: float, simulated: FloatArray, rounding: float) -> ComparedStatistic:
+def compared_statistic(name: str, measured: float, simulated: FloatArray, rounding: float) -> ComparedStatistic:
     """The rank of the measured value; where the model takes a statistic away wholly, none is rare."""
     n = simulated.size
     above = float(np.count_nonzero(simulated >= measured))

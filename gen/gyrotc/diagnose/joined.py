@@ -179,14 +179,14 @@ def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: 
     used = np.flatnonzero(projection.alive)
     gram = projection.gram[np.ix_(used, used)]
     gram = gram + np.diag(1e-7 * projection.before[used] + 1e-12)
-    factor = _root(gram)
+    factor = root_of_gram(gram)
     normal = np.random.default_rng(seed).standard_normal((draws, used.size))
     a = np.zeros((draws, projection.a.size))
     a[:, used] = normal @ factor.T
     return np.asarray(score(projection, columns, a).joined().max(axis=-1))
 
 
-def _root(gram: FloatArray) -> FloatArray:
+def root_of_gram(gram: FloatArray) -> FloatArray:
     """A factor F with F F' = gram; what rounding made negative in it, of columns that hardly differ, counts as 0."""
     try:
         return np.asarray(np.linalg.cholesky(gram))

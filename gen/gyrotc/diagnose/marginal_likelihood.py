@@ -165,7 +165,7 @@ class MarginalLikelihood:
         held = orthonormal(self.gains.beside, raw[:, :2], *free, *edges)
         y = self.gains.target - held @ (held.T @ self.gains.target)
         groups = [g - held @ (held.T @ g) for g in (of_t, of_rate, *drawn)]
-        return _largest(y, groups) - float(y @ y)
+        return largest_evidence(y, groups) - float(y @ y)
 
     @cached_property
     def _back(self) -> FloatArray:
@@ -173,7 +173,7 @@ class MarginalLikelihood:
         return np.asarray(np.linalg.pinv(self.bank.basis.mix))
 
 
-def _largest(y: FloatArray, groups: Sequence[FloatArray]) -> float:
+def largest_evidence(y: FloatArray, groups: Sequence[FloatArray]) -> float:
     """Twice the log of N(y; 0, I + Σ v_g G_g G_gᵀ) over N(y; 0, I), at the likeliest variances v."""
     base = orthonormal(*groups)
     data = base.T @ y

@@ -12,6 +12,7 @@ gains nothing.
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -144,6 +145,20 @@ class Gains:
         self.random = [(c, s) for c, s in names if c.role == "variance"]
         self.base = self._project(None, self.map, None)
         self._bases: list[_Base] | None = None
+
+    def with_target(self, target: FloatArray, *, limited: bool = True) -> Gains:
+        """Return the gains of other whitened data, of the same recordings in the same noise.
+
+        Args:
+            target: The data, in standard deviations of the noise, shape (blocks,).
+            limited: The size of a cause is limited by the spread of the rate, as `limit` says.
+        """
+        other = copy.copy(self)
+        other.target, other._bases = target, None
+        if not limited:
+            other._shares = np.zeros_like(self._shares)
+        other.base = other._project(None, other.map, None)
+        return other
 
     @cached_property
     def map_q(self) -> FloatArray:

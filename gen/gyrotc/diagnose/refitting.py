@@ -140,7 +140,7 @@ class Refitting:
     def left_out(self, held: list[BoolArray], causes: Sequence[Refined]) -> Chain:
         """Residuals of held-out training samples; as many causes are chosen anew on the others."""
         kept = [~m for m in held]
-        chosen = filter(is_corrected, self._chosen(held, len(causes)))
+        chosen = filter(is_corrected, self.chosen_without(held, len(causes)))
         effects = completed(self.train, [Effect.of(c) for c in chosen], kept)
         stages = (effects[:k] for k in range(sum(map(is_corrected, causes)) + 1))
         scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
@@ -158,7 +158,7 @@ class Refitting:
         fitted = self.fit(effects, kept, beside=beside)
         return scored_means(fitted, runs, effects, self.average_s, scored)
 
-    def _chosen(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
+    def chosen_without(self, held: list[BoolArray], count: int) -> tuple[Refined, ...]:
         """Best `count` causes on the records without the held-out samples; none where these can tell of none."""
         masks = []
         for run, played, out in zip(self.records.runs, self.train, held, strict=True):

@@ -91,9 +91,9 @@ def calibrated(
         return tuple(ranked)
     others = (*chosen[:k], *chosen[k + 1 :])
     kinds = [rival_key(chosen[k]), *((r.id, r.channel or "") for r in near)]
-    place = _Place(gains, others)
-    models = {kind: [place.model(c) for c in _points(pool, others, kind)] for kind in kinds}
-    simulated = _Simulated(place, {kind: found for kind, found in models.items() if found})
+    place = RivalPlace(gains, others)
+    models = {kind: [place.model(c) for c in best_points(pool, others, kind)] for kind in kinds}
+    simulated = SimulatedRivals(place, {kind: found for kind, found in models.items() if found})
     odds = {}
     for rival, kind in zip(near, kinds[1:], strict=True):
         if kinds[0] in simulated.models and kind in simulated.models:
@@ -102,7 +102,7 @@ def calibrated(
     return tuple(sorted(reported, key=lambda r: -odds_of(r)))
 
 
-def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: RivalKey) -> list[Candidate]:
+def best_points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: RivalKey) -> list[Candidate]:
     """The best points of a cause's grid beside the others."""
     found: list[tuple[float, Candidate]] = []
     for point in pool:
@@ -114,7 +114,7 @@ def _points(pool: Sequence[Point], others: tuple[Candidate, ...], kind: RivalKey
 
 
 @dataclass(frozen=True)
-class _Model:
+class RivalModel:
     """A cause at one point of its grid, as directions in whitened space.
 
     Attributes:
@@ -148,7 +148,7 @@ class _Model:
         return np.asarray(held), spread * rng.standard_normal((len(spread), _DRAWS))
 
 
-class _Place:
+class RivalPlace:
     """The place of one cause beside the others."""
 
     def __init__(self, gains: Gains, others: tuple[Candidate, ...]) -> None:
@@ -163,25 +163,25 @@ class _Place:
                 self.blocks.append(gains.white(other))
         self.held = orthonormal(*self.blocks, self.map)
 
-    def model(self, candidate: Candidate) -> _Model:
+    def model(self, candidate: Candidate) -> RivalModel:
         none = np.zeros((self.gains.size, 0))
         price = self.price * price_of(candidate)
         if candidate.role == "input":
             blocks = [*self.blocks, *self.gains.edges(candidate)]
             changed = orthonormal(*blocks, self.gains.replaced(candidate))
-            return _Model(none, changed, orthonormal(*blocks, self.map), None, price)
+            return RivalModel(none, changed, orthonormal(*blocks, self.map), None, price)
         columns = self.gains.white(candidate)
         rest = columns - self.held @ (self.held.T @ columns)
         left, size, _ = np.linalg.svd(rest, full_matrices=False)
         own = size**2 > INDEPENDENT * np.linalg.norm(columns, axis=0).max() ** 2
         random = candidate.role == "variance" and own.any()
-        return _Model(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
+        return RivalModel(self.held, left[:, own], none, size[own] ** 2 if random else None, price)
 
 
-class _Simulated:
+class SimulatedRivals:
     """Simulated recordings of every cause in a place, and how well each cause explains them."""
 
-    def __init__(self, place: _Place, models: dict[RivalKey, list[_Model]]) -> None:
+    def __init__(self, place: RivalPlace, models: dict[RivalKey, list[RivalModel]]) -> None:
         self.models = models
         self.target = place.gains.target
         every = [m for found in models.values() for m in found]
@@ -204,7 +204,7 @@ class _Simulated:
         near = {kind: float(np.exp(-0.5 * ((x - lead) / width) ** 2).sum()) for kind, x in of.items()}
         return min((near[rival] + 0.5) / (near[named] + 0.5), 1.0)
 
-    def _of(self, model: _Model) -> FloatArray:
+    def _of(self, model: RivalModel) -> FloatArray:
         """Inner products with recordings in which a cause acts as it was fitted, shape (directions, draws)."""
         mean, weights = model.drawn(self.target, self._rng)
         found = (self._all.T @ mean)[:, None] + self._noise

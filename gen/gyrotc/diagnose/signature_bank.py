@@ -269,7 +269,7 @@ def bank_of(
 ) -> SignatureBank:
     """The bank of these temperature records, from disk or made and kept."""
     digest = hashlib.sha256(f"{level} {lead_s:g} {_code()} {records.key()}".encode()).hexdigest()
-    bank = cache.kept(f"{digest}.bank", _bank)
+    bank = cache.kept(f"{digest}.bank", bank_from_bytes)
     if bank is None:
         say("computing the signatures of all causes")
         bank = build_bank(records, level, lead_s)
@@ -277,7 +277,8 @@ def bank_of(
     return bank
 
 
-def _bank(content: bytes) -> SignatureBank | None:
+def bank_from_bytes(content: bytes) -> SignatureBank | None:
+    """Return the bank that a file holds; None if it holds something else. It may raise anything."""
     bank = _Reader(io.BytesIO(content)).load()
     return bank if isinstance(bank, SignatureBank) else None
 

@@ -11,6 +11,7 @@ from .page import reasons as reasons
 from .page import summary_of as summary_of
 from .page import write_summary as write_summary
 from .run import Cluster as Cluster
+from .run import connected as connected
 from .run import run_fleet as run_fleet
 from .run import tasks_of as tasks_of
 from .unit import Task as Task

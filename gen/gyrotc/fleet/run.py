@@ -130,7 +130,7 @@ def on_dask(cluster: Cluster, tasks: Sequence[Task]) -> Iterator[tuple[int, Flee
     Raises:
         InputError: Dask is not installed, the scheduler cannot be reached, or no worker comes.
     """
-    with _connected(cluster) as client:
+    with connected(cluster) as client:
         from distributed import as_completed as completed
 
         _wait_for_worker(cluster, client)
@@ -157,7 +157,7 @@ def on_dask(cluster: Cluster, tasks: Sequence[Task]) -> Iterator[tuple[int, Flee
 
 
 @contextmanager
-def _connected(cluster: Cluster) -> Iterator[Any]:
+def connected(cluster: Cluster) -> Iterator[Any]:
     """A client; with the end of the block the scheduler forgets what it has not begun."""
     try:
         import distributed
@@ -300,7 +300,7 @@ def _run(
         entries[waiting[k]] = entry
         say(entry)
     done = [entries[number] for number in range(len(tasks))]
-    judged = list(_one_of_each_serial(done))
+    judged = list(one_of_each_serial(done))
     for before, after in zip(done, judged, strict=True):
         if before.status != after.status:
             say(after)
@@ -317,7 +317,7 @@ def _unfinished(task: Task, reason: str = _STOPPED) -> FleetEntry:
     return FleetEntry(name=task.unit.name, axis=task.unit.axis, status="unfinished", reason=reason)
 
 
-def _one_of_each_serial(entries: Sequence[FleetEntry]) -> Iterator[FleetEntry]:
+def one_of_each_serial(entries: Sequence[FleetEntry]) -> Iterator[FleetEntry]:
     """Two gyros under one serial: a table would fly on the wrong one, so both have failed."""
     counts = Counter((e.serial, e.axis) for e in entries)
     for entry in entries:

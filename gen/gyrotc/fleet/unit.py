@@ -194,12 +194,12 @@ def _built(task: Task) -> FleetEntry:
         )
         if task.found() != key:
             raise InputError(str(task.unit.dataset), "the recordings changed while they were read")
-        entry = _entry_of(task, key, dataset, built, runs)
+        entry = entry_of(task, key, dataset, built, runs)
         write_entry(stage.folder, entry)
     return entry.model_copy(update={"moved_to": moved_to}) if moved_to else entry
 
 
-def _entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> FleetEntry:
+def entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> FleetEntry:
     """What the summary says of the gyro, and what it is compared with others by."""
     role, judged = built.evaluation.judged() or (None, None)
     floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None

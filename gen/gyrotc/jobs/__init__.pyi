@@ -13,6 +13,7 @@ from .certification import reason_of_release as reason_of_release
 from .certification import unit_of as unit_of
 from .comparison import compare as compare
 from .diagnosis import extended_scenario as extended_scenario
+from .lot import calibrated_unit as calibrated_unit
 from .lot import checksum_of as checksum_of
 from .lot import load_lot as load_lot
 from .lot import lot_from as lot_from

@@ -27,7 +27,7 @@ _CURVE = 21  # points of the lot to be read
 
 
 @dataclass(frozen=True, slots=True)
-class _Calibrated:
+class CalibratedUnit:
     """A fully calibrated unit of a fleet: what a lot needs of its `training.json`, which is large.
 
     Attributes:
@@ -72,7 +72,7 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
         InputError: Fewer than three units, or units of several axes and none is named.
     """
     say = progress or (lambda _: None)
-    units, left_out = _units(fleet, axis)
+    units, left_out = calibrated_units(fleet, axis)
     means, envelope = [u.means for u in units], _envelope([u.model for u in units])
     found = learn_prior(means, envelope, say)
     kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
@@ -89,14 +89,14 @@ def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = 
     )
 
 
-def _units(fleet: Path, axis: str | None) -> tuple[list[_Calibrated], str]:
+def calibrated_units(fleet: Path, axis: str | None) -> tuple[list[CalibratedUnit], str]:
     """Return the units of one axis in the order of their folders, and how many others were left out and why."""
     if not fleet.is_dir():
         raise InputError(str(fleet), "is no folder", "what gyrotc fleet wrote")
     summary = read_optional(fleet / "fleet.json", FleetSummary)
     barred = {unit.name for unit in summary.serials if unit.barred} if summary else set()
     places = sorted(p.parent for p in fleet.glob("*/training.json"))
-    units = [_unit(place) for place in places if place.name not in barred]
+    units = [calibrated_unit(place) for place in places if place.name not in barred]
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:
         raise InputError("--axis", f"units of the axes {', '.join(axes)}", "one of them: each is a lot of its own")
@@ -116,13 +116,18 @@ def _units(fleet: Path, axis: str | None) -> tuple[list[_Calibrated], str]:
     return [*distinct.values()], left_out
 
 
-def _unit(place: Path) -> _Calibrated:
+def calibrated_unit(place: Path) -> CalibratedUnit:
+    """Return what a lot learns from the result of a unit.
+
+    Raises:
+        InputError: A file was changed, is missing, or does not say enough.
+    """
     check_intact(place, ("training.json", "model.json"), needed=False)
     where, model = place / "training.json", load_model(place / "model.json")
     training = read_result(where, Training)
     means = means_of(training.means, where)
     assert training.means is not None  # else it is refused
-    return _Calibrated(model, means, training.means.mean_s, training.lot is None and training.prior is None)
+    return CalibratedUnit(model, means, training.means.mean_s, training.lot is None and training.prior is None)
 
 
 def _envelope(models: Sequence[Model]) -> Envelope:

@@ -1,4 +1,6 @@
+from .f32 import FUSIBLE as FUSIBLE
 from .f32 import gauss as gauss
+from .f32 import product_plus as product_plus
 from .front_end import Settings as Settings
 from .front_end import expand_missed as expand_missed
 from .front_end import follow as follow

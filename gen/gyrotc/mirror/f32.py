@@ -46,7 +46,7 @@ def exp2_table() -> Words:
 _TABLE = exp2_table()
 
 
-def _plus(
+def product_plus(
     place: str, a: NDArray[np.float32], b: Any, c: NDArray[np.float32] | np.float32, fused: Fused
 ) -> NDArray[np.float32]:
     """a b + c, the product rounded unless this place is fused."""
@@ -72,7 +72,7 @@ def gauss(u: NDArray[np.float32], fused: Fused = _NONE) -> NDArray[np.float32]:
     bits = _TABLE[n & np.uint32(ENTRIES - 1)] - (n << np.uint32(17))
     f = np.where(inside, u, np.float32(0.0)) - np.where(inside, whole - _ROUND, np.float32(0.0))
     f = f - _H
-    f = _plus("polynomial", f, f, _G, fused)
+    f = product_plus("polynomial", f, f, _G, fused)
     return np.asarray(np.where(inside, bits.view(np.float32) * f, np.float32(0.0)))
 
 
@@ -88,8 +88,8 @@ class Points:
 def normalise(table: Table, x: NDArray[np.float32], fused: Fused = _NONE) -> Points:
     """What the network sees of inputs (T, slope per block) that lie inside the envelope."""
     scale = table.numbers(table.scale)
-    z_t = _plus("grid", x[:, 0] - scale[0], scale[1], _EIGHT, fused) - _EIGHT
-    z_r = _plus("grid", x[:, 1], scale[2], _EIGHT, fused) - _EIGHT
+    z_t = product_plus("grid", x[:, 0] - scale[0], scale[1], _EIGHT, fused) - _EIGHT
+    z_r = product_plus("grid", x[:, 1], scale[2], _EIGHT, fused) - _EIGHT
     return Points(x, z_t, z_r)
 
 
@@ -125,18 +125,18 @@ def _network(
 ) -> NDArray[np.float32]:
     """One network, whose centers are `first` ... `first + count - 1`."""
     z_t, z_r = points.z_t, points.z_r
-    acc = _plus("linear", z_t, network[2], network[1], fused)
-    acc = _plus("linear", z_r, network[3], acc, fused)
+    acc = product_plus("linear", z_t, network[2], network[1], fused)
+    acc = product_plus("linear", z_r, network[3], acc, fused)
     centers = table.numbers(table.records("centers"))[first : first + count]
     with np.errstate(under="ignore"):
         for c_t, g_t, c_r, g_r, weight in centers:
             u = (z_t - c_t) * g_t
             q = (z_r - c_r) * g_r
             if "square of slope" in fused:
-                u = _plus("square of slope", q, q, u * u, fused)
+                u = product_plus("square of slope", q, q, u * u, fused)
             else:
-                u = _plus("square of T", u, u, q * q, fused)
-            acc = _plus("weight", gauss(u, fused), weight, acc, fused)
+                u = product_plus("square of T", u, u, q * q, fused)
+            acc = product_plus("weight", gauss(u, fused), weight, acc, fused)
     return np.asarray(acc)
 
 

@@ -331,14 +331,19 @@ def _trend(unit: UnitResults) -> Markup | None:
 def _traced(folder: Path, unit: UnitResults) -> Iterator[_Traced]:
     """Runs of a result that have a trace."""
     for run in unit.evaluation.runs:
-        means = _trace(folder / "trace", run, unit.evaluation.average_s)
+        means = trace_means(folder / "trace", run, unit.evaluation.average_s)
         if means is not None and means.time_s.size:
             mine = [s.from_s for s in unit.left_out if s.file == run.file and run.role == "train"]
             first, last = means.time_s[0], means.time_s[-1]
             yield _Traced(run, means, [t for t in mine if first <= t <= last])
 
 
-def _trace(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:
+def trace_means(folder: Path, run: EvaluatedRun, average_s: float) -> Averages | None:
+    """Return the means of a run from its trace; None if the folder has none.
+
+    Raises:
+        InputError: The trace cannot be read, or its times do not increase.
+    """
     start = f"@{run.from_s or 0.0:g}"
     stems = (file_stem(run.file.replace("/", "_")), file_stem(Path(run.file).stem))
     names = [stem + end + ".csv" for stem in stems for end in (start, "")]

@@ -132,8 +132,9 @@ _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
 _TRIAD = 0.03  # relative; how near three means come to Earth's rate by chance is of this order
 _ALONG = 0.1  # relative; a bias is that much of Earth's component
 _SMALLEST_ALONG_DPH = 1.0  # deg/h: a smaller component of Earth's rate is not distinguished from a bias
-_RATES = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 648000.0 / np.pi}  # in deg/h
-_TIMES = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0}  # in s
+# Units in which a rate or a time may really be, as a declaration may have got it wrong.
+RATE_UNITS_DPH = {"deg/h": 1.0, "deg/s": 3600.0, "rad/s": 648000.0 / np.pi}
+TIME_UNITS_S = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +232,7 @@ def _of_time(
         return
     unit = units.get(column)
     declared = 1.0 if unit is None else unit.factor
-    for likely, factor in _TIMES.items():
+    for likely, factor in TIME_UNITS_S.items():
         slower = fastest * declared / factor
         if slower <= _FASTEST_C_PER_MIN:
             found = (
@@ -348,7 +349,7 @@ def _random_walks(time: FloatArray, rate: FloatArray) -> list[tuple[float, float
 def _other_rates(unit: Conversion | None) -> Iterator[tuple[str, float]]:
     """Other units of a rate, and by how much a rate would be larger if the file were in them."""
     declared = 1.0 if unit is None else unit.factor
-    for likely, factor in _RATES.items():
+    for likely, factor in RATE_UNITS_DPH.items():
         if abs(factor / declared - 1.0) > 0.01:
             yield likely, factor / declared
 

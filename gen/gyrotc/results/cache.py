@@ -97,15 +97,16 @@ def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
         removed).
     """
     path = folder() / name
-    return _read(path, content_of) if _is_own() and path.is_file() else None
+    return content_in(path, content_of) if _is_own() and path.is_file() else None
 
 
-def _read(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
+def content_in(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
+    """Return what a file keeps, as `kept` does; a file that is not as it was written is removed."""
     try:
         data = read_input(path, "recording_mib", "what was kept")
         head, content = data[:_HEAD_BYTES], data[_HEAD_BYTES:]
         del data  # a bank of signatures has the size of what a search remembers
-        if head == _head(path.name, content):
+        if head == head_of_content(path.name, content):
             found = content_of(content)
             if found is not None:
                 os.utime(path, follow_symlinks=False)
@@ -123,12 +124,12 @@ def keep(name: str, content: bytes) -> None:
     """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
     with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
         if _is_own():
-            write_atomically(folder() / name, _head(name, content), content)
+            write_atomically(folder() / name, head_of_content(name, content), content)
             _trim()
 
 
-def _head(name: str, content: bytes) -> bytes:
-    """What stands before a content in its file."""
+def head_of_content(name: str, content: bytes) -> bytes:
+    """Return what precedes a content in its file."""
     digest = hashlib.sha256(name.encode() + b"\n")
     digest.update(content)
     return _MAGIC + digest.digest()

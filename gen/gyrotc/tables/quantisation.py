@@ -67,7 +67,7 @@ def outside(table: Table, frac_bits: int = q31.DEFAULT_BITS) -> str | None:
 
 
 def _refused(table: Table, frac_bits: int) -> Iterator[str]:
-    limits = _limits(table.numeric, frac_bits)
+    limits = word_limits(table.numeric, frac_bits)
     whole, numbers, network, center, guard, guard_whole, term, sigma = limits
     header, ends = table.header[2:], _FIRST_COUNT + _N_NUMBERS
     yield from _beyond(header[:_FIRST_COUNT] + header[ends:], whole)
@@ -178,7 +178,7 @@ def _q31(table: Table, records: NDArray[np.uint32]) -> Iterator[str]:
 
 
 @functools.cache
-def _limits(numeric: str, frac_bits: int) -> tuple[WordLimits, ...]:
+def word_limits(numeric: str, frac_bits: int) -> tuple[WordLimits, ...]:
     """Rows of libc/gtc_limits.inl for one arithmetic and the unit of its runtime.
 
     They are those of whole numbers, numbers, network, center, guard, terms, sigma.

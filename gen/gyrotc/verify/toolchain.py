@@ -226,7 +226,7 @@ def compile_objects(
     for source in sources:
         objects.append(folder.absolute() / f"{source.stem}.o")
         command = [target.compiler, *flags, "-c", str(source.absolute()), "-o", str(objects[-1])]
-        _command(target, command, folder)
+        printed_by_compiler(target, command, folder)
     return objects
 
 
@@ -268,6 +268,11 @@ def runtime_object(target: Target, c_folder: Path, numeric: str, work: Path, *, 
     return shared_object(
         target.model_copy(update={"flags": flags}), c_folder / f"gtc_{numeric}.c", work, include=c_folder, fresh=fresh
     )
+
+
+def forget_objects() -> None:
+    """Forget what this process has compiled, as a process does that has just begun."""
+    _made.clear()
 
 
 def shared_object(target: Target, source: Path, work: Path, *, include: Path, fresh: bool = False) -> Object:
@@ -316,12 +321,12 @@ def _object(name: str, content: bytes) -> Object | None:
 
 def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
     """Name under which an object is kept; empty where compiler or processor cannot be determined."""
-    compiler = _identity(target.compiler)
+    compiler = compiler_identity(target.compiler)
     processor = _processor() if "-march=native" in target.flags else "any"
     if not compiler or not processor:
         return ""
     command = [target.compiler, *_flags(target, include), "-E", str(source.absolute())]
-    text = _command(target, command, work)
+    text = printed_by_compiler(target, command, work)
     places = (str(path.absolute()).encode() for path in (work, include, source.parent))
     for place in sorted(places, key=len, reverse=True):  # in lines that say where the text stood
         text = text.replace(place, b"")
@@ -331,8 +336,8 @@ def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
 
 
 @functools.cache
-def _identity(compiler: str) -> list[str]:
-    """What tells one installed compiler from another: its version, and the programs that it consists of."""
+def compiler_identity(compiler: str) -> list[str]:
+    """Return what tells one installed compiler from another: its version, and the programs that it consists of."""
     parts = () if "clang" in compiler else ("cc1", "as")
     programs = [compiler, *(_tool(compiler, part) for part in parts)]
     found = [compiler_version(compiler)]
@@ -374,7 +379,7 @@ def link(target: Target, objects: Sequence[Path], program: Path) -> None:
     script = ["-T", str(_BARE / target.script)] if target.script else []
     files = [str(f.absolute()) for f in (*objects, *parts)]
     arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections"]
-    _command(target, [target.compiler, *arguments, "-o", str(program.absolute())], program.parent)
+    printed_by_compiler(target, [target.compiler, *arguments, "-o", str(program.absolute())], program.parent)
 
 
 def compile_c(
@@ -448,8 +453,12 @@ def compiler_version(compiler: str) -> str:
     return compiler
 
 
-def _command(target: Target, command: list[str], folder: Path) -> bytes:
-    """Runs a compiler; what it prints."""
+def printed_by_compiler(target: Target, command: list[str], folder: Path) -> bytes:
+    """Run a compiler in a folder and return what it prints.
+
+    Raises:
+        CheckFailed: The compiler refused.
+    """
     done = run_to_end(command, folder, f"{target.name}: {target.compiler}")
     if done.returncode != 0:
         lines = "\n".join(done.stderr.splitlines()[:_SHOWN_LINES])

@@ -17,8 +17,7 @@ import pytest
 from conftest import run_gyrotc
 from gyrotc.assess import LEAST_POWER_ONS, load_limits
 from gyrotc.common import GyrotcError, InputError
-from gyrotc.jobs import certificate, unit_of
-from gyrotc.jobs.lot import _unit
+from gyrotc.jobs import calibrated_unit, certificate, unit_of
 from gyrotc.pages import certificate as printing
 from gyrotc.recordings import load
 from gyrotc.results import MARKER
@@ -262,7 +261,7 @@ def _refused(folder: Path, tmp_path: Path, name: str) -> None:
     assert not (tmp_path / "C").exists()
     if name in ("model.json", "training.json"):
         with pytest.raises(GyrotcError):
-            _unit(folder)
+            calibrated_unit(folder)
 
 
 def test_a_file_that_was_added_is_refused(tmp_path: Path, passing: Path) -> None:

@@ -127,7 +127,7 @@ def test_a_fleet_has_the_decision_of_the_unit(
         one = Built(model, _NO_TRAINING, evaluation, VERIFICATION, {}, limits=limits)
         task = unit.Task(Unit(Path(f"u{number}"), None), "d", _NO_FLEET, tmp_path / f"u{number}", "")
         dataset = cast(Dataset, SimpleNamespace(serial=f"S{number}", meta={}, runs=(), sketch=()))
-        entry = unit._entry_of(task, "0" * 64, dataset, one, ())
+        entry = unit.entry_of(task, "0" * 64, dataset, one, ())
         built.append(one)
         entries.append(entry)
     views = {

@@ -21,8 +21,7 @@ from conftest import ROOT, Command
 from gyrotc.assess import load_limits
 from gyrotc.common import InputError, inputs, install_command, parse_json, parse_toml
 from gyrotc.diagnose import bank_of, records_of
-from gyrotc.fleet import load_manifest
-from gyrotc.fleet.run import Cluster, _connected
+from gyrotc.fleet import Cluster, connected, load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages import report
 from gyrotc.recordings import load
@@ -314,9 +313,9 @@ def test_a_trace_whose_time_jumps(time: str, tmp_path: Path) -> None:
     head = "time_s,temperature_c,rate_dph,compensated_dph,status"
     (tmp_path / "a.csv").write_text("\n".join([head, *rows]) + "\n")
     run = EvaluatedRun.model_construct(file="a.csv")
-    assert "times that do not increase" in refused(lambda: report._trace(tmp_path, run, 100.0))
+    assert "times that do not increase" in refused(lambda: report.trace_means(tmp_path, run, 100.0))
     (tmp_path / "a.csv").write_text(f"{head.removesuffix(',status')}\n0,20,1,1\n")
-    assert "status" in refused(lambda: report._trace(tmp_path, run, 100.0))
+    assert "status" in refused(lambda: report.trace_means(tmp_path, run, 100.0))
 
 
 def _without(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -335,7 +334,7 @@ def test_the_estimator_without_scikit_learn_names_the_command(monkeypatch: pytes
 def test_a_scheduler_without_its_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     _without("distributed", monkeypatch)
     cluster = Cluster("tcp://127.0.0.1:1", 1.0, print)
-    with pytest.raises(InputError, match=re.escape('pip install "gyrotc[dask]"')), _connected(cluster):
+    with pytest.raises(InputError, match=re.escape('pip install "gyrotc[dask]"')), connected(cluster):
         pass
 
 

@@ -19,6 +19,7 @@ from gyrotc.diagnose import (
     NOISE_COLOURS,
     VERDICTS,
     Attribution,
+    Candidate,
     Colour,
     CycleFits,
     Effect,
@@ -40,8 +41,10 @@ from gyrotc.diagnose import (
     centred_slope,
     choose,
     clear_pair,
+    columns_of,
     completed,
     contest,
+    diagnosable_causes,
     direction_of,
     fine_columns,
     holds,
@@ -50,6 +53,7 @@ from gyrotc.diagnose import (
     makes_sense,
     misfit,
     model_columns,
+    model_entries,
     next_steps,
     odds_of,
     overlap,
@@ -60,27 +64,21 @@ from gyrotc.diagnose import (
     proportional_map,
     random_size,
     ranked_rivals,
+    reach_of,
     records_of,
     refine,
     remaining,
     replaced_map,
     samples,
+    searched,
     sentence_of,
+    shapes_of,
+    switch_state,
     terms_of,
+    two_sided_lag,
     verdict_of,
 )
 from gyrotc.diagnose import testable as reason_against
-from gyrotc.diagnose.candidates import (
-    Candidate,
-    _switch,
-    _two_sided_lag,
-    columns_of,
-    diagnosable_causes,
-    reach_of,
-    searched,
-    shapes_of,
-)
-from gyrotc.diagnose.diagnosis import _entries
 from gyrotc.mirror import first_order
 from gyrotc.pages import write_diagnosis_page
 from gyrotc.recordings import load
@@ -648,14 +646,14 @@ def test_a_map_of_hardly_changed_inputs_is_the_map(campaign: Campaign) -> None:
 
 def test_a_one_sided_lag_with_equal_times_is_a_first_order_one(campaign: Campaign) -> None:
     history = campaign.records.runs[0].history
-    both = _two_sided_lag(history, 500.0, 500.0)
+    both = two_sided_lag(history, 500.0, 500.0)
     plain = first_order(500.0, history.time_s, history.temperature_c) - history.temperature_c
     assert np.abs(both - plain).max() < 0.02 * np.abs(plain).max(), "the two hold T over a row or draw a line"
 
 
 def test_a_switch_remembers_the_last_threshold() -> None:
     t = np.array([0.0, 6.0, 11.0, 7.0, 3.0, 7.0, 12.0])
-    assert _switch(t, 10.0, 5.0).tolist() == [0, 0, 1, 1, 0, 0, 1]
+    assert switch_state(t, 10.0, 5.0).tolist() == [0, 0, 1, 1, 0, 0, 1]
 
 
 def test_alternatives_are_finite_and_zero_where_the_temperature_stands(campaign: Campaign) -> None:
@@ -666,7 +664,7 @@ def test_alternatives_are_finite_and_zero_where_the_temperature_stands(campaign:
     assert len(names) == 11
     time = np.arange(0.0, 7200.0, 20.0)
     still = replace(campaign.records.runs[0], history=History(time_s=time, temperature_c=np.full(time.size, 20.0)))
-    assert not _two_sided_lag(still.history, 100.0, 900.0).any()
+    assert not two_sided_lag(still.history, 100.0, 900.0).any()
 
 
 NOISE = [NoiseFinding("noise_level", 1e-9, {"ratio": 2.0}, "the noise is twice the declared level")]
@@ -1004,7 +1002,7 @@ def test_a_wave_and_its_overtones_are_taken_off_and_stand_in_the_model(refitting
     t = plain.temperature_c
     rest = [WAVE_DPH * airy(t) - taken for taken in (parts[0], sum(parts))]
     assert np.std(rest[1]) < 0.5 * np.std(rest[0]), "they are the wave's own"
-    entries = _entries([whole], {})
+    entries = model_entries([whole], {})
     assert [e["id"] for e in entries] == [WAVE.id] * 3
     assert [e["parameters"]["period_c"] for e in entries] == [PERIOD_C, PERIOD_C / 2.0, PERIOD_C / 3.0]
     assert {p.name for p in WAVE.parameters} == set(entries[1]["parameters"])

@@ -15,9 +15,13 @@ from gyrotc.diagnose import (
     Declared,
     JoinedLayout,
     Projection,
+    Records,
+    RunRecord,
     ScoredColumns,
     Search,
     Whitener,
+    block_length,
+    centred_slope,
     columns_of,
     detect,
     detection_limits,
@@ -25,6 +29,7 @@ from gyrotc.diagnose import (
     flicker_row,
     floor_of,
     gain_of,
+    grouped_rows,
     limit_of,
     markov_row,
     project,
@@ -32,17 +37,10 @@ from gyrotc.diagnose import (
     residual_log_likelihood,
     score,
     screen,
+    singled_out,
     variance_ratio_of,
     view_of_bank,
-)
-from gyrotc.diagnose.blocks import (
-    Records,
-    RunRecord,
-    _bridged,
-    _thinned,
-    block_length,
-    centred_slope,
-    singled_out,
+    without_gaps,
 )
 from gyrotc.recordings import Rows
 from numpy.typing import NDArray
@@ -329,12 +327,12 @@ def test_blocks_are_as_long_as_asked_unless_there_would_be_few_or_very_many(hour
 
 def test_gaps_are_bridged_by_lines_and_fine_rows_are_averaged() -> None:
     time = np.arange(6.0)
-    assert _bridged(time, np.array([np.nan, 1.0, np.nan, 3.0, np.nan, 5.0])).tolist() == [1, 1, 2, 3, 4, 5]
-    assert not _bridged(time, np.full(6, np.nan)).any()
+    assert without_gaps(time, np.array([np.nan, 1.0, np.nan, 3.0, np.nan, 5.0])).tolist() == [1, 1, 2, 3, 4, 5]
+    assert not without_gaps(time, np.full(6, np.nan)).any()
     rows = Rows(time, np.arange(6.0), np.array([1.0, 3.0, 5.0, 100.0, 100.0, 7.0]), {})
-    thin, usable = _thinned(rows, np.array([True, True, True, False, False, True]), 2)
+    thin, usable = grouped_rows(rows, np.array([True, True, True, False, False, True]), 2)
     assert thin.rate_dph.tolist() == [2.0, 5.0, 7.0] and usable.tolist() == [True, True, True]
-    assert not _thinned(rows, np.zeros(6, dtype=bool), 2)[1].any()
+    assert not grouped_rows(rows, np.zeros(6, dtype=bool), 2)[1].any()
 
 
 BLOCK_OF_COLOURS_S = 100.0

@@ -27,10 +27,10 @@ from gyrotc.diagnose import (
     open_search,
     project,
     records_of,
+    root_of_gram,
     search_of,
     verdict_of,
 )
-from gyrotc.diagnose.joined import _root
 from gyrotc.recordings import Dataset, joined_runs, load
 from gyrotc.train import FitOptions
 from numpy.typing import NDArray
@@ -249,7 +249,7 @@ def test_columns_that_hardly_differ_do_not_end_a_search() -> None:
     """Rounding leaves the matrix of their products with a negative eigenvalue; it was an error."""
     vectors = np.linalg.qr(np.random.default_rng(5).normal(size=(6, 6)))[0]
     gram = (vectors * [3.0, 2.0, 1.0, 0.5, 0.0, -1e-9]) @ vectors.T
-    root = _root(gram)
+    root = root_of_gram(gram)
     assert np.abs(root @ root.T - gram).max() < 1e-8
     assert np.isfinite(root).all()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -11,21 +10,34 @@ import pytest
 from gyrotc.causes import History
 from gyrotc.common import orthonormal
 from gyrotc.diagnose import (
+    LOOKED_AT,
     NOISE_WORDS,
     Candidate,
     Declared,
     Gains,
+    MarginalLikelihood,
     Point,
     Records,
+    Rival,
+    RivalPlace,
+    SimulatedRivals,
     best_of,
+    best_points,
+    calibrated,
     columns_of,
+    compared_statistic,
+    ensemble_of,
+    largest_evidence,
     needs_finer,
+    noise_findings,
+    odds_of,
+    p_value_of_energy,
+    probabilities_of,
+    ranked_rivals,
+    remaining,
+    rival_key,
     search_of,
 )
-from gyrotc.diagnose.discrepancy import _discrepancy, _two_sided, ensemble_of, noise_findings
-from gyrotc.diagnose.marginal_likelihood import MarginalLikelihood, _largest
-from gyrotc.diagnose.posterior import LOOKED_AT, Rival, odds_of, probabilities_of, remaining
-from gyrotc.diagnose.rivals import _Place, _points, _Simulated, calibrated, ranked_rivals, rival_key
 from gyrotc.mirror import delayed, first_order
 from numpy.typing import NDArray
 from scipy.optimize import brentq
@@ -86,11 +98,7 @@ def _with(quiet: Gains, campaign: Campaign, name: str, rng: np.random.Generator)
     of_map = name != "thermal_gradient"  # its size is that of the map itself
     size = rng.uniform(12.0, 25.0) / seen
     signal = size * white[:, 0] + (size if of_map else 3.0 / white[:, 1].std()) * white[:, 1]
-    other = copy.copy(quiet)
-    other.target, other._bases = signal + rng.standard_normal(quiet.size), None
-    other.base = other._project(None, other.map, None)
-    other._shares = np.zeros_like(quiet._shares)  # of what is believed of noise alone: nothing here
-    return other
+    return quiet.with_target(signal + rng.standard_normal(quiet.size), limited=False)  # the noise alone limits all
 
 
 def _reported(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, float]]:
@@ -122,12 +130,12 @@ def test_the_likelihood_of_groups_is_that_of_the_normal_distribution() -> None:
     sizes = np.exp(np.linspace(-6.0, 6.0, 241))
     direct = [multivariate_normal(np.zeros(30), np.eye(30) + v * group @ group.T).logpdf(y) for v in sizes]
     none = multivariate_normal(np.zeros(30), np.eye(30)).logpdf(y)
-    assert _largest(y, [group]) == pytest.approx(2.0 * (max(direct) - none), abs=0.01)
+    assert largest_evidence(y, [group]) == pytest.approx(2.0 * (max(direct) - none), abs=0.01)
 
 
 def test_functions_that_nothing_asks_for_cost_nothing_and_take_no_noise() -> None:
     rng = np.random.default_rng(SEED)
-    taken = [_largest(rng.standard_normal(200), [rng.standard_normal((200, 20))]) for _ in range(40)]
+    taken = [largest_evidence(rng.standard_normal(200), [rng.standard_normal((200, 20))]) for _ in range(40)]
     assert min(taken) > -0.2
     assert np.mean(taken) < 2.0, "20 free functions take 20, give or take 6"
 
@@ -181,22 +189,14 @@ def _gains(campaign: Campaign, size: float, *causes: tuple[str, dict[str, float]
     return Gains(campaign.search(y))
 
 
-def _of(gains: Gains, target: Array) -> Gains:
-    """The same campaign and noise with other whitened data."""
-    other = copy.copy(gains)
-    other.target, other._bases = target, None
-    other.base = other._project(None, other.map, None)
-    return other
-
-
 def test_the_criterion_of_a_place_is_that_of_the_search(campaign: Campaign) -> None:
     gains = _gains(campaign, 40.0, HYSTERESIS)
     singles = list(gains.single())
-    place = _Place(gains, ())
+    place = RivalPlace(gains, ())
     kinds = {rival_key(p.members[0]) for p in singles}
     best = {k: max(p.criterion(gains.size) for p in singles if rival_key(p.members[0]) == k) for k in kinds}
-    models = {k: [place.model(c) for c in _points(singles, (), k)] for k in kinds}
-    found = _Simulated(place, models).measured
+    models = {k: [place.model(c) for c in best_points(singles, (), k)] for k in kinds}
+    found = SimulatedRivals(place, models).measured
     assert {"cavity_lag", "turn_on_offset", "map_too_coarse", "hysteresis"} <= {id for id, _ in kinds}
     for kind in kinds:
         assert found[kind][0] == pytest.approx(best[kind], abs=0.5), kind
@@ -207,11 +207,11 @@ def test_beside_another_cause_it_is_that_of_the_pairs(campaign: Campaign) -> Non
     pairs = [p for p in gains.pairs() if {m.id for m in p.members} & {"warm_up"}]
     best = best_of(pairs, gains.size)
     other = next(m for m in best.members if m.id == "warm_up")
-    place = _Place(gains, (other,))
+    place = RivalPlace(gains, (other,))
     lags = ("cavity_lag", "")
     kinds = [("hysteresis", ""), ("thermal_gradient", ""), lags]
-    models = {k: [place.model(c) for c in _points(pairs, (other,), k)] for k in kinds}
-    found = _Simulated(place, models).measured
+    models = {k: [place.model(c) for c in best_points(pairs, (other,), k)] for k in kinds}
+    found = SimulatedRivals(place, models).measured
     top = {
         k: max(
             p.criterion(gains.size)
@@ -275,7 +275,7 @@ def test_what_is_said_is_true_at_least_as_often(campaign: Campaign) -> None:
     for _ in range(120):
         name = str(rng.choice(list(columns)))
         signal = columns[name] / np.linalg.norm(columns[name]) * rng.uniform(6.0, 20.0)
-        one = _of(gains, signal + rng.standard_normal(gains.size))
+        one = gains.with_target(signal + rng.standard_normal(gains.size))
         pool = [p for p in one.added() if p.members[0].id in columns]
         found, p = _said(one, pool, simulated=True)
         said.append(p)
@@ -326,7 +326,7 @@ def test_a_level_is_as_rare_as_monte_carlo_says() -> None:
     energy = (np.random.default_rng(SEED_OF_DISCREPANCY).standard_normal((20000, freedom)) ** 2).sum(axis=1)
     for value in (22.0, 60.0):
         share = min(np.mean(energy <= value), np.mean(energy >= value))
-        assert _two_sided(value, freedom) == pytest.approx(2.0 * share, abs=8.0 * np.sqrt(share / 20000))
+        assert p_value_of_energy(value, freedom) == pytest.approx(2.0 * share, abs=8.0 * np.sqrt(share / 20000))
 
 
 def test_slow_noise_has_another_colour_than_declared(campaign: Campaign) -> None:
@@ -338,9 +338,9 @@ def test_slow_noise_has_another_colour_than_declared(campaign: Campaign) -> None
 
 def test_a_p_value_is_the_rank_among_the_simulated_ones() -> None:
     simulated = np.arange(499.0)
-    assert _discrepancy("a", 1e3, simulated, 0.0).p_value == pytest.approx(2.0 / 500.0)
-    assert _discrepancy("a", 249.0, simulated, 0.0).p_value == 1.0
-    middle = _discrepancy("a", 0.0, simulated, 0.0)
+    assert compared_statistic("a", 1e3, simulated, 0.0).p_value == pytest.approx(2.0 / 500.0)
+    assert compared_statistic("a", 249.0, simulated, 0.0).p_value == 1.0
+    middle = compared_statistic("a", 0.0, simulated, 0.0)
     assert (middle.simulated_mean, middle.simulated_low) == pytest.approx((249.0, 0.025 * 498.0))
 
 

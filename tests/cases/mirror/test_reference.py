@@ -23,7 +23,7 @@ from gyrotc.mirror import (
 )
 from gyrotc.mirror import table as layout
 from gyrotc.model import Term
-from gyrotc.tables.quantisation import NUMERICS, _limits, outside, quantise
+from gyrotc.tables import NUMERICS, outside, quantise, word_limits
 from libc_build import ROOT, runtime
 from models import bank_of, bank_with_channels, random_history, random_model, random_terms
 
@@ -228,7 +228,7 @@ def test_every_range_stands_in_the_documentation() -> None:
 
 
 def _flat(numeric: str) -> list[tuple[str, float, float]]:
-    return [row for part in _limits(numeric, 24) for row in part]
+    return [row for part in word_limits(numeric, 24) for row in part]
 
 
 def _range(least: float, most: float) -> str:

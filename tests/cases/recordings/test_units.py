@@ -108,9 +108,9 @@ def test_kinds_and_names_of_channels() -> None:
 def test_the_bounds_in_other_units_are_those_of_the_table() -> None:
     from gyrotc.recordings import plausibility
 
-    for unit, factor in plausibility._RATES.items():
+    for unit, factor in plausibility.RATE_UNITS_DPH.items():
         assert conversion(unit, "rate").factor == pytest.approx(factor, rel=1e-15)
-    for unit, factor in plausibility._TIMES.items():
+    for unit, factor in plausibility.TIME_UNITS_S.items():
         assert conversion(unit, "time").factor == factor
 
 

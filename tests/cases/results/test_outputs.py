@@ -513,7 +513,7 @@ def test_output_that_cannot_be_written_is_reported_once(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(sys, "stdout", Full())
-    assert [main._flushed(status) for status in (2, 0)] == [2, 2]
+    assert [main.flushed(status) for status in (2, 0)] == [2, 2]
     assert capsys.readouterr().err == "gyrotc: standard output: No space left on device\n"
 
 

@@ -262,7 +262,8 @@ def test_attributes_are_in_the_units_of_the_inputs() -> None:
     x = rng.uniform(-40.0, 60.0, (500, 3))
     y = np.exp(-np.sum(((x - 10.0) / 40.0) ** 2, axis=1)) + 1e-3 * x[:, 1]
     found = RBFNetworkRegressor(n_centers=20).fit(x, y)
-    value = found.intercept_ + (x - found._middle) @ found.coef_
+    middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    value = found.intercept_ + (x - middle) @ found.coef_
     for center, width, weight in zip(found.centers_, found.widths_, found.weights_, strict=True):
         value = value + weight * np.exp(-np.sum(((x - center) / width) ** 2, axis=1))
     np.testing.assert_allclose(found.predict(x), value, rtol=1e-9)

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.mirror import evaluate_map
-from gyrotc.mirror.f32 import FUSIBLE, _plus
+from gyrotc.mirror import FUSIBLE, evaluate_map, product_plus
 from gyrotc.tables import N_PROBES, quantise
 from self_tests import OK, RIGHT, models, native, write_sources
 
@@ -35,7 +34,7 @@ def test_fused_products_are_those_of_exact_arithmetic() -> None:
     rng = np.random.default_rng(7)
     a, b = rng.normal(0, 3, 2000).astype(np.float32), rng.normal(0, 3, 2000).astype(np.float32)
     c = (-(a.astype(np.float64) * b) * rng.choice([1.0, 0.5, 1e-4, 1e4], 2000)).astype(np.float32)
-    found = _plus("weight", a, b, c, frozenset({"weight"}))
+    found = product_plus("weight", a, b, c, frozenset({"weight"}))
     for x, y, z, value in zip(a, b, c, found, strict=True):
         exact = Fraction(float(x)) * Fraction(float(y)) + Fraction(float(z))
         near = [Fraction(float(np.nextafter(value, np.float32(d)))) for d in (-np.inf, np.inf)]

@@ -142,13 +142,14 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[_Compi
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(toolchain, "compile_objects", counting)
-    monkeypatch.setattr(toolchain, "_made", {})
+    toolchain.forget_objects()
     yield counted
+    toolchain.forget_objects()
 
 
 def _asked(source: Path, work: Path, target: Target = HOST, *, fresh: bool = False) -> Object:
     """As a process that has just begun."""
-    toolchain._made.clear()
+    toolchain.forget_objects()
     return shared_object(target, source, work, include=source.parent, fresh=fresh)
 
 
@@ -187,13 +188,15 @@ def test_another_compiler_of_the_same_name_makes_its_own_objects(
     source: Path, tmp_path: Path, compiled: _Compiled, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _asked(source, tmp_path)
-    known = toolchain._identity(HOST.compiler)
+    known = toolchain.compiler_identity(HOST.compiler)
     assert len(known) == 4, "version, driver, compiler proper, assembler"
     for changed in range(len(known)):
-        monkeypatch.setattr(toolchain, "_identity", lambda _, k=changed: [*known[:k], known[k] + "1", *known[k + 1 :]])
+        monkeypatch.setattr(
+            toolchain, "compiler_identity", lambda _, k=changed: [*known[:k], known[k] + "1", *known[k + 1 :]]
+        )
         _asked(source, tmp_path)
         assert compiled.count == 2 + changed
-    monkeypatch.setattr(toolchain, "_identity", lambda _: [])
+    monkeypatch.setattr(toolchain, "compiler_identity", lambda _: [])
     _asked(source, tmp_path)
     assert compiled.count == 6, "a compiler that cannot be distinguished from others compiles each time"
 
@@ -212,7 +215,7 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
     _asked(source, tmp_path)
     [other] = set(cache.folder().glob("*.object")) - {path}
     (source.parent / "size.h").write_text("#define SIZE 3\n")
-    head = len(cache._head("", b""))
+    head = len(cache.head_of_content("", b""))
     spoiled = (
         b"",
         whole[:-1],
@@ -237,7 +240,7 @@ def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, co
     job = replace(job_of(emitted(tmp_path / "a")), trusted=False)
     first = [entry.content() for entry in board_entries(job, target)]
     assert all(entry["status"] == "pass" for entry in first)
-    toolchain._made.clear()
+    toolchain.forget_objects()
     before = compiled.count
     assert [entry.content() for entry in board_entries(job, target)] == first
     assert compiled.count == before, "the runtime is compiled once"

@@ -22,7 +22,7 @@ from conftest import HOST, Command, invoked, on_terminal
 from emitted import emitted
 from gyrotc.cli import progress as stage_module
 from gyrotc.cli.application import GROUPS, INSTEAD
-from gyrotc.cli.main import _hoisted, application, run
+from gyrotc.cli.main import application, hoisted, run
 from gyrotc.cli.options import JsonOption
 from gyrotc.cli.output import folded
 from gyrotc.cli.progress import BUILD, DIAGNOSE, EMIT, FIT, StageLine
@@ -37,9 +37,9 @@ PROGRAM = Path(sys.executable).with_name("gyrotc")
 
 
 def test_options_of_the_whole_program_stand_anywhere() -> None:
-    assert _hoisted(["build", "data", "-q", "--out", "x"]) == ["-q", "build", "data", "--out", "x"]
-    assert _hoisted(["check", "--", "-q"]) == ["check", "--", "-q"]
-    assert _hoisted(["--verbose", "check"]) == ["--verbose", "check"]
+    assert hoisted(["build", "data", "-q", "--out", "x"]) == ["-q", "build", "data", "--out", "x"]
+    assert hoisted(["check", "--", "-q"]) == ["check", "--", "-q"]
+    assert hoisted(["--verbose", "check"]) == ["--verbose", "check"]
 
 
 def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path, gyrotc: Command) -> None:

@@ -270,7 +270,7 @@ def test_rows_that_are_no_samples_are_left_out_with_the_stretch_beside_them(
     monkeypatch.setattr(refits, "choose", lambda search, count: ())
     for early in (True, False):
         held = [(run.data.time_s < 1800.0) == early for run in late.train]
-        late._chosen(held, 1)
+        late.chosen_without(held, 1)
         times = np.concatenate([run.history.time_s[run.usable] for run in seen[-1].runs])
         assert times.size and ((times >= 1800.0) == early).all()
 

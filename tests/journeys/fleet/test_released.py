@@ -25,10 +25,10 @@ def gyro(folder: Path) -> None:
 def test_a_barred_unit_stays_so_until_it_is_released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gyro(tmp_path)
     out = tmp_path / "out"
-    summed = run._one_of_each_serial
+    summed = run.one_of_each_serial
     monkeypatch.setattr(
         run,
-        "_one_of_each_serial",
+        "one_of_each_serial",
         lambda entries: [e.model_copy(update={"findings": ("sign_reversed",)}) for e in summed(entries)],
     )
     run.run_fleet(load_manifest(tmp_path / "fleet.toml"), out, jobs=1)
@@ -71,10 +71,11 @@ def test_a_lot_leaves_out_a_barred_unit(tmp_path: Path, monkeypatch: pytest.Monk
         read.append(place.name)
         return SimpleNamespace(model=SimpleNamespace(serial=place.name, axis=None), by_itself=True)
 
-    monkeypatch.setattr(job, "_unit", unit)
+    monkeypatch.setattr(job, "calibrated_unit", unit)
     monkeypatch.setattr(job, "LEAST_UNITS", 3)
-    assert [one.model.serial for one in job._units(tmp_path, None)] == ["b", "c", "d"]
-    assert read == ["b", "c", "d"]
+    units, left_out = job.calibrated_units(tmp_path, None)
+    assert [one.model.serial for one in units] == ["b", "c", "d"]
+    assert read == ["b", "c", "d"] and left_out == "1 barred by a finding of the fleet"
 
 
 @pytest.mark.parametrize("finding", ["axes_exchanged", "does_not_generalise", "copy_of_other"])
