@@ -32,7 +32,8 @@ class RunRecord:
         history: The whole record at its native rate.
         rate_dph: Measured rate less the mean of all runs, deg/h, shape (n,); 0 where it does not count.
         usable: Rows that may be used, shape (n,).
-        outliers: Rows of the file whose rates were left out as outliers.
+        read: Rows of the file that belong to the run.
+        outliers: Rows of each stretch of them whose rates were left out as outliers.
         environment: Environment as the data set names it.
         channels: Auxiliary channels by name, shape (n,) each.
     """
@@ -42,7 +43,8 @@ class RunRecord:
     rate_dph: FloatArray
     usable: NDArray[np.bool_]
     environment: str = ""
-    outliers: int = 0
+    read: int = 0
+    outliers: tuple[int, ...] = ()
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
@@ -223,6 +225,10 @@ def _record(
     usable = judged.usable(run, rows) & np.isfinite(rows.temperature_c)
     for name in channels:
         usable &= np.isfinite(rows.channels[name])
+    inside = run.in_span(rows.time_s)
+    found = (e.rows for e in judged.of(run).events if (e.kind, e.column) == ("outlier", "rate"))
+    outliers = tuple(end - first for first, end in found if inside[first])
+    read = int(np.count_nonzero(inside))
     group = max(round(min(block_s, 10.0) / run.row_period_s), 1) if run.row_period_s < _ROW_S else 1
     if group > 1:
         rows, usable = grouped_rows(rows, usable, group)
@@ -230,9 +236,8 @@ def _record(
     on = None if run.power_on_s is None else rows.time_s - run.power_on_s
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: without_gaps(rows.time_s, rows.channels[name]) for name in channels}
-    outliers = judged.of(run).count().get("rate outlier", 0)
     rate = np.where(usable, rows.rate_dph, 0.0)
-    return RunRecord(name_of(run), history, rate, usable, run.environment, outliers, values)
+    return RunRecord(name_of(run), history, rate, usable, run.environment, read, outliers, values)
 
 
 def name_of(run: Run) -> str:

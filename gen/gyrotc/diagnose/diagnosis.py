@@ -17,7 +17,7 @@ from ..common.statistics import running_mean
 from ..model import Model
 from ..quality.events import found_events
 from ..quality.judgement import Judged, judge
-from ..recordings.records import Dataset, Run, joined_runs
+from ..recordings.records import Dataset, Run
 from ..results.base import Finding
 from ..results.diagnosed import (
     Diagnosed,
@@ -96,7 +96,7 @@ def diagnose(
     say("reading")
     judged = judged or judge(dataset)
     events = found_events(dataset, judged)
-    stretches = replace(dataset, runs=judged.cut(joined_runs(dataset.runs)))
+    stretches = replace(dataset, runs=judged.cut(dataset.runs))
     found = _diagnosed(stretches, judged, options or FitOptions(), say)
     reported = {"events": tuple(events)}
     steps = (*_about(events), *found.result.next)

@@ -229,7 +229,7 @@ def _of_map(candidate: Candidate) -> bool:
     return CATALOGUE[candidate.id].family == "static_map"
 
 
-_MANY = 8  # single outliers are left out in silence
+_MANY = 8  # few stretches of outliers are left out in silence
 _P_VARIANCE = 1e-4  # weights for even noise cost little, yet a finding is reported: rarer than the 1 % of causes
 _RATIO = 1.25  # of standard deviations, above which uneven variance matters
 _SIGMAS = (0.1, 10.0)  # factors of a standard deviation: beyond them the functions extrapolate
@@ -251,12 +251,12 @@ class Screened:
 
 def screen(records: Records) -> Screened:
     """Runs all screens."""
-    found = sum(run.outliers for run in records.runs)
+    found = [rows for run in records.runs for rows in run.outliers]
     findings: list[tuple[str, float, dict[str, float]]] = []
-    if found >= _MANY:
-        rows = sum(len(run.usable) for run in records.runs)
-        by_chance = float(pdtrc(found - 1, FALSE_ALARMS * len(records.runs)))
-        findings.append(("outliers", by_chance, {"count": float(found), "share": found / rows}))
+    if len(found) >= _MANY:
+        by_chance = float(pdtrc(len(found) - 1, FALSE_ALARMS * len(records.runs)))
+        share = sum(found) / sum(run.read for run in records.runs)
+        findings.append(("outliers", by_chance, {"count": float(sum(found)), "share": share}))
     sigma, p_variance, ratio = _variance(records)
     if sigma is not None:
         findings.append(("noise_variance", p_variance, {"ratio": ratio}))

@@ -92,9 +92,9 @@ def _samples(dataset: Dataset, options: BuildOptions) -> tuple[TrainingData, lis
     training: Sequence[Run] = [run for run in dataset.runs if run.role == "train"]
     if not training:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
-    front = front_end(training, options.block_s)
     judged = judge(dataset)
     training = judged.cut(training)
+    front = front_end(training, options.block_s)
     blocks = [front.blocks(run, judged=judged) for run in training]
     parts = [samples_of(b, front.block_s, k) for k, b in enumerate(blocks)]
     data = joined(parts)

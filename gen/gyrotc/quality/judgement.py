@@ -118,12 +118,12 @@ class Judged:
         return judge_runs([run]).runs[0]
 
     def cut(self, runs: Sequence[Run]) -> tuple[Run, ...]:
-        """Return the runs, cut where the gyro was switched on anew.
+        """Return the runs, joined where spans of a file touch and cut where the gyro was switched on anew.
 
-        Training, diagnosis and the comparison of methods take what follows as a run of its own.
+        Training, diagnosis and the comparison of methods number these.
         """
         found: list[Run] = []
-        for run in runs:
+        for run in joined_runs(runs):
             rest = run
             for time_s in self.of(run).power_ons_s:
                 if not in_limits(np.asarray(time_s), run.from_s, run.to_s, ()):

@@ -24,7 +24,7 @@ from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge, judge_runs
 from ..recordings.fit_options import AUTO, SIMPLE, BuildOptions
 from ..recordings.plausibility import earth_rate_warning
-from ..recordings.records import Dataset, Rows, Run, joined_runs
+from ..recordings.records import Dataset, Rows, Run
 from ..results.base import Finding
 from ..results.evaluation import Pooled
 from ..results.rows import RowsUsed
@@ -186,12 +186,12 @@ def fit_dataset(
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
     say = progress or (lambda _: None)
-    front = front_end(runs, options.block_s)
     if read is None:
         if judged is None:
             say("judging rows")
             judged = judge(dataset)
-        read = _read(dataset, judged.cut(joined_runs(runs)), front, judged, say, channels=options.channels)
+        read = _read(dataset, judged.cut(runs), options, judged, say)
+    front = front_end(read.runs, options.block_s)
     data, power_on = read.data, power_ons(read.runs)
     if data.bias_dph.size < _MIN_SAMPLES:
         raise InputError(
@@ -241,10 +241,9 @@ class Read:
     longest_same_s: float
 
 
-def _read(
-    dataset: Dataset, runs: tuple[Run, ...], front: FrontEnd, judged: Judged, say: Progress, *, channels: bool
-) -> Read:
+def _read(dataset: Dataset, runs: tuple[Run, ...], options: FitOptions, judged: Judged, say: Progress) -> Read:
     """Reads the training runs."""
+    front = front_end(runs, options.block_s)
     parts, columns = [], []
     longest_s = 0.0
     for k, run in enumerate(runs):
@@ -254,7 +253,7 @@ def _read(
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))
         parts.append(samples_of(blocks, front.block_s, k))
         rows = readings_alone(rows)
-        columns.append(seen_by_target(dataset, rows, blocks) if channels else {})
+        columns.append(seen_by_target(dataset, rows, blocks) if options.channels else {})
         del blocks, rows  # before those of the next run are made: a file of 100 Hz fills memory
     whole = {name: np.concatenate([part[name] for part in columns]) for name in columns[0]}
     return Read(runs, joined(parts), whole, rows_used(judged, runs), longest_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ from gyrotc.diagnose import (
     markov_row,
     project,
     ratio_of,
+    records_of,
     residual_log_likelihood,
     score,
     screen,
@@ -42,8 +44,9 @@ from gyrotc.diagnose import (
     view_of_bank,
     without_gaps,
 )
-from gyrotc.recordings import Rows
+from gyrotc.recordings import Rows, load
 from numpy.typing import NDArray
+from recordings import toml, write_csv
 from scipy import stats
 from scipy.integrate import dblquad
 from scipy.linalg import block_diag, null_space
@@ -272,11 +275,28 @@ def test_single_blocks_are_columns_of_the_unit_matrix() -> None:
 
 
 def test_rows_that_were_left_out_as_outliers_are_a_finding_where_they_are_many(records: Records) -> None:
-    few = Records(tuple(replace(run, outliers=2) for run in records.runs), records.block_s)
-    many = Records(tuple(replace(run, outliers=12) for run in records.runs), records.block_s)
+    """One stretch of motion is one event, however many rows it has."""
+    few = Records(tuple(replace(run, read=4000, outliers=(25, 40)) for run in records.runs), records.block_s)
+    many = Records(tuple(replace(run, read=4000, outliers=(1,) * 12) for run in records.runs), records.block_s)
     assert screen(few).findings == ()
     [found] = screen(many).findings
-    assert found.id == "outliers" and found.parameters["count"] == 12 * len(records.runs)
+    assert found.id == "outliers"
+    assert found.parameters == {"count": 12 * len(records.runs), "share": 12 / 4000}
+
+
+def test_the_share_of_outliers_is_that_of_the_rows_of_the_file(tmp_path: Path) -> None:
+    """Rows of 1 s are averaged by ten before the search."""
+    rng = np.random.default_rng(20261130)
+    time = np.arange(14400.0)
+    rate = 0.01 * rng.standard_normal(time.size)
+    spikes = np.arange(500, 14000, 900)
+    rate[spikes] += 1.0
+    write_csv(
+        tmp_path / "a.csv", {"time_s": time, "temperature_c": 20.0 + 15.0 * np.sin(time / 2000.0), "rate_dph": rate}
+    )
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    found = {f.id: f for f in screen(records_of(load(tmp_path), "train", block_s=10.0, average_s=100.0)).findings}
+    assert found["outliers"].parameters == {"count": spikes.size, "share": spikes.size / time.size}
 
 
 def test_normal_noise_has_no_finding(records: Records) -> None:
