@@ -250,16 +250,15 @@ def _with_terms(
 ) -> dict[str, Any]:
     """The model with its terms, and what its uncertainty says of each."""
     content = {**plain.to_dict(), "terms": entries}
-    if content["uncertainty_dph"] is not None:
-        rules = content["uncertainty_dph"]["rules"]
-        rules["terms"] = [
-            fallback_models[e["channel"]].sigma_dph
-            if e["channel"] in fallback_models
-            else start_sigma(
-                e["id"], e["parameters"], rules, samples, readings_of(runs if e["channel"] else (), e["channel"])
-            )
-            for e in entries
-        ]
+    rules = content["uncertainty_dph"]["rules"]
+    rules["terms"] = [
+        fallback_models[e["channel"]].sigma_dph
+        if e["channel"] in fallback_models
+        else start_sigma(
+            e["id"], e["parameters"], rules, samples, readings_of(runs if e["channel"] else (), e["channel"])
+        )
+        for e in entries
+    ]
     return content
 
 

@@ -28,7 +28,6 @@ from ..train.channels import MOST_TERMS, channel_shown, readings_alone, seen_by_
 from ..train.data import MIN_HALF_RANGE_C_PER_MIN, TrainingData, cleaned_samples, joined, scaling_of
 from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_basis
 from ..train.fitting import FrontEnd, samples_of
-from ..train.gaussian import TrainingFailed
 from ..train.methods import fit
 from ..train.plausibility import longest_same_s
 from ..train.process import fit_process
@@ -315,6 +314,9 @@ def completed(
     """The effects, with the strength over T of loops and the overtones of a ripple that the samples show.
 
     Each is found beside the other effects, on the samples `kept` (default: all).
+
+    Raises:
+        TrainingFailed: The model of map and noise cannot be solved.
     """
     out = list(effects)
     for k, effect in enumerate(out):
@@ -324,10 +326,7 @@ def completed(
         if effect.term.overtone is None:
             continue
         data = cleaned_samples(_chosen(runs, [e for e in out if e is not effect], kept))
-        try:
-            found = overtones_of(data, effect.term, effect.values)
-        except TrainingFailed:
-            continue
+        found = overtones_of(data, effect.term, effect.values)
         room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
         out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
     return out
@@ -476,11 +475,8 @@ def without_intercepts(data: TrainingData, power_on: NDArray[np.int64]) -> Train
         return data
     out = data
     for _ in range(_LEVELLINGS):
-        try:
-            samples = cleaned_samples(out)
-            process = fit_process(samples, scaling_of(samples))
-        except TrainingFailed:
-            break
+        samples = cleaned_samples(out)
+        process = fit_process(samples, scaling_of(samples))
         at = scaling_of(samples).normalise(data.temperature_c, data.slope_c_per_min)
         left = data.bias_dph - process.mean_dph(*at)
         mean = np.bincount(index, left) / count

@@ -77,8 +77,8 @@ class Shipping:
         refuted: Numbers of the effects that make left-out history worse.
         candidate: What model selection would emit without them.
         left_out: What was left out, in words.
-        before_dph, after_dph: RMS over these pieces without and with the last effects tried, all pieces counting alike;
-            None where nothing can be left out, or nothing was to be added.
+        before_dph, after_dph: RMS over these pieces without effects, and with those that are shipped (if none is: with
+            those tried last), all pieces counting alike; None if no piece can be judged, or none was tried.
         reason: Why nothing is shipped; empty where something is.
     """
 
@@ -112,8 +112,8 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
     """
     best = _comparison(refitting, [], effects)
     candidate = best.choice.chosen
-    scores = _covered_scores(best, candidate)
-    before, after = _rms_of(scores), None
+    without = scores = _covered_scores(best, candidate)
+    last: FloatArray | None = None
     able = [k for k, effect in enumerate(effects) if effect.term.table is not None][:MOST_TERMS]
     shipped: list[Effect] = []
     refuted: list[int] = []
@@ -123,14 +123,13 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
     for numbers in [able] if not probabilities and able else [[k] for k in able]:
         tried = [*shipped, *(effects[k] for k in numbers)]
         beside = _comparison(refitting, tried, effects)
-        new_scores = _covered_scores(beside, "mrbf")
-        after = _rms_of(new_scores)
+        last = new_scores = _covered_scores(beside, "mrbf")
         gain = PieceGain.of(scores, new_scores)
         if gain is None:
             reason = "fewer than two pieces of the training history can be left out and judged"
         elif gain.refutes:
             refuted += numbers
-            reason = f"it makes pieces of the training history that were left out worse{_in_words(before, after)}"
+            reason = f"it makes pieces of the training history that were left out worse{_in_words(scores, new_scores)}"
         elif not probabilities:
             reason = "a single cycle cannot tell whether states hold on the next one: record it again at another rate"
         elif gain.ships(probabilities[numbers[0]]):
@@ -138,14 +137,18 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
         else:
             reason = (
                 f"on pieces of the training history that were left out it changes RMS by {np.expm1(-gain.mean):+.1%} "
-                f"with a doubt of {gain.doubt:.1%}{_in_words(before, after)}, which is not enough for a cause with a "
-                f"probability of {probabilities[numbers[0]]:.0%}"
+                f"with a doubt of {gain.doubt:.1%}{_in_words(scores, new_scores)}, which is not enough for a cause "
+                f"with a probability of {probabilities[numbers[0]]:.0%}"
             )
-    return Shipping(shipped, refuted, candidate, [best.pieces()], before, after, "" if shipped else reason)
+    after = scores if shipped else last
+    rms = _rms_of(without), None if after is None else _rms_of(after)
+    return Shipping(shipped, refuted, candidate, [best.pieces()], *rms, "" if shipped else reason)
 
 
-def _in_words(before: float | None, after: float | None) -> str:
-    return "" if before is None or after is None else f" (RMS {before:.3g} -> {after:.3g} deg/h)"
+def _in_words(before: FloatArray, after: FloatArray) -> str:
+    """Return what is left on the pieces that both scores know; a gain has two of them at least."""
+    both = np.isfinite(before + after)
+    return f" (RMS {_rms_of(before[both]):.3g} -> {_rms_of(after[both]):.3g} deg/h)"
 
 
 def _comparison(refitting: Refitting, effects: Sequence[Effect], every: Sequence[Effect]) -> CandidateComparison:

@@ -89,6 +89,10 @@ class Change:
     gap_s: float = 0.0
     restarts: bool = False
 
+    def falls_into(self, gap_s: tuple[float, float]) -> bool:
+        """Test whether it happened while rows were missing; `gap_s`: times of the rows on both sides of the gap."""
+        return self.gap_s > 0.0 and self.time_s[1] <= gap_s[0] and gap_s[1] <= self.time_s[2]
+
 
 @dataclass(frozen=True, slots=True)
 class _At:

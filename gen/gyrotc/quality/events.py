@@ -45,10 +45,10 @@ def _at(event: Finding) -> float:
 def _gaps(judgement: Judgement) -> Iterator[Finding]:
     """Yield the times without rows, other than those after which the gyro was restarted."""
     run = judgement.run
-    again = [change.time_s[1] for change in judgement.changes if change.restarts]
+    restarts = [change for change in judgement.changes if change.restarts]
     for event in judgement.events:
         start, length = event.time_s[0], event.size
-        if event.kind == "gap" and start not in again:
+        if event.kind == "gap" and not any(change.falls_into(event.time_s) for change in restarts):
             text = f"{run.file} has no rows for {length:g} s from {start:g} s on."
             limits = (start, start, start + run.row_period_s)
             yield finding("dropout", text, run, time_s=limits, size=((length,) * 3, "s"))

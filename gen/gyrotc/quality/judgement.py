@@ -184,7 +184,7 @@ def _with_changes(judgement: Judgement, changes: tuple[Change, ...], time_s: Flo
     events = list(judgement.events)
     gaps = [event.time_s for event in events if event.kind == "gap"]
     changes = tuple(
-        replace(one, restarts=one.kind == "step" and any(a <= one.time_s[0] <= b for a, b in gaps)) for one in changes
+        replace(one, restarts=one.kind == "step" and any(one.falls_into(gap) for gap in gaps)) for one in changes
     )
     for change, back in paired(changes):
         low, high = change.time_s[1], change.time_s[2] if back is None else back.time_s[2]

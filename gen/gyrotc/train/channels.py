@@ -259,7 +259,7 @@ def chosen_channels(
     columns: Mapping[str, FloatArray],
     average_s: float,
 ) -> ChannelChoice | None:
-    """Choose channels; None if there is none, or no map beside which to judge them.
+    """Choose channels; None if there is none.
 
     Args:
         dataset: The recordings.
@@ -267,6 +267,9 @@ def chosen_channels(
         power_on: Number of the power-on of each run, by its index; None: each run is one.
         columns: Of every candidate at these samples, shape (n,) each.
         average_s: Averaging of what is judged, s.
+
+    Raises:
+        TrainingFailed: There is no map to judge them with.
     """
     if not columns:
         return None
@@ -278,14 +281,11 @@ def chosen_channels(
     lines = {n: shape_of("line", v, references[n], samples) for n, v in able.items()}
     seen, of = {n: line.columns[known] for n, line in lines.items()}, samples.select(known)
     arguments = of, scaling, power_on
-    try:
-        alike = _alike(Beside.of(*arguments, Regressors(seen), {}, average_s))
-        regressors = Regressors(seen, {n: frozenset(others) for n, others in alike.items()})
-        trial = choose_regressors(*arguments, regressors, average_s, MOST_TERMS)
-        shapes = {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}
-        trial, chosen = _bent(trial, shapes, arguments, known, average_s)
-    except TrainingFailed:
-        return None
+    alike = _alike(Beside.of(*arguments, Regressors(seen), {}, average_s))
+    regressors = Regressors(seen, {n: frozenset(others) for n, others in alike.items()})
+    trial = choose_regressors(*arguments, regressors, average_s, MOST_TERMS)
+    shapes = {n: _shapes(lines[n], able[n], samples) for n in trial.chosen}
+    trial, chosen = _bent(trial, shapes, arguments, known, average_s)
     parts = {n: chosen[n].columns @ trial.weights[n] for n in trial.chosen}
     added = np.sum(list(parts.values()), axis=0) if parts else np.zeros(len(samples))
     rows = [_row(n, trial, chosen, parts, samples, against[n], alike.get(n, {})) for n in columns]
@@ -419,7 +419,6 @@ def with_channels(
     terms: list[dict[str, Any]] = []
     sigmas, stood = [], np.zeros(len(samples))
     content = model.to_dict()
-    rules = content["uncertainty_dph"]["rules"] if content["uncertainty_dph"] else {}
     for name in choice.trial.chosen:
         shape, weights = choice.shapes[name], choice.trial.weights[name]
         terms.append({"id": shape.cause.id, "parameters": shape.parameters(weights), "channel": name})
@@ -430,8 +429,7 @@ def with_channels(
         terms[-1]["stand_in"] = fallback_model.network
         sigmas.append(fallback_model.sigma_dph)
         stood += fallback_model.added
-    if rules:
-        rules["terms"] = sigmas
+    content["uncertainty_dph"]["rules"]["terms"] = sigmas
     guards = {name: channel_guard(runs, name, missing_s) for name in sorted(choice.trial.chosen)}
     both = np.concatenate([choice.added, stood])
     effects = [min(0.0, float(both.min())), max(0.0, float(both.max()))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,16 +90,28 @@ def cleaned_samples(data: TrainingData) -> TrainingData:
             positive.
     """
     columns = _checked(data)
+    order = _clean_order(columns)
+    if order is not None:
+        columns = {name: column[order] for name, column in columns.items()}
+    run = columns.pop("run").astype(np.int64)
+    return TrainingData(run=run, **columns)
+
+
+def cleaned_beside(data: TrainingData, values: FloatArray) -> FloatArray:
+    """Return values that samples have, shape (n,), for those that `cleaned_samples` returns, in their order."""
+    order = _clean_order(_checked(data))
+    return values if order is None else values[order]
+
+
+def _clean_order(columns: Mapping[str, FloatArray]) -> NDArray[np.intp] | None:
+    """Return which samples are kept, in order of run and time; None: all of them as they are."""
     run, time = np.diff(columns["run"]), np.diff(columns["time_s"])
-    if np.all((run > 0) | ((run == 0) & (time > 0))):  # in order as it is
-        run_of = columns.pop("run").astype(np.int64)
-        return TrainingData(run=run_of, **columns)
+    if np.all((run > 0) | ((run == 0) & (time > 0))):
+        return None
     keys = ("run", "time_s", "temperature_c", "slope_c_per_min", "bias_dph")  # the first counts most
     order = np.lexsort([columns[name] for name in reversed(keys)])
     same = np.all([np.diff(columns[name][order]) == 0 for name in keys], axis=0)
-    first = np.r_[True, ~same]
-    kept = {name: column[order][first] for name, column in columns.items() if name != "run"}
-    return TrainingData(run=columns["run"][order][first].astype(np.int64), **kept)
+    return np.asarray(order[np.r_[True, ~same]])
 
 
 def _checked(data: TrainingData) -> dict[str, FloatArray]:

@@ -31,7 +31,6 @@ from ..results.rows import RowsUsed
 from ..results.training import CandidateModel, DeclaredUnits, MapMeans, NoiseTerms, Training
 from .channels import chosen_channels, readings_alone, seen_by_target, with_channels
 from .data import TrainingData, cleaned_samples, joined, scaling_of
-from .gaussian import TrainingFailed
 from .methods import fit
 from .networks import snapped
 from .noise import noise_terms, sensitivities, stretches
@@ -179,6 +178,7 @@ def fit_dataset(
 
     Raises:
         InputError: No training run, or too few usable samples.
+        TrainingFailed: The model of map and noise, which says what a correction leaves, cannot be solved.
     """
     if options.prior is not None:
         options.prior.check_axis(dataset.axis)
@@ -273,7 +273,7 @@ def power_ons(runs: Sequence[Run]) -> NDArray[np.int64]:
 def _means(data: TrainingData, fitted: Fit) -> MapMeans:
     """Return what a lot is learnt from, in as many digits as its noise leaves."""
     samples = cleaned_samples(data)
-    found, mean_s = means_of_unit(samples, scaling_of(samples), fitted.outcome.process)
+    found, mean_s = means_of_unit(samples, scaling_of(samples), fitted.process)
 
     resolution = max(_MEANS_SHARE * found.sigma_dph, 10.0**-_MAX_DECIMALS)  # recordings may have no noise at all
     decimals = math.ceil(-math.log10(resolution))
@@ -316,13 +316,11 @@ def _judged(data: TrainingData, fitted: Fit, average_s: float) -> Fit:
     if fitted.folds or fitted.known or fitted.method not in (*SIMPLE, "mrbf"):
         return fitted
     history = TrainingHistory.of(cleaned_samples(data), fitted.scaling, fitted.power_on)
-    try:
-        history, smooth_map = history.without_outliers(smooth(history.count))
-    except TrainingFailed:
-        return fitted
+    history, smooth_map = history.without_outliers(smooth(history.count))
     found = smooth_map if fitted.method == "mrbf" else LeastSquares(history.power_ons, powers_of_method(fitted.method))
     left_out = [averages for [averages] in history.unseen([found], average_s)]
-    return replace(fitted, process=Process.of(history, smooth_map), folds=history.folds, left_out=left_out)
+    process = fitted.process or Process.of(history, smooth_map)
+    return replace(fitted, process=process, folds=history.folds, left_out=left_out)
 
 
 def model_of(
@@ -353,7 +351,7 @@ def model_of(
     if fitted.prior is not None:
         meta["prior"] = fitted.prior.text
     meta["warnings"] = [warning for warning in warnings if warning]
-    known = _uncertainty(data, fitted, front.block_s, added)
+    known = uncertainty_of(data, fitted, _UNCERTAINTY_CELLS, front.block_s, added)
     return Model.from_dict(
         {
             "schema": "gyrotc.model/1",
@@ -377,22 +375,12 @@ def model_of(
             "noise_floor_source": "estimated",
             "average_s": options.average_s,
             "uncertainty_dph": known,
-            "rezero_dph": rezero_dph(known["rules"]) if known else 0.0,
+            "rezero_dph": rezero_dph(known["rules"]),
             "data": [_data_file(run) for run in dataset.runs],
             "seed": options.seed,
             "meta": meta,
         }
     )
-
-
-def _uncertainty(
-    data: TrainingData, fitted: Fit, block_s: float, added: NDArray[np.float64] | float
-) -> dict[str, Any] | None:
-    """Of the corrections; None where the process behind them cannot be solved."""
-    try:
-        return uncertainty_of(data, fitted, _UNCERTAINTY_CELLS, block_s, added)
-    except TrainingFailed:
-        return None
 
 
 def _earth_rate(dataset: Dataset) -> str:

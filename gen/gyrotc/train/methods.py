@@ -105,7 +105,7 @@ def fit(
         if against:
             findings.append(_beyond(method, against))
     mean = float(np.average(samples.bias_dph, weights=samples.weight))
-    bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean)
+    bare = Fit(method, outcome, scaling, findings, 0.0, average_s, mean, process=outcome.process)
     residual = samples.bias_dph - predict(bare, samples.temperature_c, samples.slope_c_per_min)
     floor = floor_dph(samples, residual, average_s)
     found = replace(bare, noise_floor_dph=floor, reason=reason, power_on=power_on)
@@ -115,7 +115,7 @@ def fit(
         return replace(
             found,
             candidates=selected.rows,
-            process=selected.process,
+            process=outcome.process or selected.process,
             folds=selected.folds,
             left_out=selected.left_out,
         )

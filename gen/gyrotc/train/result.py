@@ -55,7 +55,7 @@ class Fit:
         lot: What a lot did for it, where one was given.
         prior: What an earlier model did for it, where one was given.
         known: What it follows, where a lot or an earlier model was used, for `training.json`.
-        process: The smooth map of its samples, where model selection has made one.
+        process: What the networks follow, or else the smooth map of the samples where one was made; None: none was.
         power_on: Number of the power-on of each run, by its index; None: each run is one.
         folds: Pieces of history that were left out in turn, where model selection has done it.
         left_out: What the correction leaves on each of them without having seen it, deg/h.

@@ -33,7 +33,7 @@ from scipy.special import ndtri, stdtrit
 from ..causes.hysteresis import strength
 from ..common.arrays import FloatArray
 from ..mirror.recursions import play
-from .data import TrainingData, bin_of, cleaned_samples
+from .data import TrainingData, bin_of, cleaned_beside, cleaned_samples
 from .gaussian import GaussianMap
 from .process import Process, fit_process
 from .result import Fit, predict
@@ -55,7 +55,7 @@ class UncertaintyInputs:
     sigma: FloatArray  # of the map at each sample, deg/h
     turn_on: TurnOn
     covered: tuple[FloatArray, FloatArray]  # points where training was: C, C/min
-    added: FloatArray | float = 0.0  # what terms add to the map at each sample, deg/h
+    added: FloatArray  # what terms add to the map at each sample, deg/h
 
 
 def rules_of(known: UncertaintyInputs, block_s: float) -> dict[str, Any]:
@@ -316,7 +316,7 @@ def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) ->
     r = _index(data.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
     seen = np.zeros(cells[::-1], dtype=bool)
     seen[r, t] = True
-    if fit.outcome.process and (asked := fit.outcome.process.asked):
+    if fit.process and (asked := fit.process.asked):
         r = _index(asked.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
         seen[r, _index(asked.temperature_c, fit.scaling.temperature_c, cells[0])] = True
     return {"cells": list(cells), "rows": ["".join("1" if x else "0" for x in row) for row in seen]}
@@ -339,10 +339,10 @@ def uncertainty_of(
         fit: The trained map.
         cells: Number of cells of T and of dT/dt.
         block_s: Length of a block, s.
-        added: What terms add to the map at each sample, deg/h; the samples are in order then.
+        added: What terms add to the map at each sample of `data`, deg/h.
     """
     samples = cleaned_samples(data)
-    process = fit.outcome.process or fit.process or fit_process(samples, fit.scaling, _power_on(samples, fit))
+    process = fit.process or fit_process(samples, fit.scaling, _power_on(samples, fit))
     errors = _Errors.of(process, fit)
     at_samples = errors.at_samples(samples)
     t, r = _points(fit)
@@ -355,9 +355,9 @@ def uncertainty_of(
     seen = _means(_cell(fit, cells, *asked), of_asked, weight, cells, everywhere)
     unseen = _means(place, at_points, (~covered).astype(np.float64), cells, everywhere)
     points = t[covered], r[covered]
-    added = added if np.size(added) in (1, len(samples)) else 0.0  # duplicates were dropped
+    beside = cleaned_beside(data, np.broadcast_to(added, len(data)))
     turn_on = errors.turn_on
-    known = UncertaintyInputs(samples, fit, process, np.sqrt(at_samples), turn_on, points, added)
+    known = UncertaintyInputs(samples, fit, process, np.sqrt(at_samples), turn_on, points, beside)
     constant = turn_on.sigma_dph**2
     return {
         "cells": list(cells),

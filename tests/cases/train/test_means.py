@@ -50,3 +50,19 @@ def test_the_residual_of_white_noise_is_the_floor(tmp_path: Path, gyrotc: Comman
     found = json.loads((tmp_path / "out" / "evaluate.json").read_text())
     after = found["exam"]["after"]["rms_dph"]
     assert after / found["noise_floor_dph"] == pytest.approx(1.0, abs=0.12)
+
+
+def test_the_means_of_a_unit_do_not_depend_on_the_correction_that_was_asked_for(tmp_path: Path) -> None:
+    """Slow noise, which differences of means do not show, counts whether a line or Gaussians are fitted."""
+    rng = np.random.default_rng(SEED)
+    time = np.arange(0.0, 3600.0 * HOURS, 10.0)
+    for k in range(3):
+        walk = 1e-3 * np.cumsum(rng.standard_normal(time.size))
+        rate = walk + NOISE_DPH * rng.standard_normal(time.size)
+        write_csv(tmp_path / f"{k}.csv", {"time_s": time, "temperature_c": 30.0 * np.sin(time / 4e3), "rate_dph": rate})
+    (tmp_path / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(3))), "utf-8")
+    dataset = load(tmp_path)
+    line, gaussians = (fit_dataset(dataset, FitOptions(method=m)).training.means for m in ("linear", "mrbf"))
+    assert line is not None and gaussians is not None
+    assert line.sigma_dph == pytest.approx(gaussians.sigma_dph)
+    assert line.bias_dph == pytest.approx(gaussians.bias_dph, abs=1e-3 * line.sigma_dph)

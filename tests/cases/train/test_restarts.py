@@ -10,6 +10,7 @@ from conftest import Command
 from gyrotc.diagnose import diagnose, series_of
 from gyrotc.jobs import compare
 from gyrotc.model import load_model
+from gyrotc.quality import found_events
 from gyrotc.recordings import load
 from gyrotc.train import FitOptions, fit_dataset
 from recordings import toml, write_csv
@@ -19,8 +20,11 @@ STOP_S, BACK_S = 10_000.0, 10_400.0
 STEP_DPH, NOISE_DPH = 0.012, 2.2e-3
 
 
-def recorded(folder: Path, files: int) -> Path:
-    """Ramps of eight hours; the first file has no rows for seven minutes and goes on at another level."""
+def recorded(folder: Path, files: int, garbage: int = 0) -> Path:
+    """Ramps of eight hours; the first file has no rows for seven minutes and goes on at another level.
+
+    So many rows on either side of the gap are `garbage`.
+    """
     rng = np.random.default_rng(SEED)
     print("seed", SEED)
     time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
@@ -29,6 +33,8 @@ def recorded(folder: Path, files: int) -> Path:
         rate = 0.01 + 2e-4 * temperature + 1e-6 * temperature**2 + NOISE_DPH * rng.standard_normal(time.size)
         kept = (time < STOP_S) | (time > BACK_S) if k == 0 else np.ones(time.size, dtype=bool)
         rate += STEP_DPH * (time > STOP_S) * (k == 0)
+        near = (time > STOP_S - ROW_S * garbage) & (time <= BACK_S + ROW_S * garbage)
+        rate += 5.0 * near * rng.standard_normal(time.size) * (k == 0 and garbage > 0)
         columns = {"time_s": time, "temperature_c": temperature, "rate_dph": rate}
         write_csv(folder / f"{k}.csv", {name: values[kept] for name, values in columns.items()})
     (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(files))), "utf-8")
@@ -67,3 +73,10 @@ def test_diagnosis_takes_both_sides_of_a_restart_as_runs(tmp_path: Path) -> None
     series = series_of(found)
     assert series is not None
     assert [run.name for run in series.runs] == ["0.csv", f"0.csv@{BACK_S + ROW_S:g}", "1.csv", "2.csv"]
+
+
+@pytest.mark.parametrize("garbage", [0, 3])
+def test_a_restart_is_one_event_whatever_the_rows_beside_the_gap_are(tmp_path: Path, garbage: int) -> None:
+    """Rows beside the gap that are left out leave neither a step nor a gap besides the restart."""
+    found = [event.id for event in found_events(load(recorded(tmp_path, 3, garbage)))]
+    assert [id for id in found if id != "rate_outliers"] == ["restart"]

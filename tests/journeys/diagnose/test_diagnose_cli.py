@@ -312,6 +312,7 @@ def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     assert choose_shipped(blind, [wrong], [0.99]).shipped == []
     both = choose_shipped(blind, [GRADIENT_TO_REMOVE, wrong], [0.99, 0.99])
     assert both.shipped == [GRADIENT_TO_REMOVE] and both.refuted == [1], "what makes it worse is left"
+    assert (both.before_dph, both.after_dph) == (found.before_dph, found.after_dph), "figures are of what is shipped"
     offset = replace(GRADIENT_TO_REMOVE, id="turn_on_offset", values={"sigma_dph": 1e-3})
     alone = choose_shipped(blind, [offset], [0.99])
     assert alone.shipped == [] and alone.refuted == [] and alone.reason == "no table holds what is named"
