@@ -4,11 +4,16 @@
 
 writes them into a folder. They are no part of the sources: the site (tools/site_pages.py) and the archives
 (tools/archives.py) have them.
+
+    python tools/reference.py --packages
+
+writes the table of packages into docs/design.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import importlib
 import inspect
 import re
@@ -147,6 +152,36 @@ def format_page() -> str:
     return PLACE.sub(table, (ROOT / "docs" / "FORMAT.md").read_text("utf-8"))
 
 
+#: Where docs/design.md has the table of packages.
+PACKAGES = re.compile(r"(?<=<!-- packages -->\n).*?(?=<!-- /packages -->)", re.DOTALL)
+
+
+def packages() -> str:
+    """Return a table of the packages in the order of gen/pyproject.toml: their docstrings, and what they import."""
+    (layers,) = re.findall(r"^layers = \[(.*?)^\]", (ROOT / "gen" / "pyproject.toml").read_text("utf-8"), re.M | re.S)
+    names = re.findall(r"\w+", layers)
+    lines = ["| package | contents | imports |", "| --- | --- | --- |"]
+    for name in names:
+        place = ROOT / "gen" / "gyrotc" / name
+        files = sorted(place.rglob("*.py")) or [place.with_suffix(".py")]
+        first = place / "__init__.py" if place.is_dir() else files[0]
+        text = (ast.get_docstring(ast.parse(first.read_text("utf-8"))) or "").partition("\n\n")[0]
+        others = [other for other in names if other != name and other in _imported(files)]
+        lines.append(f"| `{name}` | {_cell(text)} | {', '.join(f'`{other}`' for other in others)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _imported(files: list[Path]) -> set[str]:
+    """Return the packages of gyrotc that files import from."""
+    found = set()
+    for file in files:
+        depth = len(file.relative_to(ROOT / "gen" / "gyrotc").parts)
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level == depth:
+                found |= {node.module.partition(".")[0]} if node.module else {alias.name for alias in node.names}
+    return found
+
+
 PAGES = {
     "FORMAT.md": format_page,
     "reference-c.md": c_page,
@@ -164,8 +199,14 @@ def write(out: Path, python: str | Path = sys.executable) -> None:
 def main() -> int:
     """Writes the pages from the sources beside this file, whichever are installed: of these only the core is taken."""
     parser = argparse.ArgumentParser(prog="tools/reference.py", description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    out = parser.parse_args().out
+    parser.add_argument("out", type=Path, nargs="?")
+    parser.add_argument("--packages", action="store_true", help="write the table of packages into docs/design.md")
+    given = parser.parse_args()
+    if given.packages:
+        page = ROOT / "docs" / "design.md"
+        page.write_text(PACKAGES.sub(lambda _: packages(), page.read_text("utf-8")), "utf-8")
+        return 0
+    out = given.out or parser.error("a folder, or --packages")
     sys.path.insert(0, str(ROOT / "gen"))
     sys.meta_path.sort(key=lambda finder: "gyrotc" in type(finder).__module__)
     out.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What is said of a result: figures through the compiled code, findings, limits, uncertainty budget, changes."""
+"""Judge a result: figures through the compiled code, findings, limits, uncertainty budget, changes."""
 
 import lazy_loader
 

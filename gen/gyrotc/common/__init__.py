@@ -1,4 +1,4 @@
-"""What every package may use: errors, texts, opening of input files, metrics and small statistics of arrays."""
+"""Errors, texts, opening of input files, metrics and small statistics of arrays, for every package."""
 
 import lazy_loader
 

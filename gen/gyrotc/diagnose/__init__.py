@@ -1,4 +1,4 @@
-"""Diagnosis: what the simulation gets wrong, the named cause, the extended model, the measured gain."""
+"""Find and name the cause of what a static map does not explain; extend the model and measure the gain."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What people read: HTML pages and the pictures in them, made from results."""
+"""HTML pages and their pictures, made from results."""
 
 import lazy_loader
 

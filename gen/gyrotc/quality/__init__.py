@@ -1,4 +1,4 @@
-"""Whether recordings are sound: facts of runs, findings, events, and the report of `gyrotc check`."""
+"""Judge recordings: facts of runs, findings, events, and the report of `gyrotc check`."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Recordings on disk become a `Dataset`: files, units, runs. docs/recordings.md says what a folder may hold."""
+"""Read recordings into a `Dataset`: files, units, runs. docs/recordings.md says what a folder may contain."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""The JSON results as typed objects: one class writes a result, and pages and lines read the same class.
+"""JSON results as typed objects: one class writes a result, and pages and commands read the same class.
 
 `gyrotc schema` and the tables of fields in the manual are made from the classes (`cli/schema.py`).
 """

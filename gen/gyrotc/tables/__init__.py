@@ -1,4 +1,4 @@
-"""From a model to a table, and from a table to C files; states what rounding costs."""
+"""Round a model to a table and write the table as C files, with a bound of the rounding error."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Training: samples in, networks out (docs/training.md)."""
+"""Train networks on samples: process, folds, choice, compression, uncertainty (docs/training.md)."""
 
 import lazy_loader
 

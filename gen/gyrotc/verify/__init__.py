@@ -1,4 +1,4 @@
-"""Proof that emitted C is what the model gives and computes on every target what the reference computes."""
+"""Compile and run generated C on every target, and compare it bit for bit with the reference."""
 
 import lazy_loader
 

@@ -64,6 +64,12 @@ def test_every_place_of_a_table_names_a_command_that_prints_it() -> None:
     assert sorted(places) == sorted(set(kinds()) - {"model"})
 
 
+def test_the_packages_of_the_design_are_those_of_the_sources() -> None:
+    """`python tools/reference.py --packages` writes them."""
+    found = reference.PACKAGES.search((ROOT / "docs" / "design.md").read_text("utf-8"))
+    assert found is not None and found[0] == reference.packages()
+
+
 def test_the_site_has_every_page() -> None:
     """A page that stands in no list of the site is found by nobody."""
     text = (ROOT / "docs" / "mkdocs.yml").read_text("utf-8")
