@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from ..common.arrays import BoolArray, Progress
 from ..common.metrics import Averages
 from ..model import Model
+from ..results.diagnosed import GainOnUnseen
 from ..results.fleet import LotUse
 from ..train.channels import FallbackModel, fallback_model_of
 from ..train.data import TrainingData, joined
 from ..train.result import Fit
-from .gain import Gain, gain_of
+from .gain import gain_of
 from .refinement import Refined
 from .refit import Effect, Played, completed, known, samples, scored_means
 from .refitting import FOLDS, Chain, Refitting, held_out_masks, is_corrected
@@ -81,10 +82,10 @@ class Extension:
         before, after: Residuals of the scored runs without and with all causes.
     """
 
-    steps: tuple[Gain | None, ...]
-    total: Gain | None
-    rate_left_out: tuple[str, Gain] | None
-    forward: Gain | None
+    steps: tuple[GainOnUnseen | None, ...]
+    total: GainOnUnseen | None
+    rate_left_out: tuple[str, GainOnUnseen] | None
+    forward: GainOnUnseen | None
     extended: Fit | None
     shipped: tuple[Effect, ...]
     crossed: Shipping
@@ -175,7 +176,7 @@ def _score_self(refitting: Refitting) -> list[Averages]:
     return scored_means(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
 
 
-def _rate_left_out(refitting: Refitting, causes: Sequence[Refined], floor: float) -> tuple[str, Gain] | None:
+def _rate_left_out(refitting: Refitting, causes: Sequence[Refined], floor: float) -> tuple[str, GainOnUnseen] | None:
     """All runs of the fastest environment left out of everything, where another moving one remains."""
     speeds: dict[str, float] = {}
     for run in refitting.train:
@@ -189,7 +190,7 @@ def _rate_left_out(refitting: Refitting, causes: Sequence[Refined], floor: float
     return fastest, _gain_without(refitting, held, causes, floor)
 
 
-def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floor: float) -> Gain | None:
+def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floor: float) -> GainOnUnseen | None:
     """Later runs from earlier ones: the exam where it came last, else the last third of the training runs."""
     days = [run.day for run in refitting.train]
     later = [run.day for run in refitting.exam]
@@ -205,7 +206,7 @@ def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floo
     return _gain_without(refitting, held, causes, floor)
 
 
-def _gain_without(refitting: Refitting, held: list[BoolArray], causes: Sequence[Refined], floor: float) -> Gain:
+def _gain_without(refitting: Refitting, held: list[BoolArray], causes: Sequence[Refined], floor: float) -> GainOnUnseen:
     """Gain of all causes on held-out training samples."""
     chain = refitting.left_out(held, causes)
     return gain_of(chain[0], chain[-1], floor, refitting.average_s)

@@ -9,7 +9,7 @@ Where there are few half-hours, twelfths of all.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,59 +30,6 @@ _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pi
 _SEED = 1  # of the draws
 _DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
 _FAR = 4.0  # robust standard deviations: a difference beyond says no more of the floor than one of as much
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Before and after, deg/h and arcsec, on the same samples; pairs are 95 % intervals.
-
-    Attributes:
-        share, low, high: Share of the removable excess that is removed; None where the excess is too small.
-        difference_low: Lower 95 % limit of before² − after², (deg/h)².
-        rms_removed: Of before − after, deg/h.
-        angle_removed: The same of the angle after one hour, arcsec; None where no run lasts an hour.
-    """
-
-    rms_before: float
-    rms_after: float
-    share: float | None
-    low: float | None
-    high: float | None
-    difference_low: float
-    rms_removed: tuple[float, float]
-    angle_removed: tuple[float, float] | None
-    angle_before: float | None
-    angle_after: float | None
-    half_hour_before: float | None
-    half_hour_after: float | None
-
-    @property
-    def positive(self) -> bool:
-        """Whether the lower 95 % limit of before² − after² is above zero."""
-        return self.difference_low > 0.0
-
-    def result(self) -> GainOnUnseen:
-        """As `diagnose.json` has it."""
-        angle = None
-        if self.angle_before is not None and self.angle_after is not None and self.angle_removed is not None:
-            angle = _with_limits(self.angle_before - self.angle_after, self.angle_removed)
-        return GainOnUnseen(
-            exam_rms_before_dph=self.rms_before,
-            exam_rms_after_dph=self.rms_after,
-            share_of_excess_removed=self.share,
-            low=self.low,
-            high=self.high,
-            rms_removed_dph=_with_limits(self.rms_before - self.rms_after, self.rms_removed),
-            angle_1h_removed_arcsec=angle,
-            angle_1h_before_arcsec=self.angle_before,
-            angle_1h_after_arcsec=self.angle_after,
-            rms_30min_before_dph=self.half_hour_before,
-            rms_30min_after_dph=self.half_hour_after,
-        )
-
-
-def _with_limits(value: float, limits: tuple[float, float]) -> Estimate:
-    return Estimate(value=value, low=limits[0], high=limits[1])
 
 
 def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
@@ -149,8 +96,8 @@ def gain_of(
     average_s: float,
     *,
     whole_dph: float | None = None,
-) -> Gain:
-    """Compares two sets of residuals on the same samples.
+) -> GainOnUnseen:
+    """Compare two sets of residuals on the same samples.
 
     `whole_dph`: RMS without any cause, of which shares are taken; None: `before` is without any.
     """
@@ -168,19 +115,20 @@ def gain_of(
         shares = diff / excess
         share = (rms_b**2 - rms_a**2) / excess
         low, high = _middle_95(shares)
-    return Gain(
-        rms_b,
-        rms_a,
-        share,
-        low,
-        high,
-        float(np.quantile(diff, 0.025)),
-        _middle_95(removed),
-        _angle_removed(before, after, average_s, rng),
-        _pooled(before, average_s, "angle_1h_arcsec"),
-        _pooled(after, average_s, "angle_1h_arcsec"),
-        _pooled(before, average_s, "rms_30min_dph"),
-        _pooled(after, average_s, "rms_30min_dph"),
+    low_removed, high_removed = _middle_95(removed)
+    angles = [_pooled(runs, average_s, "angle_1h_arcsec") for runs in (before, after)]
+    return GainOnUnseen(
+        exam_rms_before_dph=rms_b,
+        exam_rms_after_dph=rms_a,
+        share_of_excess_removed=share,
+        low=low,
+        high=high,
+        rms_removed_dph=Estimate(value=rms_b - rms_a, low=low_removed, high=high_removed),
+        angle_1h_removed_arcsec=_angle_removed(before, after, average_s, angles, rng),
+        angle_1h_before_arcsec=angles[0],
+        angle_1h_after_arcsec=angles[1],
+        rms_30min_before_dph=_pooled(before, average_s, "rms_30min_dph"),
+        rms_30min_after_dph=_pooled(after, average_s, "rms_30min_dph"),
     )
 
 
@@ -205,16 +153,21 @@ def _middle_95(draws: FloatArray) -> tuple[float, float]:
 
 
 def _angle_removed(
-    before: Sequence[Averages], after: Sequence[Averages], average_s: float, rng: np.random.Generator
-) -> tuple[float, float] | None:
-    """Limits of the difference of the RMS angles after one hour, arcsec (1 deg/h is 1 arcsec/s)."""
+    before: Sequence[Averages],
+    after: Sequence[Averages],
+    average_s: float,
+    angles: Sequence[float | None],
+    rng: np.random.Generator,
+) -> Estimate | None:
+    """Return the difference of the RMS angles after one hour, arcsec (1 deg/h is 1 arcsec/s); None for short runs."""
+    was, remains = angles
     b, a = (np.concatenate([window_means(r, HOUR_S, average_s) for r in runs]) for runs in (before, after))
-    if b.size < 2:
+    if was is None or remains is None or b.size < 2:
         return None
     drawn = rng.integers(0, b.size, (_DRAWS, b.size))
     rms = [np.sqrt((x[drawn] ** 2).mean(axis=1)) for x in (b, a)]
     low, high = _middle_95(rms[0] - rms[1])
-    return HOUR_S * low, HOUR_S * high
+    return Estimate(value=was - remains, low=HOUR_S * low, high=HOUR_S * high)
 
 
 def _pooled(runs: Sequence[Averages], average_s: float, name: str) -> float | None:

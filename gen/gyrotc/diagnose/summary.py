@@ -18,7 +18,6 @@ from ..results.diagnosed import (
     DetectionLimit,
     Diagnosed,
     ExtendedModel,
-    GainOnUnseen,
     NamedCause,
     StaticRate,
     Statistic,
@@ -31,7 +30,6 @@ from .candidates import diagnosable_causes
 from .detection import CauseLimit
 from .discrepancy import NoiseFinding
 from .extension import Extension
-from .gain import Gain
 from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .refinement import Interval, Refined
@@ -161,14 +159,10 @@ def _single_cycle(cycle: Cycle, extension: Extension) -> CycleResult:
         map_rms_dph=cycle.rms_dph,
         turns=cycle.turns,
         not_testable=cycle.not_testable or None,
-        gain=_result(extension.steps[-1]) if extension.steps else None,
+        gain=extension.steps[-1] if extension.steps else None,
         static=tuple(static),
         tried=tuple(tried),
     )
-
-
-def _result(gain: Gain | None) -> GainOnUnseen | None:
-    return None if gain is None else gain.result()
 
 
 def _statistics(analysis: Analysis) -> Iterator[Statistic]:
@@ -194,7 +188,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
         parameters={n: _estimate(v) for n, v in cause.parameters.items() if np.isfinite(v.value)},
         equivalent=rivals,
         separate_by=deciding_run(id, rivals[0]) if rivals else None,
-        gain=_result(extension.steps[k]),
+        gain=extension.steps[k],
         signature=shows_as(id, attribution.wide),
         remedy=words.remedy,
         separable_from_d=analysis.separations[k],
@@ -235,13 +229,13 @@ def _extended(extension: Extension) -> ExtendedModel | None:
         return None
     left = extension.rate_left_out
     return ExtendedModel(
-        exam_rms_dph=extension.total.rms_after,
+        exam_rms_dph=extension.total.exam_rms_after_dph,
         centers=extension.centers,
         terms=tuple(e.id for e in terms_of(extension.shipped) if CATALOGUE[e.id].table is not None),
         model=None,
-        gain=extension.total.result(),
-        rate_left_out=None if left is None else WithoutRate(environment=left[0], **dict(left[1].result())),
-        forward_in_time=None if extension.forward is None else extension.forward.result(),
+        gain=extension.total,
+        rate_left_out=None if left is None else WithoutRate(environment=left[0], **dict(left[1])),
+        forward_in_time=extension.forward,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from ..recordings.records import Mark, Run
 from ..results.base import Finding
@@ -20,11 +21,10 @@ def row_findings(judgement: Judgement) -> Iterator[Finding]:
     """Yield what the rows of a run show by themselves: one finding for each kind of event and column."""
     of_kind: dict[tuple[str, str], list[Event]] = {}
     for event in judgement.events:
-        of_kind.setdefault((event.kind, event.column), []).append(event)
-    for (kind, column), events in of_kind.items():
-        say = _SAYS.get((kind, column))
-        if say is not None:
-            yield say(judgement, events)
+        if event.kind not in _SAID_ELSEWHERE:
+            of_kind.setdefault((event.kind, event.column), []).append(event)
+    for key, events in of_kind.items():
+        yield _SAYS[key](judgement, events)
     yield from change_findings(judgement)
 
 
@@ -51,24 +51,34 @@ def _limits(run: Run, events: Sequence[Event], at: float) -> ValueWithLimits:
     return at, min(span[0] for span in spans) - 2.0 * run.row_period_s, max(span[1] for span in spans)
 
 
+def _found(id: str, text: str, run: Run, events: Sequence[Event], worst: Event, **given: Any) -> Finding:
+    """Return a finding about events of one kind, with the time of the worst of them."""
+    return finding(id, text, run, marks=_marks(run, events), time_s=_limits(run, events, worst.time_s[0]), **given)
+
+
+def _count(events: Sequence[Event]) -> int:
+    """Return how many rows the events have."""
+    return sum(one.rows[1] - one.rows[0] for one in events)
+
+
 def _rows(count: int) -> str:
     return f"{count} row" + "s" * (count != 1)
 
 
 def _outliers(judgement: Judgement, events: Sequence[Event]) -> Finding:
     run, worst = judgement.run, _largest(events)
-    rows = sum(one.rows[1] - one.rows[0] for one in events)
+    rows = _count(events)
     text = (
         f"{_rows(rows)} of {run.file} outside the level of those around them, most at "
         f"{worst.time_s[0]:.10g} s: by {abs(worst.size):.4g} deg/h, where the noise is {worst.sigma:.2g} deg/h "
         f"({len(events)} stretches). They do not reach the fit."
     )
-    return finding(
+    return _found(
         "rate_outliers",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, worst.time_s[0]),
+        events,
+        worst,
         size=((abs(worst.size),) * 3, "deg/h"),
         leave_out=_spans(run, events),
         stretches=len(events),
@@ -86,12 +96,12 @@ def _end_stop(judgement: Judgement, events: Sequence[Event]) -> Finding:
         f"this value for readings that it did not have. These rows and the few between them, {rows} in all, do not "
         "reach the fit."
     )
-    return finding(
+    return _found(
         "end_stop",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, events[0].time_s[0]),
+        events,
+        events[0],
         leave_out=_spans(run, stretches),
         values_dph=[one.size for one in events],
         rows=rows,
@@ -100,17 +110,17 @@ def _end_stop(judgement: Judgement, events: Sequence[Event]) -> Finding:
 
 def _stuck_rate(judgement: Judgement, events: Sequence[Event]) -> Finding:
     run, longest = judgement.run, _longest(events)
-    rows = sum(one.rows[1] - one.rows[0] for one in events)
+    rows = _count(events)
     text = (
-        f"the rate stays at one value for {longest.size:.4g} s from {longest.time_s[0]:.10g} s on ({len(events)} "
-        f"stretches, {_rows(rows)}), longer than chance repeats it. They do not reach the fit."
+        f"The rate of {run.file} stays at one value for {longest.size:.4g} s from {longest.time_s[0]:.10g} s on "
+        f"({len(events)} stretches, {_rows(rows)}), longer than chance repeats it. They do not reach the fit."
     )
-    return finding(
+    return _found(
         "stuck_rate",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, longest.time_s[0]),
+        events,
+        longest,
         size=((longest.size,) * 3, "s"),
         leave_out=_spans(run, events),
         rows=rows,
@@ -124,12 +134,12 @@ def _stuck_temperature(judgement: Judgement, events: Sequence[Event]) -> Finding
         f"then steps as it does nowhere else ({len(events)} places): the temperature sensor was stuck, or its record. "
         "These rows do not reach the fit."
     )
-    return finding(
+    return _found(
         "stuck_temperature",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, longest.time_s[0]),
+        events,
+        longest,
         size=((longest.size,) * 3, "s"),
         leave_out=_spans(run, events),
     )
@@ -154,17 +164,17 @@ def _jumps(judgement: Judgement, events: Sequence[Event]) -> Finding:
 
 def _temperature_outliers(judgement: Judgement, events: Sequence[Event]) -> Finding:
     run, worst = judgement.run, _largest(events)
-    rows = sum(one.rows[1] - one.rows[0] for one in events)
+    rows = _count(events)
     text = (
         f"{_rows(rows)} of {run.file} with a temperature outside the course of the others, most at "
         f"{worst.time_s[0]:.10g} s: by {worst.size:+.4g} C ({len(events)} stretches). Their rates do not reach the fit."
     )
-    return finding(
+    return _found(
         "temperature_outliers",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, worst.time_s[0]),
+        events,
+        worst,
         size=((worst.size,) * 3, "C"),
         leave_out=_spans(run, events),
         rows=rows,
@@ -179,19 +189,21 @@ def _noise(judgement: Judgement, events: Sequence[Event]) -> Finding:
         f"{longest.size:.3g} times that of the rest ({len(events)} stretches)."
     )
     if left_out:
-        rows = sum(one.rows[1] - one.rows[0] for one in left_out)
+        rows = _count(left_out)
         text += f" {_rows(rows)} that are too noisy to say anything do not reach the fit."
-    return finding(
+    return _found(
         "noise_changes",
         text,
         run,
-        marks=_marks(run, events),
-        time_s=_limits(run, events, longest.time_s[0]),
+        events,
+        longest,
         size=((longest.size, longest.size - 2.0 * longest.sigma, longest.size + 2.0 * longest.sigma), "times"),
         leave_out=_spans(run, left_out),
     )
 
 
+# Gaps are findings of `timing` and `events`, changes that last are those of `change_findings`.
+_SAID_ELSEWHERE = ("gap", "step", "transition", "drift", "gain", "restart", "displaced")
 _SAYS = {
     ("outlier", "rate"): _outliers,
     ("end_stop", "rate"): _end_stop,

@@ -87,12 +87,6 @@ def finding(
     )
 
 
-def mark_of(file: str, rows: Rows, from_s: float, to_s: float) -> Mark:
-    """The rows from one time to another, the end exclusive, one at least."""
-    first, end = np.searchsorted(rows.time_s, (from_s, to_s))
-    return Mark(file, (int(first) + 1, int(max(end, first + 1))), (from_s, to_s))
-
-
 def temperature_findings(facts: Sequence[RunFacts]) -> Iterator[Finding]:
     """Nothing can be learnt about temperature where it hardly changes over all training runs."""
     runs = [f for f in facts if f.role == "train"]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray, parts_of, steps_are, those
-from ..common.metrics import MAD_TO_SIGMA, median, quantile_of_parts
+from ..common.metrics import quantile_of_parts
 from ..common.statistics import NORMAL_95
 from ..recordings.records import Dataset, Rows, Run, joined_runs
 from ..recordings.records import inside as in_limits
@@ -41,8 +41,6 @@ _ON_RAMPS = 0.95
 _STEP = 0.5
 # Row periods between two rows that follow each other, at most.
 _TOGETHER = 1.5
-# Differences of neighbouring rates that the noise of a row is estimated from.
-_NOISE_ROWS = 2**18
 
 
 class LeftOut(NamedTuple):
@@ -68,7 +66,6 @@ class Judgement:
         span_s: Times of the first and of the last of these rows, s.
         left_out: Stretches of these rows that are left out, in order.
         events: What happened, in order of time.
-        noise_dph: Noise of a row, deg/h; 0 for fewer than three rows.
         changes: Changes of the rate that last, in order of time; they are among the events.
     """
 
@@ -77,7 +74,6 @@ class Judgement:
     span_s: tuple[float, float]
     left_out: tuple[LeftOut, ...]
     events: tuple[Event, ...]
-    noise_dph: float
     changes: tuple[Change, ...] = ()
     absent: Mapping[str, int] = field(default_factory=dict)
 
@@ -195,8 +191,7 @@ def _with_changes(judgement: Judgement, changes: tuple[Change, ...], time_s: Flo
         odds = 0.5 * change.sigmas**2 - cost_of(float(judgement.read))
         if back is not None:
             kind = "displaced"
-            part = reason[first:end]
-            reason[first:end] = np.where(part == 0, REASONS.index("rate displaced") + 1, part)
+            _mark(reason, slice(first, end), "rate displaced")
         why = "rate displaced" if back is not None else ""
         span = (float(time_s[first]), float(time_s[end - 1]))
         events.append(Event(kind, "rate", (first, end), span, change.size[0], sigma, odds, why))
@@ -206,6 +201,12 @@ def _with_changes(judgement: Judgement, changes: tuple[Change, ...], time_s: Flo
         events=tuple(sorted(events, key=lambda one: (one.rows, one.kind))),
         changes=changes,
     )
+
+
+def _mark(reasons: NDArray[np.uint8], rows: BoolArray | slice, reason: str) -> None:
+    """Give rows a reason for which they are left out, unless they have one."""
+    part = reasons[rows]
+    reasons[rows] = np.where(part == 0, REASONS.index(reason) + 1, part)
 
 
 class _Columns:
@@ -218,21 +219,11 @@ class _Columns:
     def __init__(self, run: Run, rows: Rows) -> None:
         self._run, self._rows = run, rows
         self.reason = np.zeros(len(rows), dtype=np.uint8)
-        time = rows.time_s
-        in_span = np.ones(len(rows), dtype=bool)
-        if run.from_s is not None:
-            in_span &= time >= run.from_s
-        if run.to_s is not None:
-            in_span &= time < run.to_s
-        self._mark(~run.in_span(time), "excluded")
-        self._mark(~np.isfinite(rows.rate_dph), "no rate")
-        self._mark(~np.isfinite(rows.temperature_c), "no temperature")
-        self.reason[~in_span] = 255
+        _mark(self.reason, ~run.in_span(rows.time_s), "excluded")
+        _mark(self.reason, ~np.isfinite(rows.rate_dph), "no rate")
+        _mark(self.reason, ~np.isfinite(rows.temperature_c), "no temperature")
+        self.reason[~in_limits(rows.time_s, run.from_s, run.to_s, ())] = 255
         self.events: list[Event] = []
-
-    def _mark(self, rows: BoolArray | slice, reason: str) -> None:
-        part = self.reason[rows]
-        self.reason[rows] = np.where(part == 0, REASONS.index(reason) + 1, part)
 
     def _usable(self) -> _Chosen:
         return _Chosen(self.reason == 0)
@@ -252,7 +243,7 @@ class _Columns:
         span = float(time[first]), float(time[min(end, len(time)) - 1])
         self.events.append(Event(kind, column, rows, span, size, sigma, odds, reason))
         if reason:
-            self._mark(slice(first, end), reason)
+            _mark(self.reason, slice(first, end), reason)
 
     def judge(self) -> None:
         """Look for events of every kind."""
@@ -288,7 +279,7 @@ class _Columns:
             rows = usable.span(pile.first, pile.end)
             self._event("end_stop", "rate", rows, pile.value, 0.0, pile.log_odds)  # only some of these rows hold it
             for first, end in stretches.tolist():
-                self._mark(slice(*usable.span(first, end)), "rate at end stop")
+                _mark(self.reason, slice(*usable.span(first, end)), "rate at end stop")
 
     def _temperature(self) -> None:
         """Temperatures that leave the course of the others, for a time or for good."""
@@ -372,9 +363,6 @@ class _Columns:
         """Return what was found."""
         time, inside = self._rows.time_s, self.reason != 255
         first, last = int(np.argmax(inside)), len(inside) - 1 - int(np.argmax(inside[::-1]))
-        part = slice(first, first + _NOISE_ROWS)
-        rate = self._rows.rate_dph[part][self.reason[part] == 0]
-        noise = MAD_TO_SIGMA * median(np.abs(np.diff(rate, 2))) / np.sqrt(6.0) if len(rate) > 2 else 0.0
         run = self._run
         absent = {
             reason: int(np.count_nonzero(in_limits(times_s, run.from_s, run.to_s, ())))
@@ -387,7 +375,6 @@ class _Columns:
             span_s=(float(time[first]), float(time[last])),
             left_out=tuple(_stretches(self.reason, time)),
             events=tuple(sorted(self.events, key=lambda one: (one.rows, one.kind))),
-            noise_dph=float(noise),
         )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from ..common.arrays import FloatArray, IntArray
+from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
 
 Column = Literal["time", "temperature", "rate"]
@@ -121,11 +121,3 @@ def freedom_of(largest: FloatArray) -> float:
 def sigma_of(values: FloatArray) -> float:
     """Return the standard deviation about 0 that the median magnitude implies."""
     return max(MAD_TO_SIGMA * float(np.median(np.abs(values))), 1e-12) if len(values) else 1.0
-
-
-def mask_of(stretches: IntArray, count: int) -> np.ndarray:
-    """Return which of so many rows are in one of the stretches (first row, row after the last), shape (k, 2)."""
-    edges = np.zeros(count + 1, dtype=np.int32)
-    np.add.at(edges, stretches[:, 0], 1)
-    np.add.at(edges, stretches[:, 1], -1)
-    return np.cumsum(edges[:-1]) > 0

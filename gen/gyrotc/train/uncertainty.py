@@ -201,8 +201,10 @@ def _turned(known: UncertaintyInputs, hold: float, block_s: float) -> tuple[floa
 
 def _excess(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
     """Return the c with which squares / (variance + c² x) is 1 on average; 0 where the variance is enough."""
+    if not squares.any() or not x.any():
+        return 0.0
     variance = np.maximum(variance, 1e-12 * float(np.mean(squares)))
-    if not squares.any() or np.mean(squares / variance) <= 1.0:
+    if np.mean(squares / variance) <= 1.0:
         return 0.0
     low, high = -30.0, 10.0
     scale = float(np.mean(squares) / np.mean(x))
@@ -216,20 +218,11 @@ def _excess(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
 
 
 def _balanced(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
-    """c with which (squares + variance)/(variance + c² x) is 1 on average; 0 where nothing moved."""
-    if squares.size == 0 or not squares.any() or not x.any():
+    """Return the c with which (squares + variance)/(variance + c² x) is 1 on average; 0 where nothing moved."""
+    if not squares.any():
         return 0.0
     variance = np.maximum(variance, 1e-6 * float(np.mean(squares)))
-    scale = float(np.mean(squares) / np.mean(x))
-    both = squares + variance
-    low, high = -30.0, 10.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if np.mean(both / (variance + np.exp(middle) * scale * x)) > 1.0:
-            low = middle
-        else:
-            high = middle
-    return float(np.sqrt(np.exp(middle) * scale))
+    return _excess(squares + variance, x, variance)
 
 
 def _gradients(known: UncertaintyInputs) -> tuple[float, float]:

@@ -434,22 +434,24 @@ def test_the_share_is_of_what_can_be_removed() -> None:
     wave = np.sin(np.arange(36 * HOURS) / 40.0)
     before, after = residual(block_noise(1) + wave), residual(block_noise(1) + 0.5 * wave)
     gain = gain_of([before], [after], 1.0, AVERAGE_S)
-    assert gain.share == pytest.approx(0.75, abs=0.08), "half of the amplitude, three quarters of the power"
+    share = gain.share_of_excess_removed
+    assert share == pytest.approx(0.75, abs=0.08), "half of the amplitude, three quarters of the power"
     assert gain.low is not None and gain.high is not None and gain.low < 0.75 < gain.high
-    assert gain.positive
-    assert gain.rms_removed[0] < gain.rms_before - gain.rms_after < gain.rms_removed[1]
-    assert gain.angle_removed is not None and gain.angle_removed[0] > 0.0
+    assert gain.shown == "gain"
+    removed, angle = gain.rms_removed_dph, gain.angle_1h_removed_arcsec
+    assert removed.value == pytest.approx(gain.exam_rms_before_dph - gain.exam_rms_after_dph)
+    assert removed.low is not None and removed.high is not None and removed.low < removed.value < removed.high
+    assert angle is not None and angle.low is not None and angle.low > 0.0
 
 
-def test_a_loss_is_not_positive() -> None:
+def test_a_loss_is_no_gain() -> None:
     wave = np.sin(np.arange(36 * HOURS) / 40.0)
-    gain = gain_of([residual(block_noise(2))], [residual(block_noise(2) + 0.3 * wave)], 1.0, AVERAGE_S)
-    assert not gain.positive and gain.rms_removed[0] < 0.0
+    assert gain_of([residual(block_noise(2))], [residual(block_noise(2) + 0.3 * wave)], 1.0, AVERAGE_S).shown == "loss"
 
 
 def test_without_excess_there_is_no_share() -> None:
     gain = gain_of([residual(block_noise(3))], [residual(block_noise(3))], 1.1, AVERAGE_S)
-    assert gain.share is None and gain.low is None
+    assert gain.share_of_excess_removed is None and gain.low is None
 
 
 def floor(left: np.ndarray, block_s: float) -> float:
@@ -477,14 +479,15 @@ def test_the_floor_is_of_full_means_whatever_the_blocks(block_s: float) -> None:
 def test_a_short_exam_has_an_interval() -> None:
     before, after = residual(block_noise(5)[:12] + 5.0), residual(block_noise(5)[:12])
     gain = gain_of([before], [after], 1.0, AVERAGE_S)
-    assert gain.rms_removed[0] < gain.rms_removed[1], "twelfths where there is no half-hour"
-    assert gain.angle_removed is None, "no run lasts an hour"
+    low, high = gain.rms_removed_dph.low, gain.rms_removed_dph.high
+    assert low is not None and high is not None and low < high, "twelfths where there is no half-hour"
+    assert gain.angle_1h_removed_arcsec is None, "no run lasts an hour"
 
 
 def test_no_gain_is_seldom_taken_for_one() -> None:
     """The lower limit is that of 95 %: of 200 pairs of equally large noise 2.5 % are to seem a gain, and chance."""
     found = [
-        gain_of([residual(block_noise(100 + k))], [residual(block_noise(1000 + k))], 1.0, AVERAGE_S).positive
+        gain_of([residual(block_noise(100 + k))], [residual(block_noise(1000 + k))], 1.0, AVERAGE_S).shown
         for k in range(200)
     ]
-    assert 0 < sum(found) <= 15, sum(found)
+    assert 0 < found.count("gain") <= 15, found.count("gain")

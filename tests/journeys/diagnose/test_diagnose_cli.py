@@ -294,7 +294,7 @@ def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:
 def test_an_exam_run_measures_what_the_true_effect_gains(case: Case) -> None:
     before, after = case.refitting.on_exam([[], [GRADIENT_TO_REMOVE]])
     gain = gain_of(before, after, LEVEL, 100.0)
-    assert gain.positive and gain.rms_after == pytest.approx(LEVEL, rel=0.5)
+    assert gain.shown == "gain" and gain.exam_rms_after_dph == pytest.approx(LEVEL, rel=0.5)
 
 
 LEVEL = 1e-3 / np.sqrt(10.0)  # of 100-s means of the noise
@@ -343,7 +343,7 @@ def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_
     before, after = refitting.on_exam([[], [shift]])
     assert [r.time_s.tolist() for r in before] == [r.time_s.tolist() for r in after], "the same samples"
     gain = gain_of(before, after, LEVEL, 100.0)
-    assert gain.positive and gain.rms_after < 1.3 * LEVEL < 0.6 * gain.rms_before
+    assert gain.shown == "gain" and gain.exam_rms_after_dph < 1.3 * LEVEL < 0.6 * gain.exam_rms_before_dph
 
 
 def test_without_causes_there_is_no_extension(case: Case) -> None:
