@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.metrics import Averages
 from .choice import CandidateChoice, choose
-from .data import Scaling, TrainingData, average_samples
+from .data import Scaling, TrainingData
 from .folds import Fold
 from .gaussian import COLUMNS, FEW, GaussianMap, Structure, TrainingFailed
 from .mrbf import fit_mrbf
-from .noise import difference_rms
+from .noise import floor_dph
 from .objection import objection_to
 from .process import Process, TrainingHistory, smooth
 from .result import Outcome
@@ -56,7 +56,7 @@ class CandidateComparison:
         unseen: What each of `maps` leaves on each piece without having seen it, in their order.
         choice: The decision.
         average_s: Averaging of what is judged, s.
-        noise_dph: Noise of a mean over `average_s`, from differences of neighbours.
+        noise_dph: Noise of a mean over `average_s`, from differences of what the smooth map leaves on neighbours.
     """
 
     history: TrainingHistory
@@ -135,20 +135,20 @@ def compare_candidates(
     maps = {name: maps[name] for name in CANDIDATES if name in maps}
     unseen = history.unseen(list(maps.values()), average_s)
     squares = np.full((len(unseen), len(CANDIDATES)), np.nan)
-    noise_dph = difference_rms(average_samples(history.means, average_s))
+    noise_dph = _noise_of_means(history, maps.get("mrbf"), average_s)
     for at, name in enumerate(maps):
-        squares[:, CANDIDATES.index(name)] = [_mean_square(piece[at], noise_dph) for piece in unseen]
-    return CandidateComparison(history, maps, failed, unseen, choose(CANDIDATES, squares), average_s, noise_dph)
+        squares[:, CANDIDATES.index(name)] = [float(np.mean(piece[at].after_dph ** 2)) for piece in unseen]
+    choice = choose(CANDIDATES, squares, noise_dph)
+    return CandidateComparison(history, maps, failed, unseen, choice, average_s, noise_dph)
 
 
-def _mean_square(left: Averages, noise_dph: float) -> float:
-    """Return the mean square that is left, with one mean more that leaves the noise.
+def _noise_of_means(history: TrainingHistory, found: GaussianMap | None, average_s: float) -> float:
+    """Return the noise of a mean from differences of neighbouring residuals of the smooth map, deg/h.
 
-    A piece of two or three means may be left with less than the noise by accident, and its logarithm would then
-    outvote the others.
+    Differences of the bias itself would count the change of the map between two means as noise.
     """
-    n = len(left.after_dph)
-    return (float(np.sum(left.after_dph**2)) + noise_dph**2) / (n + 1)
+    residual = history.y if found is None else history.residual(found)
+    return floor_dph(history.means, history.spread * residual, average_s)
 
 
 @dataclass(frozen=True, slots=True)

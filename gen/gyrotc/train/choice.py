@@ -5,6 +5,10 @@ pieces count alike and one gross failure does not outvote the others. A candidat
 loss is smaller by more than its doubt: the standard error of the mean difference over the pieces. The simplest
 candidate that no richer one beats is taken.
 
+New means on a piece will show the structure that a candidate leaves, and their own noise. So a piece counts as left
+with no less than the noise: a candidate that leaves less on a few means does so by accident, and the logarithm of that
+would outvote the other pieces.
+
 Two or three pieces may agree by accident, and their scatter then says that there is no doubt. So one more deviation is
 added to theirs: that of a piece on which the candidates are equally good, give or take 3 %. It counts much with two
 pieces and hardly at all with ten.
@@ -64,7 +68,7 @@ class CandidateChoice:
         return np.asarray(self.losses[:, self.candidates.index(name)])
 
 
-def choose(candidates: Sequence[str], mean_squares: FloatArray) -> CandidateChoice:
+def choose(candidates: Sequence[str], mean_squares: FloatArray, noise: float = 0.0) -> CandidateChoice:
     """Choose the simplest candidate that no richer one beats by more than its doubt.
 
     With fewer than two pieces nothing can be said for a richer candidate: the first is taken.
@@ -73,11 +77,13 @@ def choose(candidates: Sequence[str], mean_squares: FloatArray) -> CandidateChoi
         candidates: Names, the simplest first.
         mean_squares: What each leaves on each piece without having seen it, shape (pieces, candidates); nan if it
             could not be fitted.
+        noise: RMS of the noise of what is judged: less is left by accident.
     """
     names = tuple(candidates)
     squares = np.asarray(mean_squares, dtype=np.float64).reshape(-1, len(names))
     largest = float(np.nanmax(squares, initial=0.0))
-    losses = 0.5 * np.log(np.maximum(squares, max(_LEAST_RMS**2 * largest, np.finfo(np.float64).tiny)))
+    least = max(noise**2, _LEAST_RMS**2 * largest, np.finfo(np.float64).tiny)
+    losses = 0.5 * np.log(np.maximum(squares, least))
     return CandidateChoice(names, losses, _chosen(names, losses, ()))
 
 

@@ -231,12 +231,6 @@ def difference_sigma(means: TrainingData, y: FloatArray, weight: FloatArray) -> 
     return min(found, default=0.0)
 
 
-def difference_rms(means: TrainingData) -> float:
-    """Return the noise of a mean from the RMS of differences of those that follow one another in a run, deg/h."""
-    differences = np.diff(means.bias_dph)[np.diff(means.run) == 0]
-    return float(np.sqrt(np.mean(differences**2) / 2.0)) if len(differences) else 0.0
-
-
 def not_white(residual: FloatArray, run: NDArray[np.int64], weight: FloatArray) -> str:
     """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
 

@@ -64,6 +64,13 @@ def test_a_candidate_that_scatters_does_not_shield_the_simplest_from_another() -
     assert choose(["simple", "middle", "rich"], squares(middle, rich)).chosen == "middle"
 
 
+@pytest.mark.parametrize(("lucky", "noise", "chosen"), [(0.2, 1.0, "rich"), (0.2, 0.5, "simple"), (1.0, 0.5, "rich")])
+def test_less_than_the_noise_is_left_by_accident(lucky: float, noise: float, chosen: str) -> None:
+    """Four folds show a gain; on the fifth the simple candidate leaves less, which counts as far as noise allows."""
+    simple, rich = np.array([1.6, 1.5, 1.6, 1.5, lucky]), np.array([1.2, 1.2, 1.2, 1.2, 1.0])
+    assert choose(["simple", "rich"], np.stack([simple, rich], axis=1) ** 2, noise).chosen == chosen
+
+
 def test_a_candidate_that_could_not_be_fitted_or_is_refused_is_not_taken() -> None:
     made = squares(gains(0.2, 3.0, 6), gains(0.6, 3.0, 6))
     found = choose(["simple", "middle", "rich"], made)
