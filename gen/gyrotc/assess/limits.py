@@ -22,7 +22,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from .. import __version__
 from ..common.errors import InputError
-from ..common.inputs import checked, parse_toml, read_input
+from ..common.inputs import checked, near_field, parse_toml, read_input
 from ..common.statistics import coverage_factor
 from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
 from ..results.decision import worst_of
@@ -312,7 +312,7 @@ def load_limits(path: Path) -> Limits:
         detail = error.errors()[0]
         where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
         if detail["type"] == "extra_forbidden":
-            raise InputError(where, "is not known", "a field named in docs/limits.md") from error
+            raise InputError(where, "is not known", near_field(Limits, detail["loc"], "docs/limits.md")) from error
         if detail["type"] == "missing":
             raise InputError(where, "is missing", "schema = 1") from error
         expected = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")

@@ -198,9 +198,11 @@ def run(arguments: list[str]) -> int:
     try:
         application()(hoisted(arguments), prog_name="gyrotc", standalone_mode=True)
     except GyrotcError as error:
-        # Compilers say more than a line
-        shown = terminal_line if isinstance(error, InputError) else terminal_text
-        print(f"gyrotc: {shown(str(error))}", file=sys.stderr)
+        if isinstance(error, InputError):
+            text = "\n".join(map(terminal_line, error.lines))
+        else:
+            text = terminal_text(str(error))  # compilers say more than a line
+        print(f"gyrotc: {text}", file=sys.stderr)
         return error.exit_status
     except OSError as error:
         return _failed(error)

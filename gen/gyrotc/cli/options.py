@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..common.errors import InputError
 from .output import OUT, STANDARD_OUTPUT
 
 if TYPE_CHECKING:
@@ -114,7 +115,31 @@ AcceptOption = Annotated[
     str | None,
     typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is not PASS; says why."),
 ]
-DirArg = Annotated[Path, typer.Argument(help="Folder that build (or fit and emit) wrote.")]
+
+
+def _result_place(folder: Path) -> Path:
+    """Checks that a folder holds a result; names the one beside it that does."""
+    if _holds_result(folder):
+        return folder
+    near = next((place for place in (folder.parent, *_below(folder)) if _holds_result(place)), None)
+    expected = f"{near}, which holds one" if near is not None else "a folder that gyrotc build wrote"
+    raise InputError(str(folder), "holds no result" if folder.is_dir() else "is no folder", expected)
+
+
+def _holds_result(folder: Path) -> bool:
+    names = ("model.json", "x/model.json", "y/model.json", "z/model.json", "diagnose.json")
+    return any((folder / name).is_file() for name in names)
+
+
+def _below(folder: Path) -> list[Path]:
+    """Return the folders in a folder; none where it cannot be read."""
+    try:
+        return sorted(path for path in folder.iterdir() if path.is_dir())
+    except (OSError, ValueError):
+        return []
+
+
+DirArg = Annotated[Path, typer.Argument(callback=_result_place, help="Folder that build (or fit and emit) wrote.")]
 
 
 def numerics_of(text: str | None) -> list[str] | None:

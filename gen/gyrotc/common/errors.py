@@ -5,6 +5,8 @@ Every module may import this one; it imports none of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 __all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command"]
 
 
@@ -24,17 +26,24 @@ class InputError(GyrotcError):
         where: File, option or field, e.g. ``run-01.csv, line 17, column rate_dph``.
         found: What stands there.
         expected: What should stand there; empty if `found` says it all.
+        details: What is wrong one by one, where `found` is a number of things; each is printed on a line of its own.
     """
 
-    def __init__(self, where: str, found: str, expected: str = "") -> None:
+    def __init__(self, where: str, found: str, expected: str = "", details: Sequence[str] = ()) -> None:
         self.where = where
         self.found = found
         self.expected = expected
-        super().__init__(where, found, expected)
+        self.details = tuple(details)
+        super().__init__(where, found, expected, self.details)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The message, and a line for each detail."""
+        tail = f"; expected {self.expected}" if self.expected else ""
+        return (f"{self.where}: {self.found}{tail}", *(f"  {detail}" for detail in self.details))
 
     def __str__(self) -> str:
-        tail = f"; expected {self.expected}" if self.expected else ""
-        return f"{self.where}: {self.found}{tail}"
+        return "\n".join(self.lines)
 
 
 class CheckFailed(GyrotcError):

@@ -7,6 +7,7 @@ The option writes the environment, so that the processes of a fleet see it too.
 from __future__ import annotations
 
 import codecs
+import difflib
 import functools
 import json
 import math
@@ -14,10 +15,10 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, TypeVar, cast, get_args
 
 from annotated_types import Interval
 
@@ -276,7 +277,7 @@ def checked(kind: type[T], content: Any, where: str, text: bytes | None = None) 
         found: T = _adapter(cast("Any", kind)).validate_json(json_text)
         return found
     except ValidationError as error:
-        raise refused(error, lambda field: f"{where}, field {field}" if field else where) from error
+        raise refused(error, lambda field: f"{where}, field {field}" if field else where, kind) from error
 
 
 @functools.cache
@@ -286,15 +287,45 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def refused(error: ValidationError, place: Callable[[str], str]) -> InputError:
-    """What pydantic refuses as one message; `place` says where a field stands, whose name is empty for the whole."""
+def refused(error: ValidationError, place: Callable[[str], str], kind: Any = None) -> InputError:
+    """What pydantic refuses as one message; `place` says where a field stands, whose name is empty for the whole.
+
+    Args:
+        kind: The type that was expected, which has the names of fields.
+    """
     first = error.errors(include_url=False)[0]
     where = place(".".join(str(part) for part in first["loc"]))
     if first["type"] == "missing":
         return InputError(where, "is missing")
     if first["type"] == "extra_forbidden":
-        return InputError(where, "is not known")
+        return InputError(where, "is not known", near_field(kind, first["loc"]))
     return InputError(where, _short(first["input"]), re.sub("^(Input should be|Value error,) ", "", first["msg"]))
+
+
+def near_field(kind: Any, location: Sequence[str | int], page: str = "") -> str:
+    """Return what is expected in the place of a field that is not known: the name that is nearest to it, and the page.
+
+    Args:
+        kind: The pydantic model that has the fields; None: it is not known.
+        location: Where the field stands, from the whole of it on.
+        page: The page that has all names; empty: none has.
+    """
+    here = kind
+    for part in location[:-1]:
+        fields = getattr(here, "model_fields", {})
+        field = next((one for name, one in fields.items() if part in (name, one.alias)), None)
+        if field is not None:
+            here = _model_in(field.annotation)
+    names = [one.alias or name for name, one in getattr(here, "model_fields", {}).items()]
+    near = difflib.get_close_matches(str(location[-1]), names, 1)
+    return " or ".join((*near, *([f"a field named in {page}"] if page else [])))
+
+
+def _model_in(annotation: Any) -> Any:
+    """Return the pydantic model that an annotation holds, also inside a tuple, a dict or a union; None without one."""
+    if hasattr(annotation, "model_fields"):
+        return annotation
+    return next((found for found in map(_model_in, get_args(annotation)) if found is not None), None)
 
 
 def _decoded(data: bytes, where: str, expected: str) -> str:

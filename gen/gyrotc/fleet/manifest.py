@@ -113,7 +113,7 @@ def load_manifest(path: Path) -> Fleet:
     try:
         manifest = _Manifest.model_validate(content)
     except ValidationError as error:
-        raise refused(error, lambda field: f"{path}, field {field}") from error
+        raise refused(error, lambda field: f"{path}, field {field}", _Manifest) from error
     named = (
         *((folder, manifest.axis) for folder in _matching(path, manifest.datasets)),
         *((path.parent / entry.dataset, entry.axis) for entry in manifest.unit),

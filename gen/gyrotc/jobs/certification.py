@@ -147,8 +147,8 @@ def certificate(
     missing = list(missing_facts(stated, units))
     if missing and not draft:
         raise InputError(
-            str(folder), f"{len(missing)} things are missing for a certificate: " + "; ".join(missing),
-            "them in a facts file (--facts, docs/delivery.md) or in [meta], or --draft",
+            str(folder), f"{len(missing)} things are missing for a certificate",
+            "them in a facts file (--facts, docs/delivery.md) or in [meta], or --draft", missing,
         )  # fmt: skip
     for place, unit in zip(places, units, strict=True):
         _as_built(place, unit)

@@ -49,6 +49,8 @@ def load_lot(path: Path) -> Lot:
     Raises:
         InputError: It is no lot, or was changed since gyrotc wrote it.
     """
+    if not path.exists():
+        raise InputError(f"--lot {path}", "does not exist", "the file that gyrotc lot wrote")
     lot = read_result(path, Lot)
     if lot.checksum != checksum_of(lot):
         found = "is not that of the other fields: the file was changed or damaged"

@@ -26,7 +26,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.inputs import read_toml, refuse_above
+from ..common.inputs import near_field, read_toml, refuse_above
 from ..common.texts import toml_key, toml_value
 from .records import Mark
 
@@ -339,7 +339,7 @@ def _wrong_field(detail: ErrorDetails, content: dict[str, Any]) -> InputError:
     if kind == "missing":
         return InputError(where, "is missing", f"{detail['loc'][-1]} = ...")
     if kind == "extra_forbidden":
-        return InputError(where, "is not known", "a field named in docs/recordings.md (a typing error?)")
+        return InputError(where, "is not known", near_field(Description, detail["loc"], "docs/recordings.md"))
     if kind == "fact":
         facts = detail["ctx"]
         return InputError(f"{where}.{facts['name']}", facts["found"], facts["expected"])

@@ -392,13 +392,16 @@ def _description(folder: Path, problems: Problems) -> Description | None:
         return None
     if not is_folder:
         found = "is no folder" if there else "does not exist"
-        problems.add(InputError(str(folder), found, "a folder of recordings"))
+        expected = f"the folder that holds it: {folder.parent}" if there else "a folder of recordings"
+        problems.add(InputError(str(folder), found, expected))
         return None
     if (folder / FILE).exists():
         return parse_description(folder / FILE, problems)
     files = sorted(f.name for f in folder.iterdir() if f.suffix.lower() in _KINDS and f.name[0] != ".")
     if not files:
-        problems.add(InputError(str(folder), f"no recordings and no {FILE}", "*.csv or *.parquet files"))
+        below = sorted(path.parent for path in folder.glob(f"*/{FILE}"))
+        expected = f"a folder with *.csv or *.parquet files{f', such as {below[0]}' if below else ''}"
+        problems.add(InputError(str(folder), f"no recordings and no {FILE}", expected))
         return None
     try:
         refuse_above("runs", len(files), str(folder), "recordings")
