@@ -8,6 +8,7 @@ those of scipy's t distribution; the rest is arithmetic by hand.
 from __future__ import annotations
 
 from itertools import permutations
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -15,8 +16,10 @@ import numpy as np
 import pytest
 from gyrotc.assess import (
     AtMost,
+    Earlier,
     Limits,
     budget_of,
+    changes_since,
     decided,
     figure_uncertainties,
     findings_of,
@@ -27,9 +30,12 @@ from gyrotc.jobs import reason_of_release
 from gyrotc.model import Model
 from gyrotc.recordings import Dataset, load
 from gyrotc.results import (
+    DeclaredUnits,
     EvaluatedRun,
     Evaluation,
     FigureUncertainty,
+    Manifest,
+    MapDifference,
     ModelSizes,
     Pooled,
     RunStatistics,
@@ -184,6 +190,47 @@ def test_the_uncertainty_of_the_worst_run_is_that_of_the_worst_one(worst: int) -
         value = getattr(runs[worst].after, name)
         assert found[name].standard == pytest.approx(value / np.sqrt(2.0 * count)), name
         assert found[name].freedom == count
+
+
+def changes_between(folder: Path, old: dict[str, Any], new: dict[str, Any]) -> MapDifference:
+    Model.from_dict(old).save(folder / "model.json")
+    model, nothing = Model.from_dict(new), DeclaredUnits(declared={}, trusted=())
+    manifest = Manifest(
+        gyrotc_version="0", serial=model.serial, axis=None, model_hash=model.hash, refused={}, versions={}, meta={},
+        units=nothing, sources=(), files={},
+    )  # fmt: skip
+    found = changes_since(Earlier(folder), model, evaluation_of([evaluated("exam")]), manifest).map
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("share", "significant"), [(0.98, False), (1.02, True)])
+def test_a_map_has_moved_beyond_twice_the_uncertainty_of_both_maps(
+    share: float, significant: bool, sign: float, model_dict: dict[str, Any], tmp_path: Path
+) -> None:
+    sigma = {"cells": [2, 2], "rows": [[3e-4, 3e-4], [3e-4, 3e-4]]}
+    other = {"cells": [2, 2], "rows": [[4e-4, 4e-4], [4e-4, 4e-4]]}
+    (network,) = model_dict["networks"]
+    moved = network | {"w0": network["w0"] + sign * share * 2.0 * 5e-4}
+    found = changes_between(
+        tmp_path, model_dict | {"uncertainty_dph": sigma}, model_dict | {"uncertainty_dph": other, "networks": [moved]}
+    )
+    assert found.rms_dph == pytest.approx(share * 1e-3)
+    assert found.expanded_uncertainty_dph == pytest.approx(1e-3)
+    assert found.significant is significant
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_map_has_moved_most_where_it_has_moved_most_up_or_down(
+    sign: float, model_dict: dict[str, Any], tmp_path: Path
+) -> None:
+    (network,) = model_dict["networks"]
+    weights = [network["weights"][0], network["weights"][1] + sign * 2e-3]
+    moved = network | {"w0": network["w0"] - sign * 5e-4, "weights": weights}
+    found = changes_between(tmp_path, model_dict, model_dict | {"networks": [moved]})
+    assert found.max_abs_dph == pytest.approx(1.5e-3, rel=0.01)
+    assert found.at.temperature_c == pytest.approx(30.0, abs=1.0)
 
 
 FLOOR = 1e-3

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import HOST, run_gyrotc
-from gyrotc.assess import LEAST_POWER_ONS
+from gyrotc.assess import LEAST_POWER_ONS, evaluate
+from gyrotc.recordings import load
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from read_pictures import panels_of, pictures_of
@@ -230,6 +232,25 @@ def test_a_constant_in_the_rate_changes_nothing_but_itself(
     assert one["noise_floor_dph"] == pytest.approx(scale * other["noise_floor_dph"], rel=0.02)
     assert one["constant_dph"] == pytest.approx(scale * other["constant_dph"] + offset_dph, rel=1e-3)
     assert [f["id"] for f in one["findings"]] == [f["id"] for f in other["findings"]]
+
+
+def test_figures_of_the_judged_runs_do_not_depend_on_their_order(plain: dict[str, Any], tmp_path: Path) -> None:
+    """One test run has spikes and another moves less, so that no two runs have the same figures."""
+    runs = unit()
+    exams = [name for name, (role, _) in runs.items() if role == "exam"]
+    rate = runs[exams[0]][1]["rate_dph"].copy()
+    rate[[100, 333]] += 500.0
+    runs[exams[0]] = ("exam", runs[exams[0]][1] | {"rate_dph": rate})
+    runs[exams[-1]] = ("exam", half(runs[exams[-1]][1]))
+    dataset = load(written(tmp_path / "RLG-1", runs))
+    found = [
+        evaluate(plain["out"], replace(dataset, runs=order), compiled=False)
+        for order in (dataset.runs, dataset.runs[::-1])
+    ]
+    figures = [
+        (one.sigma_rms_dph, one.usable and one.usable.rms_dph, one.exam and one.exam.after.rms_dph) for one in found
+    ]
+    assert all(figures[0]) and figures[0] == pytest.approx(figures[1], rel=1e-9)
 
 
 def test_a_limit_that_a_constant_keeps_is_named(tmp_path: Path) -> None:

@@ -477,6 +477,13 @@ def test_left_out_history_refutes_a_name_only_where_the_upper_limit_of_its_gain_
     assert PieceGain.of(np.array([-1.4, np.nan]), np.zeros(2)) is None, "one piece is judged by none"
 
 
+@pytest.mark.parametrize("gains", [[-0.10, -0.12, -0.09], [0.4, -0.3, 0.1, 0.2], [0.1] * 7 + [0.5]])
+def test_the_upper_limit_of_a_gain_is_that_of_student_s_t_over_pieces(gains: list[float]) -> None:
+    found = PieceGain.of(np.array(gains), np.zeros(len(gains)))
+    expected = stats.t.interval(0.95, len(gains) - 1, loc=np.mean(gains), scale=stats.sem(gains))
+    assert found is not None and found.upper == pytest.approx(expected[1])
+
+
 def test_a_parabola_is_read_exactly() -> None:
     def energy(x: float) -> float:
         return 7.0 - 0.5 * (x - 3.0) ** 2

@@ -186,6 +186,22 @@ def test_what_must_not_be_an_input_is_refused_with_the_reason(rng: np.random.Gen
     assert "does not change" in found["still_v"][1]
 
 
+@pytest.mark.parametrize(
+    ("blocks", "correlation", "refused"), [(17, 0.45, False), (17, 0.8, True), (720, 0.45, True), (720, 0.15, False)]
+)
+def test_fast_changes_that_are_alike_count_beyond_a_quarter_and_beyond_luck(
+    blocks: int, correlation: float, refused: bool, rng: np.random.Generator
+) -> None:
+    """Of 102 samples a correlation of 0.45 may be chance among many channels; of 4320 it is not."""
+    samples = history(rng)
+    noise = samples.bias_dph - 7e-3 - 1e-3 * np.tanh(samples.temperature_c / 20.0)
+    own = np.sqrt(1.0 - correlation**2) * rng.normal(size=len(noise))
+    channel = 5.0 + wander(rng) + 0.5 * (correlation * noise / noise.std() + own)
+    few = samples.time_s < 10.0 * blocks
+    ((verdict, reason),) = verdicts(samples.select(few), {"supply_v": channel[few]}).values()
+    assert (verdict == "refused" and "fast changes" in reason) == refused, (verdict, reason)
+
+
 def test_of_two_channels_that_say_the_same_one_is_taken_and_the_other_reported(rng: np.random.Generator) -> None:
     samples = history(rng)
     supply = wander(rng)
