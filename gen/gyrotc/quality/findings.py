@@ -12,12 +12,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import PART, BoolArray, FloatArray, parts_of, steps_are, those
+from ..common.arrays import PART, BoolArray, FloatArray, parts_of, those
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median, median_of_parts
 from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, EarthRate, Mark, Rows, Run
 from ..results.base import ADVICE, Estimate, Finding, MarkedRows, Size
+from .missing import missing_rows
 
 ValueWithLimits = tuple[float, float, float]
 """A figure and its 95 % limits."""
@@ -229,7 +230,6 @@ _SATURATED_ROWS = 10
 # Rows elsewhere must repeat less often than this share of those at the end, else the rate is coarse or held everywhere.
 _SATURATED_RATIO = 0.2
 
-_GAP_PERIODS = 1.5  # a step longer than this has room for a missing row
 _CELL_S = 60.0  # temperature is averaged over this before its rate is looked at
 _CELL_ROWS = 5  # fewer do not average the resolution of a thermometer
 _HOLD_C_PER_MIN = 0.1  # slower than this a chamber holds, or settles
@@ -255,8 +255,8 @@ class RunFacts:
         first_s: Time of its first row.
         last_s: Time of its last row.
         row_period_s: Median row period of the file.
-        gaps: Number of steps longer than 1.5 row periods.
-        missing_rows: Rows that these gaps would have held.
+        gaps: Number of places at which rows are missing.
+        missing_rows: Rows that are missing there.
         temperature_c: Lowest and highest temperature.
         temperature_step_c: Smallest difference between two temperatures that occur; 0 if there is one only.
         slopes_c_per_min: Rates of temperature of cells of a minute (at least five rows).
@@ -307,10 +307,10 @@ def run_facts(run: Run, rows: Rows) -> RunFacts:
     time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
     finite = inside & np.isfinite(rows.rate_dph)
     rate = those(rows.rate_dph, finite)
-    late = np.flatnonzero(steps_are(time, lambda step: step > _GAP_PERIODS * run.row_period_s))
+    gaps, missing = missing_rows(time, run.row_period_s)
     if not inside.all():
-        late = late[np.diff(np.flatnonzero(inside))[late] == 1]  # what was excluded is no gap
-    missing = int(np.sum(np.round((time[late + 1] - time[late]) / run.row_period_s) - 1.0))
+        together = np.diff(np.flatnonzero(inside))[gaps] == 1  # what was excluded is no gap
+        gaps, missing = gaps[together], missing[together]
     low_c, high_c, resolution = _levels(temperature)
     measured = those(rows.rate_dph, inside)
     if not np.isfinite(measured).all():
@@ -328,8 +328,8 @@ def run_facts(run: Run, rows: Rows) -> RunFacts:
         first_s=float(time[0]),
         last_s=float(time[-1]),
         row_period_s=run.row_period_s,
-        gaps=len(late),
-        missing_rows=missing,
+        gaps=len(gaps),
+        missing_rows=int(missing.sum()),
         temperature_c=(low_c, high_c),
         temperature_step_c=resolution,
         slopes_c_per_min=slopes,

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray, steps_are, those
+from ..common.arrays import BoolArray, FloatArray, those
 from ..recordings.records import Mark, Rows, Run
 from ..results.base import Finding
 from .findings import finding
+from .missing import missing_rows
 
-_GAP = 1.5  # row periods
 _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
 _LEAST_JUMP_C, _JUMP_SIGMAS = 1.0, 20.0  # what the time would have done to the temperature, had it passed
 # Of the change that the gap should have brought: less is none; and of its noise
@@ -45,15 +45,17 @@ def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     if coarse is not None:
         yield coarse
         return
-    late = steps_are(time, lambda step: step > _GAP * run.row_period_s)
-    gaps = np.flatnonzero(late & together)
+    gaps, count = missing_rows(time, run.row_period_s)
+    gaps, count = gaps[together[gaps]], count[together[gaps]]
     jumps = [k for k in gaps[:1000].tolist() if _clock_was_set(time, temperature, k, run.row_period_s)]
-    missing = np.setdiff1d(gaps, jumps)
+    missing = ~np.isin(gaps, jumps)
     if jumps:
         yield _jumps(run, time, at, jumps)
-    if len(missing):
-        yield _gaps(run, time, at, missing)
-    yield from _drift(run, time, at, together & ~late)
+    if missing.any():
+        yield _gaps(run, time, at, gaps[missing], int(count[missing].sum()))
+    even = np.array(together)
+    even[gaps] = False
+    yield from _drift(run, time, at, even)
 
 
 def _marks(run: Run, time: FloatArray, at: Sequence[int], places: list[int]) -> tuple[Mark, ...]:
@@ -63,10 +65,8 @@ def _marks(run: Run, time: FloatArray, at: Sequence[int], places: list[int]) -> 
     )
 
 
-def _gaps(run: Run, time: FloatArray, at: Sequence[int], gaps: NDArray[np.int64]) -> Finding:
-    step = np.diff(time)[gaps]
-    missing = int(np.sum(np.round(step / run.row_period_s) - 1.0))
-    longest = int(gaps[np.argmax(step)])
+def _gaps(run: Run, time: FloatArray, at: Sequence[int], gaps: NDArray[np.int64], missing: int) -> Finding:
+    longest = int(gaps[np.argmax(time[gaps + 1] - time[gaps])])
     places = sorted(gaps.tolist(), key=lambda k: time[k] - time[k + 1])[:_REPORTED]
     text = (
         f"{len(gaps)} gaps; {missing} rows of {run.row_period_s:.4g} s are missing; the longest from "
@@ -148,7 +148,7 @@ def _drift(run: Run, time: FloatArray, at: Sequence[int], even: BoolArray) -> It
     """Rows that come ever faster or slower by the stamps: the clock of the rows or that of the stamps drifts.
 
     Args:
-        even: Which steps from row to row have no room for a missing row.
+        even: Between which neighbouring rows none is missing.
     """
     parts = min(_PARTS, len(even) // _LEAST_STEPS)
     if parts < 4:

@@ -122,6 +122,18 @@ def test_gaps_are_counted_with_their_rows(tmp_path: Path) -> None:
     assert "1 gaps; 20 rows of 10 s are missing" in result.warnings[0].text
 
 
+@pytest.mark.parametrize("lost", [(), (500, 501, 502), (90, 700, 701, 2500)])
+def test_late_stamps_are_no_gaps(lost: tuple[int, ...], tmp_path: Path) -> None:
+    """Rows of 5 ms with stamps that are off by up to 2 ms: the step from an early to a late one is up to 9 ms."""
+    table = columns(3000)
+    jitter = np.random.default_rng(5).uniform(-2e-3, 2e-3, 3000)
+    table["time_s"] = np.round(5e-3 * np.arange(3000) + jitter + 2e-3, 6)
+    write_csv(tmp_path / "R" / "a.csv", {name: np.delete(values, lost) for name, values in table.items()})
+    result = check(tmp_path / "R")
+    assert result.facts[0][1].missing_rows == len(lost)
+    assert ("gaps" in {d.id for d in result.warnings}) == bool(lost)
+
+
 def test_earth_rate_that_is_not_stated(tmp_path: Path) -> None:
     table = long() | {"rate_dph": long()["rate_dph"] - 10.0}
     write_csv(tmp_path / "RLG-1" / "a.csv", table)
