@@ -51,96 +51,75 @@ struct Time;
 struct Angle;
 } // namespace unit
 
-/* float32: C, C per block, deg/h, s, arcsec. */
+/* The functions of gtc.h in float32: C, C per block, deg/h, s, arcsec. */
+#if GTC_WITH_F32
 struct F32 {
     typedef float Number;
     typedef gtc_f32_table_t Table;
     typedef gtc_f32_state_t State;
     typedef gtc_f32_angle_t Sum;
+    static constexpr decltype(&gtc_f32_check) check = &gtc_f32_check;
+    static constexpr decltype(&gtc_f32_init) init = &gtc_f32_init;
+    static constexpr decltype(&gtc_f32_sample) sample = &gtc_f32_sample;
+    static constexpr decltype(&gtc_f32_bias) bias = &gtc_f32_bias;
+    static constexpr decltype(&gtc_f32_angle) angle = &gtc_f32_angle;
+#if GTC_WITH_UNCERTAINTY
     typedef gtc_f32_snapshot_t Snapshot;
-    static int check(const Table *table) noexcept { return gtc_f32_check(table); }
-    static int check_words(const Table *table) noexcept { return gtc_f32_check_words(table); }
-    static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
-    {
-        return gtc_f32_open(table, words, n, id);
-    }
-    static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_f32_init(state, table, us); }
-    static int sample(State *state, const Table *table, uint_least32_t us, const Number *x) noexcept
-    {
-        return gtc_f32_sample(state, table, us, x);
-    }
-    static int bias(const State *state, const Table *table, Number *b) noexcept
-    {
-        return gtc_f32_bias(state, table, b);
-    }
-    static int snapshot(const State *state, const Table *table, Snapshot *all) noexcept
-    {
-        return gtc_f32_snapshot(state, table, all);
-    }
-    static int rezero(State *state, const Table *table, Number rate, uint_least32_t seconds) noexcept
-    {
-        return gtc_f32_rezero(state, table, rate, seconds);
-    }
-    static int save(const State *state, const Table *table, gtc_word_t *words) noexcept
-    {
-        return gtc_f32_save(state, table, words);
-    }
-    static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
-                       uint_least32_t off) noexcept
-    {
-        return gtc_f32_restore(state, table, us, words, off);
-    }
-    static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_f32_angle(sum, bias, dt, a); }
+    static constexpr decltype(&gtc_f32_snapshot) snapshot = &gtc_f32_snapshot;
+#endif
+#if GTC_WITH_REZERO
+    static constexpr decltype(&gtc_f32_rezero) rezero = &gtc_f32_rezero;
+#endif
+#if GTC_WITH_IMAGE
+    static constexpr decltype(&gtc_f32_open) open = &gtc_f32_open;
+    static constexpr decltype(&gtc_f32_check_words) check_words = &gtc_f32_check_words;
+#endif
+#if GTC_WITH_SAVE
+    static constexpr decltype(&gtc_f32_save) save = &gtc_f32_save;
+    static constexpr decltype(&gtc_f32_restore) restore = &gtc_f32_restore;
+#endif
 };
+#endif
 
-/* Fixed point: 2^-16 C, 2^-16 C per block, 2^-bias_frac_bits deg/h, microseconds, 2^-bias_frac_bits arcsec. */
+/* The same in fixed point: 2^-16 C, 2^-16 C per block, 2^-bias_frac_bits deg/h, microseconds,
+ * 2^-bias_frac_bits arcsec. */
+#if GTC_WITH_Q31
 struct Q31 {
     typedef int_least32_t Number;
     typedef gtc_q31_table_t Table;
     typedef gtc_q31_state_t State;
     typedef gtc_q31_angle_t Sum;
+    static constexpr decltype(&gtc_q31_check) check = &gtc_q31_check;
+    static constexpr decltype(&gtc_q31_init) init = &gtc_q31_init;
+    static constexpr decltype(&gtc_q31_sample) sample = &gtc_q31_sample;
+    static constexpr decltype(&gtc_q31_bias) bias = &gtc_q31_bias;
+    static constexpr decltype(&gtc_q31_angle) angle = &gtc_q31_angle;
+#if GTC_WITH_UNCERTAINTY
     typedef gtc_q31_snapshot_t Snapshot;
-    static int check(const Table *table) noexcept { return gtc_q31_check(table); }
-    static int check_words(const Table *table) noexcept { return gtc_q31_check_words(table); }
-    static int open(Table *table, const gtc_word_t *words, uint_least32_t n, uint_least32_t id) noexcept
-    {
-        return gtc_q31_open(table, words, n, id);
-    }
-    static int init(State *state, const Table *table, uint_least32_t us) noexcept { return gtc_q31_init(state, table, us); }
-    static int sample(State *state, const Table *table, uint_least32_t us, const Number *x) noexcept
-    {
-        return gtc_q31_sample(state, table, us, x);
-    }
-    static int bias(const State *state, const Table *table, Number *b) noexcept
-    {
-        return gtc_q31_bias(state, table, b);
-    }
-    static int snapshot(const State *state, const Table *table, Snapshot *all) noexcept
-    {
-        return gtc_q31_snapshot(state, table, all);
-    }
-    static int rezero(State *state, const Table *table, Number rate, uint_least32_t seconds) noexcept
-    {
-        return gtc_q31_rezero(state, table, rate, seconds);
-    }
-    static int save(const State *state, const Table *table, gtc_word_t *words) noexcept
-    {
-        return gtc_q31_save(state, table, words);
-    }
-    static int restore(State *state, const Table *table, uint_least32_t us, const gtc_word_t *words,
-                       uint_least32_t off) noexcept
-    {
-        return gtc_q31_restore(state, table, us, words, off);
-    }
-    static int angle(Sum *sum, Number bias, Number dt, Number *a) noexcept { return gtc_q31_angle(sum, bias, dt, a); }
+    static constexpr decltype(&gtc_q31_snapshot) snapshot = &gtc_q31_snapshot;
+#endif
+#if GTC_WITH_REZERO
+    static constexpr decltype(&gtc_q31_rezero) rezero = &gtc_q31_rezero;
+#endif
+#if GTC_WITH_IMAGE
+    static constexpr decltype(&gtc_q31_open) open = &gtc_q31_open;
+    static constexpr decltype(&gtc_q31_check_words) check_words = &gtc_q31_check_words;
+#endif
+#if GTC_WITH_SAVE
+    static constexpr decltype(&gtc_q31_save) save = &gtc_q31_save;
+    static constexpr decltype(&gtc_q31_restore) restore = &gtc_q31_restore;
+#endif
 };
+#endif
 
 /* The types and functions of one arithmetic. */
 template <class A> struct Runtime {
     typedef typename A::Number Number;
     typedef typename A::Table Table;
     typedef typename A::State State;
+#if GTC_WITH_UNCERTAINTY
     typedef typename A::Snapshot Snapshot;
+#endif
     typedef Quantity<unit::Celsius, Number> Celsius;
     typedef Quantity<unit::CelsiusPerBlock, Number> CelsiusPerBlock;
     typedef Quantity<unit::DegPerHour, Number> DegPerHour;
@@ -149,21 +128,23 @@ template <class A> struct Runtime {
 
     static Status check(const Table &table) noexcept { return Status(A::check(&table)); }
 
+#if GTC_WITH_IMAGE
     static Status check_words(const Table &table) noexcept { return Status(A::check_words(&table)); }
 
     static Status open(Table &table, const gtc_word_t *words, uint_least32_t n_words, uint_least32_t expected_id) noexcept
     {
         return Status(A::open(&table, words, n_words, expected_id));
     }
+#endif
 
     /* One state and its table; owned by one task. */
     class Correction {
     public:
         Correction() noexcept : state_(), table_(nullptr) {}
+        /* A call that failed leaves state and table as they were. */
         Status init(const Table &table, uint_least32_t period_us) noexcept
         {
-            table_ = &table;
-            return Status(A::init(&state_, table_, period_us));
+            return taken(table, Status(A::init(&state_, &table, period_us)));
         }
         /* Of a table with one channel, so many microseconds after the call before. */
         Status sample(uint_least32_t elapsed_us, Celsius temp) noexcept
@@ -184,25 +165,38 @@ template <class A> struct Runtime {
             bias = DegPerHour(result);
             return status;
         }
+#if GTC_WITH_UNCERTAINTY
         /* Correction, its uncertainty and more, as a filter takes them; the numbers as in gtc.h. */
         Status snapshot(Snapshot &all) const noexcept { return Status(A::snapshot(&state_, table_, &all)); }
+#endif
+#if GTC_WITH_REZERO
         /* After a rest of so many seconds: the mean of the compensated rate. 0 seconds take every re-zero back. */
         Status rezero(DegPerHour mean_rate, uint_least32_t seconds) noexcept
         {
             return Status(A::rezero(&state_, table_, mean_rate.value(), seconds));
         }
+#endif
         /* The state of gtc.h, to copy it or to hand it to C. */
         State &state() noexcept { return state_; }
         const State &state() const noexcept { return state_; }
+#if GTC_WITH_SAVE
         Status save(gtc_word_t (&words)[GTC_SAVE_WORDS]) const noexcept { return Status(A::save(&state_, table_, words)); }
         Status restore(const Table &table, uint_least32_t period_us, const gtc_word_t (&words)[GTC_SAVE_WORDS],
                        uint_least32_t off_blocks) noexcept
         {
-            table_ = &table;
-            return Status(A::restore(&state_, table_, period_us, words, off_blocks));
+            return taken(table, Status(A::restore(&state_, &table, period_us, words, off_blocks)));
         }
+#endif
 
     private:
+        Status taken(const Table &table, Status status) noexcept
+        {
+            if (!status.failed()) {
+                table_ = &table;
+            }
+            return status;
+        }
+
         typename A::State state_;
         const Table *table_;
     };
@@ -225,8 +219,12 @@ template <class A> struct Runtime {
     };
 };
 
+#if GTC_WITH_F32
 typedef Runtime<F32> f32;
+#endif
+#if GTC_WITH_Q31
 typedef Runtime<Q31> q31;
+#endif
 
 } // namespace gtc
 

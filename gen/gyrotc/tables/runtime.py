@@ -48,6 +48,15 @@ _OF_PARTS = {
     "narrow": "GTC_WITH_NARROW",
     "rezero": "GTC_WITH_REZERO",
 }
+#: Options that decide which functions a header declares.
+_OF_FUNCTIONS = (
+    "GTC_WITH_F32",
+    "GTC_WITH_Q31",
+    "GTC_WITH_UNCERTAINTY",
+    "GTC_WITH_REZERO",
+    "GTC_WITH_IMAGE",
+    "GTC_WITH_SAVE",
+)
 _LONGEST = 120  # characters of a line
 
 Options = Mapping[str, int]
@@ -158,6 +167,8 @@ def _constants(options: Options) -> str:
         f"#define GTC_MAX_CHANNELS {options['GTC_MAX_CHANNELS']}U",
         *_comment(f"Parts: {', '.join(held) or 'the map alone'}."),
         f"#define GTC_PARTS 0x{options['GTC_PARTS']:x}UL",
+        "/* Which functions are declared below, for a program that has to know: 1, or 0. */",
+        *(f"#define {name} {options[name]}" for name in _OF_FUNCTIONS),
     ]
     if options["GTC_WITH_Q31"]:
         lines.append(

@@ -108,6 +108,7 @@ def test_the_emitted_text_is_plain(emitted: tuple[Path, dict[str, int]], numeric
     for name in ("gtc.h", f"gtc_{numeric}.c"):
         text = (folder / name).read_text("ascii")
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        code = re.sub(r"^#define GTC_WITH_\w+ [01]$", "", code, flags=re.MULTILINE)  # what is declared
         assert not re.search(r"##|\b(NUM|WIDE|STATE|TABLE|ELEMENT|MEMBER|PUBLIC|GTC_WITH_\w+)\b", code)
         assert not re.findall(r"\bgtc_\w+\.(?:inl|h)\b", text), name
         assert max(map(len, text.splitlines())) <= 128, max(text.splitlines(), key=len)
