@@ -134,7 +134,7 @@ def rms_of(model: Model, runs: list[Rows], folder: Path) -> float:
 
 
 def _bytes(model: Model) -> int:
-    return int(quantise(model, "f32").table_bytes)
+    return int(quantise(model, "f32").parameter_bytes)
 
 
 def _operations(model: Model) -> int:

@@ -138,7 +138,8 @@ static int terms_fit(const TABLE *table)
 static int is_readable(const TABLE *table)
 {
     return (fits_runtime(table) && wholes_fit(table, FIRST_COUNT) && arrays_fit(table) && parts_fit(table)
-            && grids_fit(table) && terms_fit(table) && centers_fit(table)) ? 1 : 0;
+            && grids_fit(table) && terms_fit(table) && centers_fit(table)
+            && (array_words(table) <= MAX_TABLE_WORDS)) ? 1 : 0;
 }
 
 /* The constant correction is one that the table may give. */

@@ -18,7 +18,7 @@ _LIMITS = """schema = 1
 product = "NAV"
 [at_most]
 rms_dph = 8.0e-4
-table_bytes = 200
+table_bytes = 1000
 [at_least]
 improvement = 1.1
 """

@@ -219,7 +219,7 @@ Learner = Callable[[TrainingData], tuple[Predictor, int]]  # the map and the byt
 def _method(method: str) -> Learner:
     def learn(data: TrainingData) -> tuple[Predictor, int]:
         found = fit(data, method=method)
-        return lambda t, r: predict(found, t, r), found.table_bytes
+        return lambda t, r: predict(found, t, r), found.parameter_bytes
 
     return learn
 

@@ -3,6 +3,8 @@
 
 #define NETWORK 51U /* word of an image at which its networks begin */
 
+#define HEADER_ROOM IMAGE_MAX /* more than a test table has besides its probes */
+
 static gtc_word_t image[IMAGE_MAX];
 
 /* A word of the arithmetic of this test. */
@@ -354,6 +356,29 @@ TEST(terms_read_the_channels_that_are_theirs)
 }
 #endif
 
+/* A count that is in its range can still make more words than a table has. */
+TEST(a_table_of_more_than_16384_words_is_refused_by_each_way_in)
+{
+    static gtc_word_t probes[4096U * GTC_PROBE_WORDS];
+    static gtc_word_t large[HEADER_ROOM + (4096U * GTC_PROBE_WORDS)];
+    table_t table = TABLE;
+    table_t read;
+    uint_least32_t n;
+
+    table.probes = probes;
+    table.n_probes = 4096U;
+    n = image_of(&table, large);
+    CHECK_INT(GTC_E_LAYOUT, FN(open)(&read, large, n, table.id));
+    CHECK_INT(GTC_E_LAYOUT, FN(check_words)(&table));
+    CHECK_INT(GTC_E_LAYOUT, FN(check)(&table));
+    table.n_probes = 3500U;
+    n = image_of(&table, large);
+    CHECK_INT(GTC_OK, FN(open)(&read, large, n, table.id));
+    CHECK_INT(GTC_OK, FN(check_words)(&table));
+    table.crc = large[n - 1U].bits;
+    CHECK_INT(GTC_E_SELF_TEST, FN(check)(&table));
+}
+
 int main(void)
 {
     RUN(members_keep_to_their_ranges);
@@ -381,5 +406,6 @@ int main(void)
     RUN(functions_of_a_channel_keep_to_their_ranges);
     RUN(terms_read_the_channels_that_are_theirs);
 #endif
+    RUN(a_table_of_more_than_16384_words_is_refused_by_each_way_in);
     return test_end();
 }

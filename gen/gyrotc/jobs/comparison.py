@@ -173,7 +173,7 @@ def _judged(method: str, data: TrainingData, held: Sequence[_Held], options: Bui
         improvement=total.improvement,
         improvement_about_zero=total.improvement_about_zero,
         centers=whole.n_centers,
-        table_bytes=whole.table_bytes,
+        parameter_bytes=whole.parameter_bytes,
         sum_abs_weights_dph=whole.sum_abs_weights,
         noise_floor_dph=whole.noise_floor_dph,
         train_s=seconds,

@@ -164,7 +164,7 @@ class Table:
         return self.words[-1]
 
     @property
-    def table_bytes(self) -> int:
+    def parameter_bytes(self) -> int:
         """Bytes of w0, linear, scale, centers, widths, weights and parameters of terms."""
         networks = self.networks.size // ARRAYS["networks"]
         terms = self.terms.size // ARRAYS["terms"]
@@ -172,13 +172,13 @@ class Table:
 
     @property
     def fallback_model_bytes(self) -> int:
-        """Those of the fallback models among them."""
+        """Bytes of the parameters of the fallback models."""
         counts = self.records("networks")[self.n_networks :, 0]
         return 4 * (3 * counts.size + ARRAYS["centers"] * int(counts.sum()))
 
     @property
-    def read_only_bytes(self) -> int:
-        """Bytes of constants of an emitted table where pointers have 32 bits."""
+    def table_bytes(self) -> int:
+        """Bytes of read-only memory that the table takes in a program where pointers have 32 bits."""
         arrays = sum(int(getattr(self, a).size) for a in ARRAYS)
         # The header without its length, and CRC and number of fallback models
         return 4 * (len(self.header) - 1 + len(ARRAYS) + 2 + arrays)

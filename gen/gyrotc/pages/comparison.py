@@ -131,7 +131,7 @@ def _rows_after(
 
 def _costs(result: Comparison, unit: float) -> Table:
     table = Table(title="All environments", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    names = ["method", "RMS", "std", "improvement", "about zero", "centers", "bytes", "training, s"]
+    names = ["method", "RMS", "std", "improvement", "about zero", "centers", "bytes of parameters", "training, s"]
     paper = any(m.published_train_s for m in result.methods)
     for name in [*names, "paper's, s"] if paper else names:
         table.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
@@ -139,7 +139,7 @@ def _costs(result: Comparison, unit: float) -> Table:
         row = [
             m.id, *_numbers((m.exam_rms_dph, m.exam_std_dph), unit),
             *_numbers((m.improvement, m.improvement_about_zero), 1.0),
-            str(m.centers), str(m.table_bytes), f"{m.train_s:.3f}",
+            str(m.centers), str(m.parameter_bytes), f"{m.train_s:.3f}",
         ]  # fmt: skip
         if paper:
             row.append("-".join(f"{s:.0f}" for s in m.published_train_s or ()))
@@ -196,6 +196,8 @@ def _together(methods: Sequence[Method]) -> Panel:
     default = np.array([m.id == _DEFAULT for m in methods])
     for of, color in ((~default, COVERED), (default, AFTER)):
         panel.bars(excess[of], place[of], color)
-    costs = [(f"{m.centers} centers, " if m.centers else "") + f"{m.table_bytes} bytes" for m in methods]
+    costs = [
+        (f"{m.centers} centers, " if m.centers else "") + f"{m.parameter_bytes} bytes of parameters" for m in methods
+    ]
     panel.words(excess, place, [f"{c}, trained in {m.train_s:.3f} s" for c, m in zip(costs, methods, strict=True)])
     return panel

@@ -29,6 +29,9 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Axis = Annotated[str, Field(pattern="^[xyz]$")] | None
 ArithmeticName = Literal["f32", "q31"]
 
+TABLE_BYTES = "read-only memory that the table takes in a program where pointers have 32 bits, bytes"
+"""What the size of a table means in every result, on every page and in the header of the table."""
+
 R = TypeVar("R", bound="Numbered")
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
 from ..common.statistics import coverage_factor
-from .base import Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
+from .base import TABLE_BYTES, Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
 from .release import HeldLimits, Verdict
 from .rows import RowsCount
 
@@ -51,7 +51,7 @@ class Method(Part):
     improvement: Figure = Field(description="RMS that a constant leaves over RMS after")
     improvement_about_zero: Figure = Field(description="RMS before over RMS after")
     centers: Count = Field(description="centers of the networks")
-    table_bytes: Count = Field(description="size of its table, bytes")
+    parameter_bytes: Count = Field(description="parameters of its map as 32-bit words, bytes")
     sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
     noise_floor_dph: Figure = Field(description="as this method estimates it, deg/h")
     train_s: float = Field(description="processor time of training, s")
@@ -168,7 +168,7 @@ class ModelSizes(Part):
 
     method: str = Field(description="training method")
     centers: Count = Field(description="of all networks")
-    table_bytes: Count = Field(description="section 3")
+    table_bytes: Count = Field(description=TABLE_BYTES)
     rom_bytes: Count | None = Field(description="everything linked; null where nothing was compiled")
     ram_bytes: Count | None = Field(description="the caller's state; null where nothing was compiled")
     sizes_on: str | None = Field(description="target of these sizes")

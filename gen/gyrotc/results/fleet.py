@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr
 
-from .base import Amount, Axis, Count, Figure, Finding, Part, Positive, Result, Share
+from .base import TABLE_BYTES, Amount, Axis, Count, Figure, Finding, Part, Positive, Result, Share
 from .release import Verdict
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -53,7 +53,7 @@ class FleetUnit(Part):
     noise_floor_dph: Figure = Field(default=None, description="noise floor of the model, deg/h")
     bias_dph: Figure = Field(default=None, description="mean bias of the training samples, deg/h")
     centers: Count | None = Field(default=None, description="of all networks")
-    table_bytes: Count | None = Field(default=None, description="size of the table, bytes (section 3)")
+    table_bytes: Count | None = Field(default=None, description=TABLE_BYTES)
     sum_abs_weights_dph: Figure = Field(default=None, description="largest sum of a network's weights, deg/h")
     error_bound_dph: Figure = Field(default=None, description="of the tables for any input, deg/h")
     findings: tuple[str, ...] = Field(

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from .base import Amount, ArithmeticName, Axis, Count, Figure, Part, Positive, Result, UnitResult
+from .base import TABLE_BYTES, Amount, ArithmeticName, Axis, Count, Figure, Part, Positive, Result, UnitResult
 
 
 class Instrument(Part):
@@ -166,7 +166,7 @@ class EmittedTable(Part):
     """Size and error bound of one table."""
 
     numeric: ArithmeticName = Field(description="its arithmetic")
-    table_bytes: Count = Field(description="size of the table, bytes (section 3)")
+    table_bytes: Count = Field(description=TABLE_BYTES)
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
     rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
 
@@ -242,7 +242,7 @@ class VerifiedTarget(Part):
     flags: str | None = Field(default=None, description="options of the compiler")
     log: str | None = Field(default=None, description="file with the output of a board test that ran elsewhere")
     parts: Count | None = Field(default=None, description="board tests of this arithmetic in that file")
-    table_bytes: Count | None = Field(default=None, description="size of the table, bytes (section 3)")
+    table_bytes: Count | None = Field(default=None, description=TABLE_BYTES)
     vectors: Count | None = Field(default=None, description="results that were compared")
     mismatches: Count | None = Field(default=None, description="results that differ from the reference")
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")

@@ -207,7 +207,7 @@ class Training(UnitResult):
     block_s: float = Field(description="length of a block, s")
     average_s: float = Field(description="averaging of all RMS figures, s")
     centers: Count = Field(description="of all networks")
-    table_bytes: Count = Field(description="parameters of the map in a table, bytes")
+    parameter_bytes: Count = Field(description="parameters of the map as 32-bit words, bytes")
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
     predicted_rms_ratio: Figure = Field(
         description="expected RMS over the noise floor on data of the same history; null: no prediction"

@@ -275,8 +275,8 @@ def _sizes(model: Model, emission: Emission) -> Iterator[str]:
         of_channels = channel_error_dph(model, table.numeric, table.bias_frac_bits)
         beside = f", curves and products of channels: {_upwards(of_channels)}" if of_channels else ""
         yield (
-            f"{numeric + ':':<12} {table.read_only_bytes} bytes of read-only data, "
-            f"{table.table_bytes} of them parameters; "
+            f"{numeric + ':':<12} {table.table_bytes} bytes of read-only data, "
+            f"{table.parameter_bytes} of them parameters; "
             f"|error| <= {_upwards(table.error_bound_dph)} deg/h against the model (terms excluded{beside})"
         )
         if table.n_fallback_models:
@@ -311,7 +311,7 @@ def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
     for numeric, table in emission.tables.items():
         if numeric == "q31":
             yield _macro("Q31_BIAS_FRAC_BITS", c_code(f"{table.bias_frac_bits}"), "bias in 2^-this deg/h")
-        size = c_code(f"{table.read_only_bytes}UL")
+        size = c_code(f"{table.table_bytes}UL")
         yield _macro(f"{numeric.upper()}_TABLE_BYTES", size, "read-only data, with pointers of 32 bits")
 
 

@@ -52,6 +52,7 @@ _SUM = 2**30  # of the magnitudes of weights, so that no sum overflows: docs/num
 _PLAUSIBLE = {"f32": (-90.0, 200.0), "q31": (-90 * 65536, 200 * 65536)}
 _SPAN = 2**26 - 1  # of an input in 2^-16 C: five bits more are 31 (libc/gtc_q31.c)
 _LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
+_MAX_WORDS = 0x4000  # of the arrays of a table, MAX_TABLE_WORDS of libc/gtc_check.inl
 _LARGEST = 2**31 - 1  # a signed 32-bit word
 
 WordLimits = list[tuple[str, float, float]]  # of words in order: name, least, most
@@ -71,6 +72,9 @@ def _refused(table: Table, frac_bits: int) -> Iterator[str]:
     whole, numbers, network, center, guard, guard_whole, term, sigma = limits
     header, ends = table.header[2:], _FIRST_COUNT + _N_NUMBERS
     yield from _beyond(header[:_FIRST_COUNT] + header[ends:], whole)
+    n_words = sum(int(getattr(table, name).size) for name in ARRAYS)
+    if n_words > _MAX_WORDS:
+        yield f"a table of {n_words} words in its arrays, more than {_MAX_WORDS}"
     if table.networks.size == 0 or table.n_channels == 0:
         return
     yield from _beyond(table.numbers(header[_FIRST_COUNT:ends]), numbers)

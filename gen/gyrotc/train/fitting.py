@@ -423,7 +423,7 @@ def training_of(
         block_s=front.block_s,
         average_s=options.average_s,
         centers=fitted.n_centers,
-        table_bytes=fitted.table_bytes,
+        parameter_bytes=fitted.parameter_bytes,
         sum_abs_weights_dph=fitted.sum_abs_weights,
         predicted_rms_ratio=fitted.predicted_rms_ratio,
         prediction_withheld=fitted.withheld,

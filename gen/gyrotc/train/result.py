@@ -113,7 +113,7 @@ class Fit:
         return sum(len(network["weights"]) for network in self.networks)
 
     @property
-    def table_bytes(self) -> int:
+    def parameter_bytes(self) -> int:
         """Parameters of the map as 32-bit words: 24 + 20 M for one network."""
         return 12 + sum(12 + 20 * len(network["weights"]) for network in self.networks)
 

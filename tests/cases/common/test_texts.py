@@ -343,7 +343,7 @@ _TRAINING: dict[str, Any] = {
     "block_s": 10.0,
     "average_s": 100.0,
     "centers": 1,
-    "table_bytes": 20,
+    "parameter_bytes": 20,
     "sum_abs_weights_dph": 1.0,
     "predicted_rms_ratio": None,
     "prediction_withheld": "text",

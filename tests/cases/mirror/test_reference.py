@@ -209,6 +209,15 @@ def test_generator_and_runtime_refuse_the_same_tables(numeric: str) -> None:
     assert min(refused, taken) > 100
 
 
+@pytest.mark.parametrize("numeric", ["f32", "q31"])
+def test_both_refuse_a_table_of_more_than_16384_words(numeric: str) -> None:
+    table = quantise(random_model(4), numeric)
+    for n_probes, refused in ((3500, False), (4096, True)):
+        large = replace(table, probes=np.zeros(4 * n_probes, np.uint32))
+        assert (outside(large) is not None) == refused
+        assert runtime().check_words(large) == (LAYOUT if refused else 0)
+
+
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 @pytest.mark.parametrize("numeric", ["f32", "q31"])
 def test_a_model_whose_table_the_runtime_would_refuse_is_not_emitted(numeric: str) -> None:

@@ -45,7 +45,7 @@ def result(environments: tuple[str, ...], after: float = 7e-4) -> Comparison:
     def method(id: str, centers: int, seconds: float) -> Method:
         return Method(
             id=id, groups=groups, centers=centers, train_s=seconds, exam_rms_dph=after, exam_std_dph=after,
-            before_rms_dph=10.0 * after, improvement=1.2, improvement_about_zero=10.0, table_bytes=104,
+            before_rms_dph=10.0 * after, improvement=1.2, improvement_about_zero=10.0, parameter_bytes=104,
             sum_abs_weights_dph=0.0,
             noise_floor_dph=after,
         )  # fmt: skip

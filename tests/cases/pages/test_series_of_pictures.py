@@ -90,7 +90,7 @@ def test_the_paper_s_improvement_is_before_over_after(environment: str) -> None:
     )  # fmt: skip
     method = Method(
         id="mrbf_paper", groups=(group,) * 1, centers=1, train_s=1.0, exam_rms_dph=0.1, exam_std_dph=0.1,
-        before_rms_dph=1.0, improvement=1.2, improvement_about_zero=10.0, table_bytes=1, sum_abs_weights_dph=0.0,
+        before_rms_dph=1.0, improvement=1.2, improvement_about_zero=10.0, parameter_bytes=1, sum_abs_weights_dph=0.0,
         noise_floor_dph=0.1,
     )  # fmt: skip
     shown = with_published(

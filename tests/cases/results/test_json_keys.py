@@ -67,7 +67,7 @@ PASSED = {
 }  # fmt: skip
 COMPARE = HEAD | {
     "methods": [{
-        "id": "", "exam_rms_dph": 0.0, "centers": 0, "table_bytes": 0, "train_s": 0.0,
+        "id": "", "exam_rms_dph": 0.0, "centers": 0, "parameter_bytes": 0, "train_s": 0.0,
         "groups": [{
             "environment": "", "before_rms_dph": 0.0, "before_std_dph": 0.0, "after_rms_dph": 0.0,
             "after_std_dph": 0.0, "improvement": 0.0, "improvement_about_zero": 0.0,

@@ -256,7 +256,7 @@ def test_the_words_are_those_of_layout_3(numeric: str) -> None:
     assert words[2] == len(words)
     assert words[5] == table.id == zlib.crc32(b"rlg_4")
     assert words[-1] == zlib.crc32(np.array(words[1:-1], dtype="<u4").tobytes())
-    assert table.table_bytes == 24 + 20 * model.n_centers
+    assert table.parameter_bytes == 24 + 20 * model.n_centers
 
 
 def test_the_same_model_gives_the_same_words() -> None:

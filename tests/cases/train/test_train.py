@@ -64,7 +64,7 @@ def test_the_map_is_found_within_a_fraction_of_the_noise(seed: int) -> None:
     )
     assert rms(error) < 0.25 * NOISE_DPH
     assert 1 <= found.n_centers <= 6
-    assert found.table_bytes == 24 + 20 * found.n_centers
+    assert found.parameter_bytes == 24 + 20 * found.n_centers
     assert found.sum_abs_weights < 0.13
     assert found.noise_floor_dph == pytest.approx(NOISE_DPH, rel=0.08)
 

@@ -119,7 +119,7 @@ def test_linear_regression_drops_what_does_nothing(of_t: float, of_r: float, kep
         found.append(fitted.curves["powers"])
         assert np.all(np.diff(fitted.curves["bic"]) < 0.0)
         assert fitted.n_centers == 0
-        assert fitted.table_bytes == 24
+        assert fitted.parameter_bytes == 24
         for used, weight in zip(([1, 0], [0, 1]), fitted.networks[0]["linear"], strict=True):
             assert (weight != 0.0) == (used in fitted.curves["powers"])
     assert found.count(kept) >= 9, found
