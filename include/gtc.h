@@ -29,6 +29,8 @@
  * float32 needs C99 arithmetic (-std=c99 -ffp-contract=off, no -ffast-math), which gtc_f32_check() tests at boot.
  * Fixed point needs no flag.
  *
+ * Pages and examples that comments name (docs/..., examples/...) are in gyrotc's repository.
+ *
  * SPDX-License-Identifier: MIT
  */
 #ifndef GTC_H_INCLUDED
@@ -99,7 +101,7 @@ typedef struct gtc_q31_state gtc_q31_state_t;
  * rounding, ties, no fused products, no excess precision, order of sums, subnormals), checksum, known answers. Of a
  * constant table that the linker placed these find whatever memory lost.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT, GTC_E_IMAGE (checksum) or GTC_E_SELF_TEST.
- * Cost: n_probes + 2 evaluations of the map, about 40 operations a word. */
+ * Cost: n_probes + 2 evaluations of the map, and a CRC-32 over the table, 32 steps a word. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_check(const gtc_f32_table_t *table);
 #endif
@@ -134,7 +136,7 @@ GTC_MUST_CHECK int gtc_q31_init(gtc_q31_state_t *state, const gtc_q31_table_t *t
  *     stopped clock ends in GTC_FALLBACK. Longer than an hour: in several calls with NULL.
  * Returns the status of the correction in force, with GTC_HELD if this temperature was not accepted; GTC_E_ARG for a
  * state that is NULL or was never started, GTC_E_ID for one of another table.
- * Cost: about 40 operations a channel; the first call of a block also makes the correction (one map, slope_blocks
+ * Cost: no loop but over the channels; the first call of a block also makes the correction (one map, slope_blocks
  * multiplications, the terms), a longer gap at most missing_blocks + 1 of them. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_sample(gtc_f32_state_t *state, const gtc_f32_table_t *table, uint_least32_t elapsed_us,
@@ -183,7 +185,7 @@ typedef struct {
  * until terms have forgotten the time before the start (docs/design.md). It excludes the noise of the rate. Where it
  * grows at once, add sigma_new^2 - sigma_old^2 to the filter's variance (examples/nav_loop).
  * Returns the status of the correction, GTC_E_ARG (NULL), GTC_E_ID or GTC_E_ABSENT (no uncertainties in the table).
- * Cost: 220 instructions in float32, 770 in fixed point on a Cortex-M4F, without terms; no map. */
+ * Cost: some squares and two square roots of a loop of bounded length, one step a term; no map. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_snapshot(const gtc_f32_state_t *state, const gtc_f32_table_t *table,
                                     gtc_f32_snapshot_t *snapshot);
@@ -255,7 +257,7 @@ GTC_MUST_CHECK int gtc_q31_angle(gtc_q31_angle_t *angle, int_least32_t bias, int
  * header. Nothing is written unless the whole image is sound; then no function traps or reads outside, whoever made
  * it. A CRC does not authenticate: that the numbers are this gyro's, the firmware must know.
  * Returns 0, GTC_E_ARG, GTC_E_IMAGE (magic, byte order, length, CRC), GTC_E_LAYOUT (layout, options of the build, a
- * word out of range) or GTC_E_ID. Cost: about 50 operations a word. */
+ * word out of range) or GTC_E_ID. Cost: a CRC-32, 32 steps a word, then the ranges once. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_open(gtc_f32_table_t *table, const gtc_word_t *words,
                                 uint_least32_t n_words, uint_least32_t expected_id);
@@ -267,7 +269,7 @@ GTC_MUST_CHECK int gtc_q31_open(gtc_q31_table_t *table, const gtc_word_t *words,
 
 /* Tests a table as gtc_<n>_open() does an image: the range of every word (docs/FORMAT.md, section 3), and what relates
  * several words. For a table that did not come with the program; gtc_<n>_check() comes first.
- * Returns 0, GTC_E_ARG or GTC_E_LAYOUT. Cost: about 10 operations a word. */
+ * Returns 0, GTC_E_ARG or GTC_E_LAYOUT. Cost: one pass over the words. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_check_words(const gtc_f32_table_t *table);
 #endif
@@ -287,7 +289,7 @@ GTC_MUST_CHECK int gtc_q31_check_words(const gtc_q31_table_t *table);
  * A torn or foreign image, or one with numbers that no call leaves, leaves `state` unwritten: it is read into a state
  * on the stack first. examples/two_slots keeps it over power cuts.
  * Returns 0, GTC_E_ARG, GTC_E_LAYOUT (also: another arithmetic or version), GTC_E_IMAGE, GTC_E_ID or GTC_E_PERIOD.
- * Cost: about 40 operations a word. */
+ * Cost: a CRC-32 over the saved words, 32 steps a word. */
 #if GTC_WITH_F32
 GTC_MUST_CHECK int gtc_f32_save(const gtc_f32_state_t *state, const gtc_f32_table_t *table,
                                 gtc_word_t words[GTC_SAVE_WORDS]);

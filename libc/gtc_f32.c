@@ -1,12 +1,14 @@
 /* gtc_f32.c - the runtime in float32.
  *
- * Read from top to bottom: each function is before its callers.
+ * Read from top to bottom: each function is before its callers. Pages that comments name (docs/...) are in
+ * gyrotc's repository.
  *
  * In the repository: the algorithm is written once for both arithmetics, in the .inl files, in the names of
  * gtc_names_f32.h. MISRA 20.1 throughout: the texts use what is above them.
  *
  * SPDX-License-Identifier: MIT
  */
+#include "gtc_private.h"
 #include "gtc_num_f32.h"
 
 #include "gtc_map.inl"
@@ -16,7 +18,7 @@
 #include "gtc_rezero.inl"
 #include "gtc_crc.inl"
 
-/* ---- angle increments -------------------------------------------------------------------- */
+/* ==== Angle increments. */
 
 /* Products and sums with their rounding errors carried on. 1 deg/h is 1 arcsec/s. The rest is a pair of floats
  * (docs/numerics.md, section 6). */
@@ -116,7 +118,7 @@ int PUBLIC(angle)(ANGLE *angle, float bias, float dt, float *increment)
 }
 
 #if GTC_WITH_SAVE
-/* ---- wide numbers as words of a saved state ---------------------------------------------- */
+/* ==== Wide numbers as words of a saved state. */
 
 static void to_words(float x, gtc_word_t words[2])
 {
@@ -155,7 +157,7 @@ static int is_fraction(float x)
 #include "gtc_limits.inl"
 
 #if GTC_WITH_IMAGE
-/* ---- conditions on several words of a table ---------------------------------------------- */
+/* ==== Conditions on several words of a table. */
 
 /* Numbers that are different, and no quotient by their difference is infinite. */
 static int is_width(float low, float high)

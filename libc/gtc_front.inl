@@ -1,6 +1,6 @@
 /* gtc_front.inl - samples in, correction in force out.
  *
- * docs/numerics.md, section 1, gives every step; gen/gyrotc/mirror is its mirror. From a sample to a correction:
+ * docs/numerics.md, section 1, gives every step. From a sample to a correction:
  *
  *   sample()       puts the call on a grid of periods; slots without a call are passed as missed
  *     take_slot()    judges the readings: accepted, held, or the start of a new series
@@ -135,19 +135,14 @@ static void reset_terms(STATE *state)
 #endif
 
 #if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
-/* The terms begin at x, the first temperature; what the first start finds of a saved state goes on. */
-static void begin_terms(STATE *state, const TABLE *table, NUM x, int nothing_before)
+/* The terms begin at x, the first temperature. */
+static void begin_terms(STATE *state, const TABLE *table, NUM x)
 {
     int_least32_t ignored = GTC_OK;
     const NUM within = within_envelope(table, x, &ignored);
 #if GTC_WITH_RETAINED
     uint_least32_t i;
 
-    if (nothing_before == 0) {
-        reset_terms(state);
-    }
-#else
-    (void)nothing_before;
 #endif
 #if GTC_WITH_UNCERTAINTY
     uncertainty_terms_begin(state, table, within);
@@ -177,9 +172,8 @@ static void step_terms(STATE *state, const TABLE *table, NUM temp)
 }
 #endif
 
-/* Begins again at x: slope 0, nothing in the window. `nothing_before`: the first start, or the first one after a
- * loss. */
-static void restart(STATE *state, const TABLE *table, NUM x, int nothing_before)
+/* Begins again at x: slope 0, nothing in the window. */
+static void restart(STATE *state, const TABLE *table, NUM x)
 {
     state->filled = 0U;
     state->window_valid = 0U;
@@ -188,9 +182,7 @@ static void restart(STATE *state, const TABLE *table, NUM x, int nothing_before)
     state->uncertainty.missing = 0U;
 #endif
 #if GTC_WITH_RETAINED || (GTC_WITH_TERMS && GTC_WITH_UNCERTAINTY)
-    begin_terms(state, table, x, nothing_before);
-#else
-    (void)nothing_before;
+    begin_terms(state, table, x);
 #endif
     make_correction(state, table, x, NUM_ZERO, GTC_WARMING);
 }
@@ -413,18 +405,22 @@ static void miss_reading(INPUT *in, NUM x, uint_least32_t us)
     add_gap(in, us);
 }
 
+#if GTC_WITH_RETAINED
 /* 1 before the first reading, and after a gap for which nothing is remembered. */
 static int has_no_past(const INPUT *in)
 {
     return (in->next_gap_us == 0U) ? 1 : 0;
 }
+#endif
 
 /* One temperature. Returns GTC_OK or GTC_HELD. */
 static int take_temperature(STATE *state, const TABLE *table, NUM x)
 {
     INPUT *const in = &state->input[0];
     const gtc_word_t *const guard = table->guards;
+#if GTC_WITH_RETAINED
     const int nothing_before = has_no_past(in);
+#endif
     int verdict = IS_HELD;
 
     if (is_missing(x) || is_stuck(in, guard, x, state->period_us)
@@ -433,7 +429,12 @@ static int take_temperature(STATE *state, const TABLE *table, NUM x)
     } else {
         verdict = judge_reading(state, table, in, guard, x);
         if (verdict == IS_NEW_START) {
-            restart(state, table, x, nothing_before);
+#if GTC_WITH_RETAINED
+            if (nothing_before == 0) {
+                reset_terms(state); /* what a first start finds of a saved state goes on */
+            }
+#endif
+            restart(state, table, x);
         }
     }
     return (verdict == IS_HELD) ? GTC_HELD : GTC_OK;

@@ -1,9 +1,10 @@
 /* gtc_limits.inl - the legal range of every word of a table.
  *
  * This is the one text of them. A table with a word outside of its range, or one that does not meet the
- * conditions that relate several words, is refused by gtc_<n>_open() and gtc_<n>_check_words(); with any other
- * table no function of the runtime meets a run-time error (docs/proof.md). The generator reads this file and
- * emits no other table; docs/FORMAT.md, section 3, says it to users.
+ * conditions that relate several words, is refused by gtc_<n>_open() and gtc_<n>_check_words(). The ranges are
+ * chosen so that with any other table no function of the runtime meets a run-time error. The generator emits no
+ * table that is refused.
+ * In the repository: docs/proof.md says how far that is shown; docs/FORMAT.md, section 3, has the ranges.
  *
  * MISRA 8.9 throughout: the ranges stand together, not each in the one function that uses it.
  *

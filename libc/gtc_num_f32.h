@@ -180,7 +180,7 @@ static inline float gaussian(float acc, const gtc_word_t *center, const POINT *i
     return f;
 }
 
-/* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
+/* One network: w0 + linear part + its Gaussians. */
 static inline float network_value(const TABLE *table, const gtc_word_t *network,
                               const gtc_word_t *centers, const POINT *in)
 {
@@ -230,9 +230,9 @@ static inline void cells_of(const TABLE *table, const POINT *in, const uint_leas
 }
 #endif
 
+#if GTC_WITH_BANK
 /* ---- the bank of networks --------------------------------------------------------------- */
 
-#if GTC_WITH_BANK
 #define FULL_SHARE 1.0F
 #define IN_TEMP(in) ((in)->temp)
 #define IN_SLOPE(in) ((in)->slope)

@@ -341,7 +341,7 @@ static sum_t narrow_sum(sum_t start, const gtc_word_t *centers, const gtc_word_t
 }
 #endif
 
-/* One network: w0 + linear part + its Gaussians. In the loop, so that a fallback model costs the map no call. */
+/* One network: w0 + linear part + its Gaussians. */
 static inline int_least32_t network_value(const TABLE *table, const gtc_word_t *network,
                                       const gtc_word_t *centers, const POINT *in)
 {
@@ -377,9 +377,9 @@ static inline int_least64_t rounded_quotient(int_least64_t num, uint_least32_t d
     return (num < 0) ? -(int_least64_t)q : (int_least64_t)q;
 }
 
+#if GTC_WITH_BANK
 /* ---- the bank of networks --------------------------------------------------------------- */
 
-#if GTC_WITH_BANK
 #define FULL_SHARE 0x1000000 /* 1 in 2^-24 */
 #define IN_TEMP(in) ((int_least32_t)(in)->x_temp)
 #define IN_SLOPE(in) ((int_least32_t)(in)->x_slope)

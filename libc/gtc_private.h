@@ -14,7 +14,7 @@
 #include "gtc.h"
 
 #if GTC_TABLE_LAYOUT != 3
-#error "these sources read table layout 3: include/ and libc/ are of different versions"
+#error "these sources read table layout 3: gtc.h is of another version"
 #endif
 
 /* First of the two edges of an input. */

@@ -1,12 +1,14 @@
 /* gtc_q31.c - the runtime in fixed point.
  *
- * Read from top to bottom: each function is before its callers.
+ * Read from top to bottom: each function is before its callers. Pages that comments name (docs/...) are in
+ * gyrotc's repository.
  *
  * In the repository: the algorithm is written once for both arithmetics, in the .inl files, in the names of
  * gtc_names_q31.h. MISRA 20.1 throughout: the texts use what is above them.
  *
  * SPDX-License-Identifier: MIT
  */
+#include "gtc_private.h"
 #include "gtc_num_q31.h"
 
 #include "gtc_map.inl"
@@ -16,7 +18,7 @@
 #include "gtc_rezero.inl"
 #include "gtc_crc.inl"
 
-/* ---- angle increments -------------------------------------------------------------------- */
+/* ==== Angle increments. */
 
 #define MICROSECONDS 1000000 /* in a second */
 
@@ -45,7 +47,7 @@ int PUBLIC(angle)(ANGLE *angle, int_least32_t bias, int_least32_t dt, int_least3
 }
 
 #if GTC_WITH_SAVE
-/* ---- wide numbers as words of a saved state ---------------------------------------------- */
+/* ==== Wide numbers as words of a saved state. */
 
 static void to_words(int_least64_t x, gtc_word_t words[2])
 {
@@ -85,7 +87,7 @@ static int is_fraction(int_least32_t x)
 #include "gtc_limits.inl"
 
 #if GTC_WITH_IMAGE
-/* ---- conditions on several words of a table ---------------------------------------------- */
+/* ==== Conditions on several words of a table. */
 
 #define LARGEST_SUM 1073741824U /* of magnitudes of a network's weights: bias and sums keep to their words */
 #define LAST_POSITION 65535U

@@ -8,7 +8,7 @@
  * power-on draws a constant anew, independent of this one: nothing of the shift is kept for it.
  *
  * SPDX-License-Identifier: MIT
- *  */
+ */
 
 #if GTC_WITH_UNCERTAINTY
 int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)

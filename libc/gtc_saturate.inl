@@ -1,4 +1,6 @@
-/* gtc_saturate.inl - the one limit of a number to a range, in the numbers of the header that includes it.
+/* gtc_saturate.inl - limiting a number to a range.
+ *
+ * In the repository: the one text of it, in the numbers of the header that includes it.
  *
  * SPDX-License-Identifier: MIT
  */

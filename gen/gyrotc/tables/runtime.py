@@ -233,7 +233,7 @@ def _joined(places: Mapping[str, Path], name: str, first: str) -> list[str]:
 
 
 _HEAD = re.compile(r"\A/\* (gtc[a-z0-9_.]*) - (.*?)\*/\n", re.DOTALL)
-_OWN = re.compile(r"^ \* In the repository:.*?(?=^ \*$|^ \*/)", re.DOTALL | re.MULTILINE)
+_OWN = re.compile(r"^ \* In the repository:.*?(?=^ \*$|^ \*/|\Z)", re.DOTALL | re.MULTILINE)
 # REUSE-IgnoreStart
 _LICENCE = " *\n * SPDX-License-Identifier: MIT\n"
 # REUSE-IgnoreEnd
@@ -249,7 +249,7 @@ def _without_file_name(text: str, *, keep_licence: bool) -> str:
     rest = text[match.end() :]
     if keep_licence:
         return f"/* {match[1]} - {head}*/\n{rest}"
-    return f"/* ==== {head[0].upper()}{head[1:].rstrip()} */\n{rest}"
+    return f"\n/* ==== {head[0].upper()}{head[1:].rstrip()} */\n{rest}"
 
 
 _GUARD = "GTC_H_INCLUDED"  # of the one header that is emitted
@@ -269,7 +269,7 @@ class _Level:
 
 def _plain(lines: Sequence[str], options: Options, names: Mapping[str, _Macro]) -> str:
     text = "\n".join(_chosen(lines, options)) + "\n"
-    text = _expanded(text, names)
+    text = _HEAD_OF_FUNCTION.sub(lambda match: re.sub(r"\n +", " ", match[0]), _expanded(text, names))
     text = re.sub(r"\n{3,}", "\n\n", text)
     text = re.sub(r"\{\n\n", "{\n", text)
     text = re.sub(r"\n\n(\s*\})", r"\n\1", text)
@@ -334,6 +334,10 @@ class _Macro:
         return _WORD.sub(lambda match: values.get(match[0], match[0]), text)
 
 
+# The parameters of a function are broken into lines anew, as other names have other lengths.
+_HEAD_OF_FUNCTION = re.compile(
+    r"^(?:static |int |const |GTC_MUST_CHECK )[^(){};=#/]*\([^(){};#/]*\)(?=;?$)", re.MULTILINE
+)
 _MACRO = re.compile(r"^#define (\w+)(?:\(([\w, ]*)\))?\s+(.*?)\s*(?:/\*.*)?$", re.MULTILINE)
 
 
