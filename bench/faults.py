@@ -349,7 +349,7 @@ def table(record: Record) -> ResultsTable:
     head = ("fault", "RMS (≤ 1.5) ", "95 % ", "worst ", "RMS, worst gyro ", "silent ", "longest, s ", "never ")
     rows = [
         (
-            row["name"].replace("thermometer", "temperature sensor"),
+            row["name"].replace("thermometer", "temperature sensor").replace("begun anew", "started again"),
             Figure(row["rms"], ".2f", at_most=1.5),
             *(f"{row[key]:.2f}" for key in ("p95", "worst", "worst_gyro")),
             row["silent"],
