@@ -14,7 +14,6 @@ from self_tests import OK, RIGHT, Verdict, native, on_target, write_sources
 FLAGS = (
     ("-mfma",),
     ("-mfma", "-ffp-contract=fast"),
-    ("-mfma", "-ffp-contract=fast"),
     ("-ffast-math", "-U__FAST_MATH__"),
     ("-mfma", "-ffast-math", "-U__FAST_MATH__"),
     ("-funsafe-math-optimizations",),
@@ -95,16 +94,6 @@ def test_builds_of_targets(
     _reported(results, name, flags, right, verdict)
     assert verdict.differing(right), "the control changes no result"
     assert verdict.missed(right) == []
-
-
-@pytest.mark.parametrize("name", TARGETS)
-def test_the_source_keeps_gcc_from_fusing(
-    name: str, sources: list[Path], right: Verdict, tmp_path: Path, results: Results
-) -> None:
-    """Before: these builds gave other bits, and the self-test refused them. The control is the one above, unguarded."""
-    verdict = on_target(with_flags(name), ("-std=c99", "-ffp-contract=off", *FUSED), sources, tmp_path / "build")
-    _reported(results, name, FUSED, right, verdict)
-    assert set(verdict.statuses) == {OK} and verdict.differing(right) == []
 
 
 @pytest.mark.parametrize("name", TARGETS)
