@@ -108,10 +108,16 @@ def _annotations(tree: ast.AST) -> Iterator[Place]:
 
 
 def _fault(path: Path, operator: str, occurrence: int) -> Fault | None:
-    """Return a module with a fault; None if nothing but its looks would differ."""
+    """Return a module with a fault; None if nothing but its looks would differ, or if it were no Python.
+
+    Operators take the stars of `{**a, **b}` for a power.
+    """
     before = path.read_text("utf-8")
     after = mutate_code(before, get_operator(operator)(), occurrence)
-    if after is None or ast.dump(ast.parse(before)) == ast.dump(ast.parse(after)):
+    try:
+        if after is None or ast.dump(ast.parse(before)) == ast.dump(ast.parse(after)):
+            return None
+    except SyntaxError:
         return None
     lines = zip(before.splitlines(), after.splitlines(), strict=False)
     line, (one, other) = next((k, pair) for k, pair in enumerate(lines, start=1) if pair[0] != pair[1])

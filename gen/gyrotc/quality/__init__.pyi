@@ -17,4 +17,5 @@ from .judgement import judge_runs as judge_runs
 from .jumps import jumps as jumps
 from .odds import Event as Event
 from .repeats import stuck as stuck
+from .thermometers import late_findings as late_findings
 from .thermometers import thermometer_findings as thermometer_findings

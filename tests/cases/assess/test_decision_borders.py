@@ -7,6 +7,7 @@ those of scipy's t distribution; the rest is arithmetic by hand.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,12 +29,14 @@ from gyrotc.assess import (
 from gyrotc.common import Averages, InputError, statistics_of, time_statistics
 from gyrotc.jobs import reason_of_release
 from gyrotc.model import Model
+from gyrotc.quality import late_findings
 from gyrotc.recordings import Dataset, load
 from gyrotc.results import (
     DeclaredUnits,
     EvaluatedRun,
     Evaluation,
     FigureUncertainty,
+    Finding,
     Manifest,
     MapDifference,
     ModelSizes,
@@ -286,6 +289,34 @@ def test_a_run_is_an_outlier_with_three_times_the_scatter_of_the_others_or_of_th
         stds = [usual] * 4
         stds.insert(place, factor * threshold)
         assert outlier_files(dataset, model_dict, [0.0] * 5, stds) == expected
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("place", [0, 2, 4])
+def test_a_temperature_is_late_beyond_six_standard_errors_of_its_lag(place: int, sign: float, dataset: Dataset) -> None:
+    """Beside four runs in time: what remains of one is so many seconds of its correction's change, and noise."""
+    rng, time = np.random.default_rng(8), 100.0 * (np.arange(288) + 0.5)
+    correction = 1e-3 * np.sin(2.0 * np.pi * time / 7200.0)
+    change = np.gradient(correction, time)
+    change -= change.mean()
+    runs = []
+    for k in range(5):
+        noise = rng.normal(0.0, 1e-4, time.size)
+        noise -= noise.mean() + change * (noise @ change) / (change @ change)
+        runs.append((replace(dataset.runs[0], file=f"{k}.csv"), noise))
+
+    def found(late_s: float) -> list[Finding]:
+        left = [noise + (late_s * change if k == place else 0.0) for k, (_, noise) in enumerate(runs)]
+        means = [Averages(time, correction + x, x, np.zeros(time.size)) for x in left]
+        return list(late_findings([(run, a) for (run, _), a in zip(runs, means, strict=True)]))
+
+    (clear,) = found(sign * 1000.0)
+    assert clear.evidence["late_s"] == pytest.approx(sign * 1000.0, rel=1e-3)
+    sigma_s = 1e-4 / np.sqrt(time.size * np.mean(change**2))
+    assert clear.evidence["sigma_s"] == pytest.approx(sigma_s, rel=0.35)
+    limit = sign * 6.0 * clear.evidence["sigma_s"]
+    assert [one.file for one in found(1.05 * limit)] == [f"{place}.csv"]
+    assert found(0.95 * limit) == []
 
 
 def training_like(samples: int) -> Any:

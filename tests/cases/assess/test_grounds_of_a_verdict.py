@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import HOST, run_gyrotc
-from gyrotc.assess import LEAST_POWER_ONS, evaluate
+from gyrotc.assess import LEAST_POWER_ONS, evaluate, evaluation
 from gyrotc.recordings import load
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -251,6 +251,19 @@ def test_figures_of_the_judged_runs_do_not_depend_on_their_order(plain: dict[str
         (one.sigma_rms_dph, one.usable and one.usable.rms_dph, one.exam and one.exam.after.rms_dph) for one in found
     ]
     assert all(figures[0]) and figures[0] == pytest.approx(figures[1], rel=1e-9)
+
+
+def test_steps_that_differ_are_counted_over_all_runs(plain: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first step of each run is taken for one that differs."""
+    replay_on = evaluation.replay_on
+
+    def first_differs(*arguments: Any) -> Iterator[Any]:
+        for part in replay_on(*arguments):
+            yield replace(part, wrong=np.arange(1 if part.rows.start == 0 else 0))
+
+    monkeypatch.setattr(evaluation, "replay_on", first_differs)
+    dataset = load(plain["out"].parent / "RLG-1")
+    assert evaluate(plain["out"], dataset).mismatches == len(dataset.runs) > 1
 
 
 def test_a_limit_that_a_constant_keeps_is_named(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from gyrotc.results import Evaluation, Training, Verification, read_result
 from gyrotc.tables import emitted_tables
 from gyrotc.train import TrainingData, cleaned_samples, fit, predict, scaling_of
 from gyrotc.train.prior import (
+    FALSE_ALARM,
     Departures,
     EarlierPrior,
     Hypothesis,
@@ -33,6 +34,7 @@ from gyrotc.train.prior import (
 )
 from numpy.typing import NDArray
 from recordings import write_csv
+from scipy import stats
 
 Floats = NDArray[np.float64]
 Change = Callable[[Floats, Floats], Floats]
@@ -119,6 +121,23 @@ def test_an_earlier_map_is_known_no_better_than_its_table_states(stated: float, 
     own = posterior_of_means(known, ENVELOPE, 0.0).rms_sigma_dph()
     found = posterior_of_means(known, ENVELOPE, 0.0, stated * own)
     assert found.rms_sigma_dph() == pytest.approx(expected * own, rel=1e-9)
+
+
+def test_a_part_of_an_unchanged_unit_is_beyond_its_limit_no_more_often_than_stated() -> None:
+    """Any part of a check run, over check runs that are drawn from the earlier posterior."""
+    prior, rng, draws = one(), np.random.default_rng(3), 400
+    run = means(recorded(rng, CHECK))
+    values = prior.basis.values(run.temperature_c, run.slope_c_per_min)
+    factor = np.linalg.cholesky(prior.covariances[0])
+    alarms = 0
+    for _ in range(draws):
+        w = prior.means[0] + factor @ rng.normal(size=len(factor))
+        noise = run.sigma_dph * rng.normal(size=len(run.count)) / np.sqrt(run.count)
+        drawn = replace(run, bias_dph=prior.center_dph + prior.unit_dph * (values @ w) + noise)
+        cells = list(Departures(prior.alone(), drawn).cells())
+        alarms += not all(cell.within for cell in cells)
+    assert len(cells) > 5
+    assert alarms <= stats.binom.isf(1e-4, draws, FALSE_ALARM) < 5.0 * FALSE_ALARM * draws
 
 
 def test_an_answer_never_contradicts_the_significance_of_the_move() -> None:
