@@ -74,6 +74,8 @@ def test_the_extended_model_is_emitted_and_verified(built: Path) -> None:
     verification = read_json(folder / "verify.json")
     assert verification["failed"] == 0 and verification["passed"] > 0
     assert read_json(folder / "evaluate.json")["mismatches"] == 0
+    (table,) = [path for path in (folder / "c").glob("gtc_*.c") if path.stem not in ("gtc_f32", "gtc_q31")]
+    assert "/* thermal_gradient */" in table.read_text("ascii")
 
 
 def test_the_compiled_code_gains_what_the_diagnosis_promises(built: Path) -> None:
