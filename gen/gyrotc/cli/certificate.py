@@ -18,9 +18,14 @@ def certificate(
     folder: DirArg,
     out: OutOption,
     facts: Annotated[
-        Path | None, typer.Option("--facts", help="What the laboratory states (TOML, docs/delivery.md).")
+        Path | None,
+        typer.Option(
+            "--facts", help="What the laboratory states (TOML, docs/delivery.md); default: [meta] of the data set."
+        ),
     ] = None,
-    number: Annotated[str | None, typer.Option("--number", help="Number of the certificate.")] = None,
+    number: Annotated[
+        str | None, typer.Option("--number", help="Number of the certificate; default: that of the facts.")
+    ] = None,
     draft: Annotated[
         bool, typer.Option("--draft", help="Without what is missing: marked as a draft, and no DCC.")
     ] = False,

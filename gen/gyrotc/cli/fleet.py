@@ -28,7 +28,8 @@ def fleet(
     out: OutOption,
     jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, max=256, help="Processes on this machine.")] = 2,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Address of a Dask scheduler to use instead.")
+        str | None,
+        typer.Option("--scheduler", help="Address of a Dask scheduler to use instead; default: this machine."),
     ] = None,
     wait: Annotated[
         int,
@@ -43,9 +44,9 @@ def fleet(
 
     Example: gyrotc fleet recordings --out fleet
     """
-    from ..fleet.manifest import load_manifest
+    from ..fleet.manifest import load_manifest, printable
     from ..fleet.page import summary_of
-    from ..fleet.run import Cluster, run_fleet
+    from ..fleet.run import Cluster, forgotten_units, run_fleet
 
     wanted = load_manifest(manifest)
     cluster = Cluster(scheduler, wait, tell) if scheduler else None
@@ -55,6 +56,14 @@ def fleet(
     summary = summary_of(entries)
     write_json(json_file, summary.content())
     _tell_comparison(summary)
+    for place in wanted.skipped:
+        tell(f"{printable(str(place))}: no recordings and no dataset.toml, so no gyro", wrong=True)
+    for name in forgotten_units(wanted, out):
+        tell(
+            f"{name}: its result in {out} stays, but {manifest} has no recordings of it: bring them back, or move the "
+            "result away",
+            wrong=True,
+        )
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
@@ -120,7 +129,10 @@ def lot(
     fleet: Annotated[Path, typer.Argument(help="The folder that gyrotc fleet wrote: fully calibrated units.")],
     out: Annotated[Path, typer.Option("--out", callback=written_place, help="File for the lot.")],
     axis: Annotated[
-        str | None, typer.Option("--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own.")
+        str | None,
+        typer.Option(
+            "--axis", help="x, y or z of three-axis gyros: each axis is a lot of its own; default: gyros of one rate."
+        ),
     ] = None,
 ) -> None:
     """Learn what gyros of one type share.

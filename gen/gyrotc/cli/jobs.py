@@ -83,13 +83,15 @@ def build(
         bool, typer.Option("--extend", help="Diagnose first; add the named causes where they gain.")
     ] = False,
     limits: Annotated[
-        Path | None, typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met.")
+        Path | None,
+        typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met; default: none."),
     ] = None,
     lot: LotOption = None,
     prior: PriorOption = None,
     ageing: AgeingOption = None,
     previous: Annotated[
-        Path | None, typer.Option("--previous", help="An earlier result of this gyro: say what changed.")
+        Path | None,
+        typer.Option("--previous", help="An earlier result of this gyro: say what changed; default: that of --prior."),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -133,7 +135,9 @@ def build(
 @app.command()
 def compare(
     dataset: DatasetArg,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg; default: print only.")
+    ] = None,
     axis: AxisOption = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -166,7 +170,8 @@ def compare(
 def diagnose(
     dataset: DatasetArg,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for pictures, report and model-extended.json.")
+        Path | None,
+        typer.Option("--out", help="Folder for pictures, report and model-extended.json; default: print only."),
     ] = None,
     axis: AxisOption = None,
     lot: LotOption = None,

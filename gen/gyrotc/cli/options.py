@@ -57,13 +57,17 @@ def _json_place(path: Path | None) -> Path | None:
 
 JsonOption = Annotated[
     Path | None,
-    typer.Option("--json", callback=_json_place, help="Write the machine-readable result here; -: standard output."),
+    typer.Option(
+        "--json",
+        callback=_json_place,
+        help="Write the machine-readable result here; -: standard output; default: nowhere.",
+    ),
 ]
 AxisOption = Annotated[
     str | None,
     typer.Option(
         "--axis",
-        help="x, y or z of a three-axis recording; build, check and diagnose do all without it.",
+        help="x, y, z or all of a three-axis recording; default: all in build, check and diagnose, else none.",
         autocompletion=completing((*(axis.value for axis in GyroAxis), "all")),
     ),
 ]
@@ -102,18 +106,31 @@ TargetOption = Annotated[
     ),
 ]
 LotOption = Annotated[
-    Path | None, typer.Option("--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs.")
+    Path | None,
+    typer.Option(
+        "--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs; default: none."
+    ),
 ]
 PriorOption = Annotated[
     Path | None,
-    typer.Option("--prior", help="An earlier result of this gyro: a check run confirms it, or says where not."),
+    typer.Option(
+        "--prior", help="An earlier result of this gyro: a check run confirms it, or says where not; default: none."
+    ),
 ]
 AgeingOption = Annotated[
-    float | None, typer.Option("--ageing", help="How far the bias may have moved since --prior, 1 sigma, deg/h.")
+    float | None,
+    typer.Option(
+        "--ageing",
+        help="How far the bias may have moved since --prior, 1 sigma, deg/h; default: by drift and dates, else 0.",
+    ),
 ]
 AcceptOption = Annotated[
     str | None,
-    typer.Option("--accept-fail", metavar="REASON", help="Release a unit whose verdict is not PASS; says why."),
+    typer.Option(
+        "--accept-fail",
+        metavar="REASON",
+        help="Release a unit whose verdict is not PASS, and print why; default: refuse.",
+    ),
 ]
 
 

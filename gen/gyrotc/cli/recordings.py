@@ -35,18 +35,31 @@ def import_(
     files: Annotated[list[Path], typer.Argument(help="Files of a logger, each a run.")],
     out: OutOption,
     map_file: Annotated[
-        Path | None, typer.Option("--map", help="The map.toml of an earlier import from this logger.")
+        Path | None,
+        typer.Option(
+            "--map", help="The map.toml of an earlier import from this logger; default: recognise columns and units."
+        ),
     ] = None,
-    serial: Annotated[str | None, typer.Option("--serial", help="Serial of the gyro.")] = None,
+    serial: Annotated[
+        str | None,
+        typer.Option("--serial", help="Serial of the gyro; default: that of the file, else the name of --out."),
+    ] = None,
     rate_unit: Annotated[
-        str | None, typer.Option("--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, deg/s/131, ...")
+        str | None,
+        typer.Option(
+            "--rate-unit", help="Unit of rates: deg/h, deg/s, rad/s, deg/s/131, ...; default: as the file says."
+        ),
     ] = None,
     temperature_unit: Annotated[
         str | None,
-        typer.Option("--temperature-unit", help='Unit of temperatures: degC, K, "raw/340 + 36.53 degC", ...'),
+        typer.Option(
+            "--temperature-unit",
+            help='Unit of temperatures: degC, K, "raw/340 + 36.53 degC", ...; default: as the file says.',
+        ),
     ] = None,
     time_unit: Annotated[
-        str | None, typer.Option("--time-unit", help="Unit of times: s, ms, us, min, 0.01 s, ...")
+        str | None,
+        typer.Option("--time-unit", help="Unit of times: s, ms, us, min, 0.01 s, ...; default: as the file says."),
     ] = None,
     column: Annotated[
         list[str] | None,
@@ -69,7 +82,9 @@ def import_(
     ] = None,
     tolerance_s: Annotated[
         float | None,
-        typer.Option("--tolerance-s", min=1e-6, help="For how long a reading of a joined file holds, s."),
+        typer.Option(
+            "--tolerance-s", min=1e-6, help="For how long a reading of a joined file holds, s; needed with --join."
+        ),
     ] = None,
     exam: Annotated[
         bool | None,
@@ -174,11 +189,16 @@ def simulate(
     scenario: Annotated[str, typer.Argument(help="A built-in scenario (paper, ...) or a scenario file.")],
     out: OutOption,
     seed: SeedOption = 1,
-    raw_hz: Annotated[float | None, typer.Option("--raw-hz", help="Write rows at this rate instead, Hz.")] = None,
+    raw_hz: Annotated[
+        float | None, typer.Option("--raw-hz", help="Rows a second, Hz; default: those of the scenario.")
+    ] = None,
     pulses: Annotated[bool, typer.Option("--pulses", help="Write integer pulses instead of a rate.")] = False,
     format: Annotated[RunFormat, typer.Option("--format", help="Format of the files.")] = RunFormat.csv,
     units: Annotated[
-        int | None, typer.Option("--units", help="Simulate a lot of so many gyros, each in a folder of its own.")
+        int | None,
+        typer.Option(
+            "--units", help="Simulate a lot of so many gyros, each in a folder of its own; default: one gyro."
+        ),
     ] = None,
     family: Annotated[
         float | None,
@@ -250,7 +270,10 @@ def check(
     dataset: DatasetArg,
     axis: AxisOption = None,
     previous: Annotated[
-        Path | None, typer.Option("--previous", help="An earlier result of this gyro: are sign and axes as they were?")
+        Path | None,
+        typer.Option(
+            "--previous", help="An earlier result of this gyro: are sign and axes as they were? default: not asked."
+        ),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:

@@ -140,11 +140,21 @@ def emit(
     numeric: NumericOption = None,
     zero_at: Annotated[
         float | None,
-        typer.Option("--zero-at", metavar="C", min=-200, max=400, help="Shift the bias to 0 at this temperature."),
+        typer.Option(
+            "--zero-at",
+            metavar="C",
+            min=-200,
+            max=400,
+            help="Shift the bias to 0 at this temperature, C; default: no shift.",
+        ),
     ] = None,
     map_file: Annotated[
         Path | None,
-        typer.Option("--map", callback=_map_place, help="Write the map at 61 x 25 points here, too: CSV or JSON."),
+        typer.Option(
+            "--map",
+            callback=_map_place,
+            help="Write the map at 61 x 25 points here, too: CSV or JSON; default: nowhere.",
+        ),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -201,10 +211,14 @@ def verify(
     folder: DirArg,
     target: TargetOption = None,
     log: Annotated[
-        Path | None, typer.Option("--log", help="What board_test.c printed on hardware: checked and entered.")
+        Path | None,
+        typer.Option("--log", help="What board_test.c printed on hardware: checked and entered; default: none."),
     ] = None,
     exhaustive: Annotated[
-        bool, typer.Option("--exhaustive", help="Visit every input of the fixed-point table (minutes).")
+        bool,
+        typer.Option(
+            "--exhaustive", help="Visit every input of the fixed-point table, which takes minutes; default: a sample."
+        ),
     ] = False,
     json_file: JsonOption = None,
 ) -> None:

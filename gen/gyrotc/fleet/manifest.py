@@ -61,6 +61,7 @@ class Fleet:
     """What is to be done, and how.
 
     `releases`: Reasons, by serial, for which units are released although a finding bars them.
+    `skipped`: Folders of a folder that was given as a manifest that hold no recordings.
     """
 
     units: tuple[Unit, ...]
@@ -68,6 +69,7 @@ class Fleet:
     numerics: tuple[str, ...] | None
     limits: Limits | None
     releases: Mapping[str, str] = field(default_factory=dict)
+    skipped: tuple[Path, ...] = ()
 
 
 class _Part(BaseModel):
@@ -108,7 +110,8 @@ def load_manifest(path: Path) -> Fleet:
         except OSError as error:
             raise InputError(str(path), f"cannot be read ({error.strerror})", "a folder of data sets") from error
         every = tuple(unit for folder in listed if _has_recordings(folder) for unit in _units(folder, None))
-        return _distinct(path, Fleet(every, FitOptions(), None, None))
+        skipped = tuple(place for place in listed if _is_empty(place))
+        return _distinct(path, Fleet(every, FitOptions(), None, None, skipped=skipped))
     content = read_toml(path, "a manifest or a folder")
     try:
         manifest = _Manifest.model_validate(content)
@@ -163,6 +166,13 @@ def _has_recordings(folder: Path) -> bool:
         )
     except OSError:
         return True
+
+
+def _is_empty(folder: Path) -> bool:
+    """Test whether a folder that is neither hidden nor a result has no recordings."""
+    if folder.name.startswith(".") or not folder.is_dir() or _is_result(folder):
+        return False
+    return not _has_recordings(folder)
 
 
 def _is_result(folder: Path) -> bool:

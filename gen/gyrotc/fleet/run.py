@@ -248,6 +248,12 @@ def run_fleet(
                 clean_units(place, [unit.folder for unit in fleet.units])  # of processes that this one ended
 
 
+def forgotten_units(fleet: Fleet, out: Path) -> list[str]:
+    """Return the names of results in the folder of a fleet whose recordings are none of the fleet's."""
+    known = {unit.folder for unit in fleet.units}
+    return sorted(printable(place.parent.name) for place in out.glob(f"*/{ENTRY}") if place.parent.name not in known)
+
+
 def _checked_place(fleet: Fleet, out: Path) -> Path:
     """The folder of a fleet, which is there afterwards; raises as `run_fleet`."""
     place = Path(os.path.realpath(out))

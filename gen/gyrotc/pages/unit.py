@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..model import Model, load_model
+from ..recordings.plausibility import EARTH_RATE_NOT_STATED
 from ..results.base import read_optional, read_result
 from ..results.decision import decision_of, failed_checks, next_step
 from ..results.diagnosed import Diagnosed
@@ -133,9 +134,15 @@ class UnitResults:
         return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).text if lacking else ""
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings that the model carries into the C code, without the one that a finding repeats."""
+        repeated = any(finding.id == "earth_rate_not_stated" for finding in self.evaluation.findings)
+        return tuple(w for w in self.model.warnings if not (repeated and w.endswith(EARTH_RATE_NOT_STATED)))
+
+    @property
     def quiet(self) -> bool:
         """Test whether there is nothing that a person should know of the data."""
-        return not (self.evaluation.findings or self.model.warnings)
+        return not (self.evaluation.findings or self.warnings)
 
     @property
     def firmware(self) -> dict[str, int]:

@@ -21,6 +21,8 @@ from .units import Conversion
 
 EARTH_RATE_DPH = 15.04106717866910  # 7.2921150e-5 rad/s (WGS 84), deg/h
 
+EARTH_RATE_NOT_STATED = "the model may take Earth's rate for bias."
+"""Ends what is said of a mean rate that could be Earth's."""
 TRUSTED = "units are trusted: "
 """Begins what is said of values that contradict their units and were taken all the same."""
 _LARGEST_DPH = 15.05  # of a component of Earth's rate, rounded up
@@ -32,7 +34,7 @@ def earth_rate_warning(stated: str | None, mean_dph: float) -> str:
         return ""
     return (
         f"The mean rate is {mean_dph:.4g} deg/h, Earth's rate is up to 15.04 deg/h, and the data set does not "
-        "state earth_rate: the model may take Earth's rate for bias."
+        f"state earth_rate: {EARTH_RATE_NOT_STATED}"
     )
 
 

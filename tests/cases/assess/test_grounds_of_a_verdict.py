@@ -347,3 +347,14 @@ def test_a_pass_of_a_table_that_does_not_fit_its_exam_says_so(plain: dict[str, A
     for result, said in ((plain, False), (found, True)):
         head = (result["out"] / "report.html").read_text("utf-8").partition("</header>")[0]
         assert (words in result["done"].stdout, words in head) == (said, said)
+
+
+def test_what_is_not_stated_of_earths_rate_is_said_once(tmp_path: Path) -> None:
+    """The C code carries it, and the page has it among its findings only."""
+    data = written(tmp_path / "RLG-1", unit())
+    text = (data / "dataset.toml").read_text()
+    (data / "dataset.toml").write_text(text.replace('earth_rate = "none"\n', ""))
+    found = built(tmp_path, data)
+    page = (found["out"] / "report.html").read_text("utf-8")
+    assert page.count("the model may take Earth") == 1 == page.count("Earth rate not stated")
+    assert "the model may take Earth's rate for bias" in found["model"]["meta"]["warnings"][0]

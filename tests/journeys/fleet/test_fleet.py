@@ -197,6 +197,18 @@ def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_without_recordings_and_a_result_without_its_recordings_are_named(
+    three: Path, tmp_path: Path, gyrotc: Command
+) -> None:
+    gyrotc("fleet", three, "--out", tmp_path / "out")
+    (three / "empty").mkdir()
+    (three / "RLG-1").rename(tmp_path / "elsewhere")
+    done = gyrotc("-q", "fleet", three, "--out", tmp_path / "out")
+    reported = [line for line in done.stdout.splitlines() if line.startswith((f"{three}/empty: ", "RLG-1: "))]
+    assert len(reported) == 2 and all("no recordings" in line for line in reported), done.stdout
+    assert (tmp_path / "out" / "RLG-1" / "model.json").is_file()
+
+
 def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         gyro(tmp_path / "d" / name, "RLG-1")
