@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from gyrotc.quality import Change, judge
+from gyrotc.recordings import load
 from numpy.typing import NDArray
 
 Columns = dict[str, NDArray[np.float64]]
@@ -54,6 +56,15 @@ def write_parquet(path: Path, table: Mapping[str, NDArray[np.float64]] | None = 
 def toml(*runs: str, head: str = 'schema = 1\nserial = "RLG-0042"\nearth_rate = "removed"', tail: str = "") -> str:
     """A description; each run is the lines of one [[run]]."""
     return "\n".join([head, *(f"[[run]]\n{run}" for run in runs), tail, ""])
+
+
+def changes_in(folder: Path, *runs: Mapping[str, NDArray[np.float64]]) -> list[Change]:
+    """The changes that the judgement of some runs finds, by run in order of time; `run` numbers them as given."""
+    for k, columns_of_run in enumerate(runs):
+        write_csv(folder / f"{k}.csv", columns_of_run)
+    text = toml(*(f'file = "{k}.csv"\npower_on_s = "unknown"' for k in range(len(runs))))
+    (folder / "dataset.toml").write_text(text, "utf-8")
+    return [change for judgement in judge(load(folder)).runs for change in judgement.changes]
 
 
 def described(folder: Path, *runs: str, **parts: str) -> None:

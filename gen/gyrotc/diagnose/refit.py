@@ -47,7 +47,7 @@ def overtones_of(data: TrainingData, term: Cause, values: CauseValues) -> tuple[
         values: Its parameters.
 
     Raises:
-        TrainingFailed: The evidence process, which says what the noise is, cannot be solved.
+        TrainingFailed: The process, which gives the noise, cannot be solved.
     """
     bins = None if term.overtone is None else detrend(data, scaling_of(data))
     if bins is None or term.overtone is None or term.amplitudes is None:

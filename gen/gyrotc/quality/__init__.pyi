@@ -1,10 +1,8 @@
 from .changes import Change as Change
-from .changes import changes_of as changes_of
 from .curves import curve_findings as curve_findings
 from .events import found_events as found_events
 from .findings import finding as finding
 from .findings import run_facts as run_facts
-from .fits import RowArrays as RowArrays
 from .fits import WalkNoise as WalkNoise
 from .fits import evidence_beside_memories as evidence_beside_memories
 from .inspection import CheckResult as CheckResult

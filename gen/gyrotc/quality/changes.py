@@ -127,21 +127,6 @@ class _At:
         return np.asarray(np.clip(since / self.duration_s, 0.0, 1.0))
 
 
-def changes_of(runs: Sequence[RowArrays]) -> list[Change]:
-    """Return the changes of all runs, by run in order of time.
-
-    Args:
-        runs: Time in s, temperature in C, rate in deg/h of the rows that count, finite, shape (n,) each.
-    """
-    numbers = range(len(runs))  # by number: no run is held while the next one is read
-    cell_s = cell_length(sum(_length_s(runs[k]) for k in numbers))
-    return changes_in_cells([run_cells(runs[k], cell_s) for k in numbers], lambda k: runs[k])
-
-
-def _length_s(rows: RowArrays) -> float:
-    return float(np.ptp(rows[0]))
-
-
 def cell_length(total_s: float) -> float:
     """Return the length of the cells in which runs of so many seconds in all are searched, s."""
     return max(_CELL_S, total_s / _MOST_CELLS)
@@ -152,7 +137,7 @@ def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArra
 
     Args:
         cells: Means over cells of each run (`cell_length`).
-        rows_of: Gives the rows of a run, as for `changes_of`; only those of runs with changes are read.
+        rows_of: Gives time, temperature and rate of the rows of a run that may be used; called for runs with changes.
     """
     long = [k for k, one in enumerate(cells) if len(one) > _LEAST_LENGTH and np.ptp(one.rate_dph) > 0.0]
     fine = [cells[k] for k in long]

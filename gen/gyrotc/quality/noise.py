@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.arrays import FloatArray, parts_of
-from .odds import NOISE_FACTOR, cost_of, sigma_of
+from ..common.statistics import noise_of
+from .odds import NOISE_FACTOR, cost_of
 
 # Second differences to one mean magnitude, at least: it is then known to a fifth.
 _GROUP = 20
@@ -47,7 +48,7 @@ def noise_parts(rate: FloatArray, step: float) -> list[NoisePart]:
     if count < _MIN_GROUPS or np.median(groups) < _STEPS * step:
         return []
     noise = np.log(np.maximum(groups, 0.01 * np.median(groups)))
-    sigma = sigma_of(np.diff(noise)) / np.sqrt(2.0) + 1e-3
+    sigma = noise_of(np.diff(noise)) / np.sqrt(2.0) + 1e-3
     cost = cost_of(2.0 * count)
     bounds = _partition(noise / sigma, 2.0 * cost)
     usual, found = float(np.quantile(noise, _USUAL)), list[NoisePart]()

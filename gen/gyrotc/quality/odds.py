@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from ..common.arrays import FloatArray
-from ..common.metrics import MAD_TO_SIGMA
 
 Column = Literal["time", "temperature", "rate"]
 EventKind = Literal[
@@ -116,8 +115,3 @@ def freedom_of(largest: FloatArray) -> float:
     # Two standard errors below the median: few rows do not show that the noise has tails
     usual = float(np.median(largest)) - 2.0 * _SPREAD_OF_LARGEST / np.sqrt(len(largest))
     return next(freedom for limit, freedom in _FREEDOM_BY_LARGEST if usual <= limit)
-
-
-def sigma_of(values: FloatArray) -> float:
-    """Return the standard deviation about 0 that the median magnitude implies."""
-    return max(MAD_TO_SIGMA * float(np.median(np.abs(values))), 1e-12) if len(values) else 1.0

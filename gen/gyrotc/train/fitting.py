@@ -62,9 +62,6 @@ _SLOPE_WINDOW_S = 100.0  # as long as the paper's means
 HOLD_S = 300.0  # at 5 C/min a held temperature is then off by 25 C: longer is no holding
 _MAX_RATE_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse thermometer
-_COVERAGE_CELLS = (32, 12)  # of T and of dT/dt: 384 bits in a table
-# of T and of dT/dt: 80 words in a table; an odd number of slopes, so that rest has cells of its own
-_UNCERTAINTY_CELLS = (8, 5)
 # Gathered means are kept to this share of their noise, and their inputs to a tenth of what sensors resolve.
 _MEANS_SHARE = 0.01
 _MEANS_C_DECIMALS, _MEANS_C_PER_MIN_DECIMALS, _MAX_DECIMALS = 3, 4, 12
@@ -351,7 +348,7 @@ def model_of(
     if fitted.prior is not None:
         meta["prior"] = fitted.prior.text
     meta["warnings"] = [warning for warning in warnings if warning]
-    known = uncertainty_of(data, fitted, _UNCERTAINTY_CELLS, front.block_s, added)
+    known = uncertainty_of(data, fitted, block_s=front.block_s, added=added)
     return Model.from_dict(
         {
             "schema": "gyrotc.model/1",
@@ -363,7 +360,7 @@ def model_of(
             "lead_blocks": front.lead_blocks,
             "scale": fitted.scale,
             "envelope": fitted.envelope,
-            "coverage": coverage(data, fitted, _COVERAGE_CELLS),
+            "coverage": coverage(data, fitted),
             "networks": [snapped(n, fitted.scale) for n in fitted.networks],
             "fallback_dph": fitted.fallback_dph,
             "hold_blocks": front.hold_blocks,

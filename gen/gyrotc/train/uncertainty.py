@@ -275,6 +275,10 @@ def _correlation_s(known: UncertaintyInputs, block_s: float) -> float:
     return float(np.clip(-lag * block_s / np.log(last), block_s, 7.5e6))
 
 
+# Cells of T and of dT/dt: 384 bits in a table.
+_COVERAGE_CELLS = (32, 12)
+# Cells of T and of dT/dt: 80 words in a table; an odd number of slopes, so that rest has cells of its own.
+_UNCERTAINTY_CELLS = (8, 5)
 _POINTS = (64, 24)  # of T and of dT/dt, twice the cells of the coverage
 _MIN_FREEDOM = 3  # of quantiles of Student's t
 _ONE_SIGMA = 0.8413  # probability below one standard deviation of a normal distribution
@@ -303,7 +307,7 @@ class TurnOn:
         return _quantile(self.freedom, _ONE_SIGMA) * self.repeatability_dph
 
 
-def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) -> dict[str, Any]:
+def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = _COVERAGE_CELLS) -> dict[str, Any]:
     """`coverage` of `model.json`: cells of the envelope (T, dT/dt) that hold training samples, its own or a lot's."""
     t = _index(data.temperature_c, fit.scaling.temperature_c, cells[0])
     r = _index(data.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
@@ -318,7 +322,7 @@ def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = (32, 12)) ->
 def uncertainty_of(
     data: TrainingData,
     fit: Fit,
-    cells: tuple[int, int] = (8, 5),
+    cells: tuple[int, int] = _UNCERTAINTY_CELLS,
     block_s: float = 10.0,
     added: FloatArray | float = 0.0,
 ) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,6 @@ import numpy as np
 import pytest
 from gyrotc.mirror import first_order
 from gyrotc.quality import (
-    Change,
-    changes_of,
     check,
     curve_findings,
     found_events,
@@ -26,7 +23,7 @@ from gyrotc.results import Finding
 from gyrotc.simulate import simulate
 from gyrotc.train import FitOptions, Fitted, fit_dataset
 from numpy.typing import NDArray
-from recordings import Columns, state, toml, write_csv
+from recordings import Columns, changes_in, state, toml, write_csv
 
 from bench.rows.events import scores
 
@@ -75,11 +72,7 @@ def of_curves(dataset: Dataset) -> list[Finding]:
     return curve_findings(dataset, [run_facts(run, run.rows()) for run in dataset.runs])
 
 
-def changes(*runs: EventColumns) -> list[Change]:
-    return changes_of([(r["time_s"], r["temperature_c"], r["rate_dph"]) for r in runs])
-
-
-def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None:
+def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step(tmp_path: Path) -> None:
     """Six passages over 2 C in half a minute. A step in the same place of one passage alone is reported."""
     rng = np.random.default_rng(SEED + 3)
     time = np.arange(0.0, 3600.0 * HOURS, ROW_S)
@@ -89,33 +82,34 @@ def test_a_narrow_feature_of_the_map_that_is_passed_quickly_is_no_step() -> None
     for size, lasting, expected in ((0.01, 0.0, 0), (0.0, 0.02, 1)):
         rates = [size * feature + NOISE_DPH * rng.standard_normal(time.size) for _ in range(2)]
         rates[1] = rates[1] + lasting * (time >= at)
-        found = changes_of([(time, temperature, rate) for rate in rates])
+        runs = [{"time_s": time, "temperature_c": temperature, "rate_dph": rate} for rate in rates]
+        found = changes_in(tmp_path / str(expected), *runs)
         assert len(found) == expected, (size, found)
         assert all(step.run == 1 and step.time_s[1] <= at <= step.time_s[2] for step in found)
 
 
-def test_a_transition_carries_its_duration() -> None:
+def test_a_transition_carries_its_duration(tmp_path: Path) -> None:
     """Five minutes, in a hold: no step of seconds."""
     rng = np.random.default_rng(SEED + 6)
     run = recording(rng, 0)
     run["rate_dph"] = run["rate_dph"] + 0.02 * np.clip((run["time_s"] - 15_000.0) / 300.0, 0.0, 1.0)
-    (found,) = changes(run)
+    (found,) = changes_in(tmp_path, run)
     assert found.kind == "transition" and 180.0 <= found.duration_s <= 450.0
     assert found.time_s[1] <= 15_000.0 and found.time_s[2] >= 15_300.0
     assert found.size[0] == pytest.approx(0.02, rel=0.1)
 
 
-def test_recordings_without_changes_have_none_though_temperatures_are_followed_late() -> None:
+def test_recordings_without_changes_have_none_though_temperatures_are_followed_late(tmp_path: Path) -> None:
     """Six sets of six runs with random walks, warm-up and a slow memory: kinks, but no beginning."""
     rng = np.random.default_rng(SEED + 1)
     alarms = 0
-    for _ in range(6):
+    for number in range(6):
         runs = [recording(rng, k) for k in range(6)]
         for r in runs:
             tau = rng.uniform(300.0, 3000.0)
             late = first_order(tau, r["time_s"], r["temperature_c"])
             r["rate_dph"] = r["rate_dph"] + 5e-4 * (late - r["temperature_c"]) + 0.01 * np.exp(-r["time_s"] / tau)
-        alarms += bool(changes(*runs))
+        alarms += bool(changes_in(tmp_path / str(number), *runs))
     print(f"{alarms} of 6 sets with a change")
     assert alarms == 0
 
@@ -129,23 +123,26 @@ def test_recordings_without_changes_have_none_though_temperatures_are_followed_l
     ],
     ids=["warm-up", "step of the map", "sign of the slope"],
 )
-def test_what_a_gyro_does_in_every_run_is_no_event(habit: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]]) -> None:
+def test_what_a_gyro_does_in_every_run_is_no_event(
+    habit: Callable[[NDArray[Any], NDArray[Any]], NDArray[Any]], tmp_path: Path
+) -> None:
     rng = np.random.default_rng(SEED + 4)
     runs = [recording(rng, k) for k in (1, 2, 4)]
     for run in runs:
         run["rate_dph"] = run["rate_dph"] + habit(run["time_s"], run["temperature_c"])
-    assert changes(*runs) == []
+    assert changes_in(tmp_path, *runs) == []
 
 
-def test_noise_makes_hardly_any_event() -> None:
+def test_noise_makes_hardly_any_event(tmp_path: Path) -> None:
     """The search has a level of one set in two hundred; of thirty at most one may have a change."""
     rng = np.random.default_rng(SEED + 5)
     time = np.arange(0.0, 3.0 * 3600.0, ROW_S)
     ramps = np.interp(time, [0.0, 3600.0, 7200.0, 10800.0], [0.0, 0.0, 50.0, 20.0])
     alarms = 0
-    for _ in range(30):
+    for k in range(30):
         rates = [0.01 + 2e-4 * ramps + NOISE_DPH * rng.standard_normal(time.size) for _ in range(2)]
-        alarms += bool(changes_of([(time, ramps, rate) for rate in rates]))
+        runs = [{"time_s": time, "temperature_c": ramps, "rate_dph": rate} for rate in rates]
+        alarms += bool(changes_in(tmp_path / str(k), *runs))
     assert alarms <= 1
 
 
@@ -459,27 +456,3 @@ def test_a_run_in_another_unit_is_named_by_its_noise(tmp_path: Path, factor: flo
 
     dataset = load(state(ramps(tmp_path, in_unit), "trust_units = true"))
     assert [(e.id, e.file) for e in of_curves(dataset)] == [("unit_changed", "2.csv")]
-
-
-class _Fresh(Sequence[Any]):
-    """Runs that are read anew each time; whoever holds one while another is read has both in memory."""
-
-    def __init__(self) -> None:
-        self._last: tuple[int, Any] | None = None
-
-    def __len__(self) -> int:
-        return 3
-
-    def __getitem__(self, number: Any) -> Any:
-        if not 0 <= number < 3:
-            raise IndexError(number)
-        assert self._last is None or self._last[0] == number or self._last[1]() is None, "two runs are in memory"
-        time = np.arange(0.0, 7200.0, 10.0)
-        rate = np.random.default_rng(SEED + number).normal(0.0, 1e-3, time.size)
-        self._last = number, weakref.ref(rate)
-        return time, 20.0 + 0.001 * time, rate
-
-
-def test_changes_are_looked_for_with_one_run_in_memory() -> None:
-    """Before: of 12 runs of 8.6 million rows two at a time, 627 MB."""
-    changes_of(_Fresh())

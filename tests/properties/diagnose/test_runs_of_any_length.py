@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,12 @@ import pytest
 from drawn import examples
 from gyrotc.causes import CATALOGUE, History
 from gyrotc.diagnose import diagnose, records_of
-from gyrotc.quality import Change, RowArrays, WalkNoise, changes_of, found_events
+from gyrotc.quality import Change, WalkNoise, found_events
 from gyrotc.recordings import load
 from gyrotc.results import Diagnosed
 from hypothesis import given
 from hypothesis import strategies as st
-from recordings import Columns, toml, write_csv
+from recordings import Columns, changes_in, toml, write_csv
 
 SEED = 20261128
 NOISE_DPH, STEP_DPH = 2.2e-3, 0.05
@@ -43,8 +44,9 @@ def written(folder: Path, *runs: Columns, said: str = 'power_on_s = "unknown"') 
     return folder
 
 
-def rows(columns: Columns) -> RowArrays:
-    return columns["time_s"], columns["temperature_c"], columns["rate_dph"]
+def in_folder(*runs: Columns) -> list[Change]:
+    with tempfile.TemporaryDirectory() as folder:
+        return changes_in(Path(folder), *runs)
 
 
 def placed(found: list[Change], order: list[int], clocks: list[float]) -> list[tuple[int, str, float]]:
@@ -63,7 +65,7 @@ def test_a_step_of_a_long_run_is_found_beside_any_other_runs(
     runs[0]["rate_dph"] += STEP_DPH * (runs[0]["time_s"] >= at)
     order = data.draw(st.permutations(range(len(runs))))
     clocks = [float(runs[k]["time_s"][0]) for k in order]
-    found = changes_of([rows(runs[k]) for k in order])
+    found = in_folder(*(runs[k] for k in order))
     assert (0, "step") in [(order[one.run], one.kind) for one in found], placed(found, order, clocks)
     (step,) = [one for one in found if order[one.run] == 0]
     assert step.time_s[1] <= at <= step.time_s[2]
@@ -79,8 +81,8 @@ def test_order_and_clocks_move_no_change(shorts: list[tuple[float, float, float]
     order = data.draw(st.permutations(range(len(runs))))
     clocks = [data.draw(clocks_s) for _ in order]
     moved = [runs[k] | {"time_s": runs[k]["time_s"] + clock} for k, clock in zip(order, clocks, strict=True)]
-    as_it_is = placed(changes_of([rows(run) for run in runs]), list(range(len(runs))), [0.0] * len(runs))
-    assert placed(changes_of([rows(run) for run in moved]), order, clocks) == as_it_is != []
+    as_it_is = placed(in_folder(*runs), list(range(len(runs))), [0.0] * len(runs))
+    assert placed(in_folder(*moved), order, clocks) == as_it_is != []
 
 
 def test_a_filter_leaves_as_much_of_noise_in_cells_of_any_length() -> None:

@@ -1,6 +1,6 @@
 """What is known of a unit's map before its runs and with them, and its fit with that.
 
-The posterior over the lot's envelope stands in the place of the evidence process.
+The posterior over the lot's envelope takes the place of the process of the unit alone.
 
 The network that a table holds follows the posterior as it follows the process of a unit alone: same compression, same
 proofs. What the posterior may be wrong by becomes the table's sigma.
