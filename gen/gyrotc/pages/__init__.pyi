@@ -25,6 +25,7 @@ from .marks import AxisScale as AxisScale
 from .marks import scale_of as scale_of
 from .report import calibrations_over_time as calibrations_over_time
 from .report import page_environment as page_environment
+from .report import prior_and_posterior as prior_and_posterior
 from .report import write_report as write_report
 from .unit import UnitResults as UnitResults
 from .unit import unit_in as unit_in

@@ -211,6 +211,8 @@ def test_a_confirmed_model_and_its_check_run_are_one_table() -> None:
         both, alone = fit(data, method="auto", prior=prior), fit(data, method="mrbf")
         assert both.prior is not None and both.prior.chosen == "unchanged" and both.prior.accepted
         assert both.prior.sigma_dph < 0.9 * both.prior.prior_sigma_dph, "the run adds to what the model knew"
+        share = 1.0 - (both.prior.sigma_dph / both.prior.prior_sigma_dph) ** 2
+        assert both.prior.own_share == pytest.approx(share), "of the variance that the run took off"
         errors = [float(np.mean((predict(f, t, r) - bias(t, r)) ** 2)) for f in (both, alone)]
         squares.append((*errors, both.prior.sigma_dph**2))
     of_both, of_alone, stated = np.sqrt(np.mean(squares, axis=0))

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from gyrotc.fleet import write_summary
-from gyrotc.pages import AFTER_DPH, BEFORE_DPH, ENVIRONMENTS, calibrations_over_time, with_published
+from gyrotc.pages import (
+    AFTER_DPH,
+    BEFORE_DPH,
+    ENVIRONMENTS,
+    calibrations_over_time,
+    prior_and_posterior,
+    with_published,
+)
 from gyrotc.results import Calibration, Comparison, FleetEntry, Group, Method
 from read_pictures import panels_of, pictures_of
 
@@ -54,6 +62,26 @@ def test_calibrations_are_drawn_as_found_and_as_left_and_moves_are_summed() -> N
     for k, (mean, spread) in enumerate(((4e-4, 1e-4), (3e-4, 3e-4), (5e-4, 4e-4))):
         drawn = right.places(np.zeros(2), np.array([mean - spread, mean + spread]))[:, 1]
         assert bars.pixels[2 * k : 2 * k + 2, 1] == pytest.approx(drawn, abs=NEAR)
+
+
+def test_prior_and_posterior_have_each_their_own_line_and_band(model_dict: dict[str, Any]) -> None:
+    t = np.linspace(-20.0, 60.0, 9)
+    curve = SimpleNamespace(
+        temperature_c=t, prior_dph=7e-3 + 1e-5 * t, prior_sigma_dph=np.full(9, 4e-4), posterior_dph=7e-3 + 2e-5 * t,
+        posterior_sigma_dph=np.full(9, 1e-4),
+    )  # fmt: skip
+    training: Any = SimpleNamespace(lot=None, prior=SimpleNamespace(curve=curve), means=None)
+    (panel,) = panels_of(pictures_of(str(prior_and_posterior(training, 7e-3)))[0])
+    bands = [s for s in panel.series if s.kind == "band"]
+    for band, label, mean, sigma in (
+        (bands[0], "the earlier model after ageing", 1e-5 * t, 4e-4),
+        (bands[1], "with this unit's own runs", 2e-5 * t, 1e-4),
+    ):
+        line = panel.labelled(label)
+        assert line.colour == band.colour
+        assert panel.pixels_off(line, t, mean) < NEAR
+        around = np.r_[mean - 2.0 * sigma, (mean + 2.0 * sigma)[::-1]]
+        assert panel.pixels_off(band, np.r_[t, t[::-1]], around) < NEAR
 
 
 def test_a_fleet_is_drawn_with_a_constant_and_with_its_maps_in_the_order_of_what_remains(tmp_path: Path) -> None:

@@ -120,6 +120,14 @@ def test_rates_at_an_end_stop_are_left_out(row_s: float) -> None:
     assert [one.size for one in judgement.events if one.kind == "end_stop"] == [stop]
 
 
+def test_the_ends_of_a_coarse_rate_are_no_end_stops() -> None:
+    """Sixty levels of which each has as many rows as the next, the highest and the lowest too."""
+    time, temperature, _ = sound(np.random.default_rng(SEED), 10.0)
+    levels = np.random.default_rng(SEED + 2).permutation(np.resize(np.arange(60), len(time)))
+    judgement = judged(time, temperature, 1e-3 * (levels - 30.5))
+    assert [one for one in judgement.events if one.kind == "end_stop"] == []
+
+
 def test_noise_that_is_far_larger_in_half_of_a_run_is_left_out_and_doubled_noise_is_reported() -> None:
     time, temperature, rate = sound(np.random.default_rng(SEED), 10.0)
     half, noise = len(rate) // 2, 7e-3 / np.sqrt(10.0)

@@ -108,6 +108,7 @@ def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.
     assert row.left_out_rms_after_dph < 0.7 * row.left_out_rms_before_dph
     line = row.slope_dph_per_unit * (supply - supply.mean())
     assert np.std(choice.added - line) < 0.15 * np.std(line), "whatever its shape"
+    assert row.share_of_variance == pytest.approx(np.var(line) / np.var(made.bias_dph), rel=0.05)
 
 
 def _effect(shape: str, u: Array, t: Array) -> Array:

@@ -472,6 +472,15 @@ def test_each_picture_shows_the_series_that_its_legend_names(built: Path) -> Non
         pooled = np.concatenate([run[key] for run in series["scored"]])
         assert np.sqrt(np.mean(pooled**2)) == pytest.approx(result["extended"]["gain"][name], rel=0.02)
 
+    runs = {key: np.concatenate([run[key] for run in series["runs"]]) for key in ("slope_c_per_min", "residual_dph")}
+    (over_rate,) = (p for p in panels if p.x.words == "dT/dt, C/min")
+    (dots,) = (s for s in over_rate.series if s.kind == "dots")
+    cells = pd.cut(pd.Series(runs["slope_c_per_min"]), 24, labels=False)
+    means = pd.DataFrame(runs).groupby(cells).agg(["mean", "size"])
+    means = means[means["residual_dph", "size"] >= 4]
+    drawn = means["slope_c_per_min", "mean"].to_numpy(), means["residual_dph", "mean"].to_numpy()
+    assert over_rate.pixels_off(dots, *drawn) < near
+
     (scores,) = (p for p in panels if any(s.label == "alone" for s in p.series))
     for label, values in (
         ("alone", series["scores"]["alone"]),

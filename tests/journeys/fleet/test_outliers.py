@@ -116,6 +116,19 @@ def test_axes_are_compared_with_their_own_kind() -> None:
     assert reasons(list(entries(Lot(4, 10)))) == []
 
 
+@pytest.mark.parametrize("amplitude", [3e-3, -1e-3])
+def test_what_fades_after_a_power_on_has_its_amplitude(amplitude: float) -> None:
+    """By least squares of numpy beside a constant; a run of half an hour does not show it."""
+    time = 100.0 * (np.arange(72) + 0.5)
+    fades = np.exp(-(time - time[0]) / 900.0)
+    after = amplitude * fades + 5e-4 + 1e-4 * np.random.default_rng(3).normal(size=time.size)
+    expected = np.linalg.lstsq(np.stack([fades, np.ones(time.size)], axis=1), after, rcond=None)[0][0]
+    (run,) = gyro_facts([("a.csv", Averages(time, after, after, np.zeros(time.size)))]).runs
+    assert run.warm_up_dph == pytest.approx(expected) == pytest.approx(amplitude, rel=0.2)
+    short = Averages(time[:18], after[:18], after[:18], np.zeros(18))
+    assert gyro_facts([("a.csv", short)]).runs[0].warm_up_dph == 0.0
+
+
 def test_a_step_is_found_where_it_is() -> None:
     draw = np.random.default_rng(2)
     residual = draw.normal(size=200)
