@@ -479,7 +479,7 @@ def test_each_picture_shows_the_series_that_its_legend_names(built: Path) -> Non
     means = pd.DataFrame(runs).groupby(cells).agg(["mean", "size"])
     means = means[means["residual_dph", "size"] >= 4]
     drawn = means["slope_c_per_min", "mean"].to_numpy(), means["residual_dph", "mean"].to_numpy()
-    assert over_rate.pixels_off(dots, *drawn) < near
+    assert over_rate.pixels_off(dots, *drawn) < 0.5, "a row on an edge may be in either cell"
 
     (scores,) = (p for p in panels if any(s.label == "alone" for s in p.series))
     for label, values in (
