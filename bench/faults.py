@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gyrotc.mirror import Numeric, Table
+from gyrotc.mirror import Table
 from gyrotc.model import Model
 from gyrotc.recordings import load
+from gyrotc.results import Numeric
 from gyrotc.simulate import read, simulate, simulate_campaign, with_noise
 from gyrotc.tables import quantise
 from gyrotc.train import FitOptions, fit_dataset

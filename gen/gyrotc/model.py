@@ -391,6 +391,12 @@ class Model(_Frozen):
         return float(known.rules.between_dph) if known is not None and known.rules is not None else 0.0
 
     @property
+    def calibrated_on(self) -> str | None:
+        """Day of the calibration in ISO 8601; None if neither `[meta]` nor a recording states it."""
+        day = self.meta.get("calibrated_on")
+        return None if day is None else str(day)
+
+    @property
     def n_centers(self) -> int:
         """Of the map."""
         return sum(len(n.centers) for n in self.networks)

@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 from gyrotc.common import CheckFailed
-from gyrotc.mirror import Numeric, Table, Words
+from gyrotc.mirror import Table, Words
+from gyrotc.results import Numeric
 from gyrotc.tables import quantise
 from hypothesis import strategies as st
 from libc_device import variant

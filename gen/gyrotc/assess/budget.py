@@ -222,8 +222,7 @@ def budget_of(
     )
     parts = tuple(one for one in found if isinstance(one, Contribution))
     u, freedom = combined([(one.contribution_dph, one.freedom) for one in parts])
-    stated = model.meta.get("calibrated_on")
-    day = None if stated is None else str(stated)
+    day = model.calibrated_on
     interval = limits.interval.days if limits and limits.interval else None
     k = coverage_factor(freedom)
     return Budget(

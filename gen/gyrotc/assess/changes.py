@@ -14,6 +14,7 @@ import numpy as np
 from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..model import Model, load_model
+from ..recordings.loading import calibration_day
 from ..recordings.records import Dataset
 from ..results.base import read_optional
 from ..results.evaluation import (
@@ -99,7 +100,7 @@ class Earlier:
         self.manifest = read_optional(folder / "manifest.json", Manifest)
         changes = read_optional(folder / "changes.json", Changes)
         self.history = changes.history if changes else ()
-        self.date = stated_day(self.model)
+        self.date = self.model.calibrated_on
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--previous") -> Earlier:
@@ -178,20 +179,15 @@ def changes_since(
         files=_changed_hashes(*(_emitted(m) for m in (earlier.manifest, manifest))),
         as_found=found,
         as_found_missing=missing,
-        history=calibration_history(earlier, model, evaluation, found, moved, stated_day(model) or started_on(dataset)),
+        history=calibration_history(
+            earlier, model, evaluation, found, moved, model.calibrated_on or started_on(dataset)
+        ),
     )
 
 
-def stated_day(model: Model) -> str | None:
-    """Day of the calibration, where the recordings state it."""
-    date = model.meta.get("calibrated_on")
-    return None if date is None else str(date)
-
-
 def started_on(dataset: Dataset | None) -> str | None:
-    """Day of the last recording, where the recordings carry dates."""
-    days = [run.started for run in dataset.runs if run.started is not None] if dataset else []
-    return max(days).date().isoformat() if days else None
+    """Return the day of the last recording; None if the recordings carry no dates."""
+    return calibration_day({}, (run.started for run in dataset.runs)) if dataset else None
 
 
 def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:

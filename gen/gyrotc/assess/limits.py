@@ -25,6 +25,7 @@ from ..common.errors import InputError
 from ..common.inputs import checked, near_field, parse_toml, read_input
 from ..common.statistics import coverage_factor
 from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
+from ..results.base import Numeric
 from ..results.decision import worst_of
 from ..results.evaluation import Evaluation, FigureUncertainty, RunStatistics, Statistics
 from ..results.release import (
@@ -248,7 +249,7 @@ class Covers(_Part):
 class Required(_Part):
     """What must be there, and what must not."""
 
-    arithmetics: Annotated[tuple[Literal["f32", "q31"], ...], BeforeValidator(_as_tuple)] = ()
+    arithmetics: Annotated[tuple[Numeric, ...], BeforeValidator(_as_tuple)] = ()
     targets: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()  # bit for bit, in all their arithmetics
     no_findings: Annotated[tuple[FindingName, ...], BeforeValidator(_as_tuple)] = ()  # ids, or "any"
     generalises: bool = False  # the correction was shown to hold on thermal history that it has not seen

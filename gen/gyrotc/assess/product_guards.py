@@ -12,11 +12,9 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..common.errors import InputError
-from ..mirror.readings import PLAUSIBLE_C
+from ..common.inputs import MOST_HELD, PLAUSIBLE_C
 from ..model import Guard, Model
 from ..tables.rounding import TEMPERATURE, channel_names, guard_of
-
-_MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 
 
 def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
@@ -71,7 +69,7 @@ def guarded(model: Model, asked: Mapping[str, ProductGuard], file: str, recorded
                 "max_rate_c_per_min": own.max_rate_per_min,
                 "agree_s": own.agree_s,
                 "stuck_s": own.stuck_s,
-                "hold_blocks": min(max(1, round(own.missing_s / model.block_s)), _MOST_BLOCKS),
+                "hold_blocks": min(max(1, round(own.missing_s / model.block_s)), MOST_HELD),
             }
         elif channel not in recorded:
             raise InputError(where, "is no channel of the recordings", ", ".join([TEMPERATURE, *recorded]))

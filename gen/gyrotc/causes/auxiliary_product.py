@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
+from ..common.inputs import PLAUSIBLE_C
 from ..mirror.recursions import TableKind
 from .auxiliary import channel_of
 from .base import Cause, CauseValues, History, Needs, Parameter, Scene, Tabled, Telling, Wording, weights_of
@@ -45,7 +46,7 @@ CAUSE = Cause(
     "needs the channel",
     parameters=(
         Parameter("reference", "unit", -1e9, 1e9, signed=True),
-        Parameter("reference_c", "C", -90.0, 200.0, signed=True),
+        Parameter("reference_c", "C", *PLAUSIBLE_C, signed=True),
         Parameter("slope_dph_per_unit", "deg/h/unit", 1e-9, 1e3, linear=True, signed=True),
         Parameter("slope_dph_per_unit_per_c", "deg/h/unit/C", 1e-9, 1e3, linear=True, signed=True),
     ),

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
+from ..common.inputs import PLAUSIBLE_C
 from ..mirror.recursions import TableKind, play
 from .base import (
     Cause,
@@ -67,7 +68,7 @@ CAUSE = Cause(
     source="play operator of Prandtl and Ishlinskii (Visintin 1994; Brokate and Sprekels 1996)",
     parameters=(
         _WIDTH,
-        Parameter("reference_c", "C", -90.0, 200.0, signed=True),
+        Parameter("reference_c", "C", *PLAUSIBLE_C, signed=True),
         Parameter("amplitude_dph_per_c", "deg/h/C", 1e-6, 1e-3, linear=True, signed=True),
         Parameter("amplitude_dph_per_c_per_c", "deg/h/C/C", 1e-9, 1e-3, linear=True, signed=True),
     ),

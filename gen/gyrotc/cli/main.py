@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from .. import __version__
 from ..common.errors import GyrotcError, InputError
 from ..common.texts import terminal_line, terminal_text
+from ..common.threads import single_threaded
 
 if TYPE_CHECKING:
     from typer import Typer
@@ -79,7 +80,7 @@ def main() -> None:
     """
     _open_closed_streams()
     _quiet_start()
-    _single_threaded()
+    single_threaded()
     _returning_columns()
     _without_warnings()
     os.umask(os.umask(0) & ~stat.S_IRWXU)  # what gyrotc writes it reads again
@@ -149,15 +150,6 @@ def _failed(error: OSError) -> int:
     with contextlib.suppress(OSError):
         print(f"gyrotc: {terminal_line(f'{where}: {error.strerror or error}')}", file=sys.stderr, flush=True)
     return GyrotcError.exit_status
-
-
-def _single_threaded() -> None:
-    """One thread of BLAS unless the user says otherwise; read when numpy is first imported.
-
-    The matrices here are small: more threads gain nothing, and on a busy machine they cost many times the work.
-    """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def _without_warnings() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command"]
+__all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command", "short_reason"]
 
 
 class GyrotcError(Exception):
@@ -50,6 +50,15 @@ class CheckFailed(GyrotcError):
     """The job ran and a check failed (bits differ, a bound or limit is not met): exit status 1."""
 
     exit_status = 1
+
+
+_MAX_REASON = 120
+"""Characters of what a library says, in a message of gyrotc."""
+
+
+def short_reason(error: BaseException | str) -> str:
+    """Return what a library says of an error, on one line and not too long for a message."""
+    return " ".join(str(error).split())[:_MAX_REASON]
 
 
 def install_command(extra: str) -> str:

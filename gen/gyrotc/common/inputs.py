@@ -386,7 +386,9 @@ def _short(value: Any) -> str:
 MOST_CENTERS = 512
 """What a table holds: docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl."""
 MOST_HELD = 100_000
-"""Blocks for which a temperature is held."""
+"""Blocks for which a temperature or the reading of a channel is held."""
+PLAUSIBLE_C = (-90.0, 200.0)
+"""Temperatures that the target accepts, C: docs/numerics.md, section 1; libc/gtc_num_f32.h."""
 BlockLength = Annotated[float, Interval(gt=0.0, le=3600.0)]
 """Of a block, s."""
 AverageLength = Annotated[float, Interval(gt=0.0, le=1e6)]

@@ -16,6 +16,7 @@ from ..common.inputs import read_toml, refuse_above, refused
 from ..jobs.lot import load_lot
 from ..recordings.fit_options import options_in
 from ..recordings.loading import asked_axes
+from ..results.base import Numeric
 from ..results.marker import KINDS, read_marker
 from ..train.fitting import FitOptions
 from ..train.prior.use import prior_of
@@ -92,7 +93,7 @@ class _Manifest(_Part):
     axis: _Axis = None  # of those
     unit: list[_UnitEntry] = []
     options: dict[str, Any] = {}
-    numeric: Annotated[list[Literal["f32", "q31"]], Field(min_length=1)] | None = None
+    numeric: Annotated[list[Numeric], Field(min_length=1)] | None = None
     limits: _Place | None = None
     lot: _Place | None = None
     release: dict[str, _Reason] = {}

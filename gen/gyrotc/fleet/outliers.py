@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from ..common.arrays import FloatArray
+from ..common.inputs import PLAUSIBLE_C
 from ..common.metrics import MAD_TO_SIGMA, Averages, median
 from ..results.fleet import (
     ComparedRun,
@@ -22,7 +23,9 @@ from ..results.fleet import (
     Spread,
 )
 
-FIRST_C, BIN_C, BINS = -90.0, 5.0, 58  # as wide as temperatures are plausible, up to 200 C
+BIN_C = 5.0
+FIRST_C = PLAUSIBLE_C[0]
+BINS = round((PLAUSIBLE_C[1] - PLAUSIBLE_C[0]) / BIN_C)
 NOISY_RUN = 3.0  # times the noise of the other runs of the gyro: that run is what is to be looked at
 _LEAST_IN_BIN = 3  # means, for a mean of them
 _LEAST_MEANS = 16  # a shorter run does not show a step

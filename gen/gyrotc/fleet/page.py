@@ -25,12 +25,12 @@ from ..common.texts import csv_cell
 from ..pages.chart import ACCENT, AFTER, BEFORE, COVERED, HALF, Panel, drawing, side_by_side
 from ..pages.report import page_environment
 from ..quality.thermometers import lag_of
+from ..results.base import NUMERICS
 from ..results.files import write_atomically, write_own
 from ..results.fleet import ComparedRun, Copy, Facts, FleetEntry, FleetSummary, Reason, ResidualSeries
 from ..results.folder import result_folder
 from ..results.json_text import json_text
 from ..tables.runtime import joint_needs, runtime_texts
-from ..tables.text import ARITHMETICS
 from .manifest import RUNTIME, SUMMARY
 from .outliers import (
     BIN_C,
@@ -199,7 +199,7 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
     texts = (json_text(summary.content()), table.getvalue(), page)
     if needs := joint_needs(entry.runtime_options for entry in entries if entry.runtime_options):
         with result_folder(out / RUNTIME, "fleet") as stage:
-            for name, data in runtime_texts(needs, ARITHMETICS).items():
+            for name, data in runtime_texts(needs, NUMERICS).items():
                 write_own(stage.folder / name, data)
     for name, text in zip(SUMMARY, texts, strict=True):
         write_atomically(out / name, text)

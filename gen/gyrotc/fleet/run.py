@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ..common.errors import InputError, install_command
+from ..common.threads import single_threaded
 from ..results.cache import program_of
 from ..results.destination import check_separate
 from ..results.files import check_replaceable
@@ -28,7 +29,6 @@ from .manifest import SUMMARY, Fleet, printable
 from .page import write_summary
 from .unit import ENTRY, Task, clean_units, do_unit, failed, made_before
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DIED = "its process died (out of memory?)"
 _STOPPED = "the fleet was stopped before it: give the command again"
 
@@ -53,8 +53,7 @@ def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetE
 
 def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry]]:
     """On fresh processes with one thread each: a serial is too small to share."""
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
+    single_threaded()
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_end_with_parent)
     try:

@@ -10,13 +10,14 @@ from ..common.errors import CheckFailed, InputError
 from ..common.texts import c_environment
 from ..model import Model, load_model
 from ..pages.report import axes_page
+from ..results.base import NUMERICS
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
 from ..results.release import JointVerification, Verification
 from ..tables.emission import emitted_tables
 from ..tables.record import RECORD, joint_record_text
 from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts
-from ..tables.text import ARITHMETICS, example_period_us, example_samples
+from ..tables.text import example_period_us, example_samples
 from ..verify.emitted import file_entries
 from ..verify.toolchain import all_targets, compile_c, run_program
 
@@ -60,7 +61,7 @@ def joint_texts(
         numeric: The arithmetic that `main.c` uses.
     """
     headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
-    held = [n for n in ARITHMETICS if f"gtc_{n}_table_t" in headers]  # of all axes
+    held = [n for n in NUMERICS if f"gtc_{n}_table_t" in headers]  # of all axes
     texts = runtime_texts(joint_needs(needs_of(model) for model in models.values()), held)
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
@@ -99,7 +100,7 @@ def refuse_parts_of_two(folder: Path, models: Mapping[str, Model]) -> None:
             raise InputError(str(folder / axis), f"holds axis {model.axis}", "each axis once, in its own folder")
         for what, one, other in (
             ("serial", first.serial, model.serial),
-            ("day of the calibration", first.meta.get("calibrated_on"), model.meta.get("calibrated_on")),
+            ("day of the calibration", first.calibrated_on, model.calibrated_on),
             ("recordings", first.data, model.data),
         ):
             if one != other:

@@ -25,7 +25,7 @@ from ..recordings.description import in_order, json_value, stated_day
 from ..results.decision import worst_of
 from ..results.files import sha256, write_atomically
 from ..results.folder import result_folder
-from ..results.marker import check_intact
+from ..results.marker import EXAMPLE, check_intact
 from ..results.release import NEED_REASON, STATED
 from .axes import axes_in, refuse_parts_of_two
 
@@ -274,7 +274,7 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
         raise InputError(str(folder / "manifest.json"), "is of another model", "a folder as gyrotc build left it")
     for name, known in manifest.files.items():
         path = folder / name
-        if name.endswith("main.c") or not (name in _NEVER_REWRITTEN or name.startswith("c/")):
+        if name == EXAMPLE or not (name in _NEVER_REWRITTEN or name.startswith("c/")):
             continue
         if not path.is_file() or sha256(path) != known:
             raise InputError(str(path), "is not as it was built", "a folder as gyrotc build left it")

@@ -44,7 +44,6 @@ from .table import MAGIC as MAGIC
 from .table import SERIAL_WORDS as SERIAL_WORDS
 from .table import UNCOVERED as UNCOVERED
 from .table import WARMING as WARMING
-from .table import Numeric as Numeric
 from .table import Table as Table
 from .table import Words as Words
 from .table import f32_words as f32_words

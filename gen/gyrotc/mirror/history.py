@@ -1,7 +1,7 @@
 """Whole histories: every correction of the front end, the terms and the map, as the step functions answer.
 
 The static map is evaluated for all corrections at once; what depends on the order (held, fallen back)
-was settled by `target.front_end` and by the recursions of the terms, whose operations in float32 and in
+was settled by `mirror.front_end` and by the recursions of the terms, whose operations in float32 and in
 fixed point (mirrors of libc/gtc_num_<n>.h) stand here.
 """
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from .recursions import Arithmetic, NumberArray
 
 READING_HELD, READING_ACCEPTED, READING_RESTART = 0, 1, 2  # any three numbers
-PLAUSIBLE_C = (-90.0, 200.0)  # no gyro is used beyond: libc/gtc_num_f32.h
 _PART = 2**18  # readings that are looked at together: bounds memory
 _LONGEST_US = 2**32 - 1  # that the target counts
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 import functools
 import zlib
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ..results.base import Numeric
 
 LAYOUT = 3  # docs/FORMAT.md, section 3
 MAGIC = 0x47544331  # "GTC1" in ASCII
@@ -32,7 +34,6 @@ PARTS = {
 }  # fmt: skip
 SERIAL_WORDS = 16  # 64 characters, as many as a serial may have
 
-Numeric = Literal["f32", "q31"]
 Words = NDArray[np.uint32]
 
 

@@ -28,8 +28,9 @@ import numpy as np
 import pyarrow as pa
 
 from ..common.arrays import numpy_of
-from ..common.errors import InputError
+from ..common.errors import InputError, short_reason
 from ..common.inputs import ENVIRONMENT, ceiling
+from ..common.threads import ONE_THREAD
 from ..results.folder import scratch_folder
 from .tables import Chunk, Column, LoggerFile, LoggerTable
 
@@ -113,7 +114,7 @@ class _Child:
         with ExitStack() as stack:
             folder = stack.enter_context(scratch_folder())
             environment = {name: os.environ[name] for name in _PASSED if name in os.environ}
-            environment |= {"TMPDIR": str(folder), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+            environment |= {"TMPDIR": str(folder), **ONE_THREAD}
             where = [str(Path(entry).absolute()) for entry in sys.path]
             self._process = subprocess.Popen(
                 [sys.executable, "-I", "-c", _START, opener.__module__, opener.__name__, str(self._cpu_s), *where],
@@ -264,8 +265,7 @@ def _answered(reading: _Reading, request: dict[str, Any]) -> _Answer:
         found = f"takes more than {ceiling('memory_gib'):g} GiB of memory"
         refused = [name, found, "a smaller file, or --max memory_gib=..."]
     except Exception as error:  # whatever a damaged file makes of a library
-        what = " ".join(str(error).split())[:100]
-        refused = [name, f"is damaged ({type(error).__name__}: {what})", "a whole file"]
+        refused = [name, f"is damaged ({type(error).__name__}: {short_reason(error)})", "a whole file"]
     return _Answer({"refused": refused})
 
 

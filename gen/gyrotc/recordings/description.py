@@ -26,7 +26,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..common.inputs import near_field, read_toml, refuse_above
+from ..common.inputs import PLAUSIBLE_C, near_field, read_toml, refuse_above
 from ..common.texts import toml_key, toml_value
 from .records import Mark
 
@@ -469,7 +469,6 @@ def _list(names: Sequence[str]) -> str:
 
 
 MIN_ROWS = 10  # a file of fewer rows is a mistake, not a recording
-_TEMPERATURE_C = (-90.0, 200.0)  # the target holds samples outside: docs/numerics.md, section 1
 _RATE_DPH = (-7.5e6, 7.5e6)  # a little above 2000 deg/s, the widest usual range; no table holds more
 _TIME_S = (-1e10, 1e10)  # three hundred years: seconds of any epoch, not milliseconds or nanoseconds
 # Comparisons with it let NaN and infinities be found without an array of their own
@@ -531,7 +530,7 @@ def _order(name: str, time: FloatArray) -> Iterator[Fault]:
 
 
 def _temperature(name: str, values: FloatArray) -> Iterator[Fault]:
-    for fault in _within(name, values, _TEMPERATURE_C, "C"):
+    for fault in _within(name, values, PLAUSIBLE_C, "C"):
         likely = likely_temperature(values)
         word = {"K": "kelvin", "degF": "fahrenheit"}.get(likely or "", "")
         hint = "; nan in place of a failed reading"
@@ -547,11 +546,11 @@ def likely_temperature(values: FloatArray) -> str | None:
     """The unit in which temperatures beyond the plausible would all be plausible: "K", "degF" or None."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-    if high <= _TEMPERATURE_C[1] or np.count_nonzero(finite > _TEMPERATURE_C[1]) < _MIN_SHARE * len(finite):
+    if high <= PLAUSIBLE_C[1] or np.count_nonzero(finite > PLAUSIBLE_C[1]) < _MIN_SHARE * len(finite):
         return None
     if _KELVIN[0] <= low and high <= _KELVIN[1]:
         return "K"
-    return "degF" if (high - 32.0) / 1.8 <= _TEMPERATURE_C[1] and (low - 32.0) / 1.8 >= _TEMPERATURE_C[0] else None
+    return "degF" if (high - 32.0) / 1.8 <= PLAUSIBLE_C[1] and (low - 32.0) / 1.8 >= PLAUSIBLE_C[0] else None
 
 
 def _within(name: str, values: FloatArray, limits: tuple[float, float], unit: str) -> Iterator[Fault]:

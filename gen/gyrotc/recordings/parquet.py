@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..common.arrays import FloatArray, numpy_of
-from ..common.errors import InputError
+from ..common.errors import InputError, short_reason
 from ..common.inputs import ceiling, need_memory, open_input, refuse_above
 from .description import Fault
 from .files import LONGEST_NUMBER, Source
@@ -53,7 +53,9 @@ class ParquetBatches:
                 self.rows: int = file.metadata.num_rows
                 unpacked = _unpacked(file.metadata)
         except _DAMAGE as error:
-            raise InputError(name, f"cannot be read as Parquet ({_short(error)})", "a whole Parquet file") from error
+            raise InputError(
+                name, f"cannot be read as Parquet ({short_reason(error)})", "a whole Parquet file"
+            ) from error
         refuse_above("columns", len(self.schema), name, "columns")
         refuse_above("rows", self.rows, name, "rows")
         _refuse_bomb(name, self.size, max(unpacked, 8 * self.rows * len(self.schema)))
@@ -76,7 +78,7 @@ class ParquetBatches:
                 if at != self.rows:
                     raise ValueError(f"{at} rows instead of {self.rows}")
             except _DAMAGE as error:
-                found = f"is damaged ({_short(error)})"
+                found = f"is damaged ({short_reason(error)})"
                 raise InputError(self.name, found, "a whole Parquet file") from error
 
 
@@ -121,10 +123,6 @@ def _refuse_bomb(name: str, size: int, unpacked: int) -> None:
         raise InputError(
             name, found, f"at most {ceiling('parquet_ratio'):g} times; write it again with less compression"
         )
-
-
-def _short(error: Exception) -> str:
-    return " ".join(str(error).split())[:120]
 
 
 class ParquetFile(Source):

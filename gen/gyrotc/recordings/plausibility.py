@@ -13,6 +13,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 
 from ..common.arrays import FloatArray
+from ..common.inputs import PLAUSIBLE_C
 from ..common.metrics import MAD_TO_SIGMA, median
 from .description import Description, Layout, RunEntry
 from .reading import Evidence, Recording
@@ -118,7 +119,6 @@ def _angle(stated: object, axis: str) -> float | None:
 
 
 _HOTTEST_C = 125.0  # upper end of the military range; beyond it are down-hole gyros, whose owners know
-_COLDEST_C = -90.0  # as `values` has it
 _FASTEST_C_PER_MIN = 30.0  # of a product's thermometer: chambers of stress screening move air by 15 to 30
 _RISE_C = 5.0  # of a change that is looked at, in six steps of which none is nearly half of it
 _STEPS = 6  # of temperature that a rise must last: a single wild reading has two
@@ -217,7 +217,7 @@ def _of_temperature(evidence: Evidence, column: str, units: Mapping[str, Convers
     in_file = (low, high) if unit is None else (unit.back(low), unit.back(high))
     other = (np.array(in_file) - 32.0) / 1.8
     share = float(np.mean(evidence.cells[:, 1] > _HOTTEST_C))
-    if share < _HOT_SHARE or not _COLDEST_C <= other[0] <= other[1] <= _HOTTEST_C:
+    if share < _HOT_SHARE or not PLAUSIBLE_C[0] <= other[0] <= other[1] <= _HOTTEST_C:
         return
     found = (
         f"up to {high:.4g} C{_as(unit)}, beyond the {_HOTTEST_C:g} C that electronics stand; "

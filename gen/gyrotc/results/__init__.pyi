@@ -1,6 +1,7 @@
 from .base import Estimate as Estimate
 from .base import Finding as Finding
 from .base import Numbered as Numbered
+from .base import Numeric as Numeric
 from .base import checked_result as checked_result
 from .base import read_optional as read_optional
 from .base import read_result as read_result

@@ -6,7 +6,7 @@ Also what several hold: findings with their sizes.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -27,7 +27,10 @@ Positive = Annotated[float, Field(gt=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Axis = Annotated[str, Field(pattern="^[xyz]$")] | None
-ArithmeticName = Literal["f32", "q31"]
+Numeric = Literal["f32", "q31"]
+"""Arithmetic of a table: float32 or 32-bit fixed point."""
+NUMERICS: tuple[Numeric, ...] = get_args(Numeric)
+"""The default first."""
 
 TABLE_BYTES = "read-only memory that the table takes in a program where pointers have 32 bits, bytes"
 """What the size of a table means in every result, on every page and in the header of the table."""

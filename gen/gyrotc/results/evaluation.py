@@ -11,7 +11,7 @@ from pydantic import Field
 from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
 from ..common.statistics import coverage_factor
-from .base import TABLE_BYTES, Amount, ArithmeticName, Count, Figure, Finding, Part, UnitResult
+from .base import TABLE_BYTES, Amount, Count, Figure, Finding, Numeric, Part, UnitResult
 from .release import HeldLimits, Verdict
 from .rows import RowsCount
 
@@ -231,7 +231,7 @@ class Evaluation(UnitResult):
     """What the compiled code makes of recordings (`gyrotc evaluate`)."""
 
     schema_: Annotated[Literal["gyrotc.evaluate/1"], Field(alias="schema")] = "gyrotc.evaluate/1"
-    numeric: ArithmeticName = Field(description="arithmetic that was run")
+    numeric: Numeric = Field(description="arithmetic that was run")
     block_s: float = Field(description="length of a block, s")
     average_s: AverageLength = Field(description="averaging of all RMS figures, s")
     noise_floor_dph: Amount | None = Field(description="of means over `average_s`, deg/h")

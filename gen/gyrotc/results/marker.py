@@ -278,7 +278,7 @@ def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -
 
 
 EXAMPLE = "c/main.c"
-"""What a user may change in a result and go on using it."""
+"""The example, which a user may change in a result and go on using it."""
 
 
 def _among(name: str, names: Collection[str]) -> bool:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from .base import TABLE_BYTES, Amount, ArithmeticName, Axis, Count, Figure, Part, Positive, Result, UnitResult
+from .base import TABLE_BYTES, Amount, Axis, Count, Figure, Numeric, Part, Positive, Result, UnitResult
 
 
 class Instrument(Part):
@@ -165,7 +165,7 @@ _RMS_GROWTH = (
 class EmittedTable(Part):
     """Size and error bound of one table."""
 
-    numeric: ArithmeticName = Field(description="its arithmetic")
+    numeric: Numeric = Field(description="its arithmetic")
     table_bytes: Count = Field(description=TABLE_BYTES)
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
     rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from ..common.errors import InputError
+from ..common.inputs import PLAUSIBLE_C
 
-ChamberCelsius = Annotated[float, Field(ge=-90.0, le=200.0)]
+ChamberCelsius = Annotated[float, Field(ge=PLAUSIBLE_C[0], le=PLAUSIBLE_C[1])]
 AboveZero = Annotated[float, Field(gt=0.0)]
 
 

@@ -32,8 +32,9 @@ from ..common.errors import CheckFailed
 from ..mirror.history import evaluate_map
 from ..mirror.q31 import GAUSS_ERROR
 from ..mirror.recursions import TableKind
-from ..mirror.table import Numeric, Table, f32_words
+from ..mirror.table import Table, f32_words
 from ..model import Envelope, Model, Network, Term
+from ..results.base import Numeric
 from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient, strongest
 
 #: Share of the range of the map, and of the terms, that is granted beyond it at either end.

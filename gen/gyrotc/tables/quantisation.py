@@ -1,7 +1,7 @@
 """Round a model to a table, check that the runtime takes it, and add known answers.
 
 The ranges are read from the runtime's own text, libc/gtc_limits.inl, so that the generator cannot emit what
-`gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_table.inl;
+`gtc_<n>_open` and `gtc_<n>_check` refuse. The conditions on several words are those of libc/gtc_open.inl;
 tests/cases/mirror/test_reference.py holds both sides against each other.
 
 In float32 they are chosen, among many, to come out otherwise where a compiler fuses a product into a sum, whichever
@@ -27,15 +27,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
-from ..common.inputs import runtime_folders
+from ..common.inputs import PLAUSIBLE_C, runtime_folders
 from ..mirror.f32 import FUSIBLE
 from ..mirror.front_end import missed_before, samples_per_block
 from ..mirror.history import evaluate_map, replay
 from ..mirror.recursions import TableKind
 from ..mirror.sigma import RULES
-from ..mirror.table import ARRAYS, Numeric, Table, Words
+from ..mirror.table import ARRAYS, Table, Words
 from ..model import Model, load_model
 from ..recordings.records import Applied, Rows
+from ..results.base import NUMERICS
 from . import f32, q31
 from .error_bounds import channel_error_dph, with_authority
 
@@ -48,8 +49,8 @@ _N_WHOLE, _N_NUMBERS, _FIRST_COUNT = 19, 13, 9
 _REACH = np.float32(8.0)  # half ranges to which a normalised input may go
 _WIDTH = np.float32(2.0**-100)  # narrowest range: what is divided by it stays finite
 _SUM = 2**30  # of the magnitudes of weights, so that no sum overflows: docs/numerics.md, section 3
-# C, in the units of either arithmetic: the target holds temperatures outside (docs/numerics.md, section 1)
-_PLAUSIBLE = {"f32": (-90.0, 200.0), "q31": (-90 * 65536, 200 * 65536)}
+# In the units of either arithmetic.
+_PLAUSIBLE = {"f32": PLAUSIBLE_C, "q31": tuple(int(limit * 65536) for limit in PLAUSIBLE_C)}
 _SPAN = 2**26 - 1  # of an input in 2^-16 C: five bits more are 31 (libc/gtc_q31.c)
 _LAST_POSITION = 65535  # 16 bits of an input: docs/numerics.md, section 3
 _MAX_WORDS = 0x4000  # of the arrays of a table, MAX_TABLE_WORDS of libc/gtc_check.inl
@@ -262,9 +263,6 @@ def _telling(table: Table, inputs: Words, n: int) -> list[int]:
         known += tells[:, best]
     return chosen
 
-
-#: Arithmetics that the runtime has, the default first.
-NUMERICS: tuple[Numeric, ...] = ("f32", "q31")
 
 _MAKERS = {"f32": f32.table_of, "q31": q31.table_of}
 

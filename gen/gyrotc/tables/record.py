@@ -15,9 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..common.errors import InputError
 from ..common.inputs import read_input
-from ..mirror.table import Numeric
 from ..model import Model
-from ..results.base import Axis, Numbered
+from ..results.base import Axis, Numbered, Numeric
 from ..results.json_text import json_text
 
 RECORD = "emission.json"

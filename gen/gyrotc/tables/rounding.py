@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
-from ..mirror.readings import PLAUSIBLE_C
+from ..common.inputs import MOST_HELD, PLAUSIBLE_C
 from ..mirror.recursions import TableKind
-from ..mirror.table import SERIAL_WORDS, Numeric, Words, f32_words
+from ..mirror.table import SERIAL_WORDS, Words, f32_words
 from ..model import Guard, Model, Rules, Term, Uncertainty
+from ..results.base import Numeric
 
 _S_PER_MIN = 60.0  # a minute
 _S_PER_H = 3600.0  # an hour
@@ -137,7 +138,7 @@ def _serial_words(serial: str) -> Words:
 
 def _date(model: Model) -> int:
     """Date of calibration as a decimal number yyyymmdd; 0 where `[meta]` has none in ISO 8601."""
-    found = re.match(r"(\d{4})-(\d{2})-(\d{2})", str(model.meta.get("calibrated_on", "")))
+    found = re.match(r"(\d{4})-(\d{2})-(\d{2})", model.calibrated_on or "")
     return int("".join(found.groups())) if found else 0
 
 
@@ -339,7 +340,6 @@ TEMPERATURE = "temperature_c"
 
 _US_PER_MIN = 60e6  # microseconds in a minute
 _LARGEST = 2**31 - 1  # a signed 32-bit word
-_MOST_BLOCKS = 100000  # libc/gtc_limits.inl
 
 
 def guard_of(model: Model, channel: str | None) -> Guard:
@@ -388,7 +388,7 @@ def _guard_record(guard: Guard, numeric: Numeric, block_s: float) -> Words:
         scales = (2.0**16, 2.0**16, 2.0**16, 2.0**40, 2.0**16)
         whole = [_held(value * scale) for value, scale in zip(values, scales, strict=True)]
         numbers = np.array([w & 0xFFFFFFFF for w in whole], dtype=np.uint32)
-    blocks = min(max(1, round(guard.missing_s / block_s)), _MOST_BLOCKS)
+    blocks = min(max(1, round(guard.missing_s / block_s)), MOST_HELD)
     times = [_microseconds(guard.agree_s), _microseconds(guard.stuck_s), blocks]
     return np.concatenate([numbers[:4], np.array(times, dtype=np.uint32), numbers[4:]])
 

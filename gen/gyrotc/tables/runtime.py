@@ -21,10 +21,10 @@ from ..common.inputs import runtime_folders
 from ..mirror.recursions import TableKind
 from ..mirror.table import PARTS
 from ..model import Model, RuntimePart
+from ..results.base import NUMERICS
 from .q31 import DEFAULT_BITS
 from .quantisation import quantise
 from .rounding import channel_names
-from .text import ARITHMETICS
 
 RUNTIME_FILES = ("gtc.h", "gtc_f32.c", "gtc_q31.c")
 """Files of the runtime, of which a folder has the header and the arithmetics of its tables."""
@@ -131,7 +131,7 @@ def runtime_texts(needs: Options, numerics: Collection[str]) -> dict[str, bytes]
         needs: Options by name, as of `needs_of`.
         numerics: The arithmetics that it has.
     """
-    options = {**needs, **{f"GTC_WITH_{n.upper()}": int(n in numerics) for n in ARITHMETICS}}
+    options = {**needs, **{f"GTC_WITH_{n.upper()}": int(n in numerics) for n in NUMERICS}}
     options["GTC_WITH_REZERO"] &= options["GTC_WITH_UNCERTAINTY"]
     texts = _texts(runtime_folders(), tuple(sorted((options | _derived(options)).items())))
     return {name: text.encode("ascii") for name, text in texts.items()}
@@ -143,7 +143,7 @@ def _texts(folders: tuple[Path, Path], items: tuple[tuple[str, int], ...]) -> di
     options = dict(items)
     places = {path.name: path for folder in (libc_dir, include_dir) for path in folder.iterdir()}
     texts = {"gtc.h": _plain(_joined(places, "gtc.h", _constants(options)), options, {})}
-    for arithmetic in ARITHMETICS:
+    for arithmetic in NUMERICS:
         if options[f"GTC_WITH_{arithmetic.upper()}"]:
             names = _macros(places[f"gtc_names_{arithmetic}.h"].read_text(encoding="ascii"))
             name = f"gtc_{arithmetic}.c"

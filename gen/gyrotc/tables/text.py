@@ -13,8 +13,6 @@ from ..mirror.table import LAYOUT, SERIAL_WORDS, Table
 from ..model import Model
 from .rounding import channel_names, guard_of
 
-ARITHMETICS = ("f32", "q31")
-
 _EXAMPLE_US = 10000  # 100 samples a second
 
 

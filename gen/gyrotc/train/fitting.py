@@ -23,6 +23,7 @@ from ..model import Model
 from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge, judge_runs
 from ..recordings.fit_options import AUTO, SIMPLE, BuildOptions
+from ..recordings.loading import calibration_day
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, Rows, Run
 from ..results.base import Finding
@@ -333,12 +334,11 @@ def model_of(
 
     `added`: what terms, which are not in it yet, add to the map at each sample, deg/h.
     """
-    started = [run.started for run in runs if run.started is not None]
     meta = dict(dataset.meta)
     if dataset.description:
         meta["description"] = dataset.description
-    if started and "calibrated_on" not in meta:
-        meta["calibrated_on"] = max(started).date().isoformat()
+    if (day := calibration_day(meta, (run.started for run in runs))) is not None:
+        meta["calibrated_on"] = day
     meta["environments"] = sorted({run.environment for run in runs if run.environment})
     meta["earth_rate"] = _earth_rate(dataset)
     mean = float(np.average(data.bias_dph, weights=data.weight))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.inputs import PLAUSIBLE_C
 from ..mirror import table as status_bits
 from ..mirror.front_end import (
     FROM_FALLBACK,
@@ -21,7 +22,7 @@ from ..mirror.front_end import (
     period_us,
     samples_per_block,
 )
-from ..mirror.readings import PLAUSIBLE_C, Guarded
+from ..mirror.readings import Guarded
 from ..mirror.recursions import F32
 
 if TYPE_CHECKING:

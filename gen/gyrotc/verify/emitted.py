@@ -26,16 +26,14 @@ from ..common.errors import CheckFailed, InputError
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
 from ..model import SERIAL, Model
+from ..results.base import NUMERICS
 from ..results.files import sha256, write_own
-from ..results.marker import MARKER
+from ..results.marker import EXAMPLE, MARKER
 from ..results.release import VerifiedFile
 from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
 from ..tables.record import Options, read_options
 from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts, stated_needs
-from ..tables.text import ARITHMETICS
 
-EXAMPLE = "main.c"
-"""The example is the user's to edit; all else is written by gyrotc alone."""
 _SHOWN = 160  # characters of a line
 _MAX_OPTION = 60  # of the options that a header states
 _MAX_HEADER = 2**18  # bytes of gtc.h, which has 40,000
@@ -113,7 +111,7 @@ def shared_runtime_entries(c_folder: Path, model: Model, shared: str) -> Iterato
     """
     place = c_folder / shared
     header = _content(place / "gtc.h", _MAX_HEADER) or b""
-    for name, data in runtime_texts(_needs_beside(header, model), ARITHMETICS).items():
+    for name, data in runtime_texts(_needs_beside(header, model), NUMERICS).items():
         found = _content(place / name, len(data))
         if found is None:
             yield VerifiedFile(file=f"{shared}/{name}", verdict="missing", status="fail", mismatches=1)
@@ -146,7 +144,7 @@ def file_entries(c_folder: Path, texts: Mapping[str, bytes]) -> Iterator[Verifie
         if found == data:
             yield VerifiedFile(file=name, verdict="equal", status="pass", mismatches=0)
         else:
-            yield _differing(name, found, data, allowed=name == EXAMPLE)
+            yield _differing(name, found, data, allowed=f"c/{name}" == EXAMPLE)
     for name in sorted(there - set(texts) - {MARKER}):
         yield VerifiedFile(file=name, verdict="foreign", status="fail", mismatches=1)
 
@@ -301,7 +299,7 @@ def checked_sources(c_folder: Path, work: Path, files: Mapping[str, Check], *, t
 
 def _runtime(name: str, needs: Mapping[str, int], data: bytes) -> str | None:
     """Test a file of the runtime: it is what this gyrotc makes with the options that the file's header states."""
-    for numerics in (ARITHMETICS, *((n,) for n in ARITHMETICS)):
+    for numerics in (NUMERICS, *((n,) for n in NUMERICS)):
         if runtime_texts(needs, numerics).get(name) == data:
             return None
     return "is not the runtime of this gyrotc"

@@ -33,6 +33,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..common.errors import CheckFailed, InputError
 from ..common.inputs import read_toml
 from ..results import cache
+from ..results.base import NUMERICS
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.json_text import canonical_json, digest_of
@@ -160,7 +161,7 @@ class Target(BaseModel):
     bare: tuple[str, ...] = ()  # files of bare/ that are linked in
     script: str | None = None  # linker script in bare/
     run: tuple[str, ...] = ()
-    numerics: tuple[str, ...] = ("f32", "q31")
+    numerics: tuple[str, ...] = NUMERICS
     byte_order: Literal["little", "big"] = "little"
     counts: Literal["instructions", "cycles"] | None = None  # what the board's counter counts ...
     ticks_per_count: Annotated[float, Field(gt=0.0)] = 1.0  # ... and how often it ticks for each

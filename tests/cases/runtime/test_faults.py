@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gyrotc.mirror import Numeric
+from gyrotc.results import Numeric
 from gyrotc.tables import NUMERICS
 
 from bench.faults import CLASSES, FIRST_SEED, outcomes

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from extreme import extreme_bank, extreme_model, worst_error_dph
 from gyrotc.common import CheckFailed
-from gyrotc.mirror import Course, CourseChannel, Numeric, Recursion, TermOutcome, recursions_of_table
+from gyrotc.mirror import Course, CourseChannel, Recursion, TermOutcome, recursions_of_table
 from gyrotc.model import Envelope, Guard, Model, Network, Scale, Term
+from gyrotc.results import Numeric
 from gyrotc.tables import NUMERICS, channel_error_dph, emit_texts, quantise, quantise_all
 from models import bank_of, random_model
 from numpy.typing import NDArray

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from drawn import examples
-from gyrotc.mirror import Numeric, Words, follow_history, replay
+from gyrotc.mirror import Words, follow_history, replay
+from gyrotc.results import Numeric
 from gyrotc.tables import NUMERICS
 from hypothesis import given
 from hypothesis import strategies as st

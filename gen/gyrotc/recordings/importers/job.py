@@ -22,7 +22,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ... import __version__
-from ...common.errors import InputError
+from ...common.errors import InputError, short_reason
 from ...common.inputs import open_input, refuse_above
 from ...results.base import ADVICE, Finding
 from ...results.files import write_own
@@ -618,8 +618,7 @@ def _unpacked(path: Path, chosen: Map) -> LoggerFile:
                     refuse_above("recording_mib", size / 2**20, path.name, "MiB")
                     whole.write(block)
         except (OSError, EOFError, zlib.error) as error:
-            what = " ".join(str(error).split())[:100]
-            raise InputError(path.name, f"cannot be unpacked ({what})", "a whole .gz file") from error
+            raise InputError(path.name, f"cannot be unpacked ({short_reason(error)})", "a whole .gz file") from error
         head = _head(place)
         if head.startswith(_GZIP):
             name, once = shlex.quote(path.name), shlex.quote(f"once-{path.name}")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....common.errors import InputError
+from ....common.errors import InputError, short_reason
 from ...tables import (
     MAX_COLUMNS,
     Column,
@@ -37,8 +37,7 @@ def open_hdf5(path: Path) -> LoggerFile:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as HDF5 ({what})", "a whole HDF5 file") from error
+        raise InputError(path.name, f"cannot be read as HDF5 ({short_reason(error)})", "a whole HDF5 file") from error
     try:
         contents = _Contents(h5py, path)
         contents.read(file)
@@ -47,8 +46,7 @@ def open_hdf5(path: Path) -> LoggerFile:
         raise
     except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
         file.close()
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"is damaged ({what})", "a whole HDF5 file") from error
+        raise InputError(path.name, f"is damaged ({short_reason(error)})", "a whole HDF5 file") from error
     tables, left = grouped(contents.entries, contents.rates)
     if not tables:
         raise InputError(path.name, "no numeric vectors", "vectors, matrices or tables of numbers")

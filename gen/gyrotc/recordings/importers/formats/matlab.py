@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ....common.errors import InputError
+from ....common.errors import InputError, short_reason
 from ....common.inputs import need_memory
 from ...tables import MAX_COLUMNS, Column, LoggerFile, Vector, grouped, numbers, part_of, rate_of, unread
 from ..format import Format
@@ -40,8 +40,9 @@ def open_mat(path: Path) -> LoggerFile:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of the parser
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as MATLAB file ({what})", "a whole .mat file") from error
+        raise InputError(
+            path.name, f"cannot be read as MATLAB file ({short_reason(error)})", "a whole .mat file"
+        ) from error
     entries: list[Vector | str] = []
     rates: dict[str, tuple[float, str]] = {}
     units: dict[str, str] = {}

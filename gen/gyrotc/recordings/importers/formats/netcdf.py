@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....common.errors import InputError
+from ....common.errors import InputError, short_reason
 from ...tables import (
     MAX_COLUMNS,
     Column,
@@ -38,8 +38,9 @@ def open_netcdf(path: Path) -> LoggerFile:
     try:
         data = xarray.open_dataset(path, engine="scipy" if classic else "h5netcdf", decode_timedelta=True)
     except Exception as error:  # whatever a damaged file makes of the parser
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as NetCDF ({what})", "a whole NetCDF file") from error
+        raise InputError(
+            path.name, f"cannot be read as NetCDF ({short_reason(error)})", "a whole NetCDF file"
+        ) from error
     entries = [entry for name in data.variables for entry in _vectors(str(name), data[name])]
     rates: dict[str, tuple[float, str]] = {}
     for key, value in data.attrs.items():

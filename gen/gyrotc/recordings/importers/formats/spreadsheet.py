@@ -9,7 +9,7 @@ from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
 
-from ....common.errors import InputError
+from ....common.errors import InputError, short_reason
 from ...tables import LoggerFile, LoggerTable, optional_library
 from ..cells import split_line
 from ..csv_table import open_csv
@@ -35,8 +35,9 @@ def open_spreadsheet(path: Path) -> LoggerFile:
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     except Exception as error:  # whatever a damaged file makes of the parser
-        what = " ".join(str(error).split())[:100]
-        raise InputError(path.name, f"cannot be read as a spreadsheet ({what})", "a whole .xlsx file") from error
+        raise InputError(
+            path.name, f"cannot be read as a spreadsheet ({short_reason(error)})", "a whole .xlsx file"
+        ) from error
     folder = Path(tempfile.mkdtemp())
     tables: list[LoggerTable] = []
     refused: list[InputError] = []

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ....common.errors import InputError
+from ....common.errors import InputError, short_reason
 from ...tables import ArrayTable, Column, LoggerFile, LoggerTable, ReadPart, numbers, optional_library, unread
 from ..format import Format
 
@@ -36,8 +36,9 @@ def open_tdms(path: Path) -> LoggerFile:
             tables = tuple(table for group in file.groups() for table in _tables(group, path.name))
             left = tuple(entry for group in file.groups() for entry in _unread(group))
         except Exception as error:  # whatever a damaged file makes of the parser
-            what = " ".join(str(error).split())[:100]
-            raise InputError(path.name, f"cannot be read as TDMS ({what})", "a whole TDMS file") from error
+            raise InputError(
+                path.name, f"cannot be read as TDMS ({short_reason(error)})", "a whole TDMS file"
+            ) from error
         if not tables:
             raise InputError(path.name, "no numeric channels", "a TDMS file with channels of numbers")
         facts = {str(k).lower(): str(v) for k, v in file.properties.items()}
@@ -131,8 +132,7 @@ def _part(channel: Any, file: str) -> ReadPart:
         try:
             values = channel[first:last]
         except Exception as error:  # whatever a damaged file makes of the parser
-            what = " ".join(str(error).split())[:100]
-            raise InputError(file, f"is damaged ({what})", "a whole TDMS file") from error
+            raise InputError(file, f"is damaged ({short_reason(error)})", "a whole TDMS file") from error
         return values.astype("datetime64[ns]") if getattr(values.dtype, "kind", "") == "M" else numbers(values)
 
     return part
