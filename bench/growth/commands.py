@@ -33,7 +33,9 @@ def used():
 marks = [("starting", 0.0)]
 from gyrotc.jobs.calibration import build
 from gyrotc.train.fitting import FitOptions
-build(Path(sys.argv[1]), Path(sys.argv[2]), FitOptions(), progress=lambda text: marks.append((text.split()[0], used())))
+def note(stage, *_):
+    marks.append((stage.split()[0].rstrip(":"), used()))
+build(Path(sys.argv[1]), Path(sys.argv[2]), FitOptions(), progress=note)
 print(json.dumps([*marks, ("", used())]))
 """
 _STARTER = """import os, sys

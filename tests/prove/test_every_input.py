@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from emitted import GOLDEN, emitted
+from gyrotc.common import Progress
 from gyrotc.model import Model, load_model
 from gyrotc.tables import emitted_tables
 from gyrotc.verify import visit_all
 from results import Results
 from test_primitives import CURVE_ERROR, F32_CURVE_ERROR, F32_GAUSS_ERROR, printed_by
-
-Progress = Callable[[str], None]
 
 
 def _golden() -> Model:
@@ -41,7 +40,7 @@ def bar() -> Iterator[Progress | None]:
         yield None
         return
     with os.fdopen(number, "w", encoding="utf-8") as terminal:
-        yield lambda text: print(f"\r{text}   ", end="", file=terminal, flush=True)
+        yield lambda stage, done, total: print(f"\r{stage}, {done / total:.0%}   ", end="", file=terminal, flush=True)
         print(file=terminal)
 
 

@@ -19,9 +19,10 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..common.arrays import FloatArray, Progress
+from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed, GyrotcError, InputError
 from ..common.metrics import Averager, Averages, statistics_of, time_statistics
+from ..common.progress import Progress, silent
 from ..common.texts import file_stem
 from ..mirror.history import Replay
 from ..mirror.table import Table, Words
@@ -107,7 +108,7 @@ def evaluate(
     training: Training | None = None,
     judged: Judged | None = None,
     compiled: bool = True,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     watch: Watch | None = None,
 ) -> Evaluation:
     """Evaluates `folder` (model and C) on a data set; what `evaluate.json` holds.
@@ -121,6 +122,7 @@ def evaluate(
             recordings. Without an exam run its figures of spans left out count.
         judged: Judgement of the rows of the runs; None: they are judged here.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
+        progress: Takes note of every run.
         watch: Called with each run and its means.
 
     Raises:
@@ -139,9 +141,8 @@ def evaluate(
     parts = []
     compiling = _program(folder / "c", model, table) if compiled else nullcontext()
     with compiling as program:
-        for k, run in enumerate(dataset.runs, 1):
-            if progress:
-                progress(f"{run.file}, {k} of {len(dataset.runs)}")
+        for k, run in enumerate(dataset.runs):
+            progress(f"replaying {run.file}", k, len(dataset.runs))
             parts.append(
                 _one_run(
                     run,

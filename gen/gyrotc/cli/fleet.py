@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..common.errors import CheckFailed
+from ..common.progress import Progress
 from ..common.texts import toml_key
 from ..pages.display import sci, words
 from .application import app
 from .options import JsonOption, OutOption, written_place
 from .output import tell, write_json
-from .progress import LOT, progress
+from .progress import progress
 
 if TYPE_CHECKING:
     from ..results.fleet import FleetEntry, FleetSummary
@@ -96,15 +96,18 @@ def _tell_comparison(summary: FleetSummary) -> None:
 class _Done:
     """Tells each gyro as it comes, and how many are done of those that had to be."""
 
-    def __init__(self, total: int, say: Callable[[str], None]) -> None:
+    def __init__(self, total: int, say: Progress) -> None:
         self._waiting, self._say, self._done = total, say, 0
-        say(f"0 of {total} gyros done")
+        self._report()
 
     def __call__(self, entry: FleetEntry) -> None:
         self._waiting -= entry.kept  # what is kept takes no time
         self._done += not entry.kept
         _tell_entry(entry)
-        self._say(f"{self._done} of {self._waiting} gyros done")
+        self._report()
+
+    def _report(self) -> None:
+        self._say(f"{self._done} of {self._waiting} gyros done", self._done, self._waiting)
 
 
 def _tell_entry(entry: FleetEntry) -> None:
@@ -145,7 +148,7 @@ def lot(
     from ..results.folder import write_result
     from ..results.json_text import json_text
 
-    with progress(LOT) as say:
+    with progress() as say:
         found = lot_of(fleet, axis=axis, progress=say)
     write_result(out, json_text(found.content()))
     checked = found.cross_validation

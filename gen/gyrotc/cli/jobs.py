@@ -26,7 +26,7 @@ from .options import (
     numerics_of,
 )
 from .output import show, tell, write_json
-from .progress import BUILD, COMPARE, DIAGNOSE, progress
+from .progress import progress
 from .results import built_lines, verify_table
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def build(
     from ..jobs.calibration import build as run
     from ..train.fitting import FitOptions
 
-    with progress([*DIAGNOSE, *BUILD] if extend else BUILD) as say:
+    with progress() as say:
         results = run(
             dataset,
             out,
@@ -153,7 +153,7 @@ def compare(
     from ..results.folder import result_folder
     from ..results.json_text import json_text
 
-    with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress(COMPARE) as say:
+    with result_folder(out, "compare", inputs=[dataset]) if out else nullcontext() as stage, progress() as say:
         recordings = load(dataset, axis=axis, applied=applied_in(dataset))
         if stage:
             stage.of(recordings.serial, axis)
@@ -198,7 +198,7 @@ def diagnose(
 
     def one(name: str | None, into: Path | None) -> None:
         recordings: Dataset = load(dataset, axis=name, applied=subtracted)
-        with progress(DIAGNOSE) as say:
+        with progress() as say:
             results[name or ""] = diagnose_dataset(
                 recordings,
                 into,

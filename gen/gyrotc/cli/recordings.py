@@ -116,7 +116,7 @@ def import_(
     with progress() as say:
         result = import_files(
             files, out, checked_map(chosen, "options"), options, ask=_ask, say=tell,
-            progress=lambda name, done: say(f"{name} {done:.0%}"),
+            progress=say,
         )  # fmt: skip
     if result is not None:
         write_json(json_file, result.result().content())
@@ -234,7 +234,7 @@ def simulate(
             raw_hz=raw_hz,
             pulses=pulses,
             format=format.value,
-            progress=lambda share: say(f"simulating {share:.0%}"),
+            progress=say,
         )
     tell(f"{out}: data set of scenario {scenario}, seed {seed}")
 
@@ -260,7 +260,7 @@ def _simulate_lot(
             out=out,
             scenario=scenario,
             form=RowForm.of(raw_hz=raw_hz, pulses=pulses, format=format.value),
-            progress=lambda share: say(f"simulating {share:.0%}"),
+            progress=say,
         )
     tell(f"{out}: {order.units} data sets of scenario {scenario}, family {order.family:g}, seed {seed}")
 

@@ -30,7 +30,7 @@ from .options import (
     written_place,
 )
 from .output import ERR, show, tell, write_json
-from .progress import EMIT, FIT, VERIFY, progress
+from .progress import progress
 from .results import (
     evaluation_table,
     file_notes,
@@ -106,7 +106,7 @@ def fit(
     from ..train.fitting import FitOptions, fit_dataset
 
     fitting = FitOptions(prior=lot_in(lot))
-    with result_folder(out, "fit", inputs=[dataset]) as stage, progress(FIT) as say:
+    with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
         recordings = load(dataset, axis=axis, applied=applied_in(dataset))
         stage.of(recordings.serial, recordings.axis)
         fitting = with_prior(fitting.with_stated(recordings.fit), recordings, prior, ageing)
@@ -172,7 +172,7 @@ def emit(
 
     loaded = load_model(model)
     there = out / "model.json"
-    with progress(EMIT) as say, result_folder(out, "emit", entries=("c", "model.json")) as stage:
+    with progress() as say, result_folder(out, "emit", entries=("c", "model.json")) as stage:
         stage.of(loaded.serial, loaded.axis)
         if there.is_file() and there.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
@@ -242,7 +242,7 @@ def verify(
     if axes and log is not None:
         raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
     results = {}
-    with progress(VERIFY) as say:
+    with progress() as say:
         for part in [folder / axis for axis in axes] or [folder]:
             axis = load_model(part / "model.json").axis
             with result_folder(part, "verify", entries=("verify.json",)) as stage:

@@ -14,6 +14,8 @@ from .metrics import median as median
 from .metrics import middle_of_five as middle_of_five
 from .metrics import statistics_of as statistics_of
 from .metrics import time_statistics as time_statistics
+from .progress import Progress as Progress
+from .progress import Stages as Stages
 from .statistics import CHI2_95_ONE as CHI2_95_ONE
 from .statistics import CHI2_95_TWO as CHI2_95_TWO
 from .statistics import NORMAL_95 as NORMAL_95

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
-Progress = Callable[[str], None]
-"""Called with what is being done."""
 PART = 2**16
 """Rows that are looked at together: what is computed of them stays small beside the columns of a long recording."""
 

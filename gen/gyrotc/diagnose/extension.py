@@ -14,8 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, Progress
+from ..common.arrays import BoolArray
 from ..common.metrics import Averages
+from ..common.progress import Progress
 from ..model import Model
 from ..results.diagnosed import GainOnUnseen
 from ..results.fleet import LotUse
@@ -116,7 +117,7 @@ def extend(
         causes: The named ones, the strongest first.
         probabilities: Of each in its place; none of a single cycle, of which nothing is shipped.
         floor: Noise floor of means over the averaging time, deg/h.
-        say: Called with what is being done.
+        say: Takes note of the stage.
     """
     say("measuring the gain")
     single_cycle, average_s = refitting.single_cycle, refitting.average_s

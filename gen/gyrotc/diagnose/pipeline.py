@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, pdtrc
 
 from ..causes import CATALOGUE
-from ..common.arrays import FloatArray, Progress
+from ..common.arrays import FloatArray
+from ..common.progress import Progress, silent
 from ..common.statistics import main_directions, orthonormal
 from ..quality.odds import FALSE_ALARMS
 from .attribution import Attribution, attribute, overlap
@@ -77,7 +78,7 @@ class Analysis:
         return np.asarray(fitted.residual * np.sqrt(fitted.residual.size / max(fitted.freedom, 1)))
 
 
-def analyse(records: Records, declared: Declared | None, say: Progress = lambda _: None) -> Analysis:
+def analyse(records: Records, declared: Declared | None, say: Progress = silent) -> Analysis:
     """Everything from rows to named causes."""
     say("screening")
     screened = screen(records)
@@ -131,7 +132,7 @@ def search_of(
     records: Records,
     declared: Declared | None = None,
     screened: Screened | None = None,
-    say: Progress = lambda _: None,
+    say: Progress = silent,
 ) -> Search:
     """The search with the coarsest map that the data do not reject, of the temperature ahead of a sensor that lags."""
     checked = screen(records) if screened is None else screened

@@ -13,7 +13,7 @@ import importlib
 import inspect
 import io
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
+from ..common.progress import Progress, silent
 from ..mirror.recursions import play
 from ..results import cache
 from .blocks import Records
@@ -264,9 +265,7 @@ _NUMPY = {
 }  # fmt: skip
 
 
-def bank_of(
-    records: Records, level: int, say: Callable[[str], None] = lambda _: None, lead_s: float = 0.0
-) -> SignatureBank:
+def bank_of(records: Records, level: int, say: Progress = silent, lead_s: float = 0.0) -> SignatureBank:
     """The bank of these temperature records, from disk or made and kept."""
     digest = hashlib.sha256(f"{level} {lead_s:g} {_code()} {records.key()}".encode()).hexdigest()
     bank = cache.kept(f"{digest}.bank", bank_from_bytes)

@@ -25,6 +25,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..common.errors import InputError, install_command
+from ..common.progress import Progress
 from ..common.texts import file_stem
 from ..model import Model
 from ..pages.display import sci
@@ -136,6 +137,7 @@ def build(
     targets: Sequence[str] = (),
     numerics: Sequence[str] | None = None,
     extend: bool = False,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Result:
     """Fits, emits C, proves it on targets, judges it and writes the report, as `gyrotc build` does.
@@ -145,6 +147,7 @@ def build(
         out: Folder of the result; None: one for temporary files, gone with the result.
         limits: Limits of the product (docs/limits.md).
         targets, numerics, extend: As of the command.
+        progress: Called at every stage with its name, and with how much is done of how much: `(stage, done, total)`.
         **options: `method`, `seed`, `centers`, `rho`, `block_s`, `average_s`, `channels`, as of the command.
 
     Raises:
@@ -162,6 +165,7 @@ def build(
             targets=targets,
             extend=extend,
             limits=Path(limits) if limits is not None else None,
+            progress=progress,
         )
         result = Result(place, built)
         weakref.finalize(result, stack.pop_all().close)

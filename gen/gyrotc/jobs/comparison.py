@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..common.arrays import Progress
 from ..common.errors import InputError
 from ..common.metrics import Averages, average_rows
+from ..common.progress import Progress, Stages
 from ..quality.judgement import judge
 from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.records import Dataset, Run
@@ -55,7 +55,7 @@ def compare(
         dataset: With at least one training run.
         options: Seed, block length and averaging; the others are each method's own.
         methods: Their names.
-        progress: Called with what is being done.
+        progress: Takes note of every method.
 
     Returns:
         What `compare.json` holds.
@@ -63,14 +63,15 @@ def compare(
     Raises:
         InputError: No training run, or no usable sample.
     """
-    say = progress or (lambda _: None)
+    say = Stages(progress, {"reading": 0.05, "training": 0.95})
     say("reading")
     options = options.with_stated(dataset.fit)
     data, held, judged_on = _samples(dataset, options)
     _fit(methods[0], data, options)  # what a first call loads is not training time
     judged = []
-    for k, method in enumerate(methods, 1):
-        say(f"{method}, {k} of {len(methods)}")
+    training = say.within("training", "training ")
+    for k, method in enumerate(methods):
+        training(method, k, len(methods))
         judged.append(_judged(method, data, held, options))
     reference = next((m for m in judged if m.id == "mrbf"), judged[0])
     return Comparison(

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..common.arrays import Progress
+from ..common.progress import Progress, Stages
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
@@ -37,6 +37,7 @@ def diagnose_dataset(
     Args:
         out: Folder that gets `diagnose.json`, `report.html`, pictures and the extended model; None: no files.
         options: As for `fit`, without an earlier model.
+        progress: Takes note of every stage.
         judged: Judgement of the rows of the runs; None: they are judged here.
 
     Raises:
@@ -46,14 +47,16 @@ def diagnose_dataset(
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        found = diagnose(dataset, options=chosen, progress=progress, judged=judged)
-        return _saved(stage.folder, found, progress) if stage else found
+        say = Stages(progress, {"diagnosing": 0.87, "drawing": 0.13})
+        found = diagnose(dataset, options=chosen, progress=say.within("diagnosing"), judged=judged)
+        if stage is None:
+            return found
+        say("drawing")
+        return _saved(stage.folder, found)
 
 
-def _saved(out: Path, found: Diagnosis, progress: Progress | None = None) -> Diagnosis:
+def _saved(out: Path, found: Diagnosis) -> Diagnosis:
     """Writes a diagnosis into a folder; its result then names the files."""
-    if progress:
-        progress("drawing")
     result, names = found.result, dict[str, Any]()
     if result.extended is not None and found.model is not None:
         found.model.save(out / _MODEL)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..assess.evaluation import evaluate
 from ..assess.stated import budget_again, held_again
-from ..common.arrays import Progress
+from ..common.progress import Progress, silent
 from ..model import load_model
 from ..recordings.records import Dataset
 from ..results.base import UnitResult, read_optional
@@ -34,7 +34,7 @@ def evaluate_again(
     numeric: str | None = None,
     trace: Path | None = None,
     trace_rows: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Evaluation:
     """Evaluate the result in `folder`, and write what follows from its figures into the folder `into`.
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..common.arrays import FloatArray, Progress
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..common.progress import Progress, silent
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotCluster, LotUnit
@@ -64,19 +65,19 @@ def checksum_of(lot: Lot) -> str:
     return digest_of({key: value for key, value in lot.content().items() if key != "checksum"})
 
 
-def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress | None = None) -> Lot:
+def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress = silent) -> Lot:
     """Learns a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
 
     Args:
         axis: Axis of three-axis gyros: each axis is a lot of its own.
+        progress: Takes note of every stage.
 
     Raises:
         InputError: Fewer than three units, or units of several axes and none is named.
     """
-    say = progress or (lambda _: None)
     units, left_out = calibrated_units(fleet, axis)
     means, envelope = [u.means for u in units], _envelope([u.model for u in units])
-    found = learn_prior(means, envelope, say)
+    found = learn_prior(means, envelope, progress)
     kept = [u for u, inside in zip(units, found.inside, strict=True) if inside]
     names = [(u.model.serial, u.model.hash) for u in units]
     return lot_from(

@@ -6,7 +6,7 @@ can be checked: its unfinished last line is left out, and that is a warning.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import __version__
 from ..common.errors import InputError
+from ..common.progress import Progress, Stages, silent
 from ..model import Model
 from ..recordings.description import Problems
 from ..recordings.loading import asked_axes, load_reporting
@@ -103,13 +104,17 @@ class CheckResult:
         )
 
 
+# As `gyrotc check -v` measures them on data of `gyrotc simulate paper`.
+_STAGES = {"reading": 0.3, "judging rows": 0.4, "looking at each run": 0.3}
+
+
 def check(
     folder: Path,
     *,
     axis: str | None = None,
     applied: Applied | None = None,
     earlier: Mapping[str, Model] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = silent,
 ) -> CheckResult:
     """Checks a data set as `fit` would read it, and looks for what is suspect.
 
@@ -130,20 +135,22 @@ def check(
     counts: list[RowsCount] = []
     serial: str | None = None
     axes = _axes(folder, axis)
+    of_axes = Stages(progress, dict.fromkeys(map(str, axes), 1.0))
     for one in axes:
+        say = Stages(of_axes.within(str(one)), _STAGES)
         reported = Problems(collect=True)
-        progress("reading")
+        say("reading")
         dataset = load_reporting(folder, reported, axis=one, applied=applied)
         problems |= {str(problem): problem for problem in reported.found}
         marks |= reported.marks
         if dataset is not None:
             _refuse_another(earlier or {}, dataset)
             serial = dataset.serial
-            progress("judging rows")
+            say("judging rows")
             judged = judge(dataset)
             looked = []
-            for k, run in enumerate(dataset.runs, 1):
-                progress(f"{run.file}, {k} of {len(dataset.runs)}")
+            for k, run in enumerate(dataset.runs):
+                say("looking at each run", k, len(dataset.runs))
                 looked.append(_looked_at(run, judged.of(run)))
             of_axis = [f for f, _ in looked]
             together = _of_all_runs(dataset, of_axis, earlier)

@@ -7,7 +7,7 @@ Any row length therefore shows the same angle and the same temperature readings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..common.progress import Progress, silent
 from ..recordings.description import dataset_toml
 from ..recordings.importers.rows import FileFormat
 from ..results.files import create, write_own
@@ -77,7 +78,7 @@ def simulate(
     pulses: bool = False,
     format: FileFormat = "csv",
     noise: NoiseName = "paper",
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = silent,
 ) -> None:
     """Simulates a campaign and writes it as a data set with its truth beside it.
 
@@ -92,7 +93,7 @@ def simulate(
         pulses: Integer pulses instead of rates.
         format: The run files are written in it: "csv" or "parquet".
         noise: Levels where the scenario gives none: the paper's, or typical ones of the class.
-        progress: Called with the share that is done, 0 ... 1.
+        progress: Takes note of what is done.
 
     Raises:
         InputError: scenario, seed, row length or folder cannot be.
@@ -102,11 +103,10 @@ def simulate(
     plan = with_noise(plan, noise)
     serial = plan.gyro.serial.replace("{seed}", f"{seed:04d}")
     gyro = SimulatedGyro(plan, serial, gyro_map(plan, seed), seed, _seeds(seed)[1], name)
-    report = progress or (lambda share: None)
     with result_folder(Path(out), "simulate") as stage:
         stage.of(gyro.serial)
-        write_gyro(stage.folder, gyro, form, report)
-    report(1.0)
+        write_gyro(stage.folder, gyro, form, progress)
+    progress("simulating", 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ class SimulatedGyro:
     lot: TrueLot | None = None
 
 
-def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, report: Callable[[float], None]) -> None:
+def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, progress: Progress) -> None:
     """Writes recordings and truth of one gyro into a folder that is there."""
     weight = (gyro.plan.noise.quantum_arcsec / _PULSES_PER_QUANTUM or _DEFAULT_PULSE_ARCSEC) if form.pulses else None
     runs = _planned(gyro.plan)
@@ -160,7 +160,7 @@ def write_gyro(folder: Path, gyro: SimulatedGyro, form: RowForm, report: Callabl
         file = f"run-{index + 1:02d}.{form.format}"
         runs[index] = {"file": file, **runs[index], "power_on_s": made.power_on_s}
         for share in _write_run(folder / file, form.format, made, form.length, weight):
-            report((index + share) / len(runs))
+            progress("simulating", index + share, len(runs))
         truths.append(_truth_of_run(folder, file, made, form.length, weight))
     _write_texts(folder, gyro, weight, runs, truths)
 

@@ -8,7 +8,6 @@ scores stand for, and from where their spreads are: docs/simulation.md, section 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
+from ..common.progress import Progress, Stages, silent
 from ..results.folder import result_folder
 from ..results.recordings import TrueLot
 from .campaign import NoiseName, RowForm, SimulatedGyro, with_noise, write_gyro
@@ -87,7 +87,7 @@ def simulate_lot(
     scenario: str | Path = "paper",
     form: RowForm | None = None,
     noise: NoiseName = "paper",
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = silent,
 ) -> list[str]:
     """Simulates a lot: a data set in `out/<serial>` for each unit, with its truth beside it.
 
@@ -98,7 +98,7 @@ def simulate_lot(
         out: Folder to make; simulated data sets there are replaced one by one.
         scenario: Programmes, chamber and instrument about which units are drawn.
         form: Rows; None: rates of 10 s, CSV.
-        progress: Called with the share that is done, 0 ... 1.
+        progress: Takes note of what is done.
 
     Returns:
         The serials.
@@ -109,11 +109,11 @@ def simulate_lot(
     name, plan = read(scenario)
     rows = form or RowForm.of(10.0, None, False, "csv")
     units = draw_lot(with_noise(plan, noise), order, seed, name)
-    report = progress or (lambda share: None)
-    for k, unit in enumerate(units):
+    of_units = Stages(progress, {unit.serial: 1.0 for unit in units})
+    for unit in units:
         with result_folder(Path(out) / unit.serial, "simulate") as stage:
             stage.of(unit.serial)
-            write_gyro(stage.folder, unit, rows, lambda share, k=k: report((k + share) / len(units)))  # type: ignore[misc]
+            write_gyro(stage.folder, unit, rows, of_units.within(unit.serial))
     return [unit.serial for unit in units]
 
 

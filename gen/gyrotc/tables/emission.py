@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal, localcontext
 from pathlib import Path
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
+from ..common.progress import Progress, Stages, silent
 from ..common.texts import CText, c_code, c_environment, c_literal
 from ..mirror.history import answers
 from ..mirror.table import LAYOUT, Table
@@ -53,7 +54,7 @@ class Emission:
     refused: dict[str, str]
 
 
-def quantise_all(model: Model, numerics: Sequence[str] | None, say: Callable[[str], None] = lambda _: None) -> Emission:
+def quantise_all(model: Model, numerics: Sequence[str] | None, progress: Progress = silent) -> Emission:
     """Tables of a model for the arithmetics asked for (None: every one that the runtime has).
 
     Raises:
@@ -65,8 +66,9 @@ def quantise_all(model: Model, numerics: Sequence[str] | None, say: Callable[[st
         raise InputError("--numeric", repr(unknown[0]), " or ".join(NUMERICS))
     tables: dict[str, Table] = {}
     refused: dict[str, str] = {}
-    for numeric in NUMERICS if numerics is None else tuple(dict.fromkeys(numerics)):
-        say(f"rounding to {numeric}")
+    chosen = NUMERICS if numerics is None else tuple(dict.fromkeys(numerics))
+    for k, numeric in enumerate(chosen):
+        progress(f"rounding to {numeric}", k, len(chosen))
         try:
             tables[numeric] = quantise(model, numeric)
         except CheckFailed as error:
@@ -85,7 +87,7 @@ def emit(
     numerics: Sequence[str] | None = None,
     zero_at: float | None = None,
     runtime_apart: bool = False,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = silent,
 ) -> Emission:
     """Write `out/c/` and the `out/model.json` that it is made of, both or neither, in place of earlier ones.
 
@@ -93,10 +95,12 @@ def emit(
         numerics: The arithmetics; None: every one that the runtime has.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
         runtime_apart: Write the tables only: the runtime is in `SHARED_RUNTIME`, once for many gyros.
-        progress: Called with what is being done.
+        progress: Takes note of every stage.
     """
-    emission = quantise_all(model if zero_at is None else model.zeroed_at(zero_at), numerics, progress)
-    progress("answering the vectors")
+    say = Stages(progress, {"rounding": 0.85, "answering the vectors": 0.15})
+    shifted = model if zero_at is None else model.zeroed_at(zero_at)
+    emission = quantise_all(shifted, numerics, say.within("rounding"))
+    say("answering the vectors")
     texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at, runtime_apart=runtime_apart)
     write_texts(out, texts, model)
     return emission

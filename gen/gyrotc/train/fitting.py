@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..common.arrays import FloatArray, Progress
+from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
+from ..common.progress import Progress, Stages
 from ..model import Model
 from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge, judge_runs
@@ -160,6 +161,10 @@ def samples_of(blocks: Blocks, block_s: float, run: int) -> TrainingData:
     )
 
 
+# As `gyrotc fit -v` measures them on data of `gyrotc simulate paper`.
+_STAGES = {"judging rows": 0.4, "reading": 0.1, "training": 0.5}
+
+
 def fit_dataset(
     dataset: Dataset,
     options: FitOptions,
@@ -173,6 +178,7 @@ def fit_dataset(
     Args:
         judged: Judgement of the rows of its runs; None: they are judged here.
         read: What the front end made of the training runs, where it is known.
+        progress: Takes note of every stage.
 
     Raises:
         InputError: No training run, or too few usable samples.
@@ -183,7 +189,7 @@ def fit_dataset(
     runs = [run for run in dataset.runs if run.role == "train"]
     if not runs:
         raise InputError(str(dataset.folder), "no run has the role train", "at least one training run")
-    say = progress or (lambda _: None)
+    say = Stages(progress, _STAGES)
     if read is None:
         if judged is None:
             say("judging rows")
@@ -245,7 +251,7 @@ def _read(dataset: Dataset, runs: tuple[Run, ...], options: FitOptions, judged: 
     parts, columns = [], []
     longest_s = 0.0
     for k, run in enumerate(runs):
-        say(f"reading {run.file}")
+        say("reading", k, len(runs))
         rows = run.rows()
         blocks = front.blocks(run, rows, judged)
         longest_s = max(longest_s, longest_same_s(blocks.stream.samples, run.row_period_s))

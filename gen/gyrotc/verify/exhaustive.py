@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from subprocess import DEVNULL, PIPE
 from typing import Any
 
 from ..common.errors import CheckFailed, GyrotcError
+from ..common.progress import Progress, silent
 from ..mirror.q31 import exp2_table
 from ..mirror.table import Table
 from ..model import Model
@@ -22,7 +22,6 @@ from .emitted import checked_sources, table_files
 from .toolchain import Target, all_targets, compile_objects, confined, link, runtime_object
 
 _SLICES = 128  # of exhaustive.c, which is written independently of libc/ but for the code under test
-_BAR = 32  # characters
 _LIMIT_S = 4 * 3600  # of processor time for one of the processes; all 2^32 inputs take minutes
 _KEPT_LINES = 1000  # exhaustive.c prints fewer than ten
 _COMPILERS = ("host-clang-O3", "host-gcc-O3")
@@ -52,7 +51,7 @@ def visit_all(
     *,
     every: int = 1,
     trusted: bool = False,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> Visited:
     """Visits every pair of positions, or every `every`-th slice of slopes.
 
@@ -60,7 +59,7 @@ def visit_all(
         model: The model that the table was made of.
         table: Its fixed-point table.
         trusted: Code of the folder that is not gyrotc's is compiled and run, too.
-        progress: Called with a line that shows the share done and the time left.
+        progress: Takes note of every slice that is done.
 
     Raises:
         CheckFailed: The emitted code does not compile, or the program failed.
@@ -71,7 +70,7 @@ def visit_all(
         program = _compiled(target, c_folder, model, work, trusted=trusted)
         parts = os.cpu_count() or 1
         lines = list(_numbers(model, table))
-        done = _Counter(progress or (lambda _: None))
+        done = _Counter(progress)
         with ThreadPoolExecutor(max_workers=parts) as pool:
             results = list(
                 pool.map(lambda part: _run(program, [f"{part} {parts} {every}", *lines], done), range(parts))
@@ -125,19 +124,15 @@ def _numbers(model: Model, table: Table) -> Iterator[str]:
 
 
 class _Counter:
-    """Slices done, by all processes together, shown as a bar with the time that is left."""
+    """Slices done, by all processes together."""
 
-    def __init__(self, progress: Callable[[str], None]) -> None:
+    def __init__(self, progress: Progress) -> None:
         self._progress = progress
         self._done = 0
-        self._start = time.monotonic()
 
     def one_more(self) -> None:
         self._done += 1
-        share = self._done / _SLICES
-        bar = "█" * round(_BAR * share) + "░" * (_BAR - round(_BAR * share))
-        left = (time.monotonic() - self._start) * (1.0 - share) / share
-        self._progress(f"every input: {share:.0%} {bar} {left:.0f} s left")
+        self._progress("visiting every input", self._done, _SLICES)
 
 
 def _run(program: Path, lines: list[str], done: _Counter) -> list[str]:

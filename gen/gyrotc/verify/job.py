@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..common.arrays import Progress
 from ..common.errors import InputError
+from ..common.progress import Progress, Stages
 from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
@@ -47,6 +47,9 @@ from .toolchain import Target, all_targets, end_all
 
 __all__ = ["chosen_targets", "verify"]
 
+# As `gyrotc verify -v` measures them; two of them are seldom asked for.
+_STAGES = {"comparing files": 0.05, "testing": 0.75, "replaying": 0.1, "visiting every input": 0.1}
+
 # Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
 _NEXT_PROGRAM_S = 0.05
 
@@ -73,14 +76,14 @@ def verify(
         exhaustive: Visit every input of the fixed-point table besides.
         compiled: False: no target; files and bounds are checked against model and reference alone.
         trust_code: Compile and run `folder/c` although it holds code that gyrotc did not write.
-        progress: Called with the name of each target before it is tried.
+        progress: Takes note of every stage, and of every target before it is tried.
 
     Raises:
         InputError: No emitted code, an unknown target, an unreadable log or earlier `verify.json`, no table to visit
             all inputs of.
         CheckFailed: The log is not whole, or of another model.
     """
-    say = progress or (lambda _: None)
+    say = Stages(progress, _STAGES)
     model = load_model(folder / "model.json")
     earlier = read_optional(folder / "verify.json", Verification)
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
@@ -101,9 +104,9 @@ def verify(
     identity = (model.hash, c_hash(folder / "c"))
     same = earlier is not None and (earlier.model_hash, earlier.c_hash) == identity
     entries, brought = log_entries(job, vectors, log) if log is not None else ([], None)
-    entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say)
+    entries += _barred(job, chosen, wrong) if barred else _test_all(job, chosen, say.within("testing"))
     if dataset is not None and not barred:
-        entries = replay_dataset(job, entries, chosen, dataset, say)
+        entries = replay_dataset(job, entries, chosen, dataset, say.within("replaying"))
     before = earlier.targets if earlier is not None else ()
     boards = [entry for entry in before if entry.log is not None]
     if same:
@@ -111,7 +114,9 @@ def verify(
     exact = options.shifted(model)
     errors = [_error(job, exact, vectors, numeric) for numeric in tables]
     if exhaustive and not barred:
-        errors = [_every_input(job, exact, say) if e.numeric == "q31" else e for e in errors]
+        errors = [
+            _every_input(job, exact, say.within("visiting every input")) if e.numeric == "q31" else e for e in errors
+        ]
     passed, failed, missing = _counts(entries, [*emitted, *errors], set(targets))
     return Verification(
         gyrotc_version=__version__,
@@ -161,10 +166,10 @@ def _barred(job: Job, targets: Sequence[Target], wrong: Sequence[str]) -> list[V
 def _test_all(job: Job, targets: Sequence[Target], progress: Progress) -> list[VerifiedTarget]:
     """Entries in the order of the targets; compilers and emulators run side by side."""
 
-    begun = itertools.count(1)
+    begun = itertools.count()
 
     def one(target: Target) -> list[VerifiedTarget]:
-        progress(f"{target.name}, target {next(begun)} of {len(targets)}")
+        progress(target.name, next(begun), len(targets))
         return board_entries(job, target)
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
+from ..common.progress import Progress
 from ..common.texts import c_environment
 from ..mirror.front_end import blocks_since_power_on, missed_before, period_us, samples_per_block
 from ..mirror.history import FollowedHistory, Replay, follow_history
@@ -210,7 +211,7 @@ def replay_dataset(
     entries: Sequence[VerifiedTarget],
     targets: Sequence[Target],
     dataset: Dataset,
-    progress: Callable[[str], None],
+    progress: Progress,
 ) -> list[VerifiedTarget]:
     """Replays every run on every target whose board test ran; the entries, with `replayed` in theirs."""
     with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
@@ -226,8 +227,8 @@ def replay_dataset(
                 )
             except CheckFailed as error:
                 lane.error = str(error)
-        for k, run in enumerate(dataset.runs, 1):
-            progress(f"replaying {run.file}, {k} of {len(dataset.runs)}")
+        for k, run in enumerate(dataset.runs):
+            progress(f"replaying {run.file}", k, len(dataset.runs))
             rows = run.rows()
             for table in job.tables.values():
                 history = replay_case_of(rows, run, job.model, table)

@@ -266,8 +266,8 @@ def test_a_simulated_folder_is_replaced_and_an_interrupted_run_leaves_no_trace(s
     made(short, folder, format="parquet")
     assert (folder / "run-01.parquet").exists() and not (folder / "run-01.csv").exists()
 
-    def stop(share: float) -> None:
-        if share > 0.4:
+    def stop(_stage: str, done: float, total: float) -> None:
+        if done > 0.4 * total:
             raise KeyboardInterrupt
 
     before = sorted(path.name for path in tmp_path.iterdir())
@@ -279,7 +279,7 @@ def test_a_simulated_folder_is_replaced_and_an_interrupted_run_leaves_no_trace(s
 
 def test_progress_rises_to_one(short: Path, tmp_path: Path) -> None:
     shares: list[float] = []
-    made(short, tmp_path / "data", progress=shares.append)
+    made(short, tmp_path / "data", progress=lambda _stage, done, total: shares.append(done / total))
     assert shares == sorted(shares) and shares[-1] == 1.0 and 0.0 < shares[0] < 1.0
 
 

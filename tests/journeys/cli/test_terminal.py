@@ -19,18 +19,25 @@ from typing import Any, get_args
 
 import pytest
 from conftest import HOST, Command, invoked, on_terminal
-from emitted import emitted
+from emitted import GOLDEN, emitted
 from gyrotc.cli import progress as stage_module
 from gyrotc.cli.application import GROUPS, INSTEAD
 from gyrotc.cli.main import application, hoisted, run
 from gyrotc.cli.options import JsonOption
 from gyrotc.cli.output import folded
-from gyrotc.cli.progress import BUILD, DIAGNOSE, EMIT, FIT, StageLine
+from gyrotc.cli.progress import StageLine
 from gyrotc.cli.recordings import RunFormat
-from gyrotc.model import Model
+from gyrotc.common import Progress, Stages
+from gyrotc.jobs import build as build_result
+from gyrotc.model import load_model
+from gyrotc.quality import check
+from gyrotc.recordings import load
 from gyrotc.results import MARKER
 from gyrotc.simulate import campaign
 from gyrotc.tables import emit
+from gyrotc.train import FitOptions, fit_dataset
+from hypothesis import given
+from hypothesis import strategies as st
 from recordings import columns, described, toml, write_csv
 
 PROGRAM = Path(sys.executable).with_name("gyrotc")
@@ -53,46 +60,60 @@ def test_quiet_tells_only_what_went_wrong_and_verbose_every_stage(tmp_path: Path
     assert reported.returncode == 0 and reported.stdout
     lines = reported.stderr.splitlines()
     assert lines and all(line.split()[1] == "s" and float(line.split()[0]) >= 0.0 for line in lines)
-    course = StageLine(FIT)
-    assert all(course.share_of(line.partition(" s  ")[2]) > 0.0 for line in lines[1:]), "a stage has no place"
 
 
-def test_every_stage_of_emit_has_a_place(model_dict: dict[str, Any], tmp_path: Path) -> None:
-    reported: list[str] = []
-    emit(Model.from_dict(model_dict), tmp_path, progress=reported.append)
-    shares = [StageLine(EMIT).share_of(text) for text in reported]
-    assert shares == sorted(shares) and len(set(shares)) == len(reported) == len(EMIT)
+Report = list[tuple[str, float, float]]
+
+
+def _of_job(job: str, folder: Path, report: Progress) -> None:
+    """Run a job that takes next to no time, and have its progress reported."""
+    described(folder / "R")
+    if job == "fit":
+        fit_dataset(load(folder / "R"), FitOptions(), progress=report)
+    elif job == "check":
+        check(folder / "R", progress=report)
+    elif job == "build":
+        build_result(folder / "R", folder / "out", FitOptions(), targets=["host-gcc-O2"], progress=report)
+    else:
+        emit(load_model(GOLDEN), folder / "out", progress=report)
+
+
+@pytest.mark.parametrize("job", ["check", "fit", "emit", "build"])
+def test_a_job_reports_its_stages_and_a_share_that_never_falls(job: str, tmp_path: Path) -> None:
+    reported: Report = []
+    _of_job(job, tmp_path, lambda stage, done, total: reported.append((stage, done, total)))
+    shares = [done / total for _, done, total in reported]
+    assert shares == sorted(shares) and shares[0] == 0.0 and 0.4 < shares[-1] <= 1.0
+    assert len({stage for stage, _, _ in reported}) > 2
+
+
+@given(
+    shares=st.lists(st.floats(0.0, 10.0), min_size=1, max_size=6),
+    inside=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=6, max_size=6),
+)
+def test_the_share_of_a_job_is_that_of_its_stages(shares: list[float], inside: list[tuple[int, int]]) -> None:
+    reported: Report = []
+    stages = Stages(
+        lambda stage, done, total: reported.append((stage, done, total)), {str(k): x for k, x in enumerate(shares)}
+    )
+    for (k, share), (done, total) in zip(enumerate(shares), inside, strict=False):
+        stages.within(str(k), "of axis x: ")("reading", done, total)
+        stage, known, whole = reported[-1]
+        assert stage == "of axis x: reading" and whole == sum(shares)
+        part = min(done / total, 1.0) if total else 0.0
+        assert known == pytest.approx(sum(shares[:k]) + part * share)
 
 
 def test_the_time_left_of_a_fleet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before: percent and time left stood twice on one line, once of what is done and once of what comes next."""
     now = 1000.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
     course = StageLine()
-    course.say("0 of 20 gyros done")
+    course.say("0 of 20 gyros done", 0, 20)
     assert course.line(now) == "0 of 20 gyros done" and course.line(now + 9.0) == "0 of 20 gyros done, 9 s"
     for done, elapsed, left in ((5, 30.0, "90 s"), (10, 1200.0, "20 min"), (20, 9000.0, "0 s")):
         now = 1000.0 + elapsed
-        course.say(f"{done} of 20 gyros done")
+        course.say(f"{done} of 20 gyros done", done, 20)
         assert course.line(now) == f"{done} of 20 gyros done, {5 * done} %, about {left} left"
-
-
-def test_what_a_text_tells_of_the_work_that_is_done() -> None:
-    course = StageLine((("reading", 0.2), ("verifying", 0.6), ("drawing", 0.2)))
-    reported = {
-        "reading": 0.0,
-        "reading a.csv, 2 of 4": 0.05,
-        "verifying host-gcc-O2, target 3 of 4": 0.5,
-        "drawing": 0.8,
-        "y (2 of 3): drawing": 0.6,
-        "something else": 0.0,
-        "verifying 7 of 3": 0.2,
-    }
-    for text, share in reported.items():
-        assert course.share_of(text) == pytest.approx(share), text
-    assert StageLine().share_of("simulating 35%") == StageLine().share_of("import, 35 %") == pytest.approx(0.35)
-    for stages in (BUILD, DIAGNOSE, EMIT, FIT):
-        assert sum(share for _, share in stages) == pytest.approx(1.0)
 
 
 def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,11 +121,11 @@ def test_a_stage_is_shown_with_percent_and_time_left_from_two_seconds_on(monkeyp
     clock = SimpleNamespace(monotonic=lambda: now)
     monkeypatch.setattr(stage_module, "time", clock)
     now = 100.0
-    course = StageLine((("reading", 0.25), ("drawing", 0.75)))
-    course.say("reading")
+    course = StageLine()
+    course.say("reading", 0, 4)
     assert course.line(101.0) == "reading" and course.line(104.0) == "reading, 4 s"
     now = 110.0
-    course.say("drawing")
+    course.say("drawing", 1, 4)
     assert course.line(110.0) == "drawing, 25 %, about 30 s left"
     assert course.line(115.0) == "drawing, 25 %, about 25 s left", "the clock goes on"
     assert course.line(200.0).endswith("about 0 s left")

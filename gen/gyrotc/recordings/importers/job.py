@@ -24,6 +24,7 @@ from pydantic_core import PydanticCustomError
 from ... import __version__
 from ...common.errors import InputError, short_reason
 from ...common.inputs import open_input, refuse_above
+from ...common.progress import Progress, silent
 from ...results.base import ADVICE, Finding
 from ...results.files import write_own
 from ...results.folder import Stage, result_folder, scratch_folder
@@ -283,7 +284,6 @@ def _why(choice: Choice) -> str:
 
 
 Say = Callable[[str], None]
-ImportProgress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +345,7 @@ def import_files(
     *,
     ask: Ask | None = None,
     say: Say | None = None,
-    progress: ImportProgress | None = None,
+    progress: Progress = silent,
 ) -> Imported | None:
     """Imports files, each as a run, into a new folder.
 
@@ -353,7 +353,7 @@ def import_files(
         chosen: What is known of the logger; what it leaves open is proposed from the first file.
         ask: Asks a person for a unit that stands nowhere.
         say: Called with the proposal, the preview and what was written, line by line.
-        progress: Called with the name of the file and the share of it that is done.
+        progress: Takes note of every part of a file.
 
     Returns:
         What was written; None after a dry run.
@@ -396,12 +396,13 @@ class _Import:
         options: ImportOptions,
         ask: Ask,
         tell: Say,
-        progress: ImportProgress | None,
+        progress: Progress,
     ) -> None:
         self.serial = ""
         self.kept = Map()
         self._files, self._out, self._options = files, out, options
         self._ask, self._tell, self._progress = ask, tell, progress
+        self._done = 0  # files
 
     def runs(self, chosen: Map, stage: Stage | None) -> Iterator[ImportedRun]:
         """The runs, one after the other.
@@ -437,6 +438,7 @@ class _Import:
                 devices.setdefault(run.device, path.name)
                 if len(devices) > 1:
                     raise _of_several(devices)
+                self._done += 1
                 yield run
 
     def _run(
@@ -452,8 +454,7 @@ class _Import:
                     self._tell(line)
                 if sink is not None:
                     sink.write(columns)
-                if self._progress is not None:
-                    self._progress(file.path.name, done)
+                self._progress(file.path.name, self._done + done, len(self._files))
         if rows.count < MIN_ROWS:
             left = ", ".join(f"{count} with {reason}" for reason, count in rows.left_out.items())
             found = f"{rows.count} rows" + (f" ({left})" if left else "")

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc
 
 from ..._core import posteriors
-from ...common.arrays import FloatArray, Progress
+from ...common.arrays import FloatArray
+from ...common.progress import Progress, Stages
 from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
 from .unit_means import UnitMeans
 
@@ -281,19 +282,29 @@ class Learned:
     left_out_dph: tuple[float, float]
 
 
-def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -> Learned:
+# As `gyrotc lot -v` measures them on a lot of `gyrotc simulate --units`.
+_STAGES = {
+    "smoothness of the maps": 0.2,
+    "clusters and directions": 0.3,
+    "every unit left out": 0.4,
+    "without the outliers": 0.1,
+}
+
+
+def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progress) -> Learned:
     """Learns what units share.
 
     Args:
         units: At least `LEAST_UNITS`.
         envelope: Ranges of T (C) and dT/dt (C/min) of the lot.
-        say: Called with what is being done.
+        progress: Takes note of every stage.
     """
     bias = np.concatenate([u.bias_dph for u in units])
     count = np.concatenate([u.count for u in units])
     center = float(np.average(bias, weights=count))
     unit = float(np.sqrt(np.average((bias - center) ** 2, weights=count))) or 1.0
     every = LotBasis.over(*envelope)
+    say = Stages(progress, _STAGES)
     say("smoothness of the maps")
     sample = sums_of(units[:: -(-len(units) // _SAMPLE)], every, center, unit)
     first = fitted(sample, every, 0, np.zeros(len(sample), dtype=np.int64), _ROUNDS[0])
@@ -301,13 +312,13 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, say: Progress) -
     basis = every.only(used)
     sums = sums_of(units, basis, center, unit)
     inside = np.ones(len(units), dtype=bool)
-    state = _chosen(sums, basis, say)
+    state = _chosen(sums, basis, say.within("clusters and directions"))
     say("every unit left out")
     p, scale, outside = _left_out(sums, state)
     if outside.any() and (~outside).sum() >= LEAST_UNITS:
         inside = ~outside
         say("without the outliers")
-        state = _chosen(sums.select(inside), basis, say)
+        state = _chosen(sums.select(inside), basis, say.within("without the outliers"))
         again, scale, _ = _left_out(sums.select(inside), state)
         p[inside] = again
     left = _left_dph(units, inside, state, center, unit)
