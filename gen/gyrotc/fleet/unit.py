@@ -18,9 +18,9 @@ from ..common.metrics import Averages
 from ..jobs.applied import applied_in
 from ..jobs.calibration import Built, build_into
 from ..quality.events import found_events
-from ..recordings.loading import calibration_day, load, stated_identity
+from ..recordings.loading import calibration_day, input_hashes, load, stated_identity
 from ..recordings.records import Dataset
-from ..results.cache import input_hashes, program_of
+from ..results.cache import program_of
 from ..results.files import write_atomically
 from ..results.fleet import Facts, FleetEntry
 from ..results.folder import clean, result_folder

@@ -10,6 +10,7 @@ from .fit_options import COMPARED as COMPARED
 from .fit_options import METHODS as METHODS
 from .fit_options import SIMPLE as SIMPLE
 from .loading import axes_of as axes_of
+from .loading import input_hashes as input_hashes
 from .loading import load as load
 from .loading import load_reporting as load_reporting
 from .parquet import ParquetFile as ParquetFile

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -17,6 +18,7 @@ from pydantic_core import PydanticCustomError, ValidationError
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import refuse_above, refused
+from ..results.files import sha256
 from .description import (
     FILE,
     MIN_ROWS,
@@ -47,6 +49,7 @@ __all__ = [
     "check_spans",
     "common_channels",
     "in_entry",
+    "input_hashes",
     "judge",
     "load",
     "load_reporting",
@@ -265,6 +268,24 @@ def stated_identity(folder: Path) -> tuple[str | None, str | None]:
         return None, None
     serial = None if description.serial == UNKNOWN_SERIAL else description.serial
     return serial, calibration_day(description.meta, (run.started for run in description.run))
+
+
+def input_hashes(folder: Path) -> dict[str, str]:
+    """Return the files that a job reads of a data set, with the SHA-256 of each or why it has none.
+
+    Nothing else in the folder is looked at: a link there may lead to all files of the machine.
+    """
+    description = _description(folder, Problems(collect=True))
+    runs = [run.file for run in description.run] if description else []
+    applied = [description.applied_model] if description and description.applied_model is not None else []
+    return {name: _hash_of(folder / name) for name in dict.fromkeys([FILE, *runs, *applied])}
+
+
+def _hash_of(path: Path) -> str:
+    try:
+        return sha256(path) if stat.S_ISREG(path.stat().st_mode) else "no regular file"
+    except OSError as error:
+        return str(error.strerror)
 
 
 def applied_model(folder: Path) -> Path | None:

@@ -5,7 +5,6 @@ from .base import Numeric as Numeric
 from .base import checked_result as checked_result
 from .base import read_optional as read_optional
 from .base import read_result as read_result
-from .cache import input_hashes as input_hashes
 from .cache import program_of as program_of
 from .decision import failed_checks as failed_checks
 from .decision import worst_of as worst_of

@@ -20,7 +20,8 @@ from gyrotc.assess import load_limits
 from gyrotc.common import InputError
 from gyrotc.fleet import SUMMARY, Fleet, Task, Unit, do_unit, load_manifest, run, run_fleet
 from gyrotc.fleet import unit as units
-from gyrotc.results import MARKER, FleetEntry, held, input_hashes, program_of
+from gyrotc.recordings import input_hashes
+from gyrotc.results import MARKER, FleetEntry, held, program_of
 from gyrotc.train import FitOptions
 from recordings import columns, toml, write_csv
 
@@ -222,18 +223,36 @@ def test_recordings_that_change_while_they_are_read_are_refused(task: Task, monk
     assert not task.out.exists()
 
 
-def test_inputs_are_every_regular_file_once(tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / "run.csv").write_text("1")
-    (tmp_path / "data" / "here").symlink_to(tmp_path / "elsewhere")
-    (tmp_path / "data" / "round").symlink_to(tmp_path / "data")
-    (tmp_path / "data" / "gone.csv").symlink_to(tmp_path / "nothing")
-    os.mkfifo(tmp_path / "data" / "pipe.csv")
-    before = input_hashes(tmp_path / "data")
-    assert list(before) == ["here/run.csv"]
-    (tmp_path / "elsewhere" / "run.csv").write_text("2")
-    assert input_hashes(tmp_path / "data") != before
+def test_inputs_are_the_files_that_a_job_reads(tmp_path: Path) -> None:
+    data, elsewhere = tmp_path / "data", tmp_path / "elsewhere"
+    data.mkdir()
+    elsewhere.mkdir()
+    (elsewhere / "run.csv").write_text("1")
+    (data / "here").symlink_to(elsewhere)
+    (data / "round").symlink_to(data)
+    (data / "everything").symlink_to("/")
+    (data / "gone.csv").symlink_to(tmp_path / "nothing")
+    os.mkfifo(data / "pipe.csv")
+    (data / "notes.txt").write_text("not read")
+    names = ["dataset.toml", "gone.csv", "pipe.csv"]
+    assert list(input_hashes(data)) == names
+    runs = "".join(f'[[run]]\nfile = "{name}"\n' for name in ("here/run.csv", "pipe.csv"))
+    (data / "dataset.toml").write_text(f'schema = 1\nserial = "R"\n{runs}')
+    before = input_hashes(data)
+    assert list(before) == ["dataset.toml", "here/run.csv", "pipe.csv"]
+    (elsewhere / "run.csv").write_text("2")
+    assert [name for name in before if input_hashes(data)[name] != before[name]] == ["here/run.csv"]
+
+
+def test_a_link_to_all_files_of_the_machine_does_not_stop_a_fleet(tmp_path: Path) -> None:
+    gyro(tmp_path / "data" / "RLG-1", "RLG-1")
+    for name in ("up", "everything"):
+        (tmp_path / "data" / "RLG-1" / name).symlink_to("/" if name == "everything" else tmp_path / "data")
+        (tmp_path / "data" / name).symlink_to("/" if name == "everything" else tmp_path / "data")
+    command = [PROGRAM, "fleet", tmp_path / "data", "--out", tmp_path / "out", "--jobs", "1"]
+    done = subprocess.run(command, capture_output=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert [unit["name"] for unit in json.loads((tmp_path / "out" / "fleet.json").read_text())["serials"]] == ["RLG-1"]
 
 
 def _without_rights() -> None:
