@@ -289,4 +289,10 @@ def window_means(a: Averages, window_s: float, average_s: float) -> FloatArray:
     number = np.floor((a.time_s - a.time_s[0]) / window_s + 1e-9).astype(np.int64)
     count = np.bincount(number)
     means = np.bincount(number, weights=a.after_dph) / np.maximum(count, 1)
-    return np.asarray(means[count >= 0.9 * window_s / average_s])
+    return np.asarray(means[count >= 0.9 * window_s / _distance_s(a, average_s) - 1e-6])
+
+
+def _distance_s(a: Averages, average_s: float) -> float:
+    """Return the distance of consecutive means, which are rows if these are long (`cell_length_s`)."""
+    steps = np.diff(a.time_s)
+    return float(steps[steps <= 1.5 * median(steps)].mean()) if steps.size else average_s

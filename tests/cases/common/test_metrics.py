@@ -77,6 +77,16 @@ def test_constant_residual_turns_by_its_rate_times_one_hour() -> None:
     assert time_statistics(_averages(np.ones(50)), 100.0)["angle_1h_arcsec"] is None
 
 
+@pytest.mark.parametrize("row_s", [10.0, 60.0, 70.0, 95.0, 150.0])
+def test_a_half_hour_counts_if_nine_tenths_of_its_rows_do(row_s: float) -> None:
+    """A third of the rows of the second half-hour is missing, and the rate of the others is another."""
+    row = np.arange(round(4 * 1800 / row_s))
+    second = (row * row_s >= 1800.0) & (row * row_s < 3600.0)
+    third = (row * row_s >= 2400.0) & (row * row_s < 3000.0)
+    a = _averages(np.where(second, 100.0, 2.0), row_s, scored=~third)
+    assert time_statistics(a, 100.0)["rms_30min_dph"] == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 10, 2880, 2881])
 def test_medians_are_those_of_numpy_to_the_bit(n: int) -> None:
     rng = np.random.default_rng(n)
