@@ -158,12 +158,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="gyrotc-kills-") as work:
         root = Path(work).resolve()
         os.environ.update(TMPDIR=str(root / "tmp"), XDG_CACHE_HOME=str(root / "cache"))
-        for name in ("tmp", "cache", "exchange", "link", "commands"):
+        for name in ("tmp", "cache", "exchange", "link", "copy", "commands"):
             (root / name).mkdir()
         done["writing, names exchanged"] = between_calls(root / "exchange", arguments.every)
         os.environ["SHIM_NO_EXCHANGE"] = "1"
         done["writing, names not exchanged"] = between_calls(root / "link", arguments.every)
-        del os.environ["SHIM_NO_EXCHANGE"]
+        os.environ["SHIM_NO_LINKS"] = "1"
+        done["writing, names not exchanged, no links (as on FAT)"] = between_calls(root / "copy", arguments.every)
+        del os.environ["SHIM_NO_EXCHANGE"], os.environ["SHIM_NO_LINKS"]
         draw = random.Random(arguments.seed)
         done["commands"] = of_commands(root / "commands", arguments.commands, draw)
     counts = {name: {**campaign.counts, "wrong": len(campaign.found)} for name, campaign in done.items()}

@@ -202,13 +202,34 @@ int mkdir(const char *path, mode_t mode)
     return fails(is_ours(AT_FDCWD, path), 1) ? -1 : REAL(mkdir)(path, mode);
 }
 
+/* A file system as FAT: no hard links, no symbolic ones. */
+static int without_links(void)
+{
+    errno = EPERM;
+    return getenv("SHIM_NO_LINKS") != NULL;
+}
+
+int link(const char *from, const char *to)
+{
+    if (without_links()) {
+        return -1;
+    }
+    return fails(is_ours(AT_FDCWD, to), 1) ? -1 : REAL(link)(from, to);
+}
+
 int linkat(int from_dir, const char *from, int to_dir, const char *to, int flags)
 {
+    if (without_links()) {
+        return -1;
+    }
     return fails(is_ours(to_dir, to), 1) ? -1 : REAL(linkat)(from_dir, from, to_dir, to, flags);
 }
 
 int symlink(const char *to, const char *path)
 {
+    if (without_links()) {
+        return -1;
+    }
     return fails(is_ours(AT_FDCWD, path), 1) ? -1 : REAL(symlink)(to, path);
 }
 
