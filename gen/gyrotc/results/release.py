@@ -11,55 +11,67 @@ from .base import TABLE_BYTES, Amount, Axis, Count, Figure, Numeric, Part, Posit
 
 
 class Instrument(Part):
-    """What the calibration was made with, as `[[meta.instrument]]` or the limits file state it."""
+    """An instrument of the calibration, from `[[meta.instrument]]` or the limits file."""
 
-    name: str = Field(description="what it is, with its own serial")
-    certificate: str = Field(default="", description="number of its certificate; empty: none is stated")
+    name: str = Field(description="name of the instrument with its serial number")
+    certificate: str = Field(
+        default="", description="number of the instrument's calibration certificate; empty if none is stated"
+    )
     quantity: Literal["temperature", "rate", "other"] = Field(
         default="other",
-        description="what its uncertainty is of: the temperature that the table is asked with, C; the rate that "
-        "the recordings are referred to, deg/h; another, which takes no part in the budget",
+        description="quantity that the instrument measures: temperature of the gyro (C), reference rate (deg/h), or "
+        "another one, which does not enter the uncertainty budget",
     )
     expanded_uncertainty: Positive | None = Field(
-        default=None, description="as its certificate states it, in the unit of the quantity"
+        default=None, description="expanded uncertainty stated by the certificate, in the unit of the quantity"
     )
-    coverage_factor: Annotated[float, Field(ge=1.0, le=10.0)] = Field(default=2.0, description="k of that uncertainty")
-    degrees_of_freedom: Positive | None = Field(default=None, description="of it; null: many")
+    coverage_factor: Annotated[float, Field(ge=1.0, le=10.0)] = Field(
+        default=2.0, description="coverage factor k of the expanded uncertainty"
+    )
+    degrees_of_freedom: Positive | None = Field(
+        default=None, description="degrees of freedom of the expanded uncertainty; null means infinite"
+    )
 
 
 class Contribution(Part):
-    """One source of uncertainty."""
+    """One line of the uncertainty budget."""
 
     id: Literal["noise", "fit", "unseen", "turn_on", "thermometer", "reference", "arithmetic", "ageing"] = Field(
-        description="its stable name"
+        description="identifier of the source of uncertainty"
     )
-    text: str = Field(description="what it is of")
-    type: Literal["A", "B"] = Field(description="of its evaluation: by statistics, or by other means")
-    distribution: Literal["normal", "rectangular", "t"] = Field(description="that is assumed of it")
-    standard_uncertainty: Amount = Field(description="u of the input, 1 sigma")
-    unit: str = Field(description="of the input")
-    sensitivity: Amount = Field(description="c: deg/h of the result for a unit of the input")
-    contribution_dph: Amount = Field(description="c u, deg/h")
-    freedom: Figure = Field(description="degrees of freedom; null: many")
-    source: str = Field(description="what it rests on")
-    certificate: str = Field(default="", description="that states it; empty: none")
+    text: str = Field(description="name of the source, in words")
+    type: Literal["A", "B"] = Field(description="evaluation of the uncertainty: A by statistics, B by other means")
+    distribution: Literal["normal", "rectangular", "t"] = Field(description="assumed distribution of the input")
+    standard_uncertainty: Amount = Field(description="standard uncertainty u of the input, in `unit`")
+    unit: str = Field(description="unit of the input")
+    sensitivity: Amount = Field(description="sensitivity c: change of the bias per unit of the input, deg/h per `unit`")
+    contribution_dph: Amount = Field(description="contribution c·u to the combined uncertainty, deg/h")
+    freedom: Figure = Field(description="degrees of freedom of u; null means infinite")
+    source: str = Field(description="data or statement that u was derived from")
+    certificate: str = Field(default="", description="number of the certificate that states u; empty if none does")
 
 
 class Budget(UnitResult):
-    """Uncertainty of the bias that is left after compensation (`gyrotc build`)."""
+    """Uncertainty budget of the compensated bias (`gyrotc build`)."""
 
     schema_: Annotated[Literal["gyrotc.budget/1"], Field(alias="schema")] = "gyrotc.budget/1"
-    measurand: str = Field(description="what the uncertainty is of, in words")
-    contributions: tuple[Contribution, ...] = Field(description="all that are known")
-    not_known: tuple[str, ...] = Field(description="sources of which nothing was stated, which are not in it")
-    combined_dph: Amount = Field(description="combined standard uncertainty: root of the sum of squares, deg/h")
-    freedom: Figure = Field(description="effective degrees of freedom (Welch and Satterthwaite); null: many")
-    coverage_factor: Positive = Field(description="k of 95.45 %")
-    expanded_dph: Amount = Field(description="U = k times the combined one, deg/h")
-    instruments: tuple[Instrument, ...] = Field(description="with their certificates")
-    calibrated_on: str | None = Field(description="`calibrated_on` of `[meta]`; null: not stated")
-    interval_days: Figure = Field(description="until the next calibration, days; null: none is stated")
-    valid_until: str | None = Field(description="last day of the interval; null: no date or no interval")
+    measurand: str = Field(description="definition of the measurand, in words")
+    contributions: tuple[Contribution, ...] = Field(description="lines of the budget")
+    not_known: tuple[str, ...] = Field(
+        description="sources without a stated value; they are not included in the budget"
+    )
+    combined_dph: Amount = Field(description="combined standard uncertainty (root sum of squares), deg/h")
+    freedom: Figure = Field(description="effective degrees of freedom (Welch-Satterthwaite); null means infinite")
+    coverage_factor: Positive = Field(description="coverage factor k for 95.45 %")
+    expanded_dph: Amount = Field(description="expanded uncertainty U = k times the combined one, deg/h")
+    instruments: tuple[Instrument, ...] = Field(description="instruments of the calibration")
+    calibrated_on: str | None = Field(
+        description="day of the calibration; null if neither `[meta]` nor a recording states it"
+    )
+    interval_days: Figure = Field(description="time until the next calibration, days; null if not stated")
+    valid_until: str | None = Field(
+        description="last day on which the calibration is valid; null without date or interval"
+    )
 
     def expired(self, today: date) -> bool:
         """Test whether the last day of the interval has passed."""
@@ -79,75 +91,78 @@ NEED_REASON: tuple[Verdict, ...] = ("CONDITIONAL PASS", "NOT TESTABLE", "FAIL")
 """Verdicts of units that are certified only for a stated reason."""
 
 JudgedOn = Literal["exam", "left_out", "train"]
-"""What a figure was measured on."""
+"""Data that a figure was measured on."""
 
 DecisionRule = Literal["guard_band", "guard_band_binary", "simple_acceptance"]
-"""How the uncertainty of a figure counts (ILAC-G8:09/2019, 4.2): see docs/limits.md."""
+"""Decision rule of ILAC-G8:09/2019, 4.2 (docs/limits.md)."""
 
 Value = bool | int | float | str | tuple[float, ...] | tuple[str, ...] | None
-"""A bound, or what was measured of it; null: not measured."""
+"""A bound or a measured figure; null if it was not measured."""
 
 
 class Limit(Part):
-    """One limit with what was measured."""
+    """One limit and the figure that was compared with it."""
 
-    limit: str = Field(description="name in the limits file, such as `at_most.rms_dph`")
-    measured: Value = Field(description="figure, range, or what was found; null where it was not measured")
-    bound: Value = Field(description="as in the limits file")
+    limit: str = Field(description="key in the limits file, such as `at_most.rms_dph`")
+    measured: Value = Field(description="measured figure or range, or the findings; null if not measured")
+    bound: Value = Field(description="bound from the limits file")
     met: bool = Field(
-        description="whether the decision rule accepts it, a conditional pass included; a limit whose figure was not "
-        "measured is not met"
+        description="true if the verdict is PASS or CONDITIONAL PASS; false if the figure was not measured"
     )
-    verdict: Verdict = Field(description="statement of conformity")
+    verdict: Verdict = Field(description="verdict for this limit")
     standard_uncertainty: Figure = Field(
-        default=None, description="1 sigma, in the unit of the figure; null where there is none or it is not known"
+        default=None, description="standard uncertainty of the figure, in its unit; null if unknown or none"
     )
-    degrees_of_freedom: Figure = Field(default=None, description="of that uncertainty; null: many")
+    degrees_of_freedom: Figure = Field(
+        default=None, description="degrees of freedom of the standard uncertainty; null means infinite"
+    )
     coverage_factor: Figure = Field(
-        default=None, description="k of 95.45 %: 2 for many degrees of freedom, Student's t for few"
+        default=None, description="coverage factor k for 95.45 %: Student's t, or 2 for many degrees of freedom"
     )
-    expanded_uncertainty: Figure = Field(default=None, description="U, k times the standard uncertainty")
-    guard_band: Figure = Field(default=None, description="w: U, or 0 by simple acceptance")
-    acceptance_limit: Figure = Field(default=None, description="the bound less the guard band")
+    expanded_uncertainty: Figure = Field(default=None, description="expanded uncertainty U of the figure, in its unit")
+    guard_band: Figure = Field(default=None, description="guard band w: U, or 0 with simple acceptance")
+    acceptance_limit: Figure = Field(default=None, description="bound less guard band; figures up to it pass")
     false_acceptance: Amount | None = Field(
         default=None,
-        description="probability that the figure is beyond its limit although it was accepted: specific risk, normal "
-        "distribution about what was measured, nothing known before; null where it was not accepted or has no "
-        "uncertainty",
+        description="probability that the true value is beyond the limit although the figure was accepted (specific "
+        "risk, normal distribution, no prior); null if it was not accepted or has no uncertainty",
     )
-    uncertainty_from: str = Field(default="", description="what the uncertainty rests on, or why there is none")
+    uncertainty_from: str = Field(default="", description="source of the uncertainty, or the reason why there is none")
 
     part: JudgedOn | None = Field(
         default=None,
-        description="what the figure was measured on: `exam` runs, `left_out` spans of training, or the training runs "
-        "themselves; null: not on recordings",
+        description="data of the figure: `exam` for test runs, `left_out` for folds of the training runs, `train` for "
+        "training runs; null if it was not measured on recordings",
     )
-    capped: tuple[str, ...] = Field(default=(), description="why it is no PASS although it may be within its bound")
+    capped: tuple[str, ...] = Field(
+        default=(), description="reasons why the verdict is no PASS although the figure may be within its bound"
+    )
     constant: Figure = Field(
-        default=None, description="the same figure with a constant for a correction; null: there is none"
+        default=None, description="the same figure with a constant as correction; null if there is none"
     )
     constant_passes: bool = Field(
-        default=False, description="whether that is within the bound, so that the limit asks nothing of the map"
+        default=False,
+        description="true if a constant is within the bound, so that the limit demands nothing of the map",
     )
 
 
 class HeldLimits(UnitResult):
-    """Limits of a product, held against what was measured (`gyrotc build --limits`)."""
+    """Limits of a product compared with the measured figures (`gyrotc build --limits`)."""
 
     schema_: Annotated[Literal["gyrotc.limits/1"], Field(alias="schema")] = "gyrotc.limits/1"
-    product: str = Field(description="name of the product, empty where the limits file gives none")
-    sha256: str = Field(description="of the limits file")
+    product: str = Field(description="name of the product; empty if the limits file states none")
+    sha256: str = Field(description="SHA-256 of the limits file")
     met: bool = Field(
-        description="whether all are met and the recordings can show it; false where the file gives no limits"
+        description="true if all limits are met and the recordings can show it; false if there are no limits"
     )
-    limits: tuple[Limit, ...] = Field(description="every limit of the file")
+    limits: tuple[Limit, ...] = Field(description="all limits of the file")
     verdict: Verdict | None = Field(
         default=None,
         description="the worst of all limits and of what the recordings allow (`requirements` of `evaluate.json`); "
         "null: there are no limits",
     )
     capped: tuple[str, ...] = Field(default=(), description="why it is no PASS although all may be within their bounds")
-    decision_rule: DecisionRule = Field(description="of the limits file")
+    decision_rule: DecisionRule = Field(description="decision rule of the limits file")
 
 
 STATED = (
@@ -206,15 +221,15 @@ PassOrFail = Literal["pass", "fail"]
 class CallCost(Part):
     """Cost of a call, less an empty one."""
 
-    min: int = Field(description="of all calls")
-    mean: float = Field(description="of all calls")
-    max: int = Field(description="of all calls")
+    min: int = Field(description="smallest of all calls")
+    mean: float = Field(description="mean of all calls")
+    max: int = Field(description="largest of all calls")
 
 
 class FunctionCost(Part):
     """What a public function takes."""
 
-    code_bytes: Count = Field(description="of it and of what it calls")
+    code_bytes: Count = Field(description="code of the function and of what it calls, bytes")
     stack_bytes: Count = Field(description="at the deepest of its calls")
     helpers: tuple[str, ...] = Field(
         description="functions of the compiler's library that it calls; their stack is not counted"
@@ -234,7 +249,7 @@ class ReplayedRows(Part):
 class VerifiedTarget(Part):
     """The board test on one target, in one arithmetic."""
 
-    name: str = Field(description="of the target, or what a board calls itself")
+    name: str = Field(description="name of the target, or the name that a board prints of itself")
     status: Literal["pass", "fail", "missing"] = Field(description="`missing`: its compiler or emulator is not here")
     numeric: str = Field(description="arithmetic")
     package: str | None = Field(default=None, description="packages that are missing")
@@ -246,14 +261,16 @@ class VerifiedTarget(Part):
     vectors: Count | None = Field(default=None, description="results that were compared")
     mismatches: Count | None = Field(default=None, description="results that differ from the reference")
     first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
-    instructions: CallCost | None = Field(default=None, description="of a call of the map")
-    cycles: CallCost | None = Field(default=None, description="of a call of the map")
-    ticks: CallCost | None = Field(default=None, description="of a call of the map, in units of the board's counter")
-    stack_bytes: Count | None = Field(default=None, description="of a call of the map")
-    step_instructions: CallCost | None = Field(default=None, description="of a sample")
-    step_cycles: CallCost | None = Field(default=None, description="of a sample")
-    step_ticks: CallCost | None = Field(default=None, description="of a sample, in units of the board's counter")
-    step_stack_bytes: Count | None = Field(default=None, description="of a sample")
+    instructions: CallCost | None = Field(default=None, description="instructions of a call of the map")
+    cycles: CallCost | None = Field(default=None, description="cycles of a call of the map")
+    ticks: CallCost | None = Field(
+        default=None, description="time of a call of the map, in units of the board's counter"
+    )
+    stack_bytes: Count | None = Field(default=None, description="stack of a call of the map, bytes")
+    step_instructions: CallCost | None = Field(default=None, description="instructions of a sample")
+    step_cycles: CallCost | None = Field(default=None, description="cycles of a sample")
+    step_ticks: CallCost | None = Field(default=None, description="time of a sample, in units of the board's counter")
+    step_stack_bytes: Count | None = Field(default=None, description="stack of a sample, bytes")
     code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked")
     read_only_bytes: Count | None = Field(default=None, description="constants of them that are linked")
     ram_bytes: Count | None = Field(default=None, description="their writable static data")
@@ -279,8 +296,8 @@ class VerifiedFile(Part):
     mismatches: Count = Field(description="lines or words that differ; 1 for what has none")
     line: Count | None = Field(default=None, description="first line that differs, from 1 on")
     word: Count | None = Field(default=None, description="first word of an image that differs, from 1 on")
-    found: str | None = Field(default=None, description="what stands there")
-    expected: str | None = Field(default=None, description="what the model gives")
+    found: str | None = Field(default=None, description="that line or word in the file")
+    expected: str | None = Field(default=None, description="that line or word as the model gives it")
 
 
 class MapError(Part):
@@ -354,11 +371,13 @@ class Verification(_Counted):
     model_hash: str = Field(description="hash of the model")
     c_hash: str = Field(description="SHA-256 over names and contents of the emitted files")
     targets: tuple[VerifiedTarget, ...] = Field(description="every target that was tried, and boards")
-    log: ReadLog | None = Field(default=None, description="of a board test that ran elsewhere")
+    log: ReadLog | None = Field(
+        default=None, description="log of a board test that ran elsewhere; null if none was read"
+    )
     outdated_boards: tuple[str, ...] = Field(
         default=(), description="boards whose entries were dropped, because they ran another model or other code"
     )
-    options: EmittedWith | None = Field(default=None, description="of `emit`")
+    options: EmittedWith | None = Field(default=None, description="options of `emit`")
     errors: tuple[MapError, ...] = Field(description="one for each arithmetic")
     error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")
     worst_error_dph: WorstError = Field(description="largest departure that was found")
@@ -374,4 +393,4 @@ class Verification(_Counted):
 class JointVerification(_Counted):
     """The same for a folder with several axes."""
 
-    axes: dict[str, Verification] = Field(description="what was proven of each axis")
+    axes: dict[str, Verification] = Field(description="verification of each axis")
