@@ -33,15 +33,15 @@ def numpy_of(values: pa.Array) -> NDArray[Any]:
     return np.asarray(values.to_numpy(zero_copy_only=False))
 
 
-def those(values: FloatArray, chosen: BoolArray) -> FloatArray:
-    """The chosen values; the same array where that is all of them."""
-    return values if chosen.all() else values[chosen]
+def masked(values: FloatArray, mask: BoolArray) -> FloatArray:
+    """Return `values[mask]`, without a copy if the mask selects everything."""
+    return values if mask.all() else values[mask]
 
 
-def steps_are(values: FloatArray, found: Callable[[FloatArray], BoolArray]) -> BoolArray:
-    """What is found of the differences of neighbours, shape (n - 1,); part by part."""
+def steps_where(values: FloatArray, predicate: Callable[[FloatArray], BoolArray]) -> BoolArray:
+    """Apply a predicate to the differences of consecutive values, part by part; shape (n - 1,)."""
     parts = (np.diff(values[part.start : part.stop + 1]) for part in parts_of(len(values) - 1))
-    return np.concatenate([np.zeros(0, dtype=bool), *map(found, parts)])
+    return np.concatenate([np.zeros(0, dtype=bool), *map(predicate, parts)])
 
 
 def parts_of(rows: int, size: int = PART) -> Iterator[slice]:

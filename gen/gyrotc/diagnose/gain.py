@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..common.arrays import FloatArray, parts_of, those
+from ..common.arrays import FloatArray, masked, parts_of
 from ..common.metrics import HALF_HOUR_S, HOUR_S, MAD_TO_SIGMA, Averager, Averages, time_statistics, window_means
 from ..mirror.history import FollowedHistory, follow_history
 from ..mirror.table import Table
@@ -43,7 +43,7 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
         histories = [_followed(run, model, table) for model, table in zip(models, tables, strict=True)]
         rows = replace(run.rows(), temperature_c=np.zeros(0))
         inside = run.in_span(rows.time_s)
-        averagers = [Averager(those(rows.time_s, inside), average_s) for _ in models]
+        averagers = [Averager(masked(rows.time_s, inside), average_s) for _ in models]
         for at in parts_of(len(rows)):
             span, answers = inside[at], [history.rows(at) for history in histories]
             scored = np.all([(answer.block_valid & answer.begun)[span] for answer in answers], axis=0)

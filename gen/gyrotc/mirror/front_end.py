@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import steps_are
+from ..common.arrays import steps_where
 from ..common.inputs import need_memory
 from .readings import READING_HELD, READING_RESTART, Guarded, judge_readings
 from .recursions import Arithmetic, Course, NumberArray
@@ -389,7 +389,7 @@ class SampleStream:
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
     """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    late = np.flatnonzero(steps_are(time_s, lambda step: step / row_period_s > _GAP))
+    late = np.flatnonzero(steps_where(time_s, lambda step: step / row_period_s > _GAP))
     if len(late) == 0:
         return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
     missed = np.zeros(time_s.size, dtype=np.int64)

@@ -16,7 +16,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray, IntArray, those
+from ..common.arrays import BoolArray, FloatArray, IntArray, masked
 from ..common.metrics import median
 from ..common.statistics import NORMAL_95, cell_means
 from ..model import Model
@@ -372,7 +372,7 @@ def _gain_throughout(run: Run, others: Sequence[_Series]) -> bool:
     good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
     if not good.any():
         return False
-    columns = (those(column, good) for column in (rows.time_s, rows.temperature_c, rows.rate_dph))
+    columns = (masked(column, good) for column in (rows.time_s, rows.temperature_c, rows.rate_dph))
     t, x, y = cell_means(_BLOCK_S, *columns)
     curve = np.interp(x, known, usual)
     used = (x >= known[0]) & (x <= known[-1])

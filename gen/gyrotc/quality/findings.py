@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import PART, BoolArray, FloatArray, parts_of, those
+from ..common.arrays import PART, BoolArray, FloatArray, masked, parts_of
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median, median_of_parts
 from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
@@ -208,7 +208,7 @@ def coarse_rate_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """
     if run.pulse_weight_arcsec is not None:
         return
-    rate = those(rows.rate_dph, run.in_span(rows.time_s))[:_COARSE_ROWS]
+    rate = masked(rows.rate_dph, run.in_span(rows.time_s))[:_COARSE_ROWS]
     rate = rate[np.isfinite(rate)]
     move = np.abs(np.diff(rate))
     moved = move[move > 0.0]
@@ -304,15 +304,15 @@ class RunFacts:
 def run_facts(run: Run, rows: Rows) -> RunFacts:
     """Facts about a run from the rows of its file (as `run.rows()` gives them)."""
     inside = run.in_span(rows.time_s)
-    time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
+    time, temperature = masked(rows.time_s, inside), masked(rows.temperature_c, inside)
     finite = inside & np.isfinite(rows.rate_dph)
-    rate = those(rows.rate_dph, finite)
+    rate = masked(rows.rate_dph, finite)
     gaps, missing = missing_rows(time, run.row_period_s)
     if not inside.all():
         together = np.diff(np.flatnonzero(inside))[gaps] == 1  # what was excluded is no gap
         gaps, missing = gaps[together], missing[together]
     low_c, high_c, resolution = _levels(temperature)
-    measured = those(rows.rate_dph, inside)
+    measured = masked(rows.rate_dph, inside)
     if not np.isfinite(measured).all():
         measured = np.where(np.isfinite(measured), measured, rate.mean() if len(rate) else 0.0)
     cells_t, slopes, cells_rate = _cells(time, temperature, measured, run.row_period_s)
@@ -466,6 +466,6 @@ def _held(rate: FloatArray) -> int:
 
 
 def _constant(rows: Rows, inside: BoolArray, rate: FloatArray) -> tuple[str, ...]:
-    columns = {"temperature": those(rows.temperature_c, inside), "rate": rate}
-    columns |= {f"channel {name}": those(values, inside) for name, values in rows.channels.items()}
+    columns = {"temperature": masked(rows.temperature_c, inside), "rate": rate}
+    columns |= {f"channel {name}": masked(values, inside) for name, values in rows.channels.items()}
     return tuple(name for name, values in columns.items() if len(values) and np.ptp(values) == 0.0)

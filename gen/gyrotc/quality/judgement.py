@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray, parts_of, steps_are, those
+from ..common.arrays import BoolArray, FloatArray, masked, parts_of, steps_where
 from ..common.metrics import quantile_of_parts
 from ..common.statistics import NORMAL_95
 from ..recordings.records import Dataset, Rows, Run, joined_runs
@@ -260,7 +260,7 @@ class _Columns:
         """Times without rows, other than those that are excluded."""
         inside, period = _Chosen(self.reason != 255), self._run.row_period_s
         time, least = inside.of(self._rows.time_s), max(GAP_S, 3.0 * period)
-        for k in np.flatnonzero(steps_are(time, lambda step: step > least)).tolist():
+        for k in np.flatnonzero(steps_where(time, lambda step: step > least)).tolist():
             self._event("gap", "time", inside.span(k, k + 2), float(time[k + 1] - time[k]), period, np.inf)
 
     def _stuck(self, column: Column) -> None:
@@ -346,7 +346,7 @@ class _Columns:
         for part in parts_of(len(self.reason)):
             use = self.reason[part] == 0
             if use.any():
-                time, *others = (those(column[part], use) for column in columns)
+                time, *others = (masked(column[part], use) for column in columns)
                 number = np.floor((time - columns[0][0]) / length_s + 1e-9)
                 begun = np.flatnonzero(np.diff(number, prepend=-1.0))
                 numbers.append(number[begun])

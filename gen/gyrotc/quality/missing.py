@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.arrays import FloatArray, IntArray, parts_of, steps_are
+from ..common.arrays import FloatArray, IntArray, parts_of, steps_where
 
 # A step longer than this, in row periods, has room for a missing row.
 _ROOM = 1.5
@@ -24,7 +24,7 @@ def missing_rows(time_s: FloatArray, period_s: float) -> tuple[IntArray, IntArra
         time_s: Times in order, s, shape (n,).
         period_s: Row period, s.
     """
-    before = np.flatnonzero(steps_are(time_s, lambda step: step > _ROOM * period_s))
+    before = np.flatnonzero(steps_where(time_s, lambda step: step > _ROOM * period_s))
     room = np.round((time_s[before + 1] - time_s[before]) / period_s).astype(np.int64) - 1
     count = _shifts(time_s, period_s, before, np.array([-1, len(time_s) - 1]))
     # The first count is too large near another gap.

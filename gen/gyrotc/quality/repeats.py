@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.arrays import FloatArray, IntArray, parts_of, steps_are
+from ..common.arrays import FloatArray, IntArray, parts_of, steps_where
 from ..common.metrics import quantile_of_parts
 from .odds import OCTAVE, cost_of
 
@@ -48,7 +48,7 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
     n = len(values)
     if n < 2:
         return []
-    again = steps_are(values, lambda step: step == 0.0)
+    again = steps_where(values, lambda step: step == 0.0)
     if again.all():
         return []  # a column of one value is no event of the run: the finding `constant_channel` names it
     starts = np.flatnonzero(again & ~np.r_[False, again[:-1]])

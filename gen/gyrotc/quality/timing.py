@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray, those
+from ..common.arrays import BoolArray, FloatArray, masked
 from ..recordings.records import Mark, Rows, Run
 from ..results.base import Finding
 from .findings import finding
@@ -32,7 +32,7 @@ _HOUR_S = 3600.0  # a change of summer time
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
     """What is suspect about the times of a run."""
     inside = run.in_span(rows.time_s)
-    time, temperature = those(rows.time_s, inside), those(rows.temperature_c, inside)
+    time, temperature = masked(rows.time_s, inside), masked(rows.temperature_c, inside)
     at: Sequence[int] = range(len(rows))
     together: BoolArray = np.broadcast_to(np.True_, max(len(rows) - 1, 0))
     if not inside.all():
