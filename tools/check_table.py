@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Checks emitted tables against model.json without a line of gyrotc: standard library only.
 
-    tools/check_table.py DIR        DIR holds model.json and c/, as `gyrotc emit` or `gyrotc build` leave them
+    tools/check_table.py DIR [ANSWERS]   DIR holds model.json and c/, as `gyrotc emit` or `gyrotc build` leave them;
+                                         ANSWERS is what `gyrotc emit --answers` wrote
 
 Reads the tables from the C source and from the image, computes the equation of docs/FORMAT.md with the words
 of the table and with the numbers of the model, and compares the two within the bound that the emitted header
-prints; banks of networks with their hand-over. The emitted known answers are judged by the model, too. The bound
+prints; banks of networks with their hand-over. Known answers, and ANSWERS, are judged by the model, too. The bound
 leaves out extension terms: their records are compared word by word with what the model's parameters give.
 The checksum of the model and the hashes in `c/emission.json` must hold.
 Exit status: 0 all agrees, 1 something differs (each is printed), 2 a file cannot be read.
@@ -650,17 +651,19 @@ def check_answer(model: Model, image: Image, words: list[int], bound: float) -> 
             yield f"answer at T = {t:.4f}, slope = {slope:.6f} has status {words[3]}, coverage says otherwise"
 
 
-def known_answers(folder: Path, name: str, image: Image) -> Iterator[list[int]]:
-    """Known answers of the table and of the board test's map vectors: temperature, slope, bias, status."""
+def known_answers(folder: Path, name: str, image: Image, answers: Path | None) -> Iterator[list[int]]:
+    """Known answers of the table, and of the board test's map if given: temperature, slope, bias, status."""
     probes = image.array["probes"]
     yield from (probes[k : k + 4] for k in range(0, len(probes), 4))
+    if answers is None:
+        return
     header = (folder / f"vectors_{name}.h").read_text(encoding="ascii")
     number = {k: int(v, 0) for k, v in re.findall(r"#define VECTORS_(\w+) \(?(-?\w+?)U?L\)?(?:\s|$)", header)}
     direct = re.search(rf"vectors_{image.numeric}_direct.*?= \{{(.*?)\n\}};", header, re.S)
-    text = (folder / f"vectors_{name}.txt").read_text(encoding="ascii")
+    text = answers.read_text(encoding="ascii")
     lines = re.search(rf"begin {image.numeric} \w+\n((?:\w{{8}} \w{{8}}\n)+)", text)
     if direct is None or lines is None:
-        raise Unreadable(f"no {image.numeric} vectors")
+        raise Unreadable(f"{answers}: no {image.numeric} answers")
     inputs = [[int(w, 16) for w in pair] for pair in re.findall(r"0x(\w{8})UL, 0x(\w{8})UL", direct[1])]
     x = number["SEED"]
     for _ in range(number["RANDOM"]):
@@ -673,8 +676,8 @@ def known_answers(folder: Path, name: str, image: Image) -> Iterator[list[int]]:
             as_bits = struct.pack("<f", n * 2.0**-fraction) if image.numeric == "f32" else None
             pair.append(struct.unpack("<I", as_bits)[0] if as_bits else n << 16 - fraction & 0xFFFFFFFF)
         inputs.append(pair)
-    answers = [[int(w, 16) for w in line.split()] for line in lines[1].splitlines()]
-    yield from ([*pair, bits, status] for pair, (status, bits) in zip(inputs, answers[1:], strict=False))
+    results = [[int(w, 16) for w in line.split()] for line in lines[1].splitlines()]
+    yield from ([*pair, bits, status] for pair, (status, bits) in zip(inputs, results[1:], strict=False))
 
 
 def check_record(c: Path, model: Model, record: dict[str, Any]) -> Iterator[str]:
@@ -686,8 +689,8 @@ def check_record(c: Path, model: Model, record: dict[str, Any]) -> Iterator[str]
             yield f"{name} is not the file that emission.json names"
 
 
-def check(folder: Path) -> list[str]:
-    """Everything that is wrong with an emitted folder."""
+def check(folder: Path, answers: Path | None) -> list[str]:
+    """Everything that is wrong with an emitted folder, and with the answers of its board test if given."""
     model = Model(folder / "model.json")
     name = model.id()
     c = folder / "c"
@@ -716,18 +719,18 @@ def check(folder: Path) -> list[str]:
             *check_bound(model, bound),
             *check_map(model, image, bound),
         ]
-        for words in known_answers(c, name, image):
+        for words in known_answers(c, name, image, answers):
             found += check_answer(model, image, words, bound)
         wrong += [f"{image.where}: {text}" for text in found]
     return wrong
 
 
 def main() -> int:
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         print(__doc__, file=sys.stderr)
         return 2
     try:
-        wrong = check(Path(sys.argv[1]))
+        wrong = check(Path(sys.argv[1]), Path(sys.argv[2]) if len(sys.argv) == 3 else None)
     except (OSError, Unreadable, ArithmeticError, ValueError, KeyError, TypeError, StopIteration) as error:
         print(f"check_table: {type(error).__name__}: {error}", file=sys.stderr)
         return 2

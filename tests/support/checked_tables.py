@@ -16,12 +16,12 @@ from models import bank_of, random_model, random_terms
 SCRIPT = ROOT / "tools" / "check_table.py"
 
 
-def checked(folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the tool on a folder, in this process."""
+def checked(folder: Path, *answers: Path) -> subprocess.CompletedProcess[str]:
+    """Run the tool on a folder, and the answers of its board test if given, in this process."""
     out, err = io.StringIO(), io.StringIO()
     main = runpy.run_path(str(SCRIPT))["main"]
     with (
-        mock.patch("sys.argv", [str(SCRIPT), str(folder)]),
+        mock.patch("sys.argv", [str(SCRIPT), str(folder), *map(str, answers)]),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):

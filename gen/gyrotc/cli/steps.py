@@ -156,6 +156,12 @@ def emit(
             help="Write the map at 61 x 25 points here, too: CSV or JSON; default: nowhere.",
         ),
     ] = None,
+    answers: Annotated[
+        Path | None,
+        typer.Option(
+            "--answers", callback=written_place, help="Write the answers that the board test must print here, too."
+        ),
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Write the C files of a model into DIR/c.
@@ -166,6 +172,7 @@ def emit(
     from ..results.folder import result_folder, write_result
     from ..results.json_text import json_text
     from ..results.release import Emitted, EmittedTable
+    from ..tables.emission import answers_file
     from ..tables.emission import emit as run
     from ..tables.map_grid import csv_text, grid_of_map, map_result
     from ..tables.quantisation import rms_growth
@@ -199,6 +206,9 @@ def emit(
         text = csv_text(grid) if map_file.suffix == ".csv" else json_text(map_result(grid).content())
         write_result(map_file, text)
         tell(f"{map_file}: {grid.summary}")
+    if answers is not None:
+        write_result(answers, answers_file(loaded, emission).decode("ascii"))
+        tell(f"{answers}: status and bits of every result of board_test.c")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     for line in rounding_lines(result.tables):

@@ -110,10 +110,12 @@ def _replace(path: Path, *content: bytes) -> None:
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
 _MAP = b"serial,axis,temperature_c,slope_c_per_min,bias_dph"  # how a map in CSV begins
+ANSWERS = b"# gyrotc: answers of the board test\n"
+"""First line of the file that `emit --answers` writes."""
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuses to replace a file, named by `--json` or `--map`, that gyrotc did not write.
+    """Refuses to replace a file, named by `--json`, `--map` or `--answers`, that gyrotc did not write.
 
     Raises:
         InputError: There is such a file, a folder, or a link to a device or a pipe.
@@ -128,7 +130,7 @@ def check_replaceable(path: Path) -> None:
             return
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
-            if _PAGE in head or head.startswith(_MAP):
+            if _PAGE in head or head.startswith((_MAP, ANSWERS)):
                 return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:

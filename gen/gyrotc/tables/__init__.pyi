@@ -1,4 +1,5 @@
 from .emission import Emission as Emission
+from .emission import answers_file as answers_file
 from .emission import emit as emit
 from .emission import emit_texts as emit_texts
 from .emission import emitted_tables as emitted_tables

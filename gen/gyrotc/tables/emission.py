@@ -23,7 +23,7 @@ from ..common.texts import CText, c_code, c_environment, c_literal
 from ..mirror.history import answers
 from ..mirror.table import LAYOUT, Table
 from ..model import Model
-from ..results.files import write_own
+from ..results.files import ANSWERS, write_own
 from ..results.folder import result_folder
 from .error_bounds import MARGIN, channel_error_dph
 from .quantisation import NUMERICS, quantise
@@ -162,6 +162,11 @@ def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.u
     return dict(_expected(_Made.of(model, emission)))
 
 
+def answers_file(model: Model, emission: Emission) -> bytes:
+    """Return the expected answers as text: status and bits of every result of the board test, in its order."""
+    return ANSWERS + answers_text(_expected(_Made.of(model, emission)))
+
+
 @dataclass(frozen=True, slots=True)
 class _Made:
     """A model and its tables; another one is the same if the model's hash is, and the tables are the same objects."""
@@ -202,7 +207,6 @@ def _texts(made: _Made, options: Options) -> dict[str, bytes]:
     if options.runtime is None:
         texts["board_test.c"] = board_test_text(model, numerics, _vectors(made).n_channels)
         texts |= runtime_texts(needs_of(model), numerics)
-        texts[f"vectors_{model.id}.txt"] = answers_text(_expected(made))
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
         texts[f"gtc_{model.id}{suffix}.bin"] = image_of(table)

@@ -150,8 +150,10 @@ def _effect(model: Model, term: Term) -> Range:
         size = abs(values[1]) * (high - low)
     elif kind == TableKind.PLAY:
         size = strongest(values[1:], (low, high)) * values[0]
-    else:  # warm-up, harmonic
+    elif kind in (TableKind.WARM_UP, TableKind.HARMONIC):
         size = abs(values[-1])
+    else:
+        raise NotImplementedError(f"largest effect of a term of kind {kind}")
     return -size, size
 
 
@@ -162,6 +164,8 @@ def _of_channel(kind: TableKind, values: Sequence[float], temperature_c: Range, 
         reference, bells = values[2], (values[3], values[5])
     elif kind == TableKind.PRODUCT:
         slopes = [values[0] + values[2] * (t - values[3]) for t in temperature_c]
+    elif kind != TableKind.AUXILIARY:
+        raise NotImplementedError(f"largest effect of a term of kind {kind}")
     ends = [slope * (x - reference) for slope in slopes for x in readings]
     low, high = (math.fsum(pick(0.0, weight) for weight in bells) for pick in (min, max))
     return min(0.0, *ends) + low, max(0.0, *ends) + high

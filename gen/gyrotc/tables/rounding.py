@@ -235,7 +235,7 @@ _PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, sec
 _LIMIT = 2**30  # of parameters in fixed point that are multiplied
 
 _ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}
-"""Which parameter is an amplitude in deg/h; the line of a channel has no bound."""
+"""Which parameter is an amplitude in deg/h."""
 _BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
 """What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
 
@@ -263,6 +263,8 @@ def term_size_dph(model: Model) -> float:
         elif kind == TableKind.PRODUCT:
             slope, _, growth, middle = values
             sizes.append(max(abs(slope), abs(growth), strongest((slope, growth, middle), (low, high))))
+        elif kind != TableKind.AUXILIARY:  # the line of a channel has no bound
+            raise NotImplementedError(f"largest words of a term of kind {kind}")
     return math.fsum(sizes)
 
 

@@ -279,7 +279,7 @@ def _history(model: Model, numerics: tuple[str, ...]) -> Iterator[Segment]:  # n
 
 
 def answers_text(expected: Mapping[str, NDArray[np.uint32]]) -> bytes:
-    """`vectors_<id>.txt` of the answers by arithmetic, each (status, bits), shape (n, 2)."""
+    """Text of the answers by arithmetic, each (status, bits), shape (n, 2)."""
     parts = [
         f"begin {numeric} {len(rows):08x}\n".encode("ascii") + _hex_lines(rows) for numeric, rows in expected.items()
     ]

@@ -13,14 +13,22 @@ from pathlib import Path
 
 import pytest
 from checked_tables import SCRIPT, checked, extended
-from emitted import emitted
+from emitted import GOLDEN, emitted
+from gyrotc.model import Model, load_model
+from gyrotc.tables import answers_file, quantise_all
 from models import random_model
 
 
-def _check_alone(folder: Path) -> subprocess.CompletedProcess[str]:
+def _check_alone(folder: Path, answers: Path) -> subprocess.CompletedProcess[str]:
     """Without site packages, so that nothing of gyrotc can be imported."""
-    command = [sys.executable, "-I", "-S", str(SCRIPT), str(folder)]
+    command = [sys.executable, "-I", "-S", str(SCRIPT), str(folder), str(answers)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def _answers(model: Model, folder: Path) -> Path:
+    path = folder / "answers.txt"
+    path.write_bytes(answers_file(model, quantise_all(model, None)))
+    return path
 
 
 def test_it_imports_the_standard_library_only() -> None:
@@ -32,15 +40,16 @@ def test_it_imports_the_standard_library_only() -> None:
 
 @pytest.mark.parametrize("seed", [None, 64])
 def test_emitted_tables_are_the_model(seed: int | None, tmp_path: Path) -> None:
-    emitted(tmp_path, None if seed is None else random_model(seed))
-    done = _check_alone(tmp_path)
+    model = load_model(GOLDEN) if seed is None else random_model(seed)
+    emitted(tmp_path, model)
+    done = _check_alone(tmp_path, _answers(model, tmp_path))
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("seed", [1])
 def test_tables_with_terms_and_banks_are_the_model(seed: int, tmp_path: Path, few_vectors: None) -> None:
     emitted(tmp_path, extended(seed))
-    done = checked(tmp_path)
+    done = checked(tmp_path, _answers(extended(seed), tmp_path))
     assert done.returncode == 0, done.stdout + done.stderr
 
 

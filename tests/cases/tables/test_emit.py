@@ -20,6 +20,7 @@ from gyrotc.tables import (
     NUMERICS,
     emit,
     emit_texts,
+    expected_answers,
     joint_needs,
     needs_of,
     quantise,
@@ -177,6 +178,20 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
         [sys.executable, str(ROOT / "tools" / "check_table.py"), str(out)], capture_output=True, check=False
     )
     assert checked.returncode == 0, checked.stdout
+
+
+def test_the_answers_of_the_board_test_are_written_where_they_are_asked_for(tmp_path: Path, gyrotc: Command) -> None:
+    """They are ten times as large as all that firmware compiles, which is not beside them."""
+    out, answers = tmp_path / "result", tmp_path / "answers.txt"
+    for _ in range(2):  # a second call replaces what the first one wrote
+        assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--answers", answers).returncode == 0
+    model = load_model(EXAMPLE / "model.json")
+    rows = expected_answers(model, quantise_all(model, None))
+    lines = [f"{status:08x} {bits:08x}" for numeric in rows for status, bits in rows[numeric].tolist()]
+    assert [line for line in answers.read_text("ascii").splitlines() if line[:1] not in "#b"] == lines
+    assert sum(path.stat().st_size for path in (out / "c").iterdir()) < 300_000
+    answers.write_text("of somebody else\n")
+    assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--answers", answers).returncode == 2
 
 
 def test_the_runtime_of_several_tables_has_what_each_needs() -> None:

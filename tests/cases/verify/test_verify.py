@@ -65,13 +65,6 @@ def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
         assert entry["status"] == "fail" and entry["mismatches"] > 1000
 
 
-def test_a_flipped_bit_of_the_emitted_answers_fails(copy: Path) -> None:
-    flip(copy / "c" / "vectors_rlg_0042.txt", r"\n[0-9a-f]{8} ([0-9a-f]{8})\n", bit=31)
-    result = verify(copy, targets=[FAST], trust_code=True).content()
-    assert result["failed"] == 1 and result["passed"] >= 1
-    assert [e["mismatches"] for e in result["emitted"] if e["status"] == "fail"] == [1]
-
-
 def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     path = copy / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())
