@@ -147,8 +147,22 @@ def _texts(folders: tuple[Path, Path], items: tuple[tuple[str, int], ...]) -> di
         if options[f"GTC_WITH_{arithmetic.upper()}"]:
             names = _macros(places[f"gtc_names_{arithmetic}.h"].read_text(encoding="ascii"))
             name = f"gtc_{arithmetic}.c"
-            texts[name] = _plain(_joined(places, name, '#include "gtc.h"\n'), options, names)
+            text = _plain(_joined(places, name, '#include "gtc.h"\n'), options, names)
+            texts[name] = _with_ranges_of(arithmetic, text)
     return texts
+
+
+_RANGE = re.compile(r"^    (?P<range>\{[^{}]*\},) +/\* (?P<f32>.*?)(?:; q31: (?P<q31>.*?))? \*/$", re.MULTILINE)
+_HEADING_OF_RANGES = re.compile(r"^    /\* +float32: least, most +fixed point: least, most \*/\n", re.MULTILINE)
+
+
+def _with_ranges_of(arithmetic: str, text: str) -> str:
+    """A text whose table of legal ranges speaks of one arithmetic alone, with its comments in a column."""
+
+    def row(match: re.Match[str]) -> str:
+        return f"    {match['range']:<42} /* {match[arithmetic] or match['f32']} */"
+
+    return _RANGE.sub(row, _HEADING_OF_RANGES.sub("", text))
 
 
 _PART_TEXTS = {"probes": "known answers", "narrow": "narrow Gaussians", "warm_up": "warm-up"}

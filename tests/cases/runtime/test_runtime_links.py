@@ -314,6 +314,20 @@ def test_the_cplusplus_face_is_of_any_emitted_header(numeric: str, part: Runtime
     )
 
 
+@pytest.mark.parametrize("file", ["gtc.h", "gtc_table.h", "gtc_private_state.h"])
+def test_the_structs_of_both_arithmetics_have_the_same_members(file: str) -> None:
+    """They are written twice, with the types of each, and must not drift apart."""
+    code = re.sub(r"/\*.*?\*/", "", (ROOT / "include" / file).read_text("ascii"), flags=re.DOTALL)
+    members: dict[str, dict[str, list[str]]] = {"f32": {}, "q31": {}}
+    for tag, body, name in re.findall(r"^(?:typedef )?struct (\w*) ?\{\n(.*?)^\}(?: (\w+))?;", code, re.DOTALL | re.M):
+        _, numeric, kind = (tag or name.removesuffix("_t")).split("_", 2)
+        lines = (line.strip() for line in body.splitlines())
+        members[numeric][kind] = [
+            line if line.startswith("#") else re.sub(r"^.*?(\w+)(?:\[.*\])?;$", r"\1", line) for line in lines if line
+        ]
+    assert members["f32"] == members["q31"] and members["f32"]
+
+
 @pytest.mark.parametrize("broken", [False, True])
 def test_the_rule_of_the_header_is_free_of_races_and_a_breach_is_seen(broken: bool, tmp_path: Path) -> None:
     include = [f"-I{ROOT / 'include'}", f"-I{ROOT / 'libc'}", f"-I{MINIMAL}"]
