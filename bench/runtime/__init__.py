@@ -47,7 +47,7 @@ def _of_map(record: Record) -> Iterator[tuple[str, Figure]]:
         count = _largest(record, numeric, centers, cores, lambda cost: cost["map"]["mean"])
         yield f"instructions of a map, {words}", Figure(count, ".0f", at_most=aim)
     for words, key, aim in (
-        ("bytes of the map's function", "map_bytes", 340),
+        ("bytes of the map's functions", "map_bytes", 340),
         ("bytes of its lookup table", "lookup_bytes", 256),
         ("bytes of stack", "stack_bytes", 56),
         ("bytes of writable static data", "ram_bytes", 0),
