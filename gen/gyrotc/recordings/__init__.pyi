@@ -1,9 +1,9 @@
 from .child import open_in_child as open_in_child
+from .csv_file import CsvFile as CsvFile
 from .description import Layout as Layout
 from .description import Problems as Problems
 from .description import dataset_toml as dataset_toml
 from .description import parse_description as parse_description
-from .files import CsvFile as CsvFile
 from .fingerprints import fingerprints_of as fingerprints_of
 from .fingerprints import windows_in_common as windows_in_common
 from .fit_options import COMPARED as COMPARED

@@ -16,8 +16,9 @@ import pyarrow.parquet as pq
 from ..common.arrays import FloatArray, numpy_of
 from ..common.errors import InputError, short_reason
 from ..common.inputs import ceiling, need_memory, open_input, refuse_above
+from .csv_file import LONGEST_NUMBER
 from .description import Fault
-from .files import LONGEST_NUMBER, Source
+from .sources import Source
 from .tables import CHUNK_ROWS
 
 # Without a buffer the whole column of a row group is read at once, bytes of a column.

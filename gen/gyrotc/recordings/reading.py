@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.metrics import median_step
+from .csv_file import CsvFile
 from .description import MIN_ROWS, Columns, Fault, Layout, Problems, arrange, column_faults, rate_faults
 from .devices import MAX_DEVICES, names_device
-from .files import CsvFile, Source
 from .fingerprints import Fingerprints, fingerprints_of
 from .parquet import ParquetFile
 from .records import NO_CHANNEL, NO_TEMPERATURE, NO_TEMPERATURE_THEN, Applied, EarthRate, Mark, Rows
+from .sources import Source
 from .units import Conversion, declared
 
 _PART = 2**16  # rows that are looked at together

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from ..files import LONGEST_NUMBER, number_in
+from ..csv_file import LONGEST_NUMBER, number_in
 from .stamps import forms_of
 
 MISSING_WORDS = (

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from ...common.errors import InputError
-from ..files import blocks_of_lines, nuls_at_end, number_in, parsed
+from ..csv_file import blocks_of_lines, nuls_at_end, number_in, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .cells import (
     HEXADECIMAL,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
 from ...results.files import create
+from ..csv_file import number_in
 from ..description import Layout, column_faults, likely_temperature
-from ..files import number_in
 from ..reading import Evidence
 from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, UnitError, channel_unit, conversion, meaning

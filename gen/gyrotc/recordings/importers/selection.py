@@ -13,8 +13,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ...common.errors import InputError
+from ..csv_file import number_in
 from ..devices import MAX_DEVICES, names_device
-from ..files import number_in
 from ..tables import Chunk, Column, LoggerTable
 
 _MAX_LISTED = 4

@@ -1,4 +1,4 @@
-"""Files of rows as they were when they were opened, known by their hash; and those of CSV, in blocks of whole lines.
+"""Recordings as CSV, read in blocks of whole lines.
 
 Read are UTF-8 text with or without byte order mark, LF or CRLF, quotes and spaces around cells, empty lines, a last
 line without end. pyarrow reads the blocks; a block that it cannot make numbers of is read cell by cell, so that every
@@ -10,159 +10,21 @@ from __future__ import annotations
 
 import codecs
 import csv
-import hashlib
 import io
 import re
-from abc import ABC, abstractmethod
 from array import array
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from threading import Lock
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
-from ..common.arrays import FloatArray, give_back, numpy_of
+from ..common.arrays import FloatArray, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from .description import Fault
-
-_BLOCK_BYTES = 2**21  # of a read: bounds memory; a table's whole lines are parsed at once
-_KEPT_BYTES = 2**25  # of columns in memory: forty runs of the paper's size
-
-
-class Prefix(io.RawIOBase):
-    """The first `size` bytes of a file."""
-
-    def __init__(self, path: Path, size: int) -> None:
-        self._file, _ = open_input(path, path.name, "a recording")
-        self._left = size
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        count: int = self._file.readinto(memoryview(buffer)[: self._left])  # type: ignore[attr-defined]
-        self._left -= count
-        return count
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-
-class _LastRead:
-    """Columns of the files that were read last, `_KEPT_BYTES` at most."""
-
-    def __init__(self) -> None:
-        self._kept: OrderedDict[Source, dict[str, FloatArray]] = OrderedDict()
-        self._size = 0
-        self._lock = Lock()
-
-    def of(self, file: Source) -> dict[str, FloatArray]:
-        with self._lock:
-            return self._kept.get(file, {})
-
-    def keep(self, file: Source, columns: dict[str, FloatArray]) -> None:
-        for values in columns.values():
-            values.flags.writeable = False
-        with self._lock:
-            self._size += _bytes(columns) - _bytes(self._kept.pop(file, {}))
-            self._kept[file] = columns
-            while self._size > _KEPT_BYTES:
-                self._size -= _bytes(self._kept.popitem(last=False)[1])
-
-
-def _bytes(columns: dict[str, FloatArray]) -> int:
-    """Of whole arrays in memory, where columns are parts of larger ones."""
-    return sum((values if values.base is None else values.base).nbytes for values in columns.values())
-
-
-_last_read = _LastRead()
-
-
-class Source(ABC):
-    """One file of rows.
-
-    Attributes:
-        name: Name in messages.
-        path: Where it is.
-        size: Number of bytes that are read.
-        sha256: Of these bytes, hexadecimal.
-        names: Names of the columns.
-        torn: Text of an unfinished last line that is left out, empty if there is none.
-        row_unit: What `place` counts: "line" or "row".
-    """
-
-    name: str
-    path: Path
-    size: int
-    sha256: str
-    names: tuple[str, ...]
-    torn: str = ""
-    row_unit: str
-
-    @abstractmethod
-    def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
-        """Columns as float64, NaN where a value is missing; None if only `scan` can read the file.
-
-        Raises:
-            InputError: The file is damaged.
-        """
-
-    @abstractmethod
-    def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
-        """Reads what can be read of a file that `read` cannot make numbers of.
-
-        Returns:
-            All columns of the rows that are whole (NaN where a cell is no number), the place of each row, and
-            the faults, with a place in `Fault.row`.
-        """
-
-    @abstractmethod
-    def place(self, row: int) -> int:
-        """Place of a row (0 is the first) in the file: number of its line, or of the row counted from 1."""
-
-    def columns(self, names: Sequence[str]) -> dict[str, FloatArray] | None:
-        """As `read`; not to write to. Small files that were read last are not read again: a job asks three times."""
-        kept = _last_read.of(self)
-        if not all(name in kept for name in names):
-            if self.size > _KEPT_BYTES:
-                give_back()
-            found = self.read(names)
-            if found is None:
-                return None
-            _last_read.keep(self, found)
-            kept = found
-        return {name: kept[name] for name in names}
-
-    def keep_as_read(self) -> None:
-        """Sets `sha256`; `check_unchanged` refers to the file as it is now."""
-        self.sha256 = self._hash()
-        self._stamp = self._stat()
-
-    def check_unchanged(self) -> None:
-        """A file that has only grown counts as unchanged.
-
-        Raises:
-            InputError: The bytes that were read have been changed.
-        """
-        if self._stat() != self._stamp and self._hash() != self.sha256:
-            raise InputError(self.name, "was changed while it was in use", "a recording that stays as it is")
-
-    def _stat(self) -> tuple[int, int]:
-        stat = self.path.stat()
-        return stat.st_size, stat.st_mtime_ns
-
-    def _hash(self) -> str:
-        digest = hashlib.sha256()
-        with Prefix(self.path, self.size) as prefix:
-            while block := prefix.read(_BLOCK_BYTES):
-                digest.update(block)
-        return digest.hexdigest()
-
+from .sources import BLOCK_BYTES, Prefix, Source
 
 _LONGEST_LINE = 2**20  # bytes: a row has at most some hundred columns of 25 characters
 _COPIES = 2.0  # of the columns while they are checked
@@ -199,7 +61,7 @@ def blocks_of_lines(
     plain = encoding in ("utf-8", "utf-8-sig", "ascii")
     rest, number, left = b"", 1, size
     with Prefix(path, size) as prefix:
-        while block := prefix.read(_BLOCK_BYTES):
+        while block := prefix.read(BLOCK_BYTES):
             left -= len(block)
             try:
                 text = block if plain else decoder.decode(block, final=not left).encode()
@@ -334,7 +196,7 @@ class CsvFile(Source):
         """
         ends = 0
         with Prefix(self.path, self.size) as prefix:
-            while block := prefix.read(_BLOCK_BYTES):
+            while block := prefix.read(BLOCK_BYTES):
                 ends += block.count(b"\n") + block.count(b"\r")
         return min(ends, self.size // (2 * len(self.names))) + 1
 
@@ -440,7 +302,7 @@ def nuls_at_end(path: Path, size: int) -> int:
     count = 0
     with file:
         while count < size:
-            start = max(size - count - _BLOCK_BYTES, 0)
+            start = max(size - count - BLOCK_BYTES, 0)
             file.seek(start)
             block = file.read(size - count - start)
             held = len(block.rstrip(b"\x00"))
