@@ -175,6 +175,22 @@ def test_a_map_that_leaves_its_process_or_the_data_is_refused_with_words() -> No
     assert "more than a table holds" in objection_to(replace(far, networks=[heavy]), *arguments)
 
 
+@pytest.mark.parametrize("share", [k / 32.0 for k in range(1, 32, 2)])
+def test_a_narrow_spike_of_a_map_is_refused_wherever_it_is(share: float) -> None:
+    """A hundredth of the range of T wide, between the places of a grid of sixteenths."""
+    data = samples(0)
+    found = fit(data)
+    [good] = found.networks
+    low, high = found.scaling.temperature_c
+    spike = {
+        "centers": [*good["centers"], [low + share * (high - low), 0.0]],
+        "widths": [*good["widths"], [0.02, 100.0]],
+        "weights": [*good["weights"], 0.02],
+    }
+    outcome = replace(found.outcome, networks=[{**good, **spike}])
+    assert "leaves the process" in objection_to(outcome, data, found.scaling, 100.0)
+
+
 def test_a_run_handed_over_twice_is_no_second_witness() -> None:
     """Left out, its copy would still be trained on: every map would look perfect."""
     data = samples(0)

@@ -151,6 +151,18 @@ def test_coverage_marks_the_cells_that_hold_samples() -> None:
     assert not seen.all()
 
 
+def test_coverage_has_cells_however_narrow_the_envelope_is() -> None:
+    """Half a degree and half a degree a minute."""
+    data = samples(0)
+    narrow = replace(data, temperature_c=20.0 + 0.005 * data.temperature_c, slope_c_per_min=0.05 * data.slope_c_per_min)
+    found = fit(narrow, method="linear")
+    spans = (found.scaling.slope_c_per_min, found.scaling.temperature_c)
+    seen, *_ = np.histogram2d(narrow.slope_c_per_min, narrow.temperature_c, bins=(6, 16), range=spans)
+    rows = coverage(narrow, found, (16, 6))["rows"]
+    assert [[cell == "1" for cell in row] for row in rows] == (seen > 0).tolist()
+    assert all(high - low < 1.0 for low, high in spans)
+
+
 def test_where_no_sample_was_it_is_larger() -> None:
     """A ramp that never cooled: on the other side of dT/dt nothing is known."""
     data = samples(1)
