@@ -175,7 +175,7 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
 
     guards = "[guards.temperature_c]\nrange = [-55.0, 85.0]\nstuck_s = 700.0\n"
     needs = "[needs]\nimage = false\nuncertainty = false\n"
-    product.write_text("schema = 1\nq31_bias_frac_bits = 30\n[at_most]\ntable_bytes = 700\n" + needs + guards)
+    product.write_text("schema = 1\nq31_bias_frac_bits = 30\n[at_most]\ntable_bytes = 1000\n" + needs + guards)
     recording(tmp_path / "second", "RLG-1", shift=0.01)
     done = gyrotc(*build, tmp_path / "second", "--out", tmp_path / "two", "--previous", tmp_path / "one")
     assert done.returncode == 0, done.stderr
