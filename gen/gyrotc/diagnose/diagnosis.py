@@ -77,12 +77,12 @@ class Diagnosis:
 
 # As `gyrotc diagnose -v` measures them on data of `gyrotc simulate paper`.
 _STAGES = {
-    "reading": 0.05,
-    "screening": 0.05,
-    "computing the signatures of all causes": 0.62,
-    "searching for causes": 0.1,
-    "comparing with the simulation": 0.08,
-    "measuring the gain": 0.1,
+    "reading": 0.3,
+    "screening": 0.01,
+    "computing the signatures of all causes": 0.5,
+    "searching for causes": 0.07,
+    "comparing with the simulation": 0.05,
+    "measuring the gain": 0.07,
 }
 
 

@@ -47,13 +47,13 @@ _VERSIONED = ("numpy", "scipy", "pyarrow", "pydantic")
 # As `gyrotc build -v` and `gyrotc build --extend -v` measure them on data of `gyrotc simulate paper`.
 _STAGES = {
     "reading": 0.02,
-    "judging rows": 0.09,
-    "diagnosing": 1.0,
-    "training": 0.09,
+    "judging rows": 0.35,
+    "diagnosing": 0.6,
+    "training": 0.03,
     "emitting C": 0.03,
-    "verifying": 0.6,
-    "replaying": 0.09,
-    "drawing the report": 0.08,
+    "verifying": 0.4,
+    "replaying": 0.06,
+    "drawing the report": 0.11,
 }
 
 

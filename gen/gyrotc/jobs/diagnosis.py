@@ -47,7 +47,7 @@ def diagnose_dataset(
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        say = Stages(progress, {"diagnosing": 0.87, "drawing": 0.13})
+        say = Stages(progress, {"diagnosing": 0.96, "drawing": 0.04})
         found = diagnose(dataset, options=chosen, progress=say.within("diagnosing"), judged=judged)
         if stage is None:
             return found
