@@ -416,8 +416,8 @@ def _shared_swing(own: _Series, others: Sequence[_Series]) -> tuple[FloatArray, 
     if len(common) < _LEAST_PLACES:
         return None
     x, y = usual[at] - usual[at].mean(), own[1][mine] - own[1][mine].mean()
-    swings = float(x @ x) >= _LEAST_SWING**2 * len(x) * max(scatter, 1e-300) ** 2
-    return (x, y, scatter) if swings else None
+    power = float(x @ x)  # 0 of rates of one value, which have no scatter either
+    return (x, y, scatter) if power > 0.0 and power >= _LEAST_SWING**2 * len(x) * scatter**2 else None
 
 
 def _usual_curve(others: Sequence[_Series]) -> tuple[FloatArray, FloatArray, float]:

@@ -163,6 +163,16 @@ def test_row_periods_that_differ(tmp_path: Path) -> None:
     assert "row_periods_differ" in ids(check(tmp_path / "RLG-1"))
 
 
+def test_runs_whose_rates_have_one_value(tmp_path: Path) -> None:
+    """A rate of a dead gyro in every run: it is reported, and nothing is concluded from a curve of zeros."""
+    runs = [f'file = "run-{k}.csv"' for k in range(4)]
+    for k in range(4):
+        write_csv(tmp_path / f"run-{k}.csv", columns(seed=k) | {"rate_dph": np.full(ROWS, 0.5)})
+    (tmp_path / "dataset.toml").write_text(toml(*runs))
+    result = check(tmp_path)
+    assert {"constant_channel"} <= {one.id for one in result.warnings}
+
+
 def test_a_recording_that_still_grows(tmp_path: Path) -> None:
     folder = tmp_path / "RLG-1"
     checked(folder, long())
