@@ -157,29 +157,16 @@ PACKAGES = re.compile(r"(?<=<!-- packages -->\n).*?(?=<!-- /packages -->)", re.D
 
 
 def packages() -> str:
-    """Return a table of the packages in the order of gen/pyproject.toml: their docstrings, and what they import."""
+    """Return a table of the packages in the order of gen/pyproject.toml, with their docstrings."""
     (layers,) = re.findall(r"^layers = \[(.*?)^\]", (ROOT / "gen" / "pyproject.toml").read_text("utf-8"), re.M | re.S)
-    names = re.findall(r"\w+", layers)
-    lines = ["| package | contents | imports |", "| --- | --- | --- |"]
-    for name in names:
-        place = ROOT / "gen" / "gyrotc" / name
-        files = sorted(place.rglob("*.py")) or [place.with_suffix(".py")]
-        first = place / "__init__.py" if place.is_dir() else files[0]
-        text = (ast.get_docstring(ast.parse(first.read_text("utf-8"))) or "").partition("\n\n")[0]
-        others = [other for other in names if other != name and other in _imported(files)]
-        lines.append(f"| `{name}` | {_cell(text)} | {', '.join(f'`{other}`' for other in others)} |")
+    lines = ["| package | contents |", "| --- | --- |"]
+    for level in re.findall(r'"([^"]+)"', layers):
+        for name in level.split(" | "):
+            place = ROOT / "gen" / "gyrotc" / name
+            file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+            text = (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").partition("\n\n")[0]
+            lines.append(f"| `{name}` | {_cell(text)} |")
     return "\n".join(lines) + "\n"
-
-
-def _imported(files: list[Path]) -> set[str]:
-    """Return the packages of gyrotc that files import from."""
-    found = set()
-    for file in files:
-        depth = len(file.relative_to(ROOT / "gen" / "gyrotc").parts)
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level == depth:
-                found |= {node.module.partition(".")[0]} if node.module else {alias.name for alias in node.names}
-    return found
 
 
 PAGES = {
