@@ -229,6 +229,20 @@ def test_a_lost_channel_may_be_off_by_what_it_differed_in_training() -> None:
     assert stated == pytest.approx(2e-3 * np.sqrt(np.mean((volts - 12.0) ** 2)))
 
 
+def test_rules_have_the_unit_of_the_rate_and_no_other_size() -> None:
+    """A rate a thousand times larger has rules a thousand times larger; times and counts stay."""
+    data = gyro(3, 6e-4)
+    small, large = (
+        uncertainty_of(one, fit(one, method="linear"), CELLS)["rules"]
+        for one in (data, replace(data, bias_dph=1e3 * data.bias_dph))
+    )
+    for name, value in small.items():
+        if name != "terms" and value is not None:
+            factor = 1e3 if "dph" in name or "deg" in name else 1.0
+            assert large[name] == pytest.approx(factor * value, rel=0.02), name
+    assert small["correlation_s"] > 10.0
+
+
 @pytest.mark.parametrize("runs", [4, 6])
 def test_what_stands_for_a_lost_channel_states_the_error_of_the_next_run(runs: int, model_dict: dict[str, Any]) -> None:
     """Spread within runs, and of the mean of a run more: Student's t about the mean of few, by pandas and scipy."""
