@@ -259,11 +259,7 @@ def calibration_day(meta: Mapping[str, Any], starts: Iterable[datetime | None]) 
 
 def stated_identity(folder: Path) -> tuple[str | None, str | None]:
     """Return the serial that a data set states and the day of its calibration, also where it is refused."""
-    problems = Problems(collect=True)
-    try:
-        description = _description(folder, problems)
-    except OSError:
-        description = None
+    description = _readable_description(folder)
     if description is None:
         return None, None
     serial = None if description.serial == UNKNOWN_SERIAL else description.serial
@@ -275,10 +271,18 @@ def input_hashes(folder: Path) -> dict[str, str]:
 
     Nothing else in the folder is looked at: a link there may lead to all files of the machine.
     """
-    description = _description(folder, Problems(collect=True))
+    description = _readable_description(folder)
     runs = [run.file for run in description.run] if description else []
     applied = [description.applied_model] if description and description.applied_model is not None else []
     return {name: _hash_of(folder / name) for name in dict.fromkeys([FILE, *runs, *applied])}
+
+
+def _readable_description(folder: Path) -> Description | None:
+    """Return the description of a data set; None if it is refused or cannot be read, which its job will say."""
+    try:
+        return _description(folder, Problems(collect=True))
+    except OSError:
+        return None
 
 
 def _hash_of(path: Path) -> str:
