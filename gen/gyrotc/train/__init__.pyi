@@ -6,6 +6,7 @@ from .channels import fallback_model_of as fallback_model_of
 from .channels import seen_by_target as seen_by_target
 from .channels import shape_of as shape_of
 from .choice import choose as choose
+from .choice import expected_square as expected_square
 from .data import TrainingData as TrainingData
 from .data import average_samples as average_samples
 from .data import cleaned_samples as cleaned_samples

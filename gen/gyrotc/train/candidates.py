@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
 from ..common.metrics import Averages
-from .choice import CandidateChoice, choose
+from .choice import CandidateChoice, choose, expected_square
 from .data import Scaling, TrainingData
 from .folds import Fold
 from .gaussian import COLUMNS, FEW, GaussianMap, Structure, TrainingFailed
@@ -137,9 +137,8 @@ def compare_candidates(
     squares = np.full((len(unseen), len(CANDIDATES)), np.nan)
     noise_dph = _noise_of_means(history, maps.get("mrbf"), average_s)
     for at, name in enumerate(maps):
-        squares[:, CANDIDATES.index(name)] = [float(np.mean(piece[at].after_dph ** 2)) for piece in unseen]
-    choice = choose(CANDIDATES, squares, noise_dph)
-    return CandidateComparison(history, maps, failed, unseen, choice, average_s, noise_dph)
+        squares[:, CANDIDATES.index(name)] = [expected_square(piece[at].after_dph, noise_dph) for piece in unseen]
+    return CandidateComparison(history, maps, failed, unseen, choose(CANDIDATES, squares), average_s, noise_dph)
 
 
 def _noise_of_means(history: TrainingHistory, found: GaussianMap | None, average_s: float) -> float:

@@ -5,13 +5,13 @@ pieces count alike and one gross failure does not outvote the others. A candidat
 loss is smaller by more than its doubt: the standard error of the mean difference over the pieces. The simplest
 candidate that no richer one beats is taken.
 
-New means on a piece will show the structure that a candidate leaves, and their own noise. So a piece counts as left
-with no less than the noise: a candidate that leaves less on a few means does so by accident, and the logarithm of that
-would outvote the other pieces.
-
 Two or three pieces may agree by accident, and their scatter then says that there is no doubt. So one more deviation is
-added to theirs: that of a piece on which the candidates are equally good, give or take 3 %. It counts much with two
+added to theirs: that of a piece on which the candidates are equally good, give or take 1.5 %. It counts much with two
 pieces and hardly at all with ten.
+
+New means on a piece will show the structure that a candidate leaves and their own noise, so a candidate cannot leave
+less than the noise but by accident. The logarithm of such an accident on a few means would outvote the other pieces;
+`expected_square` returns what is to be expected of new means instead.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from ..common.arrays import FloatArray
 
-# Smallest deviation from piece to piece that is believed, in log RMS: a difference of two candidates of 3 % on a piece
-# is as large as what noise and the choice of the pieces make of it (`bench ONLY=splits`, `bench ONLY=accuracy`).
-_PRIOR_DEVIATION = 0.03
+# Smallest deviation from piece to piece that is believed, in log RMS. With 3 %, two runs of a simulated gyro keep a
+# cubic where the map would leave 1 % less; with 1 %, channels get bent shapes by chance. Measured gyros scatter more.
+_PRIOR_DEVIATION = 0.015
 # Standard errors that a gain must exceed. More keep the constant where a map would help; fewer take maps by chance.
 _STANDARD_ERRORS = 1.0
 # Least RMS, as a share of the largest: below it lie rates without noise, which differ by rounding.
@@ -68,7 +69,27 @@ class CandidateChoice:
         return np.asarray(self.losses[:, self.candidates.index(name)])
 
 
-def choose(candidates: Sequence[str], mean_squares: FloatArray, noise: float = 0.0) -> CandidateChoice:
+def expected_square(residual: FloatArray, noise: float) -> float:
+    """Return the mean square that new means on a piece are expected to have.
+
+    It is that of the noise and of the structure that is left. The latter is estimated by the mean square beyond that of
+    the noise, which scatters by the noise of n means, and is not negative: its mean under a normal distribution that
+    ends at 0. With many means, or far above the noise, it is the mean square itself.
+
+    Args:
+        residual: What is left on the means of a piece.
+        noise: Standard deviation of the noise of a mean; 0: not known.
+    """
+    square = float(np.mean(residual**2))
+    if noise <= 0.0:
+        return square
+    scatter = noise**2 * float(np.sqrt(2.0 / len(residual)))
+    beyond = (square - noise**2) / scatter
+    tail = float(np.exp(-0.5 * beyond**2 - log_ndtr(beyond)) / np.sqrt(2.0 * np.pi))
+    return noise**2 + scatter * (beyond + tail)
+
+
+def choose(candidates: Sequence[str], mean_squares: FloatArray) -> CandidateChoice:
     """Choose the simplest candidate that no richer one beats by more than its doubt.
 
     With fewer than two pieces nothing can be said for a richer candidate: the first is taken.
@@ -77,13 +98,11 @@ def choose(candidates: Sequence[str], mean_squares: FloatArray, noise: float = 0
         candidates: Names, the simplest first.
         mean_squares: What each leaves on each piece without having seen it, shape (pieces, candidates); nan if it
             could not be fitted.
-        noise: RMS of the noise of what is judged: less is left by accident.
     """
     names = tuple(candidates)
     squares = np.asarray(mean_squares, dtype=np.float64).reshape(-1, len(names))
     largest = float(np.nanmax(squares, initial=0.0))
-    least = max(noise**2, _LEAST_RMS**2 * largest, np.finfo(np.float64).tiny)
-    losses = 0.5 * np.log(np.maximum(squares, least))
+    losses = 0.5 * np.log(np.maximum(squares, max(_LEAST_RMS**2 * largest, np.finfo(np.float64).tiny)))
     return CandidateChoice(names, losses, _chosen(names, losses, ()))
 
 
