@@ -83,7 +83,11 @@ class LaboratoryFacts(BaseModel):
         return self
 
 
-_NEVER_REWRITTEN = ("model.json", "training.json", "limits.json")  # by any command but build
+_NEVER_REWRITTEN = (
+    "model.json",
+    "training.json",
+    "limits.json",
+)  # by build alone; evaluate replaces limits.json if figures differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +113,8 @@ def laboratory_facts(meta: Mapping[str, Any], path: Path | None, number: str | N
         known |= {key: json_value(value) for key, value in stated.items()}
         where = str(path)
     if number is not None:
+        if not number.strip():
+            raise InputError("--number", repr(number), "the number of the certificate")
         known["number"] = number
     return checked(LaboratoryFacts, known, where)
 
@@ -277,4 +283,5 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
         if name == EXAMPLE or not (name in _NEVER_REWRITTEN or name.startswith("c/")):
             continue
         if not path.is_file() or sha256(path) != known:
-            raise InputError(str(path), "is not as it was built", "a folder as gyrotc build left it")
+            expected = "a folder as gyrotc build left it; build again if gyrotc evaluate has replaced figures"
+            raise InputError(str(path), "is not as it was built", expected)
