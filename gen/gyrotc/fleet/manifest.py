@@ -170,10 +170,10 @@ def _has_recordings(folder: Path) -> bool:
 
 
 def _is_empty(folder: Path) -> bool:
-    """Test whether a folder that is neither hidden nor a result has no recordings."""
-    if folder.name.startswith(".") or not folder.is_dir() or _is_result(folder):
+    """Test whether a folder that can be read, and is neither hidden nor a result, has no recordings."""
+    if folder.name.startswith(".") or _has_recordings(folder):  # so does one that cannot be read
         return False
-    return not _has_recordings(folder)
+    return folder.is_dir() and not _is_result(folder)
 
 
 def _is_result(folder: Path) -> bool:
