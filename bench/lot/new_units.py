@@ -146,7 +146,7 @@ def learnt(units: list[UnitMeans]) -> LotPrior:
     t = [float(f(u.temperature_c)) for u in units for f in (np.min, np.max)]
     r = [float(f(u.slope_c_per_min)) for u in units for f in (np.min, np.max)]
     envelope = (min(t), max(t)), (min(r), max(r))
-    found = learn_prior(units, envelope, lambda _: None)
+    found = learn_prior(units, envelope, lambda *_: None)
     lot: Lot = lot_from([(f"U{k:03d}", "") for k in range(len(units))], units, found, envelope)
     return prior_of(lot)
 
@@ -157,7 +157,7 @@ def recordings_of(units: list[SimulatedGyro], *, exam: bool) -> Iterator[tuple[T
         kept = [s for s in drawn.plan.set if exam or s.role == "train"]
         unit = replace(drawn, plan=drawn.plan.model_copy(update={"set": kept}))
         with tempfile.TemporaryDirectory(prefix="gyrotc-lot-") as work:
-            write_gyro(Path(work), unit, RowForm.of(10.0, None, False, "parquet"), lambda _: None)
+            write_gyro(Path(work), unit, RowForm.of(10.0, None, False, "parquet"), lambda *_: None)
             dataset, truth = load(Path(work)), read_truth(Path(work))
             assert truth is not None
             front = front_end(dataset.runs, _STEP_S)

@@ -72,7 +72,7 @@ def short_run(rng: np.random.Generator, own: list[float]) -> TrainingData:
 
 
 def lot_of(units: list[UnitMeans]) -> tuple[Lot, Learned]:
-    found = learn_prior(units, ENVELOPE, lambda _: None)
+    found = learn_prior(units, ENVELOPE, lambda *_: None)
     return lot_from([(f"U{k}", "0" * 64) for k in range(len(units))], units, found, ENVELOPE), found
 
 

@@ -193,7 +193,7 @@ def learnt_units() -> tuple[list[UnitMeans], Learned]:
         t, r = rng.uniform(*ENVELOPE[0], 300), rng.uniform(*ENVELOPE[1], 300)
         bias = true_bias(t, r) + 2e-4 * rng.normal() + 7e-4 * rng.normal(size=300)
         units.append(UnitMeans(t, r, bias, np.ones(300), 7e-4))
-    return units, learn_prior(units, ENVELOPE, lambda _: None)
+    return units, learn_prior(units, ENVELOPE, lambda *_: None)
 
 
 def lot(between_dph: float) -> LotPrior:

@@ -349,7 +349,7 @@ def test_where_a_late_record_says_nothing_is_neither_learnt_from_nor_scored(tmp_
 
 
 def test_without_causes_there_is_no_extension(case: Case) -> None:
-    found = extend(case.refitting, (), (), 1.0, lambda _: None)
+    found = extend(case.refitting, (), (), 1.0, lambda *_: None)
     assert found.extended is None and found.steps == () and found.measured_on == "exam"
     assert found.baseline_rms > 2.0 * LEVEL, "the plain map leaves the gradient"
 
