@@ -83,11 +83,7 @@ class LaboratoryFacts(BaseModel):
         return self
 
 
-_NEVER_REWRITTEN = (
-    "model.json",
-    "training.json",
-    "limits.json",
-)  # by build alone; evaluate replaces limits.json if figures differ
+_BUILT = ("model.json", "training.json", "limits.json")  # besides c/: a certificate is of the build
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +276,7 @@ def _as_built(folder: Path, unit: UnitResults) -> None:
         raise InputError(str(folder / "manifest.json"), "is of another model", "a folder as gyrotc build left it")
     for name, known in manifest.files.items():
         path = folder / name
-        if name == EXAMPLE or not (name in _NEVER_REWRITTEN or name.startswith("c/")):
+        if name == EXAMPLE or not (name in _BUILT or name.startswith("c/")):
             continue
         if not path.is_file() or sha256(path) != known:
             expected = "a folder as gyrotc build left it; build again if gyrotc evaluate has replaced figures"
