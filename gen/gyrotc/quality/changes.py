@@ -27,7 +27,7 @@ from .fits import (
     RunCells,
     SmoothFit,
     WalkNoise,
-    knots_of,
+    knots_and_noise,
     likeliest_noise,
     maps_of,
     run_cells,
@@ -144,12 +144,13 @@ def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArra
     coarse = [run_cells((one.time_s, one.temperature_c, one.rate_dph), max(_COARSE_S, one.cell_s)) for one in fine]
     if sum(len(one) for one in coarse) < _LEAST_CELLS:
         return []
-    knots_c = knots_of(coarse)
+    knots_c, noise = knots_and_noise(coarse)
     found: list[_At] = []
     curves: list[FloatArray] = [np.zeros((2, 1))] * len(fine)
     for _ in range(2):
-        beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
-        noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside)
+        if found:
+            beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
+            noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside, noise)
         search = _Search(fine, maps_of(fine, knots_c), noise.in_cells(min(one.cell_s for one in fine)), curves)
         found = search.found(found)
         if not found:

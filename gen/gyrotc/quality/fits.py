@@ -32,7 +32,7 @@ _WARM_UP_S = (300.0, 1000.0, 3000.0)  # time constants of a level that settles a
 _GAP_CELLS = 3.0  # without rows: the next cell comes behind a gap
 _LEVELS = 10.0 ** np.arange(-7.0, 0.5)  # variance of the level's walk over the white one, in a coarse cell
 _SLOPES = 10.0 ** np.arange(-13.0, -2.0, 1.5)  # of the slope's walk; at the lowest it moves nothing in a day
-_START = (4, 2)  # where the search over both begins: it ends at the same place from others
+_START = (4, 2)  # where the search over both begins
 _LEAST_SLOPE = 1e-14  # below it the equation of the filter has no solution in float64
 
 
@@ -232,40 +232,57 @@ def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
     return found
 
 
-def knots_of(cells: Sequence[RunCells]) -> float:
-    """Distance of the map's knots, C, by Schwarz's criterion (BIC): a bend that all passages show is no change."""
-    chosen, least = _KNOTS_C[0], np.inf
+def knots_and_noise(cells: Sequence[RunCells]) -> tuple[float, WalkNoise]:
+    """Return the distance of the map's knots, C, and the likeliest noise beside that map.
+
+    The distance is that of Schwarz's criterion (BIC): a bend that all passages show is no change.
+    """
+    found: tuple[float, WalkNoise] | None = None
+    least = np.inf
     for knots_c in _KNOTS_C:
         maps = maps_of(cells, knots_c)
-        _, likelihood = likeliest_noise(cells, maps, [None] * len(cells))
+        noise, likelihood = likeliest_noise(cells, maps, [None] * len(cells), found and found[1])
         n = sum(len(one) for one in cells)
         criterion = maps[0].shape[1] * float(np.log(n)) - 2.0 * likelihood
-        if criterion > least or 2 * maps[0].shape[1] > n:
+        if found and (criterion > least or 2 * maps[0].shape[1] > n):
             break
-        chosen, least = knots_c, criterion
-    return chosen
+        found, least = (knots_c, noise), criterion
+    assert found is not None
+    return found
 
 
 def likeliest_noise(
-    cells: Sequence[RunCells], maps: Sequence[FloatArray], changes: Sequence[FloatArray | None]
+    cells: Sequence[RunCells],
+    maps: Sequence[FloatArray],
+    changes: Sequence[FloatArray | None],
+    start: WalkNoise | None = None,
 ) -> tuple[WalkNoise, float]:
-    """The walks of the largest likelihood beside changes that are known (as for `SmoothFit.of`), and its logarithm."""
+    """Return the walks of the largest likelihood beside changes that are known, and its logarithm.
+
+    Args:
+        changes: As for `SmoothFit.of`.
+        start: Noise of this function at which the search begins; it ends at the same place from others.
+    """
     known: dict[tuple[int, int], float] = {}
     cell_s = min(one.cell_s for one in cells)
 
+    def noise_at(at: tuple[int, int]) -> WalkNoise:
+        return WalkNoise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
+
     def likelihood(at: tuple[int, int]) -> float:
         if at not in known:
-            noise = WalkNoise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
-            known[at] = SmoothFit.of(cells, maps, noise, changes).log_likelihood
+            known[at] = SmoothFit.of(cells, maps, noise_at(at), changes).log_likelihood
         return known[at]
 
     best, last = _START, (-1, -1)
+    if start is not None:
+        best = int(np.searchsorted(_LEVELS, start.level)), int(np.searchsorted(_SLOPES, start.slope))
     while best != last:
         last = best
         around = [(last[0] + i, last[1] + j) for i in (0, -1, 1) for j in (0, -1, 1)]
         inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
         best = max(inside, key=likelihood)
-    return WalkNoise(float(_LEVELS[best[0]]), float(_SLOPES[best[1]]), cell_s), known[best]
+    return noise_at(best), known[best]
 
 
 _WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through
