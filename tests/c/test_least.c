@@ -90,6 +90,16 @@ TEST(a_call_is_a_period_and_null_is_a_missed_sample)
     CHECK_INT(2, state.position);
 }
 
+TEST(a_stuck_sensor_is_held_here_too)
+{
+    const table_t table = plain();
+    state_t state;
+
+    CHECK_INT(GTC_OK, init(&state, &table, PERIOD));
+    CHECK_INT(GTC_WARMING, feed(&state, C(10.0), 12));
+    CHECK_INT(GTC_WARMING | GTC_HELD, feed(&state, C(10.0), 1));
+}
+
 int main(void)
 {
     RUN(a_table_that_needs_a_part_is_refused);
@@ -97,5 +107,6 @@ int main(void)
     RUN(the_correction_is_that_of_the_whole_runtime);
     RUN(a_correction_that_is_no_number_is_the_fallback);
     RUN(a_call_is_a_period_and_null_is_a_missed_sample);
+    RUN(a_stuck_sensor_is_held_here_too);
     return test_end();
 }
