@@ -19,7 +19,7 @@ from scipy.linalg import solve_discrete_are
 
 from ..common.arrays import FloatArray
 from ..common.metrics import median_step
-from ..common.statistics import cell_means, orthonormal, running_mean
+from ..common.statistics import TOLERANCE, cell_means, orthonormal, running_mean
 from ..mirror.recursions import first_order, play
 
 RowArrays = tuple[FloatArray, FloatArray, FloatArray]
@@ -150,7 +150,7 @@ class SmoothFit:
             maps: Columns of the map at the cells of each run (`maps_of`).
             changes: Columns of what changes in each run, shape (n, k) each; None: nothing.
         """
-        own, white, rates = [], [], []
+        own, white, rates, whole = list[FloatArray](), list[FloatArray](), list[FloatArray](), list[FloatArray]()
         for one, of_map, change in zip(cells, maps, changes, strict=True):
             n = len(one)
             columns: list[FloatArray] = [np.ones(n), np.arange(n) / n]
@@ -162,12 +162,15 @@ class SmoothFit:
             q = orthonormal(noise.white(np.column_stack(columns), one.cell_s))
             own.append(q)
             both = noise.white(np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]), one.cell_s)
+            whole.append(np.sum(both[:, :-1] ** 2, axis=0))
             both -= q @ (q.T @ both)
             white.append(both[:, :-1])
             rates.append(both[:, -1])
         log_scale = sum(len(one) * noise.log_scale(one.cell_s) for one in cells)
         ends = np.cumsum([len(one) for one in cells])[:-1]
         stacked, y = np.concatenate(white), np.concatenate(rates)
+        norm = np.sqrt(np.sum(whole, axis=0))  # what is left of a column that the own ones hold is rounding
+        stacked[:, np.linalg.norm(stacked, axis=0) <= TOLERANCE * norm] = 0.0
         shared = orthonormal(stacked)
         amplitudes = shared.T @ y
         rest = y - shared @ amplitudes

@@ -661,6 +661,7 @@ def test_a_refusal_is_one_line_whatever_the_name(tmp_path: Path, gyrotc: Command
 @pytest.mark.parametrize("text", ["[red]a[/bold].csv", ":smile:", "a\x1b[2J.csv", "a\u202eb.csv", "[/]" * 20])
 def test_a_line_of_progress_shows_a_name_and_obeys_none(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     stream = io.StringIO()
+    monkeypatch.setenv("TERM", "xterm")  # one that is dumb is shown no progress
     console = type(output.ERR)(file=stream, force_terminal=True, color_system=None, width=10**4)
     monkeypatch.setattr(progress, "ERR", console)
     with progress.progress() as say:

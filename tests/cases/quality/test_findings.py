@@ -98,6 +98,15 @@ def test_constant_temperature(tmp_path: Path, model_dict: dict[str, Any]) -> Non
     assert reported(2.1) == {"fails_on_unseen_span"}
 
 
+@pytest.mark.parametrize("seed", [5, 6, 26, 36])
+def test_an_even_ramp_of_noise_alone_has_no_change(seed: int, tmp_path: Path) -> None:
+    """At one rate of the temperature, columns of a map are those of a level and a trend but for rounding."""
+    table = columns(600)
+    table["temperature_c"] = 25.0 + 2.1 * np.linspace(-0.5, 0.5, 600)
+    table["rate_dph"] = 20.0 + 1e-3 * np.random.default_rng(seed).normal(size=600)
+    assert [change for run in judge(dataset_of(tmp_path / "R", table)).runs for change in run.changes] == []
+
+
 def test_what_a_map_has_not_seen(plain: Dataset, model_dict: dict[str, Any]) -> None:
     def reported(exam: float | None, left_out: float | None = None, train: float = 0.001) -> set[str]:
         training = None if left_out is None else _left_out(left_out)
