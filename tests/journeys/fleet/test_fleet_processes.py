@@ -56,7 +56,7 @@ def lot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_on_dask_it_is_the_same_to_the_byte(lot: Path) -> None:
     import distributed
 
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
         cluster = Cluster(local.scheduler_address, 60.0)
         entries = run_fleet(load_manifest(lot / "d"), lot / "dask", cluster=cluster)
     assert [entry.status for entry in entries] == ["done", "done", "done", "failed"]
@@ -123,7 +123,7 @@ def test_a_gyro_that_kills_workers_of_a_cluster_has_failed_and_the_others_are_do
     one_by_one = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
     with (
         dask.config.set(one_by_one),
-        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as local,
     ):
         cluster = Cluster(local.scheduler_address, 60.0)
         entries = run_fleet(load_manifest(lot / "d"), tmp_path / "out", cluster=cluster)
@@ -154,7 +154,7 @@ def test_a_killed_client_of_a_cluster_leaves_no_half_result_and_the_next_call_go
     import distributed
 
     out = tmp_path / "out"
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as local:
         address = local.scheduler_address
         command = [sys.executable, "-c", CLIENT, str(out), address, ":".join(sys.path), str(lot / "d")]
         with subprocess.Popen(command) as client:
