@@ -142,8 +142,8 @@ static void begin_terms(STATE *state, const TABLE *table, NUM x)
     const NUM within = within_envelope(table, x, &ignored);
 #if GTC_WITH_RETAINED
     uint_least32_t i;
-
 #endif
+
 #if GTC_WITH_UNCERTAINTY
     uncertainty_terms_begin(state, table, within);
 #endif

@@ -48,10 +48,12 @@ def check_stated(
     _same(evaluation.constant_dph, model.fallback_dph, f"{where}, field constant_dph")
     _check_figures(evaluation, where)
     if limits is not None:
-        _check_limits(limits, model, evaluation, verification, str(folder / "limits.json"))
+        where = str(folder / "limits.json")
+        _check_same(limits, held_again(limits, model, evaluation, verification, where), where)
     if budget is not None:
         where = str(folder / "budget.json")
-        _check_budget(budget, model, training, evaluation, verification, changes, where)
+        again = budget_again(budget, model, training, evaluation, verification, changes, where)
+        _check_same(budget, again, where)
 
 
 def _check_figures(evaluation: Evaluation, where: str) -> None:
@@ -102,17 +104,14 @@ def _same(stated: float | None, found: float | None, where: str, scale: float = 
         raise InputError(where, f"is {stated}, and the other figures give {found}", _EXPECTED)
 
 
-def _check_limits(
-    held: HeldLimits, model: Model, evaluation: Evaluation, verification: Verification | None, where: str
-) -> None:
-    """Every limit says what its bound and the figures give, by the decision rule.
+def _check_same(stated: HeldLimits | Budget, again: HeldLimits | Budget, where: str) -> None:
+    """A result says what is computed again from the other results, whatever version of gyrotc wrote it.
 
     Raises:
-        InputError: One does not.
+        InputError: It does not.
     """
-    again = held_again(held, model, evaluation, verification, where)
-    found = again.model_copy(update={"gyrotc_version": held.gyrotc_version})
-    _refuse_departure(held.content(), found.content(), where)
+    found = again.model_copy(update={"gyrotc_version": stated.gyrotc_version})
+    _refuse_departure(stated.content(), found.content(), where)
 
 
 def held_again(
@@ -143,25 +142,6 @@ def held_again(
     )
     then = verification.model_copy(update={"targets": targets}) if verification else None
     return held_against(limits, model, evaluation, then)
-
-
-def _check_budget(
-    budget: Budget,
-    model: Model,
-    training: Training | None,
-    evaluation: Evaluation,
-    verification: Verification | None,
-    changes: Changes | None,
-    where: str,
-) -> None:
-    """Its parts follow from the other results, and U from its parts.
-
-    Raises:
-        InputError: They do not.
-    """
-    again = budget_again(budget, model, training, evaluation, verification, changes, where)
-    found = again.model_copy(update={"gyrotc_version": budget.gyrotc_version})
-    _refuse_departure(budget.content(), found.content(), where)
 
 
 def budget_again(
