@@ -141,7 +141,6 @@ template <class A> struct Runtime {
     class Correction {
     public:
         Correction() noexcept : state_(), table_(nullptr) {}
-        /* A call that failed leaves state and table as they were. */
         Status init(const Table &table, uint_least32_t period_us) noexcept
         {
             return taken(table, Status(A::init(&state_, &table, period_us)));
@@ -189,6 +188,7 @@ template <class A> struct Runtime {
 #endif
 
     private:
+        /* A start that failed leaves state and table as they were. */
         Status taken(const Table &table, Status status) noexcept
         {
             if (!status.failed()) {

@@ -56,7 +56,7 @@ static NUM within_envelope(const TABLE *table, NUM temp, int_least32_t *remarks)
 #endif
 
 #if GTC_WITH_TERMS
-/* What all terms do to the map's inputs, and add. */
+/* What all terms do to the map's inputs, and add; `remarks` of the effect are set before. */
 static void apply_terms(STATE *state, const TABLE *table, NUM temp, NUM slope, EFFECT *effect)
 {
     NUM within;

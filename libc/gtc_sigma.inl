@@ -1,8 +1,7 @@
 /* gtc_sigma.inl - how uncertain a correction is.
  *
  * docs/design.md (How uncertain a correction is) gives the rules with their reasons.
- * All of it is a function of a state: whoever does not ask for a snapshot pays a few words at the end
- * of a block.
+ * All of it is a function of a state: whoever does not ask for a snapshot pays a few words at the end of a block.
  *
  * SPDX-License-Identifier: MIT
  */

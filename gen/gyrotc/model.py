@@ -134,6 +134,11 @@ class Coverage(_Frozen):
             raise ValueError("rows do not have the size that cells gives")
         return self
 
+    @property
+    def trained(self) -> NDArray[np.bool_]:
+        """Cells with training data, shape (rows, columns)."""
+        return np.array([[cell == "1" for cell in row] for row in self.rows])
+
 
 BiasAmount = Annotated[float, Field(ge=0.0, le=7.5e6)]
 
@@ -432,7 +437,7 @@ class Model(_Frozen):
         t = t0 + (t1 - t0) * (np.arange(columns) + 0.5) / columns
         r = r0 + (r1 - r0) * (np.arange(rows) + 0.5) / rows
         every_t, every_r = (grid.ravel() for grid in np.meshgrid(t, r))
-        seen = np.array([c == "1" for row in self.coverage.rows for c in row]) if self.coverage else np.ones(0, bool)
+        seen = self.coverage.trained.ravel() if self.coverage else np.ones(0, bool)
         return (every_t[seen], every_r[seen]) if seen.any() else (every_t, every_r)
 
     def sigma_dph(self, temperature_c: ArrayLike, slope_c_per_min: ArrayLike) -> NDArray[np.float64] | None:
@@ -443,13 +448,12 @@ class Model(_Frozen):
         known, seen = self.uncertainty_dph, self.coverage
         if known is None:
             return None
-        sigma = np.array(known.rows)[self._cells_within(known.cells, temperature_c, slope_c_per_min)]
+        cells = self._cells_within(known.cells, temperature_c, slope_c_per_min)
+        sigma = np.array(known.rows)[cells]
         if seen is None or known.uncovered is None:
             return np.asarray(sigma)
-        trained = np.array([[cell == "1" for cell in row] for row in seen.rows])
-        uncovered = np.array(known.uncovered)[self._cells_within(known.cells, temperature_c, slope_c_per_min)]
-        covered = trained[self._cells_within(seen.cells, temperature_c, slope_c_per_min)]
-        return np.asarray(np.where(covered, sigma, uncovered))
+        covered = seen.trained[self._cells_within(seen.cells, temperature_c, slope_c_per_min)]
+        return np.asarray(np.where(covered, sigma, np.array(known.uncovered)[cells]))
 
     def _cells_within(
         self, cells: tuple[int, int], temperature_c: ArrayLike, slope_c_per_min: ArrayLike

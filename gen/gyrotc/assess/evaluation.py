@@ -118,8 +118,8 @@ def evaluate(
         average_s: Averaging of all RMS figures; default the model's.
         trace: Folder for one CSV per run.
         trace_rows: Most rows of it: a longer run's are means of as few rows as that takes; None: every row.
-        training: What `training.json` says; default that of `folder`, where it was made from these
-            recordings. Without an exam run its figures of spans left out count.
+        training: What `training.json` says; default that of `folder`. Its figures of spans left out count only if
+            the model was made from these recordings and there is no exam run.
         judged: Judgement of the rows of the runs; None: they are judged here.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
         progress: Takes note of every run.
@@ -160,13 +160,13 @@ def evaluate(
                 watch(run, parts[-1].averages)
     sizes = footprint(folder / "c", model, table) if compiled else None
     result = _result(model, dataset, table, parts, sizes, average_s=window)
-    trained = training or read_optional(folder / "training.json", Training)
-    training = training or (trained if _is_trained_on(model, dataset) else None)
-    if result.exam is None and training:
-        result = result.model_copy(update={"left_out": training.left_out})
-    result = _with_what_is_known(result, parts, trained)
+    known = training or read_optional(folder / "training.json", Training)
+    of_these = training or (known if _is_trained_on(model, dataset) else None)
+    if result.exam is None and of_these:
+        result = result.model_copy(update={"left_out": of_these.left_out})
+    result = _with_what_is_known(result, parts, known)
     of_runs = [found for p in parts for found in p.findings]
-    found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), training)
+    found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), of_these)
     found += [*beyond_noise(result), *late_findings([(p.run, p.averages) for p in parts])]
     return result.model_copy(update={"findings": tuple(found)})
 

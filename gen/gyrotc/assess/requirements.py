@@ -65,7 +65,7 @@ def _visited(model: Model, exam: Sequence[Averages]) -> float:
     """Return the share of trained cells with a mean of the exam in them or in a neighbour."""
     coverage = model.coverage
     cells = coverage.cells if coverage else (32, 12)
-    trained = np.array([[c == "1" for c in row] for row in coverage.rows]) if coverage else np.ones(cells[::-1], bool)
+    trained = coverage.trained if coverage else np.ones(cells[::-1], bool)
     visited: BoolArray = np.zeros(trained.shape, dtype=bool)
     for a in exam:
         if a.time_s.size:

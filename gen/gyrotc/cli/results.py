@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -201,8 +202,7 @@ def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
         dataset, folder: The data set and the result as a shell takes them.
     """
     evaluation = unit.evaluation
-    axis = f" {unit.model.axis}" if unit.model.axis else ""
-    yield f"{unit.model.serial}{axis}: {verdict_words(unit)}"
+    yield verdict_line(unit)
     yield from summary_lines(evaluation)
     if kept := [one for one in unit.held if one.constant_passes]:
         bounds = "; ".join(f"{limit_words(one.limit)} {bound_words(one)}" for one in kept)
@@ -216,7 +216,14 @@ def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
         yield "; ".join(line.strip() for line in change_lines(unit.changes))
     if evaluation.findings:
         yield f"findings: {', '.join(dict.fromkeys(one.id for one in evaluation.findings))}"
-    yield f"next: {unit.next_step.replace('DATASET', dataset).replace('DIR', folder)}"
+    places = {"DATASET": dataset, "DIR": folder}
+    yield "next: " + re.sub(r"\b(DATASET|DIR)\b", lambda found: places[found[0]], unit.next_step)
+
+
+def verdict_line(unit: UnitResults) -> str:
+    """Return serial, axis and verdict of a unit in a line."""
+    axis = f" {unit.model.axis}" if unit.model.axis else ""
+    return f"{unit.model.serial}{axis}: {verdict_words(unit)}"
 
 
 def verdict_words(unit: UnitResults) -> str:

@@ -37,7 +37,7 @@ from .results import (
     prediction_line,
     rounding_lines,
     training_lines,
-    verdict_words,
+    verdict_line,
     verify_notes,
     verify_table,
 )
@@ -239,6 +239,7 @@ def verify(
 
     Example: gyrotc verify result --target all
     """
+    from ..common.progress import Stages
     from ..jobs.axes import axes_in, verify_axes
     from ..model import load_model
     from ..results.base import read_optional
@@ -251,9 +252,11 @@ def verify(
     axes = axes_in(folder)
     if axes and log is not None:
         raise InputError("--log", f"{folder} has three axes", f"the folder of one, e.g. {folder / axes[0]}")
+    parts = [folder / axis for axis in axes] or [folder]
     results = {}
     with progress() as say:
-        for part in [folder / axis for axis in axes] or [folder]:
+        of_parts = Stages(say, dict.fromkeys((part.name for part in parts), 1.0))
+        for part in parts:
             axis = load_model(part / "model.json").axis
             with result_folder(part, "verify", entries=("verify.json",)) as stage:
                 results[str(axis)] = run(
@@ -261,7 +264,7 @@ def verify(
                     targets=target or (),
                     log=log,
                     exhaustive=exhaustive,
-                    progress=say,
+                    progress=of_parts.within(part.name, f"{part.name}: " if axes else ""),
                 )
                 write_atomically(stage.folder / "verify.json", json_text(results[str(axis)].content()))
     result: Verification | JointVerification = next(iter(results.values()))
@@ -279,7 +282,7 @@ def verify(
     if result.failed:
         n_targets = sum(len(one.targets) for one in results.values())
         raise CheckFailed(f"{result.failed} checks failed; {n_targets} targets")
-    for part in [folder / axis for axis in axes] or [folder]:
+    for part in parts:
         budget = read_optional(part / "budget.json", Budget)
         if budget is not None and budget.expired(date.today()):
             raise CheckFailed(f"{part}: the calibration was valid until {budget.valid_until}; calibrate again")
@@ -322,9 +325,10 @@ def evaluate(
     show(evaluation_table(result))
     unit = unit_in(folder)
     if unit.limits is not None:
-        tell(f"{unit.model.serial}: {verdict_words(unit)}")
+        tell(verdict_line(unit))
     if (folder / "report.html").is_file():
-        tell(f"{folder / 'report.html'} shows the figures of before: gyrotc report {folder} draws it again")
+        again = f"gyrotc report {shlex.quote(str(folder))}"
+        tell(f"{folder / 'report.html'} shows the figures of before: {again} draws it again")
     if unit.failed:
         raise CheckFailed("; ".join(unit.failed))
 

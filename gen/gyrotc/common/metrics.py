@@ -168,8 +168,7 @@ def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e
 def cell_length_s(length_s: float, period_s: float) -> float:
     """Return the length of the cells of means over `length_s`, of rows or samples that last `period_s`.
 
-    The number of them in a mean is the whole number that is nearest to the quotient: if one is nearer than two, each is
-    a mean.
+    Of rows longer than 2/3 of `length_s` each is a mean, as one row in a mean is nearer to it than two.
     """
     return period_s if period_s > length_s / 1.5 else length_s
 

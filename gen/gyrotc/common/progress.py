@@ -26,12 +26,12 @@ class Stages:
     """The stages of a job, each with its share of the time: a `Progress` in terms of the stage that is being done.
 
     Args:
-        progress: Takes note of the job; None: nobody does.
+        progress: Takes note of the job.
         shares: Time of every stage as it was measured, in any unit, in the order of the stages.
     """
 
-    def __init__(self, progress: Progress | None, shares: Mapping[str, float]) -> None:
-        self._progress = progress or silent
+    def __init__(self, progress: Progress, shares: Mapping[str, float]) -> None:
+        self._progress = progress
         self._shares = shares
         self._total = sum(shares.values())
 

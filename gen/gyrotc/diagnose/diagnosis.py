@@ -13,7 +13,7 @@ from .. import __version__
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.metrics import HALF_HOUR_S, LEAST_SPAN_C, Averages
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..common.statistics import running_mean
 from ..model import Model
 from ..quality.events import found_events
@@ -90,7 +90,7 @@ def diagnose(
     dataset: Dataset,
     *,
     options: FitOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     judged: Judged | None = None,
 ) -> Diagnosis:
     """Run the whole diagnosis on the training runs; exam runs measure the gain only.

@@ -25,7 +25,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..common.errors import InputError, install_command
-from ..common.progress import Progress
+from ..common.progress import Progress, silent
 from ..common.texts import file_stem
 from ..model import Model
 from ..pages.display import sci
@@ -137,7 +137,7 @@ def build(
     targets: Sequence[str] = (),
     numerics: Sequence[str] | None = None,
     extend: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     **options: Any,
 ) -> Result:
     """Fits, emits C, proves it on targets, judges it and writes the report, as `gyrotc build` does.

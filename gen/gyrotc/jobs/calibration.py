@@ -17,7 +17,7 @@ from ..assess.evaluation import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
 from ..common.errors import InputError
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
@@ -124,7 +124,7 @@ def build(
     previous: Path | None = None,
     prior: Path | None = None,
     ageing_dph: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> list[Built]:
     """Recordings in, verified C and a report out; one result for each axis.
 
@@ -200,7 +200,7 @@ def build_into(
         CheckFailed: Every arithmetic is refused.
     """
     order = _Order(numerics, False, limits, None, in_fleet=True, watch=watch)
-    return _build_axis(dataset, work, options, order, Stages(None, _STAGES))
+    return _build_axis(dataset, work, options, order, Stages(silent, _STAGES))
 
 
 def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Stages) -> Built:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..common.errors import InputError
 from ..common.metrics import Averages, average_rows
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..quality.judgement import judge
 from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.records import Dataset, Run
@@ -47,7 +47,7 @@ def compare(
     options: BuildOptions = DEFAULTS,
     *,
     methods: Sequence[str] = COMPARED,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Comparison:
     """Train and judge every method.
 

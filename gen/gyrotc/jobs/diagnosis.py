@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
@@ -29,7 +29,7 @@ def diagnose_dataset(
     out: Path | None = None,
     *,
     options: FitOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     judged: Judged | None = None,
 ) -> Diagnosis:
     """Diagnoses a data set and writes the result into a folder.

@@ -316,24 +316,24 @@ def _of_noise(
 
 def _too_noisy(walk: float, rate: FloatArray, column: str, unit: Conversion | None) -> Suspicion:
     """Noise above that of every gyro, with the unit that makes it that of one."""
-    mean = np.median(rate)
+    middle = median(rate)
     found = (
-        f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of any gyro at rest, and a mean of "
-        f"{mean:.4g} deg/h"
+        f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of any gyro at rest, and a median of "
+        f"{middle:.4g} deg/h"
     )
     for likely, factor in _other_rates(unit):
         if factor < 1.0 and _FLOWN <= walk * factor <= _NOISY:
-            found += f"; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and {mean * factor:.4g} deg/h"
+            found += f"; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and {middle * factor:.4g} deg/h"
             return Suspicion("rate", column, found, likely)
     return Suspicion("rate", column, found, None)
 
 
 def _random_walks(time: FloatArray, rate: FloatArray) -> list[tuple[float, float]]:
-    """Return angle random walks, deg/sqrt(h), of cells up to 100 s (or of the cells as they are): by Allan, and robust.
+    """Return pairs of angle random walks, deg/sqrt(h): from all steps between cells, and from their median.
 
-    The largest tells what is too quiet, because a logger's filter makes neighbouring rows alike: the noise shows on
-    longer means only. The smallest robust one tells what is too noisy: it sees neither wild rows nor the quantisation
-    of pulses. None is returned of rates that are all the same.
+    Cells are the rows, then ever longer ones up to 100 s. The largest tells what is too quiet, because a logger's
+    filter makes neighbouring rows alike: the noise shows on longer means only. The smallest from a median tells what is
+    too noisy: it sees neither wild rows nor the quantisation of pulses. Rates that are all the same give no pair.
     """
     walks: list[tuple[float, float]] = []
     while len(rate) >= _FEWEST_CELLS:

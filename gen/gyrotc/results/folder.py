@@ -262,7 +262,7 @@ def _recover(place: Path) -> None:
 
 
 def _is_same(path: Path, other: Path) -> bool:
-    """Test whether a file of an earlier result went on into the new one."""
+    """Test whether two files are one, or equal; links are neither."""
     if path.is_symlink() or other.is_symlink() or not other.is_file():
         return False
     return path.samefile(other) or sha256(path) == sha256(other)

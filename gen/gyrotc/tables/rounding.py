@@ -11,7 +11,6 @@ A cause says what its record holds (`causes.base`); here are the numbers of both
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 import zlib
@@ -123,7 +122,7 @@ def coverage_words(model: Model) -> Words:
     """One bit a cell, T fastest, 32 cells a word, low bit first."""
     if model.coverage is None:
         return np.zeros(0, dtype=np.uint32)
-    bits = [c == "1" for c in itertools.chain.from_iterable(model.coverage.rows)]
+    bits = model.coverage.trained.ravel()
     padded = np.zeros(-(-len(bits) // 32) * 32, dtype=np.uint32)
     padded[: len(bits)] = bits
     words: Any = padded.reshape(-1, 32) << np.arange(32, dtype=np.uint32)

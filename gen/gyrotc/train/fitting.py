@@ -19,7 +19,7 @@ from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.inputs import MOST_HELD
 from ..common.metrics import Averages
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..model import Model
 from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge, judge_runs
@@ -171,7 +171,7 @@ def fit_dataset(
     *,
     judged: Judged | None = None,
     read: Read | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Fitted:
     """Fit a model to the training runs of a data set.
 

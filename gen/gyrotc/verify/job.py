@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import __version__
 from ..common.errors import InputError
-from ..common.progress import Progress, Stages
+from ..common.progress import Progress, Stages, silent
 from ..model import Model, load_model
 from ..recordings.records import Dataset
 from ..results.base import read_optional
@@ -47,7 +47,7 @@ from .toolchain import Target, all_targets, end_all
 
 __all__ = ["chosen_targets", "verify"]
 
-# As `gyrotc verify -v` measures them; two of them are seldom asked for.
+# Times as `gyrotc verify -v` measures them
 _STAGES = {"comparing files": 0.05, "testing": 0.75, "replaying": 0.1, "visiting every input": 0.1}
 
 # Between two looks at threads that are to end: a delay that nobody notices, and next to no work.
@@ -63,7 +63,7 @@ def verify(
     exhaustive: bool = False,
     compiled: bool = True,
     trust_code: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Verification:
     """Verifies `folder/c` against `folder/model.json`; what `verify.json` holds.
 
@@ -83,7 +83,8 @@ def verify(
             all inputs of.
         CheckFailed: The log is not whole, or of another model.
     """
-    say = Stages(progress, _STAGES)
+    asked = {"replaying": dataset is not None, "visiting every input": exhaustive}
+    say = Stages(progress, {stage: share if asked.get(stage, True) else 0.0 for stage, share in _STAGES.items()})
     model = load_model(folder / "model.json")
     earlier = read_optional(folder / "verify.json", Verification)
     chosen = chosen_targets(targets) if compiled and (targets or log is None) else []
@@ -117,6 +118,8 @@ def verify(
         errors = [
             _every_input(job, exact, say.within("visiting every input")) if e.numeric == "q31" else e for e in errors
         ]
+    tested = {entry.name for entry in entries}
+    outdated = () if same else tuple(dict.fromkeys(entry.name for entry in boards if entry.name not in tested))
     passed, failed, missing = _counts(entries, [*emitted, *errors], set(targets))
     return Verification(
         gyrotc_version=__version__,
@@ -129,7 +132,7 @@ def verify(
         missing=missing,
         targets=tuple(entries),
         log=brought,
-        outdated_boards=() if same else tuple(dict.fromkeys(entry.name for entry in boards)),
+        outdated_boards=outdated,
         options=EmittedWith(numeric=options.numeric, zero_at_c=options.zero_at_c),
         emitted=tuple(emitted),
         errors=tuple(errors),

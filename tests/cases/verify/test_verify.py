@@ -184,6 +184,7 @@ def test_log_of_a_board_is_checked_and_kept(copy: Path, gyrotc: Command) -> None
     spoil(copy / "c" / "main.c", "return 1;", "return 3;")
     found = verify(copy, targets=[FAST]).content()
     assert {e["name"] for e in found["targets"]} == {FAST} and found["outdated_boards"] == ["bench 7, iar 9"]
+    assert verify(copy, log=log).content()["outdated_boards"] == [], "the board has run again"
     assert "bench 7, iar 9: ran another model or other code" in gyrotc("verify", copy, "--target", FAST).stdout
 
 

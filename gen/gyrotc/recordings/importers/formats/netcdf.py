@@ -74,8 +74,11 @@ def _vectors(name: str, variable: Any) -> Iterator[Vector | str]:
         yield Vector(group, group, rows, column, _part(variable, None))
         return
     width = variable.shape[1]
-    if width > MAX_COLUMNS or kind in "Mm":
-        yield unread(name, "a matrix of times" if kind in "Mm" else f"{width} columns, more than {MAX_COLUMNS}")
+    if kind in "Mm":
+        yield unread(name, "a matrix of times")
+        return
+    if width > MAX_COLUMNS:
+        yield unread(name, f"{width} columns, more than {MAX_COLUMNS}")
         return
     for k in range(width):
         label = f"{name}_{'xyz'[k]}" if width == 3 else f"{name}_{k + 1}"
