@@ -56,11 +56,6 @@ class CandidateChoice:
         rms = float(np.sqrt(np.mean(np.exp(2.0 * self._of(name))))) if len(self.losses) else np.nan
         return rms if np.isfinite(rms) else None
 
-    def beats(self, name: str, other: str) -> bool:
-        """Test whether a candidate is better than another by more than its doubt."""
-        gain, doubt = self.gain(name, other)
-        return bool(gain > doubt)
-
     def without(self, refused: Sequence[str]) -> CandidateChoice:
         """Return the choice among the candidates that may be used."""
         return CandidateChoice(self.candidates, self.losses, _chosen(self.candidates, self.losses, refused))
