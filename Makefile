@@ -43,7 +43,7 @@ else
 	@$(GYROTC) build build/demo-data --out build/demo
 endif
 
-## what to run before a commit: C library, generator, one of each command; five minutes on two cores
+## what to run before a commit: C library, generator, one of each command
 test:
 	@tools/setup.sh test
 	@mkdir -p build
@@ -113,7 +113,7 @@ bench:
 	@$(PYTHON) -m bench --real="$$SET_REAL" $${SET_SEED:+"--seed=$$SET_SEED"} $${SET_SETS:+"--sets=$$SET_SETS"} \
 	  $${SET_BASE:+"--base=$$SET_BASE"} $${SET_QUICK:+--quick} -- $${SET_ONLY:+"$$SET_ONLY"}
 
-## tests of the tools and archives; hidden effects found again, two fresh seeds of both worlds, an hour and a half: docs/results.md (SEED="n m" goes on or repeats)
+## tests of the tools and archives; hidden effects found again, two fresh seeds of both worlds: docs/results.md (SEED="n m" goes on or repeats)
 blind:
 	@tools/setup.sh check
 	@$(PYTHON) -m pytest -q -rs -n 2 --dist worksteal tests/check $(addprefix --ignore=,$(QUICK_CHECKS))
