@@ -219,7 +219,7 @@ def test_units_of_a_stronger_family_differ_less() -> None:
     strengths = (0.0, 0.5, 0.8, 0.94, 0.99)
     found = [np.median([spread(maps(LotOrder(16, f), SEED + k)) for k in range(3)]) for f in strengths]
     assert found == sorted(found, reverse=True)
-    assert 0.1 < found[3] < 0.5 < found[0]  # medians of many lots: docs/simulation.md, section 5
+    assert 0.1 < found[3] < 0.5 < found[0]  # medians of a few lots
     assert np.ptp(maps(LotOrder(3, 1.0), SEED), axis=0).max() < 1e-15
 
 
