@@ -13,6 +13,7 @@ from gyrotc.jobs import checksum_of, lot_from
 from gyrotc.results import Lot, LotCluster
 from gyrotc.train import TrainingData, coverage, fit, predict, uncertainty_of
 from gyrotc.train.prior import (
+    FALSE_ALARM,
     PRIOR_LOG,
     Learned,
     LotBasis,
@@ -177,6 +178,17 @@ def test_a_stranger_is_reported_and_calibrated_without_the_lot() -> None:
     assert coverage(data, with_lot) == coverage(data, alone)
 
 
+@pytest.mark.parametrize(("distance", "accepted"), [(0.3, True), (0.35, False)])
+def test_one_in_a_hundred_of_its_units_is_a_stranger_to_a_lot(distance: float, accepted: bool) -> None:
+    _, prior, _ = family(11)
+    own = distance * np.array([2e-3, -2e-3, 1e-3, 0.0, 1e-3])
+    found = fit(short_run(np.random.default_rng(22), own.tolist()), method="auto", prior=prior)
+    assert found.lot is not None and FALSE_ALARM == 0.01
+    assert 0.003 < found.lot.p_value < 0.03, "the case is near the threshold"
+    assert found.lot.accepted == (found.lot.p_value >= 0.01) == accepted
+    assert ("not_of_its_lot" in [f["id"] for f in found.findings]) != accepted
+
+
 def test_without_a_family_the_prior_is_wide_and_says_so() -> None:
     rng = np.random.default_rng(31)
     units = []
@@ -210,6 +222,18 @@ def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     lot, found = lot_of(units)
     assert not found.inside[4] and found.inside.sum() >= 13
     assert lot.units[4].cluster is None and "U4" in lot.text
+
+
+@pytest.mark.parametrize(("distance", "inside"), [(6.0, True), (7.0, False)])
+def test_of_twenty_units_one_is_set_aside_at_a_twentieth_of_the_level(distance: float, inside: bool) -> None:
+    """The level of 1 % is that of a lot, not of each of its units: one of a hundred clean units is below it."""
+    rng = np.random.default_rng(41)
+    units = [calibrated(rng, unit_map(rng, 2e-4)) for _ in range(20)]
+    units[4] = calibrated(rng, [0.0, 2e-4 * distance, -2e-4 * distance, 0.0, 1e-4 * distance])
+    _, found = lot_of(units)
+    assert 1e-4 < found.p_values[4] < 0.005, "a single unit as far away would be set aside"
+    assert found.inside[4] == (found.p_values[4] >= 0.01 / 20) == inside
+    assert np.delete(found.inside, 4).all()
 
 
 def test_a_lot_of_few_units_knows_its_mean_badly() -> None:
