@@ -14,7 +14,8 @@ from gyrotc.tables import NUMERICS, joint_needs, needs_of, runtime_texts
 from models import bank_of, random_model, random_terms
 
 PARTS = ("uncertainty", "rezero", "coverage", "known_answers", "image", "saved_state", "time")
-FLAGS = ("-std=c99", "-ffp-contract=off", "-O2", "-ffunction-sections")
+# Without optimisation, the object has everything that the text says, whether it is used or not.
+FLAGS = ("-std=c99", "-ffp-contract=off", "-O0", "-ffunction-sections")
 WARNINGS = (
     "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wundef", "-Wshadow",
     "-Wmissing-declarations", "-Wunused-macros", "-Werror", "-Dinline=", "-DGTC_ASSERT(claim)=((void)(claim))",
