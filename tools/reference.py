@@ -32,7 +32,7 @@ PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE
 PYTHON = (
     "model", "recordings.loading", "recordings.records", "train.methods", "train.fitting", "tables.quantisation",
     "tables.emission", "mirror.history", "verify.job", "assess.evaluation", "diagnose.diagnosis",
-    "simulate.campaign", "common.metrics", "common.errors",
+    "simulate.data_set", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(
     r"/\* (?P<text>(?:(?!\*/).)*?) ?\*/\n(?P<code>(?:GTC_MUST_CHECK int gtc_\w+\([^;]*;\n)+)", re.DOTALL

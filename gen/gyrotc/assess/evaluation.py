@@ -48,7 +48,7 @@ from ..results.evaluation import (
 from ..results.files import create
 from ..results.rows import RowsCount
 from ..results.training import Training
-from ..simulate.scenario import simulated_floor
+from ..simulate.truth import simulated_floor
 from ..tables.emission import emitted_tables
 from ..verify.replay import replay_case_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint

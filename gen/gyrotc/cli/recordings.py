@@ -217,7 +217,7 @@ def simulate(
 
     Example: gyrotc simulate paper --units 60 --seed 1 --out lot
     """
-    from ..simulate.campaign import simulate as run
+    from ..simulate.data_set import simulate as run
 
     of_lot = {"family": family, "unrelated": unrelated}
     stated = {name: value for name, value in of_lot.items() if value is not None}
@@ -249,7 +249,7 @@ def _simulate_lot(
     format: RunFormat,
 ) -> None:
     """Simulates a lot of gyros."""
-    from ..simulate.campaign import RowForm
+    from ..simulate.data_set import RowForm
     from ..simulate.lot import LotOrder, simulate_lot
 
     order = LotOrder(**stated)

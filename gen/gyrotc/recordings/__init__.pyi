@@ -9,6 +9,7 @@ from .fingerprints import windows_in_common as windows_in_common
 from .fit_options import COMPARED as COMPARED
 from .fit_options import METHODS as METHODS
 from .fit_options import SIMPLE as SIMPLE
+from .importers.rows import FileFormat as FileFormat
 from .loading import axes_of as axes_of
 from .loading import input_hashes as input_hashes
 from .loading import load as load

@@ -1,9 +1,9 @@
-"""A lot of gyros of one type: each unit's physical parameters are drawn about those of its lot.
+"""Simulate a lot: gyros of one type, whose physical parameters are drawn about those of the lot.
 
-Every parameter has a standard score; that of a unit is √F · (score of its cluster) + √(1 − F) · (score of its own),
-so that F, the strength of the family, is the correlation of each parameter between two units: at 0 they share nothing
-but their scenario, at 1 they are one gyro. Within a unit parameters with a common cause are correlated, too. What the
-scores stand for, and from where their spreads are: docs/simulation.md, section 5.
+Every parameter has a standard score; that of a unit is √F · (score of its cluster) + √(1 − F) · (a score of its own).
+F, the strength of the family, is therefore the correlation of each parameter between two units: at 0 they share nothing
+but their scenario, at 1 they are one gyro. Within a unit, parameters with a common cause are correlated too.
+docs/simulation.md gives the meaning of the scores and the sources of their spreads.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from ..common.errors import InputError
 from ..common.progress import Progress, Stages, silent
 from ..results.folder import result_folder
 from ..results.recordings import TrueLot
-from .campaign import NoiseName, RowForm, SimulatedGyro, with_noise, write_gyro
-from .gyro import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, made, shape_over_range
+from .bias_map import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, map_of, shape_over_range
+from .campaign import NoiseName, with_noise
+from .data_set import RowForm, SimulatedGyro, write_gyro
 from .scenario import Gyro, Scenario, read
 
 SharedScores = dict[str, float]
 
-_KNOTS = 7  # as in `draw`
+_KNOTS = 7  # as in `draw_map`
 _EXPANSION = ("expansion", "expansion_slope", "expansion_curvature")
 _MOUNT = tuple(f"mount_{k}" for k in range(_KNOTS))
 _OTHERS = (
@@ -45,13 +46,13 @@ _CORRELATED = {
     ("contact_case", "contact_cavity"): 0.5,
     ("to_air", "power"): 0.3,
 }
-_MOST_UNITS = 10_000  # folders in one: more is no lot of gyros any more
-_MID_DPH = 0.3  # of the range of the bias: standard deviation of a unit's mean
+_MOST_UNITS = 10_000  # more folders than this are a mistake
+_MID_SHARE = 0.3  # standard deviation of a unit's mean bias over the range of its bias
 
 
 @dataclass(frozen=True, slots=True)
 class LotOrder:
-    """What lot is to be made.
+    """Size and kinship of a lot.
 
     Attributes:
         units: Number of gyros, foreign units among them.
@@ -60,7 +61,7 @@ class LotOrder:
         unrelated: Units that share nothing with the others but the scenario.
 
     Raises:
-        InputError: A number that cannot be.
+        InputError: A number is out of its range.
     """
 
     units: int
@@ -89,22 +90,24 @@ def simulate_lot(
     noise: NoiseName = "paper",
     progress: Progress = silent,
 ) -> list[str]:
-    """Simulates a lot: a data set in `out/<serial>` for each unit, with its truth beside it.
+    """Simulate a lot: a data set in `out/<serial>` for each unit, with its truth beside it.
 
     Seed, order and scenario fix every byte. A unit keeps its parameters where the lot is made larger.
 
     Args:
-        seed: 0 or more; draws the lot, its units and their noise.
+        order: Size and kinship of the lot.
+        seed: Number from which the lot, its units and their noise are drawn, 0 or more.
         out: Folder to make; simulated data sets there are replaced one by one.
         scenario: Programmes, chamber and instrument about which units are drawn.
-        form: Rows; None: rates of 10 s, CSV.
-        progress: Takes note of what is done.
+        form: Form of the rows; None: rates of 10 s, CSV.
+        noise: Levels of what the scenario does not give.
+        progress: Called with what is done.
 
     Returns:
         The serials.
 
     Raises:
-        InputError: Scenario, seed, order or folder cannot be.
+        InputError: The scenario, the seed, the thermal network or the folder is not valid.
     """
     name, plan = read(scenario)
     rows = form or RowForm.of(10.0, None, False, "csv")
@@ -118,10 +121,10 @@ def simulate_lot(
 
 
 def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list[SimulatedGyro]:
-    """The gyros of a lot, each with its instrument in the plan.
+    """Draw the gyros of a lot, each with its instrument in the plan.
 
     Raises:
-        InputError: The seed is negative, or the scenario's thermal network has not the parts that units differ in.
+        InputError: The seed is negative, or the scenario's thermal network lacks a node in which units differ.
     """
     if seed < 0:
         raise InputError("seed", str(seed), "0 or more")
@@ -155,7 +158,7 @@ def draw_lot(plan: Scenario, order: LotOrder, seed: int, name: str = "") -> list
 
 
 def _mixing() -> FloatArray:
-    """Factor of the correlation of scores within a unit, shape (scores, scores)."""
+    """Return the Cholesky factor of the correlation of scores within a unit, shape (scores, scores)."""
     matrix = np.eye(len(SCORES))
     for (one, other), value in _CORRELATED.items():
         i, j = SCORES.index(one), SCORES.index(other)
@@ -164,19 +167,19 @@ def _mixing() -> FloatArray:
 
 
 def _map(gyro: Gyro, scores: SharedScores, center: FloatArray, family: float) -> BiasMap:
-    """The static map: as sensitive as its lot to the extent to which the lot is a family."""
+    """Return the static map of a unit; it is as sensitive as its lot to the extent to which the lot is a family."""
     parameters = _shape_of(scores)
     low, high = gyro.bias_dph
     shape = shape_over_range(parameters)
     of_lot = shape_over_range(_shape_of(dict(zip(SCORES, center.tolist(), strict=True))))
     extent = family * np.log(np.ptp(of_lot)) + (1.0 - family) * np.log(np.ptp(shape))
     scale = (high - low) / float(np.exp(extent))
-    mean = 0.5 * (low + high) + _MID_DPH * (high - low) * scores["level"]
-    return made(parameters, scale, mean - scale * float(shape.mean()))
+    mean = 0.5 * (low + high) + _MID_SHARE * (high - low) * scores["level"]
+    return map_of(parameters, scale, mean - scale * float(shape.mean()))
 
 
 def _shape_of(s: SharedScores) -> dict[str, object]:
-    """Parameters of the shape (`simulate/gyro.py`); their moments are those of the gyros that `draw` makes."""
+    """Return parameters of the shape (`bias_map.py`); their moments are those of the gyros that `draw_map` draws."""
     knots_c = np.linspace(*T_RANGE_C, _KNOTS)
     x = np.linspace(-1.0, 1.0, _KNOTS)
     expansion = 0.4 * s["expansion"] * x + 0.35 * s["expansion_slope"] * (x**2 - 1.0 / 3.0)
@@ -202,7 +205,7 @@ def _shape_of(s: SharedScores) -> dict[str, object]:
 
 
 def _instrument(plan: Scenario, s: SharedScores) -> Scenario:
-    """The plan with this unit's thermal paths and thermometer."""
+    """Return the plan with the thermal paths and the thermometer of a unit."""
     node = dict(plan.gyro.node)
     case, block = node["case"], node["block"]
     joints = {name: g * _factor(0.15, s["contact_case"]) for name, g in case.to.items()}
@@ -226,10 +229,13 @@ def _instrument(plan: Scenario, s: SharedScores) -> Scenario:
 
 
 def _factor(spread: float, score: float) -> float:
-    """A positive quantity over its median: log-normal, `spread` of the logarithm."""
+    """Return a log-normal quantity over its median; `spread` is the standard deviation of its logarithm."""
     return float(np.exp(spread * score))
 
 
 def _check_nodes(gyro: Gyro) -> None:
+    """Raise `InputError` if the thermal network lacks a node in which units differ."""
     if missing := {"case", "block"} - set(gyro.node):
-        raise InputError("scenario, gyro.node", f"no {' and no '.join(sorted(missing))}", "what units differ in")
+        raise InputError(
+            "scenario, gyro.node", f"no {' and no '.join(sorted(missing))}", "both nodes: units of a lot differ in them"
+        )

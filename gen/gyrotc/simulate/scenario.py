@@ -2,30 +2,20 @@
 
 A scenario names a gyro (thermal network, range of its bias), a chamber, the sensor, profiles (one chamber
 programme each), sets (which profiles are run, when, and in which role) and causes of the catalogue.
-docs/simulation.md describes every key.
-
-Beside what was simulated lie `truth.json` and the noise that was really added: only `evaluate` and tests open them;
-nothing that fits or diagnoses may.
+`gyrotc simulate` takes one; docs/simulation.md describes it.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..causes import CATALOGUE
 from ..common.errors import InputError
-from ..common.inputs import read_input, read_toml, refuse_above
-from ..results.base import read_optional
-from ..results.recordings import SimulatedTruth
+from ..common.inputs import read_toml, refuse_above
 from .profile import AboveZero, Step
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
@@ -37,10 +27,10 @@ class _Strict(BaseModel):
 
 
 class Thermometer(_Strict):
-    """A further thermometer, recorded as a column: its place, and what its reading makes of that temperature.
+    """A further thermometer, recorded as a column.
 
-    From `loose_from_day` on its contact is loose: it shows `loose_share` of the way from its node to the air, with
-    the lag `loose_lag_s`.
+    From `loose_from_day` on its contact is loose: it shows the temperature `loose_share` of the way from its node to
+    the air, with the lag `loose_lag_s`.
     """
 
     name: Identifier
@@ -70,8 +60,9 @@ class NodeDifference(_Strict):
 class Laser(_Strict):
     """The discharge and the cavity as the gyro itself sees them: beam intensity and path-length voltage.
 
-    Units stand in the names. Gain and losses are shares of the light of one round trip, 1e-6; `walk_ppm` is what the
-    beam loses more where the moving mirror stands half a wavelength from the middle of its stroke.
+    Units stand in the names; `laser.py` has the equations. Gain and losses are shares of the light of one round trip,
+    1e-6; `walk_ppm` is the additional loss of the beam with the moving mirror half a wavelength off the middle of its
+    stroke.
     """
 
     intensity: Identifier = "intensity_v"
@@ -130,7 +121,7 @@ class Node(_Strict):
 
 
 def _default_nodes() -> dict[str, Node]:
-    """Self-heating 8 K at the block; cavity walls and mirrors 20 s behind it, the gas 30 K above them."""
+    """Return a network that heats the block by 8 K; the cavity follows it in 20 s, the gas is 30 K warmer."""
     return {
         "case": Node(heat_capacity_j_per_k=1500.0, power_w=14.75, to_air_w_per_k=2.5, to={"block": 1.0}),
         "block": Node(heat_capacity_j_per_k=800.0, to={"cavity": 3.0}),
@@ -140,7 +131,7 @@ def _default_nodes() -> dict[str, Node]:
 
 
 class Gyro(_Strict):
-    """The instrument: serial (`{seed}` is filled in), range of its bias, thermal network."""
+    """The instrument: serial number (`{seed}` is filled in), range of its bias, thermal network."""
 
     serial: Annotated[str, Field(pattern=r"^[A-Za-z0-9._{}-]{1,56}$")] = "SIM-{seed}"
     bias_dph: tuple[float, float] = (5.8e-3, 8.5e-3)
@@ -162,7 +153,7 @@ class Gyro(_Strict):
         return self
 
     def _joined(self) -> set[str]:
-        """Nodes from which a chain of conductances leads to the air."""
+        """Return the nodes from which a chain of conductances leads to the air."""
         joined = {name for name, node in self.node.items() if node.to_air_w_per_k > 0.0}
         links = [(name, other) for name, node in self.node.items() for other in node.to]
         for _ in self.node:
@@ -207,7 +198,7 @@ class Channel(_Strict):
 
 
 class ScenarioCause(BaseModel):
-    """A cause of the catalogue that acts: its id, its parameters, the channel where it needs one."""
+    """A cause of the catalogue that acts: its id, its parameters, and the channel that it follows if it needs one."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
@@ -232,13 +223,13 @@ class ScenarioCause(BaseModel):
         return self
 
     def values(self) -> dict[str, float]:
-        """All parameters, defaults filled in."""
+        """Return all parameters, defaults filled in."""
         defaults = {p.name: p.default for p in CATALOGUE[self.id].parameters if p.default is not None}
         return {**defaults, **self.__pydantic_extra__}
 
 
 class Profile(_Strict):
-    """One chamber programme, when power comes on in it and what of it is recorded (min from its start)."""
+    """One chamber programme; power-on and the recorded part are in minutes from its start."""
 
     start_c: float
     power_on_min: Minutes = 0.0
@@ -248,7 +239,7 @@ class Profile(_Strict):
 
 
 class RunSet(_Strict):
-    """Profiles that are run one after the other."""
+    """Profiles that are run one after the other, every `every_h` hours."""
 
     role: Literal["train", "exam"] = "train"
     started: datetime
@@ -290,12 +281,12 @@ class Scenario(_Strict):
         return self
 
     def columns(self) -> list[str]:
-        """Names of the recorded channels: thermometers, signals of the laser, what else is recorded."""
+        """Return the names of the recorded columns: thermometers, signals of the laser, auxiliary channels."""
         of_laser = [self.laser.intensity, self.laser.path_voltage] if self.laser else []
         return [t.name for t in self.thermometer] + of_laser + [channel.name for channel in self.channel]
 
     def _places(self) -> list[tuple[str, str]]:
-        """Where nodes are named, and the names."""
+        """List each place that names a node, with the name."""
         named = [("sensor.node", self.sensor.node)]
         named += [(f"node of thermometer {t.name}", t.node) for t in self.thermometer]
         named += [("node of a difference", n) for d in self.difference for n in (d.node, d.against)]
@@ -306,20 +297,20 @@ class Scenario(_Strict):
 
 
 def names() -> list[str]:
-    """Names of the scenarios that come with gyrotc."""
+    """Return the names of the scenarios that come with gyrotc."""
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
 def read(scenario: str | Path) -> tuple[str, Scenario]:
-    """A scenario by name, or from a file.
+    """Read a scenario by name, or from a file.
 
-    `extends = "name"` in it takes another one as the ground: its tables are merged, all else is replaced.
+    With `extends = "name"` a file begins from another scenario: tables are merged key by key, other values replaced.
 
     Returns:
-        Its name (file stem) and the checked scenario.
+        Name (stem of the file) and checked scenario.
 
     Raises:
-        InputError: no such scenario or file, no TOML, or a key or value that cannot be.
+        InputError: There is no such scenario or file, it is no TOML, or a key or value is not valid.
     """
     where = _place(scenario)
     try:
@@ -354,101 +345,9 @@ def _content(where: Path, below: tuple[Path, ...]) -> dict[str, Any]:
 
 
 def _merged(ground: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    """Tables merged key by key; anything else replaced."""
+    """Merge tables key by key and replace anything else."""
     merged = dict(ground)
     for key, value in over.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merged(merged[key], value) if both else value
     return merged
-
-
-TRUTH_FILE = "truth.json"
-# What numpy.save writes of one dimension (NEP 1); matched, not evaluated.
-_HEAD = re.compile(
-    rb"\x93NUMPY\x01\x00..\{'descr': '<f(?P<size>[48])', 'fortran_order': False, "
-    rb"'shape': \((?P<count>[0-9]{1,12}),\), \} *\n",
-    re.DOTALL,
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """The truth of one data set.
-
-    Attributes:
-        folder: The data set.
-        content: `truth.json`.
-    """
-
-    folder: Path
-    content: SimulatedTruth
-
-    def noise_dph(self, file: str) -> tuple[float, NDArray[np.float64]]:
-        """Noise really added to one run.
-
-        Returns:
-            Step in s (step k begins at k · step_s on the file's clock), and the mean noise of every step,
-            deg/h.
-
-        Raises:
-            InputError: no such run, or its noise is missing.
-        """
-        runs = {run.file: run for run in self.content.runs}
-        if file not in runs:
-            raise InputError(str(self.folder / TRUTH_FILE), f"no run {file}", ", ".join(sorted(runs)))
-        name = Path(runs[file].noise)
-        if name.is_absolute() or ".." in name.parts:
-            where = f"{self.folder / TRUTH_FILE}, run {file}, field noise"
-            raise InputError(where, repr(str(name)), "a file in the folder of the data set")
-        return runs[file].noise_step_s, _array(self.folder / name)
-
-    def mean_noise_dph(self, file: str, average_s: float) -> NDArray[np.float64]:
-        """Means over `average_s` (rounded to whole steps, at least one) of the noise of one run, deg/h."""
-        step_s, noise = self.noise_dph(file)
-        count = max(1, round(average_s / step_s))
-        if len(noise) < count:
-            where = f"{self.folder / TRUTH_FILE}, run {file}"
-            raise InputError(where, f"noise of {len(noise) * step_s:g} s", f"{average_s:g} s at least")
-        return np.asarray(noise[: len(noise) - len(noise) % count].reshape(-1, count).mean(axis=1))
-
-
-def simulated_floor(folder: Path, files: Sequence[str], average_s: float) -> float | None:
-    """RMS of the noise that was really added to `files`, pooled over means of `average_s`, deg/h.
-
-    None for recordings, and where there are no files.
-
-    Raises:
-        InputError: the truth beside the data set cannot be read.
-    """
-    truth = read_truth(folder)
-    if truth is None or not files:
-        return None
-    noise = np.concatenate([truth.mean_noise_dph(file, average_s) for file in files])
-    return float(np.sqrt(np.mean(noise**2)))
-
-
-def read_truth(folder: Path) -> Truth | None:
-    """The truth of a simulated data set, None for recordings.
-
-    Raises:
-        InputError: `truth.json` is there and is not what `simulate` writes.
-    """
-    content = read_optional(folder / TRUTH_FILE, SimulatedTruth)
-    return Truth(folder, content) if content else None
-
-
-def _array(path: Path) -> NDArray[np.float64]:
-    """The finite float numbers of an .npy file of one dimension.
-
-    Raises:
-        InputError: It holds anything else; also where its head promises more than the file holds.
-    """
-    expected = "the noise of a simulated run"
-    data = read_input(path, "recording_mib", expected)
-    head = _HEAD.match(data)
-    if head is None or int(head["count"]) * int(head["size"]) != len(data) - head.end():
-        raise InputError(str(path), "is no whole array of numbers", expected)
-    values = np.frombuffer(data[head.end() :], dtype=f"<f{int(head['size'])}").astype(np.float64)
-    if not np.isfinite(values).all():
-        raise InputError(str(path), "a number that is not finite", expected)
-    return values

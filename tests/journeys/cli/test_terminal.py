@@ -31,9 +31,8 @@ from gyrotc.common import Progress, Stages
 from gyrotc.jobs import build as build_result
 from gyrotc.model import load_model
 from gyrotc.quality import check
-from gyrotc.recordings import load
+from gyrotc.recordings import FileFormat, load
 from gyrotc.results import MARKER
-from gyrotc.simulate import campaign
 from gyrotc.tables import emit
 from gyrotc.train import FitOptions, fit_dataset
 from hypothesis import given
@@ -307,7 +306,7 @@ def test_a_shell_completes_the_words_that_an_option_takes(
 
 @pytest.mark.parametrize(
     ("words", "types"),
-    [(RunFormat, (campaign.FileFormat,))],
+    [(RunFormat, (FileFormat,))],
     ids=["runs"],
 )
 def test_words_of_the_command_line_are_those_of_the_job(words: type[Enum], types: tuple[Any, ...]) -> None:
