@@ -4,7 +4,7 @@
  * conditions that relate several words, is refused by gtc_<n>_open() and gtc_<n>_check_words(). The ranges are
  * chosen so that with any other table no function of the runtime meets a run-time error. The generator emits no
  * table that is refused.
- * In the repository: docs/proof.md says how far that is shown; docs/FORMAT.md, section 3, has the ranges.
+ * In the repository: docs/proof.md says how far that is shown.
  *
  * MISRA 8.9 throughout: the ranges stand together, not each in the one function that uses it.
  *

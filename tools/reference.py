@@ -1,4 +1,4 @@
-"""Pages made from the code: reference-{c,cli,schemas,python}.md, and docs/FORMAT.md with its tables of fields.
+"""Pages made from the code: reference-{c,cli,schemas,python}.md.
 
     python tools/reference.py OUT
 
@@ -26,8 +26,6 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 #: Results whose objects are reported in the tables of another result on the page.
 REPORTED_BY = {"entry": "fleet", "verify-axes": "verify"}
-#: Where FORMAT.md has the table of a result's fields.
-PLACE = re.compile(r"^Fields: `gyrotc schema ([\w-]+) --table`.*$", re.MULTILINE)
 #: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
     "model", "recordings.loading", "recordings.records", "train.methods", "train.fitting", "tables.quantisation",
@@ -97,22 +95,18 @@ def _cell(text: str) -> str:
 
 
 def schemas_page() -> str:
-    """Every JSON Schema with its first fields; FORMAT.md has those within objects."""
-    from gyrotc.cli.schema import kinds
+    """Every result with the tables of its fields."""
+    from gyrotc.cli.schema import kinds, tables
 
     parts = [
         "# JSON reference\n",
-        "Made from the schemas by `tools/reference.py`. `gyrotc schema NAME` prints one; fields within objects",
-        "and what they mean: [FORMAT.md](FORMAT.md).\n",
+        "Made from the schemas by `tools/reference.py`; `gyrotc schema NAME --table` prints the same.",
+        "[Formats](FORMAT.md) has what a schema cannot state.\n",
     ]
-    for kind, described in kinds().items():
-        schema = described.model_json_schema(by_alias=True)
-        required = set(schema.get("required", []))
-        parts += [f"## {kind}\n", _cell(schema.get("description", "")) + "\n"]
-        parts += ["| field | always there | meaning |", "| --- | --- | --- |"]
-        for name, field in schema.get("properties", {}).items():
-            parts.append(f"| `{name}` | {'yes' if name in required else ''} | {_cell(field.get('description', ''))} |")
-        parts.append("")
+    for name, kind in kinds().items():
+        other = REPORTED_BY.get(name)
+        parts += [f"## {name}\n", inspect.cleandoc(kind.__doc__ or "") + "\n"]
+        parts.append(tables(kind, [kinds()[other]] if other else []))
     return "\n".join(parts)
 
 
@@ -141,17 +135,6 @@ def _documented(name: str, thing: Any) -> Iterator[str]:
         yield "A constant or a type.\n"
 
 
-def format_page() -> str:
-    """docs/FORMAT.md with the tables of fields."""
-    from gyrotc.cli.schema import kinds, tables
-
-    def table(place: re.Match[str]) -> str:
-        other = REPORTED_BY.get(place[1])
-        return tables(kinds()[place[1]], [kinds()[other]] if other else []).rstrip()
-
-    return PLACE.sub(table, (ROOT / "docs" / "FORMAT.md").read_text("utf-8"))
-
-
 #: Where docs/design.md has the table of packages.
 PACKAGES = re.compile(r"(?<=<!-- packages -->\n).*?(?=<!-- /packages -->)", re.DOTALL)
 
@@ -170,7 +153,6 @@ def packages() -> str:
 
 
 PAGES = {
-    "FORMAT.md": format_page,
     "reference-c.md": c_page,
     "reference-cli.md": cli_page,
     "reference-python.md": python_page,

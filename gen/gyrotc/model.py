@@ -59,7 +59,7 @@ __all__ = [
 MODEL_SCHEMA = "gyrotc.model/1"
 CHECKSUM = "checksum"  # field of the file: the hash of all others
 SERIAL = r"^[A-Za-z0-9._-]{1,64}$"
-_MAX_NETWORKS = 16  # docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl
+_MAX_NETWORKS = 16  # libc/gtc_limits.inl
 _C_NAME_LIMIT = 31  # significant characters of an external name, C99 5.2.4.1
 _LONGEST_SYMBOL = _C_NAME_LIMIT - len("gtc_") - len("_f32")
 # Names of the runtime: its files with their include guards, and GTC_E_ID.
@@ -94,15 +94,19 @@ class _Frozen(BaseModel):
 class Scale(_Frozen):
     """Normalisation of the inputs: z_T = (T − center)/half_range, z_r = r/slope_c_per_min."""
 
-    temperature_c: tuple[Celsius, PositiveAmount]
-    slope_c_per_min: PositiveAmount
+    temperature_c: tuple[Celsius, PositiveAmount] = Field(description="center and half range of T, C")
+    slope_c_per_min: PositiveAmount = Field(description="half range of dT/dt, C/min; its center is 0")
 
 
 class Envelope(_Frozen):
     """Range of the inputs, C and C/min; also the region of one network of a bank."""
 
-    temperature_c: Annotated[tuple[Celsius, Celsius], AfterValidator(_ordered)]
-    slope_c_per_min: Annotated[tuple[CelsiusPerMin, CelsiusPerMin], AfterValidator(_ordered)]
+    temperature_c: Annotated[tuple[Celsius, Celsius], AfterValidator(_ordered)] = Field(
+        description="smallest and largest T, C"
+    )
+    slope_c_per_min: Annotated[tuple[CelsiusPerMin, CelsiusPerMin], AfterValidator(_ordered)] = Field(
+        description="smallest and largest dT/dt, C/min"
+    )
 
     def cells_at(
         self, cells: tuple[int, int], temperature_c: ArrayLike, slope_c_per_min: ArrayLike
@@ -125,8 +129,10 @@ class Envelope(_Frozen):
 class Coverage(_Frozen):
     """Where training data was: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
 
-    cells: CellCounts
-    rows: tuple[Annotated[str, Field(pattern="^[01]+$")], ...]
+    cells: CellCounts = Field(description="numbers of cells of T and of dT/dt, equal in size over the envelope")
+    rows: tuple[Annotated[str, Field(pattern="^[01]+$")], ...] = Field(
+        description="a text for each cell of dT/dt, lowest first, with a digit for each cell of T, ascending"
+    )
 
     @model_validator(mode="after")
     def _shape(self) -> Coverage:
@@ -144,40 +150,41 @@ BiasAmount = Annotated[float, Field(ge=0.0, le=7.5e6)]
 
 
 class Rules(_Frozen):
-    """How the uncertainty grows where a correction is not as it was trained, 1 σ; docs/design.md gives the reasons.
+    """How the uncertainty grows where a correction is not as it was trained, 1 σ; docs/design.md gives the reasons."""
 
-    Attributes:
-        hold_dph_per_c: For each C by which a held input may have gone on at its slope.
-        rest_dph_per_min: For each minute for which a correction is held, whatever its slope.
-        slope_dph_per_c_per_min: For the slope while it is known and not in the correction yet.
-        start_dph: Nothing is known of the slope.
-        turn_dph: A held input may have turned to any trained slope; None: as `start_dph`.
-        beyond_dph_per_c, beyond_dph_per_c_per_min: For each C and C/min beyond the envelope.
-        fallback_dph: About the constant correction.
-        none_dph: Of the bias itself, before any reading is accepted.
-        between_dph: Of the constant of the next power-on, 1 sigma by Student's t; part of every cell.
-        turn_on_dph: Standard deviation of the same; None: the repeatability of power-ons is not known.
-        turn_on_freedom: Its degrees of freedom; None: many.
-        noise_deg_per_sqrt_h: Angle random walk of the rate.
-        correlation_s: Correlation time of the error of the compensated bias, s.
-        terms: Of what each term does not know of the time before it began, deg/h (`hysteresis`: deg/h/C).
-    """
-
-    hold_dph_per_c: BiasAmount
-    rest_dph_per_min: BiasAmount
-    slope_dph_per_c_per_min: BiasAmount
-    start_dph: BiasAmount
-    turn_dph: BiasAmount | None = None
-    beyond_dph_per_c: BiasAmount
-    beyond_dph_per_c_per_min: BiasAmount
-    fallback_dph: BiasAmount
-    none_dph: BiasAmount
-    between_dph: BiasAmount
-    turn_on_dph: BiasAmount | None = None
-    turn_on_freedom: Annotated[int, Field(ge=0)] | None = None
-    noise_deg_per_sqrt_h: BiasAmount
-    correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)]
-    terms: tuple[BiasAmount, ...] = ()
+    hold_dph_per_c: BiasAmount = Field(
+        description="for each C by which a held temperature may have continued at its slope, deg/h/C"
+    )
+    rest_dph_per_min: BiasAmount = Field(description="for each minute for which a correction is held, deg/h/min")
+    slope_dph_per_c_per_min: BiasAmount = Field(
+        description="for a slope that is known and not yet in the correction, deg/h per C/min"
+    )
+    start_dph: BiasAmount = Field(description="while no slope is known, deg/h")
+    turn_dph: BiasAmount | None = Field(
+        default=None,
+        description="for a held temperature that may have turned to any trained slope, deg/h; absent: `start_dph`",
+    )
+    beyond_dph_per_c: BiasAmount = Field(description="for each C beyond the envelope, deg/h/C")
+    beyond_dph_per_c_per_min: BiasAmount = Field(description="for each C/min beyond the envelope, deg/h per C/min")
+    fallback_dph: BiasAmount = Field(description="of the constant correction, deg/h")
+    none_dph: BiasAmount = Field(description="of the bias before the first accepted reading, deg/h")
+    between_dph: BiasAmount = Field(
+        description="of the constant of the next power-on, by Student's t, deg/h; included in every cell"
+    )
+    turn_on_dph: BiasAmount | None = Field(
+        default=None, description="standard deviation that `between_dph` follows from, deg/h; absent: not known"
+    )
+    turn_on_freedom: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="degrees of freedom of `turn_on_dph`; absent: infinite"
+    )
+    noise_deg_per_sqrt_h: BiasAmount = Field(description="angle random walk of the rate, for a re-zero, deg/√h")
+    correlation_s: Annotated[float, Field(ge=1.0, le=7.5e6)] = Field(
+        description="correlation time of the error of the compensated bias, s"
+    )
+    terms: tuple[BiasAmount, ...] = Field(
+        default=(),
+        description="for each term, what is not known of the time before it started: deg/h, of `hysteresis` deg/h/C",
+    )
 
     @model_serializer(mode="wrap")
     def _without_unknown(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -190,14 +197,15 @@ class Rules(_Frozen):
 class Uncertainty(_Frozen):
     """1 σ of the compensated bias, deg/h: `rows[j][i]` for cell i of T and j of dT/dt.
 
-    `uncovered`: the same where training was not; `rules`: what comes on top of a cell. Without both a table does not
-    say how uncertain its corrections are.
+    Without `uncovered` and `rules` a table does not state how uncertain its corrections are.
     """
 
-    cells: CellCounts
-    rows: tuple[tuple[BiasAmount, ...], ...]
-    uncovered: tuple[tuple[BiasAmount, ...], ...] | None = None
-    rules: Rules | None = None
+    cells: CellCounts = Field(description="numbers of cells of T and of dT/dt over the envelope")
+    rows: tuple[tuple[BiasAmount, ...], ...] = Field(description="with training data, deg/h")
+    uncovered: tuple[tuple[BiasAmount, ...], ...] | None = Field(
+        default=None, description="the same without training data"
+    )
+    rules: Rules | None = Field(default=None, description="growth that is added to that of a cell")
 
     @model_validator(mode="after")
     def _shape(self) -> Uncertainty:
@@ -210,12 +218,18 @@ class Uncertainty(_Frozen):
 class Network(_Frozen):
     """One network: w0, linear part and Gaussians. Centers in C and C/min, widths δ in normalised units."""
 
-    w0: Dph
-    linear: tuple[Dph, Dph]
-    centers: Annotated[tuple[tuple[Celsius, CelsiusPerMin], ...], Field(max_length=MOST_CENTERS)]
-    widths: tuple[tuple[Width | None, Width | None], ...]
-    weights: tuple[Dph, ...]
-    region: Envelope | None = None
+    w0: Dph = Field(description="constant, deg/h")
+    linear: tuple[Dph, Dph] = Field(description="coefficients of z_T and z_r, deg/h")
+    centers: Annotated[tuple[tuple[Celsius, CelsiusPerMin], ...], Field(max_length=MOST_CENTERS)] = Field(
+        description="T and dT/dt of each Gaussian, C and C/min"
+    )
+    widths: tuple[tuple[Width | None, Width | None], ...] = Field(
+        description="δ of each Gaussian for both inputs, normalised; null: infinite"
+    )
+    weights: tuple[Dph, ...] = Field(description="weight of each Gaussian, deg/h")
+    region: Envelope | None = Field(
+        default=None, description="in a bank, where the network is used; neighbours overlap and are blended linearly"
+    )
 
     @model_validator(mode="after")
     def _same_length(self) -> Network:
@@ -225,18 +239,18 @@ class Network(_Frozen):
 
 
 class Term(_Frozen):
-    """One extension term: its id, its parameters (docs/FORMAT.md, section 2), its channel.
-
-    `fallback_model`: what it adds on average at a temperature and its rate, while its channel is not known; None: the
-    guard's fallback stands for the channel. In the file it is `stand_in`, only where there is one.
-    """
+    """Term that is added to the map, of the kinds in docs/FORMAT.md, section 2."""
 
     model_config = ConfigDict(populate_by_name=True)
 
-    id: str
-    parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]]
-    channel: str | None = None
-    fallback_model: Annotated[Network | None, Field(alias="stand_in")] = None
+    id: str = Field(description="kind of the term")
+    parameters: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(description="parameters by name")
+    channel: str | None = Field(default=None, description="channel that it follows; null: the temperature")
+    fallback_model: Annotated[Network | None, Field(alias="stand_in")] = Field(
+        default=None,
+        description="mean effect at a temperature and its rate, while the channel is lost; absent: the guard's"
+        " `fallback` is used as the reading",
+    )
 
     @model_validator(mode="after")
     def _known(self) -> Term:
@@ -277,22 +291,29 @@ class Term(_Frozen):
 
 
 class Guard(_Frozen):
-    """What is accepted of an auxiliary channel, in its unit; times in s.
+    """Plausibility check of the readings of a channel, in its unit."""
 
-    Beyond `low` ... `high` the edge is taken. A change is accepted up to `max_step`, and `max_rate_per_min` for the
-    time since the last reading that was accepted; of anything else, and of the first readings, at least three must
-    agree for `agree_s` (0: one is enough). A reading that stays the same for `stuck_s` is none (0: never). After
-    `missing_s` without enough readings `fallback` stands for the channel.
-    """
-
-    low: Annotated[float, Field(ge=-1e9, le=1e9)]
-    high: Annotated[float, Field(ge=-1e9, le=1e9)]
-    max_step: Annotated[float, Field(ge=0.0, le=1e9)]
-    max_rate_per_min: Annotated[float, Field(ge=0.0, le=1e9)]
-    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)]
-    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)]
-    missing_s: Annotated[float, Field(gt=0.0, le=1e6)]
-    fallback: Annotated[float, Field(ge=-1e9, le=1e9)]
+    low: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+        description="smallest reading; an auxiliary channel is limited to it, a temperature below it is rejected"
+    )
+    high: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(description="largest reading, in the same way")
+    max_step: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+        description="largest plausible change between two readings"
+    )
+    max_rate_per_min: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+        description="further change per minute since the last accepted reading"
+    )
+    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = Field(
+        description="time for which at least three readings must agree at the start, after a loss and after a change"
+        " that is not plausible, s; 0: one is enough"
+    )
+    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = Field(
+        description="time after which an unchanged reading is rejected, s; 0: never"
+    )
+    missing_s: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
+        description="time without enough readings after which the channel is lost, s"
+    )
+    fallback: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(description="reading of a lost channel")
 
     @model_validator(mode="after")
     def _in_order(self) -> Guard:
@@ -304,10 +325,12 @@ class Guard(_Frozen):
 class DataFile(_Frozen):
     """One recording, or a span of one, that the model was fitted to (or that was left for the exam)."""
 
-    file: str
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    span: tuple[float | None, float | None] | None
-    role: Literal["train", "exam"]
+    file: str = Field(description="name in the data set")
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] = Field(description="SHA-256 of the file")
+    span: tuple[float | None, float | None] | None = Field(
+        description="from and to on the clock of the file, s; null: the whole file"
+    )
+    role: Literal["train", "exam"] = Field(description="`exam`: a test run, which no fit has used")
 
 
 #: Parts of tables and runtime that a product may leave out: docs/limits.md.
@@ -315,38 +338,82 @@ RuntimePart = Literal["uncertainty", "rezero", "coverage", "known_answers", "ima
 
 
 class Model(_Frozen):
-    """Everything that is known of one axis of one serial. See docs/FORMAT.md for every field."""
+    """Everything that is known of one axis of one serial."""
 
     schema_: Annotated[Literal["gyrotc.model/1"], Field(alias="schema")] = "gyrotc.model/1"
-    serial: Annotated[str, Field(pattern=SERIAL)]
-    axis: Literal["x", "y", "z"] | None
-    method: Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,31}$")]
-    block_s: BlockLength
-    slope_blocks: Annotated[int, Field(ge=2, le=20)]
-    lead_blocks: Annotated[int, Field(ge=0, le=1)] = 0
-    scale: Scale
-    envelope: Envelope
-    coverage: Coverage | None
-    networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)]
-    terms: Annotated[tuple[Term, ...], Field(max_length=4)] = ()
-    fallback_dph: Dph
-    effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = None
-    rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = 0.0
-    q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = None
-    left_out: tuple[RuntimePart, ...] = ()
-    hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)]
-    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 0.0
-    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = 1.0
-    max_step_c: PositiveAmount
-    max_rate_c_per_min: PositiveAmount
-    guards: dict[str, Guard] = {}
-    noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None
-    noise_floor_source: Literal["estimated"] | None
-    average_s: AverageLength = 100.0
-    uncertainty_dph: Uncertainty | None = None
-    data: tuple[DataFile, ...]
-    seed: int
-    meta: dict[str, Any] = {}
+    serial: Annotated[str, Field(pattern=SERIAL)] = Field(description="serial number of the gyro")
+    axis: Literal["x", "y", "z"] | None = Field(description="null if the recordings have one axis")
+    method: Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,31}$")] = Field(
+        description="training method that model selection chose or `[fit]` named"
+    )
+    block_s: BlockLength = Field(
+        description="length of a block, s: T is averaged over it, and a correction is made after it"
+    )
+    slope_blocks: Annotated[int, Field(ge=2, le=20)] = Field(description="blocks in the least-squares window of dT/dt")
+    lead_blocks: Annotated[int, Field(ge=0, le=1)] = Field(
+        default=0,
+        description="map and terms are evaluated at T + lead_blocks · dT/dt · block_s, the temperature while the"
+        " correction is active",
+    )
+    scale: Scale = Field(description="normalisation of T and dT/dt")
+    envelope: Envelope = Field(description="calibrated range; inputs outside are limited to it")
+    coverage: Coverage | None = Field(description="cells of the envelope with training data; null: not known")
+    networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)] = Field(
+        description="the map; several networks are a bank"
+    )
+    terms: Annotated[tuple[Term, ...], Field(max_length=4)] = Field(default=(), description="what is added to the map")
+    fallback_dph: Dph = Field(
+        description="constant correction after the temperature was lost for `hold_blocks`, deg/h: the mean bias of the"
+        " training samples"
+    )
+    effects_dph: Annotated[tuple[Dph, Dph], AfterValidator(_around_zero)] | None = Field(
+        default=None,
+        description="smallest and largest sum of all terms in training, deg/h; null: what their parameters permit"
+        " within the envelope",
+    )
+    rezero_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] = Field(
+        default=0.0, description="largest shift of the constant in service, deg/h; 0: none"
+    )
+    q31_bias_frac_bits: Annotated[int, Field(ge=0, le=60)] | None = Field(
+        default=None, description="n of the fixed-point unit 2^-n deg/h; absent: 24"
+    )
+    left_out: tuple[RuntimePart, ...] = Field(
+        default=(), description="parts that the limits file removes from table and runtime"
+    )
+    hold_blocks: Annotated[int, Field(ge=1, le=MOST_HELD)] = Field(
+        description="consecutive blocks without enough readings until `fallback_dph` is used"
+    )
+    stuck_s: Annotated[float, Field(ge=0.0, le=2000.0)] = Field(
+        default=0.0, description="time after which an unchanged temperature is rejected, s; 0: never"
+    )
+    agree_s: Annotated[float, Field(ge=0.0, le=2000.0)] = Field(
+        default=1.0,
+        description="time for which at least three temperatures must agree at the start, after a loss and after a"
+        " change that is not plausible, s; 0: one is enough",
+    )
+    max_step_c: PositiveAmount = Field(description="largest plausible change of T between two samples, C")
+    max_rate_c_per_min: PositiveAmount = Field(
+        description="further change per minute since the last accepted reading, C/min"
+    )
+    guards: dict[str, Guard] = Field(
+        default={},
+        description="plausibility checks of auxiliary channels, and of `temperature_c` if the limits file states them;"
+        " a channel without one accepts every reading",
+    )
+    noise_floor_dph: Annotated[float, Field(ge=0.0, le=7.5e6)] | None = Field(
+        description="noise floor of means over `average_s`, deg/h; null: not known"
+    )
+    noise_floor_source: Literal["estimated"] | None = Field(description="how the noise floor was obtained")
+    average_s: AverageLength = Field(default=100.0, description="averaging time of RMS figures, s")
+    uncertainty_dph: Uncertainty | None = Field(
+        default=None, description="standard uncertainty of the compensated bias; null: not known"
+    )
+    data: tuple[DataFile, ...] = Field(description="recordings")
+    seed: int = Field(description="seed of the fit")
+    meta: dict[str, Any] = Field(
+        default={},
+        description="`[meta]` of the data set, its description, environments and date; never used in a computation",
+    )
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True, populate_by_name=True)
 

@@ -384,7 +384,7 @@ def _short(value: Any) -> str:
 
 
 MOST_CENTERS = 512
-"""What a table holds: docs/FORMAT.md, "Legal ranges"; libc/gtc_limits.inl."""
+"""What a table holds: libc/gtc_limits.inl."""
 MOST_HELD = 100_000
 """Blocks for which a temperature or the reading of a channel is held."""
 PLAUSIBLE_C = (-90.0, 200.0)

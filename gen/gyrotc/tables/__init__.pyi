@@ -16,7 +16,6 @@ from .quantisation import channels_of as channels_of
 from .quantisation import outside as outside
 from .quantisation import quantise as quantise
 from .quantisation import rms_growth as rms_growth
-from .quantisation import word_limits as word_limits
 from .record import RECORD as RECORD
 from .record import read_options as read_options
 from .runtime import SWITCHES as SWITCHES

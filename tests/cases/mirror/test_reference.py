@@ -23,8 +23,8 @@ from gyrotc.mirror import (
 )
 from gyrotc.mirror import table as layout
 from gyrotc.model import Term
-from gyrotc.tables import NUMERICS, outside, quantise, word_limits
-from libc_build import ROOT, runtime
+from gyrotc.tables import NUMERICS, outside, quantise
+from libc_build import runtime
 from models import bank_of, bank_with_channels, random_history, random_model, random_terms
 
 COUNTED = '-DGTC_CONFIG_HEADER="libc_counted.h"'
@@ -226,22 +226,6 @@ def test_a_model_whose_table_the_runtime_would_refuse_is_not_emitted(numeric: st
     scale = model.scale.model_copy(update={"temperature_c": narrow})
     with pytest.raises(CheckFailed):
         quantise(model.model_copy(update={"scale": scale}), numeric)
-
-
-def test_every_range_stands_in_the_documentation() -> None:
-    text = (Path(ROOT) / "docs" / "FORMAT.md").read_text(encoding="utf-8")
-    for f32, q31 in zip(_flat("f32"), _flat("q31"), strict=True):
-        row = f"| {f32[0]} | {_range(*f32[1:])} | {_range(*q31[1:])} |"
-        assert f32[0] == q31[0]
-        assert f32[0] == "what a term does not use" or row in text, row
-
-
-def _flat(numeric: str) -> list[tuple[str, float, float]]:
-    return [row for part in word_limits(numeric, 24) for row in part]
-
-
-def _range(least: float, most: float) -> str:
-    return f"{least:.10g}" if least == most else f"{least:.10g} ... {most:.10g}"
 
 
 HEADER = Path(__file__).resolve().parents[3] / "include" / "gtc.h"

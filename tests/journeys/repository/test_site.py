@@ -106,7 +106,7 @@ def test_no_link_of_the_site_is_dead_and_nothing_is_fetched(site: Path) -> None:
 def test_the_site_has_the_pages_that_are_made(site: Path) -> None:
     for name in reference.PAGES:
         assert (site / name).with_suffix(".html").is_file()
-    assert "rms_over_floor" in (site / "FORMAT.html").read_text("utf-8")
+    assert "rms_over_floor" in (site / "reference-schemas.html").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
