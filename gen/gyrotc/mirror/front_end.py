@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import steps_where
 from ..common.inputs import need_memory
+from ..common.missing import missing_rows
 from .readings import READING_HELD, READING_RESTART, Guarded, judge_readings
 from .recursions import Arithmetic, Course, NumberArray
 from .table import WARMING
@@ -25,7 +25,6 @@ FROM_MAP, FROM_KEPT, FROM_FALLBACK = 0, 1, 2  # any three numbers
 _SAMPLE_BYTES = 24  # of what is kept for each sample while a history is followed
 _LARGEST = 2**31 - 1  # of a number in fixed point
 _PART = 2**16  # samples that are looked at together; few, so that what is computed of them stays small
-_GAP = 1.5  # median row periods
 _MAX_MISSED = 2**32 - 1  # samples between two readings: the runtime counts them in 32 bits
 
 
@@ -388,13 +387,12 @@ class SampleStream:
 
 
 def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[np.int64]:
-    """Number of rows missing before each row: round(gap/period) - 1 where gap > 1.5 periods, else 0."""
-    late = np.flatnonzero(steps_where(time_s, lambda step: step / row_period_s > _GAP))
-    if len(late) == 0:
+    """Return the number of rows that are missing before each row; a stamp that is only late is no missing row."""
+    before, count = missing_rows(time_s, row_period_s)
+    if len(before) == 0:
         return np.broadcast_to(np.int64(0), time_s.shape)  # which takes no memory
     missed = np.zeros(time_s.size, dtype=np.int64)
-    gaps = (time_s[late + 1] - time_s[late]) / row_period_s
-    missed[late + 1] = np.minimum(np.rint(gaps) - 1.0, _MAX_MISSED).astype(np.int64)
+    missed[before + 1] = np.minimum(count, _MAX_MISSED)
     return missed
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from ..common.arrays import PART, BoolArray, FloatArray, masked, parts_of
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, median, median_of_parts
+from ..common.missing import missing_rows
 from ..recordings.description import exclude_line
 from ..recordings.plausibility import earth_rate_warning
 from ..recordings.records import Dataset, EarthRate, Mark, Rows, Run
 from ..results.base import ADVICE, Estimate, Finding, MarkedRows, Size
-from .missing import missing_rows
 
 ValueWithLimits = tuple[float, float, float]
 """A figure and its 95 % limits."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray, masked
+from ..common.missing import missing_rows
 from ..recordings.records import Mark, Rows, Run
 from ..results.base import Finding
 from .findings import finding
-from .missing import missing_rows
 
 _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
 _LEAST_JUMP_C, _JUMP_SIGMAS = 1.0, 20.0  # what the time would have done to the temperature, had it passed

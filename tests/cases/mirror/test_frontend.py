@@ -69,6 +69,15 @@ def test_a_gap_in_time_is_missing_samples() -> None:
     assert blocks.rows.tolist() == [4, 1, 2, 1]
 
 
+def test_uneven_stamps_are_no_missing_samples() -> None:
+    """The slope of a ramp stays what it is if the logger stamps the rows late, by up to most of a period."""
+    temperature = 20.0 + np.arange(4000) / 1000.0
+    even = blocks_of(temperature)
+    uneven = blocks_of(temperature, np.arange(4000) + np.random.default_rng(1).uniform(0.0, 0.8, 4000))
+    np.testing.assert_array_equal(uneven.slope_c, even.slope_c)
+    np.testing.assert_array_equal(uneven.rows, even.rows)
+
+
 def test_a_long_gap_is_shortened_by_whole_blocks() -> None:
     guard = Guarded(-90.0, 200.0, np.float32(1.0), np.float32(1.0), 0, 0, 5)
     settings = Settings(4, 1, 4, 3, guard, 5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.arrays import FloatArray, IntArray, parts_of, steps_where
+from .arrays import FloatArray, IntArray, parts_of, steps_where
 
 # A step longer than this, in row periods, has room for a missing row.
 _ROOM = 1.5
