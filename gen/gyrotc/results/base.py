@@ -1,7 +1,4 @@
-"""What every JSON result has: frozen fields of known types, one form on disk, one way to be read back.
-
-Also what several hold: findings with their sizes.
-"""
+"""Parts that JSON results share: types of fields, the form on disk, findings, and the way a result is read back."""
 
 from __future__ import annotations
 
@@ -17,11 +14,11 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-# Far above any figure, and products of two figures of pages still have a square root in float64
+# Far above any figure; the product of two figures on a page still has a square root in float64.
 _LARGEST = 1e300
 
 Figure = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)] | None
-"""A number, or null where it was not measured."""
+"""Number, or null if it was not measured."""
 Amount = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 Positive = Annotated[float, Field(gt=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0)]
@@ -30,16 +27,16 @@ Axis = Annotated[str, Field(pattern="^[xyz]$")] | None
 Numeric = Literal["f32", "q31"]
 """Arithmetic of a table: float32 or 32-bit fixed point."""
 NUMERICS: tuple[Numeric, ...] = get_args(Numeric)
-"""The default first."""
+"""Arithmetics that a table may have, the default first."""
 
 TABLE_BYTES = "read-only memory that the table takes in a program where pointers have 32 bits, bytes"
-"""What the size of a table means in every result, on every page and in the header of the table."""
+"""Meaning of the size of a table, in every result, on every page and in the header of the table."""
 
 R = TypeVar("R", bound="Numbered")
 
 
 class Part(BaseModel):
-    """An object inside a result. Fields that are not known are let through when one is read, and forgotten."""
+    """An object inside a result. Unknown fields are accepted when it is read, and dropped."""
 
     model_config = ConfigDict(
         frozen=True, extra="ignore", strict=True, allow_inf_nan=False, populate_by_name=True, protected_namespaces=()
@@ -47,47 +44,47 @@ class Part(BaseModel):
 
     @classmethod
     def of_object(cls, found: object, **others: Any) -> Self:
-        """From what a computation found: its attributes that have the names of fields, and the other fields."""
+        """Make one from the attributes of an object that have the names of fields, and from further fields."""
         return cls(**{n: getattr(found, n) for n in cls.model_fields if n not in others}, **others)
 
     def content(self) -> dict[str, Any]:
-        """The JSON object: the fields in their order, without those that were not given."""
+        """Return the JSON object: the fields in their order, without those that were not set."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
 
 class Numbered(Part):
-    """A file with name and number of its form."""
+    """A file that states the name and number of its form."""
 
     schema_: Annotated[str, Field(alias="schema")]
 
     def model_post_init(self, _: Any) -> None:
-        """The schema is written although nobody has to name it."""
+        """Mark the schema as set, so that it is written."""
         self.model_fields_set.add("schema_")
 
     @classmethod
     def schema_id(cls) -> str:
-        """Name and number of the form, such as `gyrotc.limits/1`."""
+        """Return name and number of the form, such as `gyrotc.limits/1`."""
         return str(cls.model_fields["schema_"].default)
 
 
 class Result(Numbered):
-    """A whole result, with the version that wrote it."""
+    """A result, with the version of gyrotc that wrote it."""
 
-    gyrotc_version: str = Field(description="of the gyrotc that wrote it")
+    gyrotc_version: str = Field(description="version of gyrotc that wrote the result")
 
 
 class UnitResult(Result):
     """A result of one gyro."""
 
     serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis")
+    axis: Axis = Field(description="axis of the gyro; null if the recordings have one axis")
 
 
 def read_result(path: Path, kind: type[R]) -> R:
-    """A result that a command wrote.
+    """Read a result that a command wrote.
 
     Raises:
-        InputError: It is missing, is no JSON, has another schema, or a field of it is wrong.
+        InputError: The file is missing or no JSON, has another schema, or a field has a wrong value.
     """
     where, expected = str(path), f"what gyrotc wrote as {path.name}"
     data = read_input(path, "result_mib", expected)
@@ -95,12 +92,12 @@ def read_result(path: Path, kind: type[R]) -> R:
 
 
 def read_optional(path: Path, kind: type[R]) -> R | None:
-    """A result that a command wrote; None where the file is absent. Raises as `read_result`."""
+    """Read a result that a command wrote; None if the file is absent. Raises as `read_result`."""
     return read_result(path, kind) if path.exists() or path.is_symlink() else None
 
 
 def checked_result(content: Any, kind: type[R], where: str, text: bytes | None = None) -> R:
-    """JSON content, from `text` where that is known, as a result. Raises as `read_result`."""
+    """Return JSON content as a result; `text` is its source, for line numbers. Raises as `read_result`."""
     schema = kind.schema_id()
     if not isinstance(content, dict):
         raise InputError(where, "is not a JSON object", f"what gyrotc wrote ({schema})")
@@ -148,55 +145,59 @@ ADVICE = {
     "runs by to_s and from_s.",
     "time_since_epoch": "State power_on_s of the run, or subtract the time of power-on; gyrotc import does that.",
 }
-"""What to do next, by the id of a finding."""
+"""Advice on what to do next, by the id of a finding."""
 
 
 class MarkedRows(Part):
-    """Rows that something is reported of."""
+    """Rows that a finding or a problem is about."""
 
-    file: str = Field(description="as in `dataset.toml`")
-    rows: tuple[int, int] | None = Field(description="first and last, counted from 1; null where not stated")
-    span_s: tuple[float, float] | None = Field(description="their times on the file's clock, s")
+    file: str = Field(description="name of the file in `dataset.toml`")
+    rows: tuple[int, int] | None = Field(description="first and last row, counted from 1; null if not stated")
+    span_s: tuple[float, float] | None = Field(
+        description="times of the first and last row on the file's clock, s; null if not stated"
+    )
 
 
 class Estimate(Part):
     """A figure with its 95 % interval."""
 
-    value: float = Field(description="the likeliest")
-    low: Figure = Field(description="lower end; null where there is no interval")
-    high: Figure = Field(description="upper end; null where there is no interval")
+    value: float = Field(description="likeliest value")
+    low: Figure = Field(description="lower end of the 95 % interval; null if there is none")
+    high: Figure = Field(description="upper end of the 95 % interval; null if there is none")
 
     @classmethod
     def of(cls, found: tuple[float, float, float], **others: Any) -> Self:
-        """From the value and the ends of its interval."""
+        """Make one from the value and the ends of its interval."""
         return cls(value=found[0], low=found[1], high=found[2], **others)
 
 
 class Size(Estimate):
-    """How large something is."""
+    """Size of an effect with its unit."""
 
-    unit: str = Field(description="of these figures")
+    unit: str = Field(description="unit of the value and of its interval")
 
 
 class Finding(Part):
-    """Something that a person should know; fields that do not apply are absent."""
+    """A fact that a person should know; fields that do not apply are absent."""
 
-    id: str = Field(description="its stable name")
+    id: str = Field(description="stable name of the finding")
     where: str = Field(default="data set", description="file with the start of the run and axes, or `data set`")
-    text: str = Field(description="what was found, and what it means")
-    next: str = Field(default="", description="what to do next; empty or absent where `text` says it")
-    file: str | None = Field(default=None, description="of its run; null: it is about the data set or the model")
-    from_s: Figure = Field(default=None, description="start of the run in its file, s; null: the whole file")
-    axes: tuple[str, ...] = Field(default=(), description="axes that show it; empty: all that were read")
-    time_s: Estimate | None = Field(default=None, description="when it happened, on the file's clock, s")
-    size: Size | None = Field(default=None, description="how large it is")
-    leave_out_s: tuple[tuple[float, float], ...] = Field(
-        default=(), description="times to leave out, from and to, s; empty: nothing has to be left out"
+    text: str = Field(description="observation and its meaning, in words")
+    next: str = Field(default="", description="next step; empty or absent if `text` says it")
+    file: str | None = Field(
+        default=None, description="file of the run; null if the finding is about the data set or the model"
     )
-    whole_run: bool = Field(default=False, description="whether the run is to be left out as a whole")
+    from_s: Figure = Field(default=None, description="start of the run in its file, s; null means the whole file")
+    axes: tuple[str, ...] = Field(default=(), description="axes that show the finding; empty means all that were read")
+    time_s: Estimate | None = Field(default=None, description="time of the event on the file's clock, s")
+    size: Size | None = Field(default=None, description="size of the event")
+    leave_out_s: tuple[tuple[float, float], ...] = Field(
+        default=(), description="times to leave out, from and to, s; empty if nothing has to be left out"
+    )
+    whole_run: bool = Field(default=False, description="true if the run has to be left out as a whole")
     exclude: str | None = Field(default=None, description="line of dataset.toml that leaves these times out")
-    rows: tuple[MarkedRows, ...] = Field(default=(), description="rows that it is about, the first ones")
-    evidence: dict[str, Any] = Field(default={}, description="the figures that it rests on")
+    rows: tuple[MarkedRows, ...] = Field(default=(), description="first rows that the finding is about")
+    evidence: dict[str, Any] = Field(default={}, description="figures that the finding rests on")
 
     def __str__(self) -> str:
         return f"{self.where}: {self.text}"

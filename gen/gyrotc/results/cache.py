@@ -1,10 +1,10 @@
-"""What is kept between calls, by hashes of what it depends on.
+"""Cache of results between calls, named by hashes of what they depend on.
 
-A file is the SHA-256 of its name and content and then the content. What protects whom: the folder is the user's own
-(made with mode 0700; one that belongs to somebody else, or that others may write, is not used), the checksum finds
-damage and what lies under another's name, and who reads a content takes nothing from it but what it should hold.
-Whatever does not fit is thrown away and computed again.
-`joblib.Memory` keeps results on disk as well, but has neither: it unpickles whatever lies there.
+A file is the SHA-256 of its name and content, followed by the content. Three things protect the user: the folder is his
+own (made with mode 0700; one that belongs to somebody else, or that others may write, is not used); the checksum finds
+damage and a content that lies under another name; and a reader takes nothing from a content but what it should hold.
+A file that does not fit is removed, and its content is computed again. `joblib.Memory` has no such protection: it
+unpickles whatever it finds.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _COMPUTING = ("numpy", "scipy", "pyarrow")  # libraries that a model's figures c
 
 @functools.cache
 def program_of() -> str:
-    """SHA-256 of the program: the package, its compiled core, the C runtime, and what they compute with."""
+    """Return the SHA-256 of the program: package, compiled core, C runtime, and versions of the numerical libraries."""
     here = Path(__file__).resolve().parents[1]
     parts: list[Any] = [__version__, {name: metadata.version(name) for name in _COMPUTING}]
     for folder in (here, *runtime_folders()):
@@ -50,20 +50,20 @@ _HEAD_BYTES = len(_MAGIC) + hashlib.sha256().digest_size
 
 
 def folder() -> Path:
-    """Where everything is kept."""
+    """Return the folder of the cache."""
     return user_cache_path("gyrotc", appauthor=False) / "kept"
 
 
 def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
-    """What was kept under a name.
+    """Return what was kept under a name.
 
     Args:
         name: Name of the file: a hash, and the kind after a point.
-        content_of: Makes it of its bytes; may raise anything, or give None, where they are not what they should be.
+        content_of: Function that makes the value of its bytes; it may raise anything, or return None, if they are not
+            what they should be.
 
     Returns:
-        None where there is none, or where the file is not as it was written or does not hold what it should (it is
-        removed).
+        The value, or None if there is none; a file that is not as it was written is removed.
     """
     path = folder() / name
     return content_in(path, content_of) if _is_own() and path.is_file() else None
@@ -90,7 +90,7 @@ def content_in(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
 
 
 def keep(name: str, content: bytes) -> None:
-    """Keeps a content under a name, and drops what was not used for longest. Where that fails nothing is kept."""
+    """Keep a content under a name, and drop the least recently used. If that fails nothing is kept."""
     with contextlib.suppress(OSError, InputError):  # a cache that cannot be written costs time, nothing else
         if _is_own():
             write_atomically(folder() / name, head_of_content(name, content), content)
@@ -105,7 +105,7 @@ def head_of_content(name: str, content: bytes) -> bytes:
 
 
 def _is_own() -> bool:
-    """Whether the folder is there, is the user's and nobody else may write into it."""
+    """Test whether the folder exists, belongs to the user, and nobody else may write into it."""
     try:
         folder().mkdir(parents=True, exist_ok=True, mode=0o700)
         facts = folder().stat()
@@ -115,7 +115,7 @@ def _is_own() -> bool:
 
 
 def _trim() -> None:
-    """Drops what was not used for longest, down to the limit."""
+    """Drop the least recently used files, down to the limit."""
     total = 0
     for path in sorted(folder().glob("*.*"), key=lambda p: p.stat().st_mtime, reverse=True):
         total += path.stat().st_size

@@ -1,4 +1,4 @@
-"""Where a result may go: into a new folder, or into the place of an earlier result that is all gyrotc's."""
+"""Check that a result may be written to a place: a new folder, or an earlier result that is gyrotc's alone."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _SHOWN = 3  # names in a message
 
 
 def real_path(path: Path) -> Path:
-    """Where a path is when links are followed; also of a loop of links."""
+    """Return a path with all links followed; a loop of links is no error."""
     return Path(os.path.realpath(path))  # resolve() raises for a loop until Python 3.13
 
 
 def check_separate(out: Path, inputs: Sequence[Path] = ()) -> None:
-    """Refuses an `out` that is a file, or is, holds or lies in what the job reads or gyrotc's own sources.
+    """Refuse an `out` that is a file, or that is, contains or lies in an input of the job or gyrotc's own sources.
 
     Raises:
-        InputError: It is.
+        InputError: `out` is one of these.
     """
     place = real_path(out)
     if place.exists() and not place.is_dir():
@@ -47,14 +47,14 @@ def _sources() -> list[Path]:
 
 
 def check_contents(out: Path, kind: str | None, entries: Collection[str] | None) -> Marker | None:
-    """The marker of what stands at `out`, once it is seen that gyrotc wrote all that is replaced.
+    """Check that gyrotc wrote all that would be replaced at `out`, and return the marker of what stands there.
 
     Args:
-        kind: What it must be; None: anything.
+        kind: Kind of folder that it must be; None: any.
         entries: Names in it that are replaced; None: all.
 
     Raises:
-        InputError: Something there would be lost that gyrotc did not write, or it is another kind of result.
+        InputError: A file that gyrotc did not write would be lost, or it is another kind of folder.
     """
     place = real_path(out)
     if not place.exists():

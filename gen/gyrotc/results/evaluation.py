@@ -1,4 +1,4 @@
-"""`evaluate.json`, `compare.json` and `changes.json`: a correction, methods, and differences to an earlier result."""
+"""`evaluate.json`, `compare.json` and `changes.json`: figures of a correction, of methods, and their changes."""
 
 from __future__ import annotations
 
@@ -19,43 +19,45 @@ from .rows import RowsCount
 class Published(Part):
     """Figures of Ding et al. 2014, Table 1."""
 
-    before_rms_dph: float = Field(description="deg/h")
-    after_rms_dph: float = Field(description="deg/h")
+    before_rms_dph: float = Field(description="RMS before compensation, deg/h")
+    after_rms_dph: float = Field(description="RMS after compensation, deg/h")
     improvement_about_zero: float = Field(description="RMS before over RMS after")
 
 
 class Group(Part):
-    """What one method makes of one environment."""
+    """Figures of one method in one environment."""
 
-    environment: str = Field(description="free text of the data set")
-    samples: Count = Field(description="means over `average_s`")
-    before_rms_dph: Figure = Field(description="deg/h")
-    before_std_dph: Figure = Field(description="about the mean, deg/h")
-    after_rms_dph: Figure = Field(description="deg/h")
-    after_std_dph: Figure = Field(description="about the mean, deg/h")
-    improvement: Figure = Field(description="RMS that a constant leaves over RMS after")
-    improvement_about_zero: Figure = Field(description="RMS before over RMS after")
+    environment: str = Field(description="environment, as the data set states it")
+    samples: Count = Field(description="number of means over `average_s`")
+    before_rms_dph: Figure = Field(description="RMS before compensation, deg/h")
+    before_std_dph: Figure = Field(description="standard deviation before compensation, deg/h")
+    after_rms_dph: Figure = Field(description="RMS after compensation, deg/h")
+    after_std_dph: Figure = Field(description="standard deviation after compensation, deg/h")
+    improvement: Figure = Field(description="RMS with a constant over RMS after compensation")
+    improvement_about_zero: Figure = Field(description="RMS before over RMS after compensation")
     published: Published | None = Field(
-        default=None, description="the paper's figures, where the recordings are of its environments"
+        default=None, description="figures of the paper; null if the environment is none of the paper"
     )
 
 
 class Method(Part):
-    """What one training method makes of all environments."""
+    """Figures of one training method in all environments."""
 
-    id: str = Field(description="as `method` of `[fit]` takes it")
-    groups: tuple[Group, ...] = Field(description="environment by environment")
-    exam_rms_dph: Figure = Field(description="RMS over all environments, deg/h")
-    exam_std_dph: Figure = Field(description="about the mean, deg/h")
-    before_rms_dph: Figure = Field(description="deg/h")
-    improvement: Figure = Field(description="RMS that a constant leaves over RMS after")
-    improvement_about_zero: Figure = Field(description="RMS before over RMS after")
-    centers: Count = Field(description="centers of the networks")
-    parameter_bytes: Count = Field(description="parameters of its map as 32-bit words, bytes")
+    id: str = Field(description="name of the method, as `method` of `[fit]` takes it")
+    groups: tuple[Group, ...] = Field(description="figures of each environment")
+    exam_rms_dph: Figure = Field(description="RMS after compensation over all environments, deg/h")
+    exam_std_dph: Figure = Field(description="standard deviation after compensation over all environments, deg/h")
+    before_rms_dph: Figure = Field(description="RMS before compensation over all environments, deg/h")
+    improvement: Figure = Field(description="RMS with a constant over RMS after compensation")
+    improvement_about_zero: Figure = Field(description="RMS before over RMS after compensation")
+    centers: Count = Field(description="number of centers of all networks")
+    parameter_bytes: Count = Field(description="parameters of the map as 32-bit words, bytes")
     sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
-    noise_floor_dph: Figure = Field(description="as this method estimates it, deg/h")
+    noise_floor_dph: Figure = Field(description="noise floor that the method estimates, deg/h")
     train_s: float = Field(description="processor time of training, s")
-    published_train_s: tuple[float, float] | None = Field(default=None, description="least and most of the paper, s")
+    published_train_s: tuple[float, float] | None = Field(
+        default=None, description="shortest and longest training time of the paper, s; null if it states none"
+    )
 
 
 class Comparison(UnitResult):
@@ -63,28 +65,30 @@ class Comparison(UnitResult):
 
     schema_: Annotated[Literal["gyrotc.compare/1"], Field(alias="schema")] = "gyrotc.compare/1"
     block_s: float = Field(description="length of a block, s")
-    average_s: float = Field(description="averaging of all RMS figures, s")
-    seed: int = Field(description="of everything that is drawn")
-    judged_on: Literal["exam", "left_out"] = Field(description="exam runs, or what was left out in turn")
-    noise_floor_dph: Figure = Field(description="estimated, of means over `average_s`, deg/h")
-    noise_floor_source: Literal["estimated"] = Field(description="where the noise floor comes from")
-    methods: tuple[Method, ...] = Field(description="in the order in which they were tried")
+    average_s: float = Field(description="averaging time of all RMS figures, s")
+    seed: int = Field(description="seed from which everything random is drawn")
+    judged_on: Literal["exam", "left_out"] = Field(
+        description="data of the figures: `exam` for test runs, `left_out` for folds of the training runs"
+    )
+    noise_floor_dph: Figure = Field(description="estimated noise floor of means over `average_s`, deg/h")
+    noise_floor_source: Literal["estimated"] = Field(description="source of the noise floor")
+    methods: tuple[Method, ...] = Field(description="methods in the order in which they were tried")
 
 
 class Statistics(Part):
-    """Figures of means over `average_s`; null where there is no sample."""
+    """Figures of means over `average_s`; null if there is none."""
 
-    mean_dph: Figure = Field(description="deg/h")
-    std_dph: Figure = Field(description="about the mean, ddof 0, deg/h")
-    rms_dph: Figure = Field(description="deg/h")
+    mean_dph: Figure = Field(description="mean, deg/h")
+    std_dph: Figure = Field(description="standard deviation (of the population), deg/h")
+    rms_dph: Figure = Field(description="RMS, deg/h")
     max_abs_dph: Figure = Field(description="largest magnitude, deg/h")
 
 
 class RunStatistics(Statistics):
-    """The same of one run, and what the residual does over longer times; null where the run is too short."""
+    """Figures of one run, with those over longer times; null if the run is too short."""
 
     rms_30min_dph: Figure = Field(description="RMS of means over 30 minutes, deg/h")
-    angle_1h_arcsec: Figure = Field(description="RMS of the angle that one hour adds up to, arcsec")
+    angle_1h_arcsec: Figure = Field(description="RMS of the angle error over one hour, arcsec")
     first_10min_rms_dph: Figure = Field(description="RMS of the first 10 minutes, deg/h")
 
 
@@ -94,19 +98,19 @@ def ratio_of(numerator: float | None, denominator: float | None) -> float | None
 
 
 class Pooled(Part):
-    """Several runs, every sample with the same weight."""
+    """Figures over several runs, every sample with the same weight."""
 
     before: Statistics = Field(description="before compensation")
-    constant: Statistics = Field(description="after subtraction of a constant, see `constant_dph` of the result")
+    constant: Statistics = Field(description="after subtraction of `constant_dph` of the result")
     after: Statistics = Field(description="after compensation")
     improvement: Figure = Field(
-        description="RMS that a constant leaves over RMS after compensation: what the map gains, whatever constant is "
-        "in the rate"
+        description="RMS with a constant over RMS after compensation: the gain of the map, whatever constant is in the "
+        "rate"
     )
     improvement_about_zero: Figure = Field(
         description="RMS before over RMS after compensation: it grows with any constant in the rate"
     )
-    samples: Count = Field(description="means over `average_s`")
+    samples: Count = Field(description="number of means over `average_s`")
 
     @classmethod
     def of(cls, runs: Sequence[Averages], constant_dph: float | None = None) -> Pooled:
@@ -133,16 +137,20 @@ class Pooled(Part):
 class EvaluatedRun(Part):
     """One run before and after compensation."""
 
-    file: str = Field(description="as in `dataset.toml`")
-    role: Literal["train", "exam"] = Field(description="of the run")
-    environment: str | None = Field(description="free text of the data set")
-    from_s: Figure = Field(default=None, description="start of the span, s; only of spans")
-    to_s: Figure = Field(default=None, description="end of the span, s; only of spans")
-    samples: Count = Field(description="means over `average_s`")
+    file: str = Field(description="name of the file in `dataset.toml`")
+    role: Literal["train", "exam"] = Field(description="role of the run")
+    environment: str | None = Field(description="environment, as the data set states it; null if not stated")
+    from_s: Figure = Field(
+        default=None, description="start of the run in its file, s; null means the start of the file"
+    )
+    to_s: Figure = Field(default=None, description="end of the run in its file, s; null means the end of the file")
+    samples: Count = Field(description="number of means over `average_s`")
     before: Statistics = Field(description="before compensation")
     constant: RunStatistics = Field(description="after subtraction of `constant_dph` of the result")
     after: RunStatistics = Field(description="after compensation")
-    rows: RowsCount | None = Field(default=None, description="rows, used and left out; null: an older result")
+    rows: RowsCount | None = Field(
+        default=None, description="rows used and left out; null if the result is of an older gyrotc"
+    )
     usable: Statistics | None = Field(
         default=None,
         description="after compensation, of the rows that may be used alone; null if no row is left out for what it "
@@ -151,41 +159,43 @@ class EvaluatedRun(Part):
 
 
 class FigureUncertainty(Part):
-    """How well a figure is known from recordings of this length."""
+    """Uncertainty of a figure from recordings of this length."""
 
-    standard: Amount = Field(description="1 sigma, in the unit of the figure")
-    freedom: Figure = Field(description="degrees of freedom; null: many")
-    method: str = Field(description="what it rests on")
+    standard: Amount = Field(description="standard uncertainty, in the unit of the figure")
+    freedom: Figure = Field(description="degrees of freedom; null means infinite")
+    method: str = Field(description="derivation of the uncertainty, in words")
 
     @property
     def expanded(self) -> float:
-        """Expanded uncertainty U of 95.45 %."""
+        """Expanded uncertainty U for 95.45 %."""
         return coverage_factor(self.freedom) * self.standard
 
 
 class ModelSizes(Part):
-    """What was evaluated, and its sizes on a target."""
+    """Method and sizes of the evaluated model."""
 
     method: str = Field(description="training method")
-    centers: Count = Field(description="of all networks")
+    centers: Count = Field(description="number of centers of all networks")
     table_bytes: Count = Field(description=TABLE_BYTES)
-    rom_bytes: Count | None = Field(description="everything linked; null where nothing was compiled")
-    ram_bytes: Count | None = Field(description="the caller's state; null where nothing was compiled")
-    sizes_on: str | None = Field(description="target of these sizes")
+    rom_bytes: Count | None = Field(
+        description="read-only memory of all linked code and constants, bytes; null if nothing was compiled"
+    )
+    ram_bytes: Count | None = Field(description="memory of the caller's state, bytes; null if nothing was compiled")
+    sizes_on: str | None = Field(description="target of these sizes; null if nothing was compiled")
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
 
 
 class Requirement(Part):
-    """Something that recordings must have before a limit can be passed on them."""
+    """A property that recordings must have before a limit can be passed on them."""
 
-    id: str = Field(description="its stable name: `exam_covers_envelope`, `rows` or `power_ons`")
-    verdict: Verdict = Field(description="best verdict that it allows: `PASS` where the recordings have it")
-    text: str = Field(description="what the recordings have, and what a PASS needs")
-    next: str = Field(default="", description="what to record; empty where the recordings have it")
+    id: str = Field(description="stable name: `exam_covers_envelope`, `rows` or `power_ons`")
+    verdict: Verdict = Field(description="best verdict that it allows: `PASS` if the recordings meet it")
+    text: str = Field(description="state of the recordings and need of a PASS, in words")
+    next: str = Field(default="", description="recording to make; empty if the recordings meet it")
 
     @property
     def met(self) -> bool:
-        """Test whether the recordings have it."""
+        """Test whether the recordings meet it."""
         return self.verdict == "PASS"
 
 
@@ -194,22 +204,23 @@ RMS_OVER_FLOOR = 1.3  # chosen: structure of 0.8 noise floors beside the noise, 
 
 
 class ResidualTest(Part):
-    """What remains of the judged runs, held against white noise of the same runs."""
+    """Residual of the judged runs, compared with white noise of the same runs."""
 
     autocorrelation: Figure = Field(
-        description="mean over the first `lags` lags of means over `average_s`; null: the runs are too short"
+        description="mean autocorrelation of means over `average_s` over the first `lags` lags; null if the runs are "
+        "too short"
     )
-    autocorrelation_limit: Figure = Field(description="four standard deviations above what white noise has")
+    autocorrelation_limit: Figure = Field(description="limit for white noise: four standard deviations above its mean")
     lags: Count = Field(description="number of lags")
-    rms_over_floor: Amount = Field(description="RMS over the noise floor, of the rows that may be used")
+    rms_over_floor: Amount = Field(description="ratio of RMS to noise floor over the rows that may be used")
     rms_over_floor_band: tuple[Amount, Amount] = Field(
-        description="four standard deviations on either side of what white noise has, the floor estimated from as many "
+        description="range for white noise: four standard deviations either side, the floor estimated from as many "
         "means; at most 1.3"
     )
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """In which of the two the residual is more than white noise, in words."""
+        """Statistics by which the residual is more than white noise, in words."""
         both = (
             ("autocorrelation", self.autocorrelation, self.autocorrelation_limit),
             ("RMS over the noise floor", self.rms_over_floor, self.rms_over_floor_band[1]),
@@ -224,61 +235,65 @@ class ResidualTest(Part):
 _OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
 
 PARTS = {"exam": "exam runs", "left_out": "spans left out of training in turn", "train": "the training runs themselves"}
-"""What a model may be judged by, in words."""
+"""Data that a model may be judged by, in words."""
 
 
 class Evaluation(UnitResult):
-    """What the compiled code makes of recordings (`gyrotc evaluate`)."""
+    """Figures of the compiled code on recordings (`gyrotc evaluate`)."""
 
     schema_: Annotated[Literal["gyrotc.evaluate/1"], Field(alias="schema")] = "gyrotc.evaluate/1"
     numeric: Numeric = Field(description="arithmetic that was run")
     block_s: float = Field(description="length of a block, s")
-    average_s: AverageLength = Field(description="averaging of all RMS figures, s")
-    noise_floor_dph: Amount | None = Field(description="of means over `average_s`, deg/h")
-    noise_floor_source: str | None = Field(description="`simulated`, or `estimated`")
+    average_s: AverageLength = Field(description="averaging time of all RMS figures, s")
+    noise_floor_dph: Amount | None = Field(
+        description="noise floor of means over `average_s`, deg/h; null if not known"
+    )
+    noise_floor_source: str | None = Field(description="source of the noise floor: `simulated` or `estimated`")
     constant_dph: float = Field(
         description="weighted mean of the training bias, which the table falls back to without a temperature: the "
         "constant that the map is compared with, deg/h"
     )
-    mismatches: Count | None = Field(description="steps that differ from the reference; null: not compared")
-    requirements: tuple[Requirement, ...] = Field(
-        description="what a PASS needs of the recordings, and whether they have it"
+    mismatches: Count | None = Field(description="steps that differ from the reference; null if not compared")
+    requirements: tuple[Requirement, ...] = Field(description="properties of the recordings that a PASS needs")
+    runs: tuple[EvaluatedRun, ...] = Field(description="all runs")
+    train: Pooled | None = Field(description="figures over all training runs; null if there are none")
+    exam: Pooled | None = Field(description="figures over all exam runs; null if there are none")
+    findings: tuple[Finding, ...] = Field(description="findings, the gravest first")
+    model: ModelSizes = Field(description="method and sizes of the model")
+    left_out: Pooled | None = Field(
+        default=None, description="figures over spans left out of training in turn; null if there are exam runs"
     )
-    runs: tuple[EvaluatedRun, ...] = Field(description="every run")
-    train: Pooled | None = Field(description="all training runs; null where there are none")
-    exam: Pooled | None = Field(description="all exam runs; null where there are none")
-    findings: tuple[Finding, ...] = Field(description="what a person should know, the gravest first")
-    model: ModelSizes = Field(description="what was evaluated")
-    left_out: Pooled | None = Field(default=None, description="without exam runs: spans left out of training in turn")
 
     generalises: bool | None = Field(
-        default=None, description="whether the correction held on history that it had not seen; null: not known"
+        default=None, description="true if the correction holds on history that it has not seen; null if not known"
     )
     rows_left_out: Count | None = Field(
-        default=None, description="rows of training runs that were left out for what they show; null: not known"
+        default=None,
+        description="rows of training runs that were left out because of what they show; null if not known",
     )
     sigma_rms_dph: Amount | None = Field(
         default=None,
         description="RMS of the 1 sigma that the table states, over the rows that the model is judged by and where the "
-        "correction is neither held nor clamped, deg/h; null where the table states none",
+        "correction is neither held nor clamped, deg/h; null if the table states none",
     )
     uncertainty: dict[str, FigureUncertainty] | None = Field(
         default=None,
-        description="of the figures that the model is judged by, by the names of limits; without those that the "
-        "recordings are too short for",
+        description="uncertainty of the figures that the model is judged by, by the names of limits; figures that the "
+        "recordings are too short for are absent",
     )
 
     residual: ResidualTest | None = Field(
-        default=None, description="of the runs that the model is judged by; null without an RMS or a noise floor"
+        default=None,
+        description="residual of the runs that the model is judged by; null without an RMS or a noise floor",
     )
     usable: Statistics | None = Field(
         default=None,
-        description="of all exam runs, else of all training runs, after compensation, of the rows that may be used "
-        "alone; null if no row is left out for what it shows",
+        description="figures after compensation over the usable rows of all exam runs, else of all training runs; null "
+        "if no row is left out because of what it shows",
     )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:
-        """What the model is judged by: exam runs, else spans left out, else the training runs themselves."""
+        """Return the data that the model is judged by: exam runs, else spans left out, else the training runs."""
         if self.exam:
             return "exam", self.exam
         if self.left_out:
@@ -287,12 +302,12 @@ class Evaluation(UnitResult):
 
     @property
     def structure_left(self) -> bool:
-        """Whether the residual holds more than noise, by its test or by a finding: `gyrotc diagnose` is next."""
+        """True if the residual is more than noise, by its test or by a finding; then `gyrotc diagnose` is next."""
         return bool(self.residual and self.residual.reasons) or any(f.id in _OF_STRUCTURE for f in self.findings)
 
     @property
     def residual_words(self) -> str:
-        """Why `gyrotc diagnose` is next; empty where it is not."""
+        """Reasons why `gyrotc diagnose` is next, in words; empty if it is not."""
         reasons = self.residual.reasons if self.residual else ()
         named = [f.id.replace("_", " ") for f in self.findings if f.id in _OF_STRUCTURE]
         return "; ".join((*reasons, *named))
@@ -301,123 +316,128 @@ class Evaluation(UnitResult):
 class FigureChange(Part):
     """A figure of both results."""
 
-    before: int | Figure = Field(description="of the earlier result")
-    after: int | Figure = Field(description="of this one")
+    before: int | Figure = Field(description="figure of the earlier result")
+    after: int | Figure = Field(description="figure of this result")
 
 
 class TextChange(Part):
     """A text of both results."""
 
-    before: str | None = Field(description="of the earlier result")
-    after: str | None = Field(description="of this one")
+    before: str | None = Field(description="text of the earlier result")
+    after: str | None = Field(description="text of this result")
 
 
 class RangeChange(Part):
     """A range of both results, lowest and highest."""
 
-    before: tuple[float, float] = Field(description="of the earlier result")
-    after: tuple[float, float] = Field(description="of this one")
+    before: tuple[float, float] = Field(description="range of the earlier result")
+    after: tuple[float, float] = Field(description="range of this result")
 
 
 class Envelopes(Part):
     """Calibrated ranges."""
 
-    temperature_c: RangeChange = Field(description="C")
-    slope_c_per_min: RangeChange = Field(description="C/min")
+    temperature_c: RangeChange = Field(description="calibrated temperatures, C")
+    slope_c_per_min: RangeChange = Field(description="calibrated dT/dt, C/min")
 
     @classmethod
     def of(cls, **ranges: tuple[tuple[float, float], tuple[float, float]]) -> Envelopes:
-        """From pairs of an earlier and a later range."""
+        """Make one from pairs of an earlier and a later range."""
         return cls(**{name: RangeChange(before=a, after=b) for name, (a, b) in ranges.items()})
 
 
 class NameChanges(Part):
     """Names that came and went."""
 
-    new: tuple[str, ...] = Field(description="only in this result")
-    gone: tuple[str, ...] = Field(description="only in the earlier one")
+    new: tuple[str, ...] = Field(description="names that are in this result alone")
+    gone: tuple[str, ...] = Field(description="names that are in the earlier result alone")
 
 
 class FileChanges(NameChanges):
     """Files that came, went, or have other bytes."""
 
-    other_bytes: tuple[str, ...] = Field(description="in both, with another SHA-256")
+    other_bytes: tuple[str, ...] = Field(description="files of both results with different SHA-256")
 
 
 class At(Part):
     """A place on the map."""
 
-    temperature_c: float = Field(description="C")
-    slope_c_per_min: float = Field(description="C/min")
+    temperature_c: float = Field(description="temperature, C")
+    slope_c_per_min: float = Field(description="dT/dt, C/min")
 
 
 class MapDifference(Part):
-    """How far the maps differ where both were calibrated."""
+    """Difference of two maps over their common envelope."""
 
-    rms_dph: float = Field(description="deg/h")
-    mean_dph: float = Field(description="deg/h")
-    max_abs_dph: float = Field(description="deg/h")
-    at: At = Field(description="where they differ most")
-    rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null where that is not known")
+    rms_dph: float = Field(description="RMS difference, deg/h")
+    mean_dph: float = Field(description="mean difference, deg/h")
+    max_abs_dph: float = Field(description="largest difference, deg/h")
+    at: At = Field(description="place of the largest difference")
+    rms_over_floor: Figure = Field(description="`rms_dph` over the noise floor; null if the floor is not known")
     expanded_uncertainty_dph: Amount | None = Field(
         default=None,
-        description="U (k = 2) of `rms_dph`: twice the RMS by which the map moves although the gyro has not changed. "
-        "With `--prior` by the noise of the new recordings and the earlier map's sigma; else by the uncertainties of "
-        "both maps (`uncertainty_dph`; without it those of the means of what remains). Null where that is not known",
+        description="expanded uncertainty (k = 2) of `rms_dph`: twice the RMS by which the map of an unchanged gyro "
+        "moves. With `--prior` it comes from the noise of the new recordings and the sigma of the earlier map, else "
+        "from the uncertainties of both maps. Null if not known",
     )
     significant: bool | None = Field(
-        default=None, description="whether `rms_dph` is more than that; null where it is not known"
+        default=None, description="true if `rms_dph` is above its expanded uncertainty; null if that is not known"
     )
 
 
 class AsFound(Part):
-    """The earlier correction on the new recordings: how the unit was when it came back."""
+    """The state of the unit as found: the earlier correction on the new recordings."""
 
     judged_on: Literal["exam", "train"] = Field(
-        description="runs of the new data set that it was judged on; it has seen none of them"
+        description="runs of the new data set that the earlier correction is judged on"
     )
-    figures: Pooled = Field(description="of these runs, `after` with the earlier correction")
-    limits: HeldLimits | None = Field(description="the same limits; null where there were none")
+    figures: Pooled = Field(description="figures of these runs; `after` is with the earlier correction")
+    limits: HeldLimits | None = Field(description="limits compared with these figures; null without limits")
 
 
 class Calibration(Part):
     """One of the calibrations of a unit, the earliest first."""
 
-    date: str | None = Field(description="`calibrated_on` of `[meta]`, else the start of the last recording")
-    model_hash: str = Field(description="of its model")
-    as_found_rms_dph: Figure = Field(description="of the correction before it on its recordings, deg/h")
-    as_left_rms_dph: Figure = Field(description="of its own, deg/h")
-    moved_rms_dph: Figure = Field(description="how far the map moved since the one before, deg/h")
-    moved_mean_dph: Figure = Field(description="its mean over the common envelope, deg/h")
-    expanded_uncertainty_dph: Figure = Field(description="U (k = 2) of `moved_rms_dph`")
-    significant: bool | None = Field(description="whether it moved by more than that")
+    date: str | None = Field(
+        description="date of the calibration: `calibrated_on` of `[meta]`, else the start of the last recording"
+    )
+    model_hash: str = Field(description="hash of the model")
+    as_found_rms_dph: Figure = Field(description="RMS of the earlier correction on the recordings, deg/h")
+    as_left_rms_dph: Figure = Field(description="RMS of the new correction on the recordings, deg/h")
+    moved_rms_dph: Figure = Field(description="RMS change of the map since the calibration before, deg/h")
+    moved_mean_dph: Figure = Field(description="mean change of the map over the common envelope, deg/h")
+    expanded_uncertainty_dph: Figure = Field(description="expanded uncertainty (k = 2) of `moved_rms_dph`, deg/h")
+    significant: bool | None = Field(
+        description="true if the map moved by more than its expanded uncertainty; null if not known"
+    )
 
 
 class Changes(UnitResult):
-    """What is different from an earlier result (`gyrotc build --previous`)."""
+    """Changes since an earlier result (`gyrotc build --previous`)."""
 
     schema_: Annotated[Literal["gyrotc.changes/1"], Field(alias="schema")] = "gyrotc.changes/1"
-    same_model: bool = Field(description="whether the models have one hash")
+    same_model: bool = Field(description="true if both models have the same hash")
     model_hash: TextChange = Field(description="hashes of the models")
     recordings: FileChanges = Field(description="recordings that the models were fitted to")
-    map: MapDifference | None = Field(description="null where the envelopes have nothing in common")
+    map: MapDifference | None = Field(description="difference of the maps; null if the envelopes do not overlap")
     envelope: Envelopes = Field(description="calibrated ranges")
     figures: dict[str, FigureChange | str] = Field(
-        description="figures of both results; `judged_on` says on what those of recordings were measured, which are "
-        "there where both results were judged on the same kind"
+        description="figures of both results; `judged_on` names the data of those from recordings, which are present "
+        "if both results were judged on the same kind of data"
     )
-    findings: NameChanges = Field(description="ids of findings")
-    versions: dict[str, TextChange] = Field(description="programs whose version is another")
-    files: FileChanges = Field(description="emitted files")
+    findings: NameChanges = Field(description="changes of the ids of findings")
+    versions: dict[str, TextChange] = Field(description="programs with another version")
+    files: FileChanges = Field(description="changes of the emitted files")
     as_found: AsFound | None = Field(
-        default=None, description="null where `as_found_missing` says why, or of an older gyrotc"
+        default=None,
+        description="state of the unit as found; null if `as_found_missing` says why, or if written by an older gyrotc",
     )
-    as_found_missing: str = Field(default="", description="why there is no state as found")
+    as_found_missing: str = Field(default="", description="reason why there is no state as found")
     history: tuple[Calibration, ...] = Field(
-        default=(), description="all calibrations that are known by their chain of `--previous`, this one last"
+        default=(), description="known calibrations by the chain of `--previous`, this one last"
     )
 
     @property
     def named(self) -> tuple[tuple[str, NameChanges], ...]:
-        """What came, went or has other bytes, by what it is."""
+        """Changes of recordings, findings and files, with what they are."""
         return ("recordings", self.recordings), ("findings", self.findings), ("files", self.files)

@@ -1,4 +1,4 @@
-"""Two names are swapped in one step where system and file system can."""
+"""Swap two names in one step, if system and file system can."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _NOT_HERE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 
 
 def exchange(first: Path, second: Path) -> bool:
-    """Swaps two existing names; False where system or file system cannot (nothing is done then).
+    """Swap two existing names; return False, with nothing done, if system or file system cannot.
 
     Raises:
-        OSError: It can, and it failed.
+        OSError: The exchange is supported and failed.
     """
     call = _call()
     if call is None:

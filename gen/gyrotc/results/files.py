@@ -1,4 +1,4 @@
-"""Single files: opened for writing in one place, replaced whole or not at all."""
+"""Write single files: a file is replaced as a whole, or stays as it was."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 def create(path: Path) -> BinaryIO:
-    """A new file, open for writing.
+    """Create a new file and open it for writing.
 
     Raises:
-        FileExistsError: The name is taken, be it by a link that leads nowhere.
-        OSError: It cannot be made.
+        FileExistsError: The name is taken, even if by a link that leads nowhere.
+        OSError: The file cannot be created.
     """
     return os.fdopen(os.open(path, _NEW, 0o666), "wb")
 
 
 def write_own(path: Path, data: str | bytes) -> None:
-    """Writes a file into a folder that this job has made for itself, in place of one that it wrote there before.
+    """Write a file into a folder that this job made for itself; it replaces one that the job wrote there before.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     path.unlink(missing_ok=True)
     with create(path) as stream:
@@ -39,7 +39,7 @@ def write_own(path: Path, data: str | bytes) -> None:
 
 
 def sha256(path: Path, *, sync: bool = False) -> str:
-    """SHA-256 of a file; with `sync` the file is on disk when this returns."""
+    """Return the SHA-256 of a file; with `sync` the file is on disk when this returns."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(2**20):
@@ -50,7 +50,7 @@ def sha256(path: Path, *, sync: bool = False) -> str:
 
 
 def sync_folder(folder: Path) -> None:
-    """Names in a folder are on disk when this returns, where the file system can do that."""
+    """Put the names in a folder on disk, if the file system can."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(handle)
@@ -59,19 +59,17 @@ def sync_folder(folder: Path) -> None:
 
 
 unfinished: list[Path] = []
-"""Folders that this process is writing; they are put on disk and into their places as a whole."""
+"""Folders that this process is writing; each is put on disk and into its place as a whole."""
 
 
 def write_atomically(path: Path, data: str | bytes, more: bytes = b"") -> None:
-    """Writes a file under a temporary name beside it and renames it into place, on disk when this returns.
+    """Write a file under a temporary name and rename it into place; it is on disk when this returns.
 
-    `more` comes behind `data`.
-
-    A device or a pipe is written as it is; a link is replaced, and where it led stays as it was.
+    `more` follows `data`. A device or a pipe is written directly; a link is replaced, and its target stays as it was.
 
     Raises:
-        InputError: Something else has the name of the lock; nobody reads the pipe.
-        OSError: It cannot be written; then what was there still is.
+        InputError: Something else has the name of the lock, or nobody reads the pipe.
+        OSError: The file cannot be written; the earlier one stays.
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
@@ -115,7 +113,7 @@ ANSWERS = b"# gyrotc: answers of the board test\n"
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuses to replace a file, named by `--json`, `--map` or `--answers`, that gyrotc did not write.
+    """Refuse to replace a file that gyrotc did not write (`--json`, `--map`, `--answers`).
 
     Raises:
         InputError: There is such a file, a folder, or a link to a device or a pipe.
@@ -143,7 +141,7 @@ def check_replaceable(path: Path) -> None:
 
 
 def _is_stream(path: Path) -> bool:
-    """Whether it is a device or a pipe; behind a link only where that is the system's, such as `/dev/stdout`."""
+    """Test whether a path is a device or a pipe; behind a link only if the link is the system's, as `/dev/stdout`."""
     try:
         mode = path.stat().st_mode
     except OSError:

@@ -1,4 +1,4 @@
-"""A result folder: made beside its place, then exchanged with it in one step, so that it is never seen half-written."""
+"""Write a result folder: it is made beside its place and exchanged with it in one step, so it is never half-written."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _open: list[_Job] = []
 
 
 class Stage:
-    """What a job sees of its output.
+    """The folder that a job writes into.
 
     Attributes:
-        folder: Write here. It is empty at first; what is written takes its place at the end.
+        folder: Path of the folder. It is empty at first; its content takes its place at the end of the job.
     """
 
     def __init__(self, folder: Path, job: _Job, part: str) -> None:
@@ -45,10 +45,10 @@ class Stage:
         self._part = part
 
     def of(self, serial: str, axis: str | None = None) -> None:
-        """Says whose result it is: call it as soon as that is known, before the work.
+        """State whose result it is. Call it as soon as that is known, before the work.
 
         Raises:
-            InputError: An earlier result there is another gyro's.
+            InputError: There is an earlier result of another gyro.
         """
         if not self._part:
             self._job.check_serial(serial)
@@ -56,7 +56,7 @@ class Stage:
         markers[self._part] = markers[self._part].but(serial=serial, axis=axis)
 
     def stale(self) -> None:
-        """Says that what else gyrotc wrote into the folder no longer holds: it goes when the new files come.
+        """State that everything else gyrotc wrote into the folder is out of date: it goes when the new files come.
 
         Raises:
             InputError: Some of it was changed since.
@@ -74,22 +74,22 @@ def result_folder(
     entries: Collection[str] | None = None,
     inputs: Sequence[Path] = (),
 ) -> Iterator[Stage]:
-    """A folder to write into, which becomes `out` when the block ends well; else `out` stays as it was.
+    """Provide a folder to write into, which becomes `out` if the block ends well; else `out` stays as it was.
 
-    Whoever reads `out` meanwhile, and whenever the job is killed, sees the earlier result or the new one.
-    Inside another result folder of this process it is a part of that one: written there, placed with it.
+    A reader of `out` sees the earlier result or the new one, whenever he looks and whenever the job is killed. Inside
+    another result folder of this process it is a part of that one: written there, and placed with it.
 
     Args:
-        out: Where the result goes.
-        command: The command that writes it.
-        kind: What kind of folder it becomes; default: the kind of the command. "" takes any kind that is there.
-        entries: Names in `out` that are written; all else in it stays. None: the folder is replaced as a whole.
-        inputs: What the job reads: `out` must lie outside of it.
+        out: Place of the result.
+        command: Command that writes it.
+        kind: Kind of the folder; None: the kind of the command; "": any kind that is there.
+        entries: Names in `out` that are written; everything else in it stays. None: the folder is replaced as a whole.
+        inputs: Folders that the job reads; `out` must lie outside of them.
 
     Raises:
-        InputError: `out` holds what gyrotc did not write, or another kind of result; it is the same as, above or
-            inside an input or gyrotc's sources; another job is writing there.
-        GyrotcError: It cannot be written (disk full, no permission).
+        InputError: `out` contains files that gyrotc did not write, or is another kind of result; it is the same as,
+            above or inside an input or gyrotc's sources; another job is writing there.
+        GyrotcError: The folder cannot be written (disk full, no permission).
     """
     kind = KINDS[command] if kind is None else kind
     outer = next((job for job in reversed(_open) if job.work in (real := real_path(out), *real.parents)), None)
@@ -120,7 +120,7 @@ def result_folder(
 
 
 def write_result(path: Path, text: str) -> None:
-    """Writes a JSON result or a page where the user asked for it; in a result folder it becomes one of its files.
+    """Write a JSON result or a page to a path of the user's; in a result folder it becomes one of its files.
 
     Raises:
         InputError: As `check_replaceable`.
@@ -134,7 +134,7 @@ def write_result(path: Path, text: str) -> None:
 
 
 class _Job:
-    """A folder that is being written, by the one who holds its place."""
+    """A folder that is being written while its place is held."""
 
     def __init__(self, out: Path, marker: Marker, entries: Collection[str] | None) -> None:
         self.out = out
@@ -147,21 +147,21 @@ class _Job:
         self.markers = {"": marker.but(kind=kind)}
 
     def begin(self) -> None:
-        """Makes the folder to work in, with a marker that lets everybody see what it is."""
+        """Make the folder to work in, with a marker that says what it is."""
         self.work.mkdir(mode=0o755)
         _open.append(self)
         unfinished.append(self.work)
         write_marker(self.work, self.markers[""].but(finished=False))
 
     def check_serial(self, serial: str) -> None:
-        """Refuses to put a result of one gyro into the place of another's; raises as `Stage.of`."""
+        """Refuse to put a result of one gyro into the place of another's; raises as `Stage.of`."""
         earlier = self.earlier
         if earlier is not None and earlier.serial not in (None, serial) and earlier.kind in _OF_ONE_GYRO:
             found = f"holds the result of serial {earlier.serial}, and this is of {serial}"
             raise InputError(str(self.out), found, "another folder; or delete the earlier result first")
 
     def part(self, path: Path, marker: Marker) -> Stage:
-        """A result inside this one, with a marker of its own."""
+        """Begin a result inside this one, with a marker of its own."""
         name = real_path(path).relative_to(self.work).as_posix()
         name = "" if name == "." else name
         path.mkdir(parents=True, exist_ok=True)
@@ -169,13 +169,13 @@ class _Job:
         return Stage(path, self, name)
 
     def replace_all(self) -> None:
-        """From now on all that gyrotc wrote is replaced, not only the entries asked for."""
+        """Replace all that gyrotc wrote, not only the entries asked for."""
         if self.entries is not None and self.earlier is not None:
             self.earlier = check_contents(self.out, None, None)
             self.entries = None
 
     def describe(self) -> None:
-        """Gives what was written, and what stays of the earlier result, their markers; all is on disk then."""
+        """Write the markers of what was written and of what stays of the earlier result; all is on disk then."""
         for name in sorted(self.markers, reverse=True):
             inside = f"{name}/" if name else ""
             parts = tuple(p[len(inside) :] for p in self.markers if p not in ("", name) and p.startswith(inside))
@@ -187,7 +187,7 @@ class _Job:
             sync_folder(Path(place))
 
     def _with_earlier(self, new: Marker, earlier: Marker, entries: Collection[str]) -> Marker:
-        """The marker with what stays of the earlier result, which is linked into the new folder with all else there."""
+        """Link all that stays of the earlier folder into the new one, and return the marker of both."""
         written = {top(name) for name in (*new.files, *new.parts)}
         if beyond := written.difference(entries):
             raise ValueError(f"{sorted(beyond)} is not among the entries of this job")
@@ -206,7 +206,7 @@ class _Job:
         )
 
     def commit(self) -> None:
-        """Puts the work into its place; what was there before then lies in `work`."""
+        """Put the work into its place; what was there before then lies in `work`."""
         if not self.place.exists():
             self.work.rename(self.place)
         elif not exchange(self.work, self.place):
@@ -217,7 +217,7 @@ class _Job:
         sync_folder(self.place.parent)
 
     def end(self) -> None:
-        """Removes what is left of the work, or of the earlier result."""
+        """Remove what is left of the work, or of the earlier result."""
         if self in _open:
             _open.remove(self)
             unfinished.remove(self.work)
@@ -236,7 +236,7 @@ def _link(source: Path, target: Path) -> None:
 
 
 def clean(place: Path) -> None:
-    """Removes what dead jobs left beside a place.
+    """Remove what dead jobs left beside a place.
 
     Raises:
         InputError: A job is writing there.
@@ -246,7 +246,7 @@ def clean(place: Path) -> None:
 
 
 def _recover(place: Path) -> None:
-    """Puts a finished result into a place that a dead job left empty, and removes what it left beside it."""
+    """Put a finished result into a place that a dead job left empty, and remove what the job left beside it."""
     parts = [path for path in parts_beside(place) if path.is_dir() and not path.is_symlink()]
     if parts and not place.exists():
         whole = next((path for path in parts if _is_whole(path)), None)
@@ -276,7 +276,7 @@ def _is_whole(path: Path) -> bool:
 
 
 def _remove(path: Path, place: Path) -> None:
-    """Removes a folder of a job; what somebody else put into it is kept, under a name that can be seen."""
+    """Remove a folder of a job; files that somebody else put into it are kept, under a visible name."""
     for name in list(walk(path)):
         if not name.endswith("/") and _is_same(path / name, place / name):
             (path / name).unlink()
@@ -290,7 +290,7 @@ def _remove(path: Path, place: Path) -> None:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """An empty folder, this user's alone, in the place for temporary files; gone with all that is in it afterwards.
+    """Provide an empty folder of this user alone among the temporary files; it is removed with its content afterwards.
 
     Raises:
         OSError: There is no place for temporary files, or no space in it.

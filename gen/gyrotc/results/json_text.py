@@ -1,4 +1,4 @@
-"""JSON as gyrotc writes it: one text for one content, and the form that hashes are taken of."""
+"""The JSON that gyrotc writes: one text for one content, and the canonical form for hashes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SERIES = 32  # numbers; a longer list stands in one line: a third of its bytes 
 
 
 def json_text(content: Any) -> str:
-    """The text of a JSON file: one blank for each level, long lists of numbers in one line, a line end at the end.
+    """Return the text of a JSON file: one blank for each level, long lists of numbers in one line, a final line end.
 
     Raises:
         ValueError: A number is not finite.
@@ -21,9 +21,9 @@ def json_text(content: Any) -> str:
 
 
 def _text(content: Any, level: int) -> str:
-    """As `json.dumps(content, indent=1)` but for series; that goes value by value in Python: ten times as long.
+    """Return what `json.dumps(content, indent=1)` gives, but for series, in a tenth of its time.
 
-    What holds no list or object itself is written in one go, with line ends for blanks.
+    A list or object without lists or objects inside is written in one go, with line ends for blanks.
     """
     if not isinstance(content, _NESTED) or not content:
         return _encoder(level).encode(content)
@@ -45,7 +45,7 @@ def _text(content: Any, level: int) -> str:
 
 @functools.cache
 def _encoder(level: int) -> json.JSONEncoder:
-    """Writes lists and objects that hold plain values, one a line."""
+    """Return an encoder of lists and objects of plain values, one a line."""
     return json.JSONEncoder(allow_nan=False, separators=(",\n" + " " * (level + 1), ": "))
 
 
@@ -55,7 +55,7 @@ def _line() -> json.JSONEncoder:
 
 
 def canonical_json(content: Any) -> bytes:
-    """What a hash is taken of: sorted keys, no blanks, ASCII.
+    """Return the text that a hash is taken of: sorted keys, no blanks, ASCII.
 
     Raises:
         ValueError: A number is not finite.

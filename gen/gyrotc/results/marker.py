@@ -48,15 +48,15 @@ _MOST_BYTES = 2**26  # 64 MiB: a marker of half a million files
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """What in a folder is gyrotc's.
+    """The files of a folder that gyrotc wrote, and the result that they are.
 
     Attributes:
         kind: One of `KINDS`, or `trace` (traces outside a result).
-        command: That wrote the folder last.
-        serial: Of the gyro; None where the folder is not of one gyro.
-        axis: None where it is not of one axis.
+        command: Command that wrote the folder last.
+        serial: Serial number of the gyro; None if the folder is not of one gyro.
+        axis: Axis; None if the folder is not of one axis.
         parts: Paths of folders inside with a marker of their own (an axis, a diagnosis).
-        finished: Whether the job that made the folder came to its end.
+        finished: True if the job that made the folder came to its end.
         files: SHA-256 of every file that gyrotc wrote, by its path in the folder, without markers and parts.
     """
 
@@ -69,11 +69,11 @@ class Marker:
     files: dict[str, str] = field(default_factory=dict)
 
     def but(self, **changed: Any) -> Self:
-        """The same with other values in some fields."""
+        """Return a copy with other values in some fields."""
         return replace(self, **changed)
 
     def text(self) -> str:
-        """The file's text, as `sha256sum` writes and reads it, below the line that says whose it is."""
+        """Return the text of the file: a line that says whose it is, then lines of `sha256sum`."""
         head = {
             "version": __version__,
             "kind": self.kind,
@@ -97,10 +97,10 @@ _ESCAPES = {"\\\\": "\\", "\\n": "\n", "\\r": "\r"}
 
 
 def _file_of(line: str) -> tuple[str, str]:
-    """Path and hash that a line states.
+    """Return the path and the hash that a line states.
 
     Raises:
-        ValueError: It is no line of a list of hashes.
+        ValueError: The line is none of a list of hashes.
     """
     found = _LINE.fullmatch(line)
     if found is None:
@@ -110,10 +110,10 @@ def _file_of(line: str) -> tuple[str, str]:
 
 
 def read_marker(folder: Path) -> Marker | None:
-    """The marker of a folder; None if it has none.
+    """Read the marker of a folder; None if it has none.
 
     Raises:
-        InputError: It is damaged, or gyrotc did not write it.
+        InputError: The marker is damaged, or gyrotc did not write it.
     """
     path = folder / MARKER
     try:
@@ -137,10 +137,10 @@ def read_marker(folder: Path) -> Marker | None:
 
 
 def _checked_part(folder: Path, part: str) -> str:
-    """A folder inside, by a path that leads nowhere else: whoever wrote the marker may have meant one of the user's.
+    """Check that a part is a folder inside: a forged marker may name one of the user's own.
 
     Raises:
-        ValueError: It is not.
+        ValueError: The path leads elsewhere.
     """
     names = part.split("/")
     if not all(names) or {".", ".."} & set(names) or "\0" in part:
@@ -151,10 +151,10 @@ def _checked_part(folder: Path, part: str) -> str:
 
 
 def write_marker(folder: Path, marker: Marker) -> None:
-    """Writes a folder's marker in one step, on disk when this returns.
+    """Write the marker of a folder in one step; it is on disk when this returns.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The marker cannot be written.
     """
     new = folder / _NEXT
     new.unlink(missing_ok=True)
@@ -167,7 +167,7 @@ def write_marker(folder: Path, marker: Marker) -> None:
 
 
 def walk(folder: Path, parts: Collection[str] = ()) -> Iterator[str]:
-    """Paths of all that is in a folder but its marker and its parts; an empty folder ends with a slash.
+    """Yield the paths of all that is in a folder except its marker and its parts; an empty folder ends with a slash.
 
     Links are not followed.
     """
@@ -192,7 +192,7 @@ def walk(folder: Path, parts: Collection[str] = ()) -> Iterator[str]:
 
 
 def described(folder: Path, marker: Marker) -> Marker:
-    """A marker with the hashes of what is in a folder; the files are on disk then, empty folders are gone."""
+    """Return a marker with the hashes of all files in a folder; puts them on disk and removes empty folders."""
     files = {}
     for name in walk(folder, marker.parts):
         path = folder / name
@@ -206,15 +206,15 @@ def described(folder: Path, marker: Marker) -> Marker:
 
 
 def top(name: str) -> str:
-    """The entry of the folder itself that a path in it begins with."""
+    """Return the first name of a path."""
     return name.split("/", 1)[0]
 
 
 def survey_folder(folder: Path, marker: Marker, entries: Collection[str] | None = None) -> tuple[list[str], list[str]]:
-    """What is in a folder and not of gyrotc, and what gyrotc wrote and somebody changed: two lists of paths.
+    """List the files of a folder that gyrotc did not write, and those that it wrote and somebody changed.
 
     Args:
-        entries: Look at these names in the folder only; None: at all.
+        entries: Names in the folder to look at; None: all.
     """
     foreign, edited = [], []
     for name in walk(folder, marker.parts):
@@ -234,7 +234,7 @@ def survey_folder(folder: Path, marker: Marker, entries: Collection[str] | None 
 
 
 def result_faults(folder: Path) -> list[str]:
-    """What keeps a folder from being a complete result as it was written: a line for each; empty if it is one.
+    """List what keeps a folder from being a complete result as it was written, a line each.
 
     Files that gyrotc did not write are no fault.
     """
@@ -249,14 +249,14 @@ _AS_WRITTEN = "a folder as gyrotc wrote it; make it again"
 
 
 def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -> None:
-    """Refuses a result of which a file is missing, or is not as gyrotc wrote it.
+    """Refuse a result of which a file is missing, or is not as gyrotc wrote it.
 
     Args:
-        names: Paths of files and folders in it; others are not looked at, nor is the example that a user makes his own.
-        needed: A folder without a marker is refused, too.
+        names: Paths of the files and folders in it to look at; the example, which users edit, is passed over.
+        needed: True if a folder without a marker is refused, too.
 
     Raises:
-        InputError: One is.
+        InputError: A file is missing, changed or not of gyrotc.
     """
     marker = read_marker(folder)
     if marker is None:
@@ -278,7 +278,7 @@ def check_intact(folder: Path, names: Collection[str], *, needed: bool = True) -
 
 
 EXAMPLE = "c/main.c"
-"""The example, which a user may change in a result and go on using it."""
+"""Path of the example, which a user may change in a result."""
 
 
 def _among(name: str, names: Collection[str]) -> bool:
@@ -290,12 +290,12 @@ def _is(path: Path, known: str) -> bool:
 
 
 def remove_listed(folder: Path) -> bool:
-    """Removes what gyrotc wrote into a folder, and the folder if nothing else is in it.
+    """Remove what gyrotc wrote into a folder, and the folder if nothing else is in it.
 
-    Of a job that did not come to its end nobody knows a list; its folder had a name that only it knew, and all goes.
+    A job that was killed left no list of its files; the name of its folder was known to it alone, so all of it goes.
 
     Returns:
-        Whether it is gone: else it holds what gyrotc did not write, or not like this.
+        True if the folder is gone; False if it holds files that gyrotc did not write, or that were changed.
     """
     try:
         marker = read_marker(folder)
@@ -316,7 +316,7 @@ def remove_listed(folder: Path) -> bool:
 
 
 def _remove_empty(folder: Path) -> bool:
-    """Removes a folder in which there are folders only, and its marker last; whether it was one."""
+    """Remove a folder that holds nothing but folders and its marker; return whether it was one."""
     if any(not name.endswith("/") for name in walk(folder)):
         return False
     for place, _, _ in os.walk(folder, topdown=False):

@@ -1,4 +1,4 @@
-"""A place is a name at which a file or a folder appears whole: who holds it, and what lies beside it meanwhile."""
+"""A place: a name at which a file or a folder appears whole. Lock it, and name what lies beside it meanwhile."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from filelock import FileLock, Timeout
 
 from ..common.errors import InputError
 
-_PART = ".gyrotc-part-"  # in the name, beside a place, of what is not in it yet or any more
+_PART = ".gyrotc-part-"  # in the names, beside a place, of files and folders that are not yet or no longer in it
 
 
 def part_of(place: Path) -> Path:
-    """A new name beside a place, for what a job makes before it takes the place."""
+    """Return a new name beside a place, for what a job makes before it takes the place."""
     return place.with_name(f".{place.name}{_PART}{secrets.token_hex(4)}")
 
 
 def parts_beside(place: Path) -> list[Path]:
-    """What lies beside a place under such names, in the order of the names. None but who holds the place may ask."""
+    """List what lies beside a place under such names, in their order. Call it only while the place is held."""
     own = re.compile(re.escape(f".{place.name}{_PART}") + "[0-9a-f]{8}")
     return sorted(path for path in place.parent.iterdir() if own.fullmatch(path.name))
 
 
 def unfinished_beside(folder: Path, names: Sequence[str]) -> set[str]:
-    """Names in a folder that a job has not finished, be it dead or alive; and those of `names` that one holds."""
+    """Return the names in a folder that a job, dead or alive, has not finished, and those of `names` that are held."""
     hidden = {path.name[1:] for path in folder.iterdir() if path.name.startswith(".")}
     unfinished = {name.partition(_PART)[0] for name in hidden if _PART in name}
     return unfinished | {name for name in names if f"{name}{_LOCK}" in hidden}
@@ -40,10 +40,10 @@ _LOCK = ".lock"
 
 @contextmanager
 def held(place: Path, *, wait: bool = False) -> Iterator[None]:
-    """Inside, no other job of gyrotc writes at a place: `.<name>.lock` beside it is locked, and gone afterwards.
+    """Hold a place: no other job of gyrotc writes there meanwhile. `.<name>.lock` beside it is locked, and removed.
 
     Raises:
-        InputError: Another job does; something else has the name of the lock.
+        InputError: Another job writes there, or something else has the name of the lock.
         OSError: The folder that the place lies in cannot be written.
     """
     path = place.with_name(f".{place.name}{_LOCK}")
@@ -56,12 +56,12 @@ def held(place: Path, *, wait: bool = False) -> Iterator[None]:
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)  # who waits for this file finds out, and locks a new one
+        path.unlink(missing_ok=True)  # a job that waits for this file finds out, and locks a new one
         lock.release()
 
 
 def _check_lock(path: Path) -> None:
-    """Refuses what is no empty file of this user at the name of a lock; there may be none."""
+    """Refuse anything but an empty file of this user at the name of a lock; there may be none."""
     try:
         facts = path.lstat()
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What was emitted and verified of a unit, and what is decided of it (`limits.json`, `budget.json`)."""
+"""Results that a release rests on: emitted tables, verification, limits and uncertainty budget."""
 
 from __future__ import annotations
 
@@ -158,10 +158,12 @@ class HeldLimits(UnitResult):
     limits: tuple[Limit, ...] = Field(description="all limits of the file")
     verdict: Verdict | None = Field(
         default=None,
-        description="the worst of all limits and of what the recordings allow (`requirements` of `evaluate.json`); "
-        "null: there are no limits",
+        description="worst of the verdicts of all limits and of `requirements` of `evaluate.json`; null if there are "
+        "no limits",
     )
-    capped: tuple[str, ...] = Field(default=(), description="why it is no PASS although all may be within their bounds")
+    capped: tuple[str, ...] = Field(
+        default=(), description="reasons why it is no PASS although all figures may be within their bounds"
+    )
     decision_rule: DecisionRule = Field(description="decision rule of the limits file")
 
 
@@ -169,7 +171,7 @@ STATED = (
     "model.json", "training.json", "evaluate.json", "limits.json", "budget.json", "changes.json", "manifest.json",
     "diagnosis/diagnose.json", "verify.json", "c",
 )  # fmt: skip
-"""Files and folders of an axis that say something of the unit, by their paths in its folder."""
+"""Files and folders of an axis that state facts of the unit, by their paths in its folder."""
 
 
 _RMS_GROWTH = (
@@ -180,7 +182,7 @@ _RMS_GROWTH = (
 class EmittedTable(Part):
     """Size and error bound of one table."""
 
-    numeric: Numeric = Field(description="its arithmetic")
+    numeric: Numeric = Field(description="arithmetic of the table")
     table_bytes: Count = Field(description=TABLE_BYTES)
     error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
     rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
@@ -191,7 +193,7 @@ class Emitted(UnitResult):
 
     schema_: Annotated[Literal["gyrotc.emit/1"], Field(alias="schema")] = "gyrotc.emit/1"
     id: str = Field(description="id of the table, part of every emitted name")
-    tables: tuple[EmittedTable, ...] = Field(description="one for each arithmetic")
+    tables: tuple[EmittedTable, ...] = Field(description="tables, one for each arithmetic")
     refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
 
 
@@ -227,10 +229,10 @@ class CallCost(Part):
 
 
 class FunctionCost(Part):
-    """What a public function takes."""
+    """Code and stack of a public function."""
 
     code_bytes: Count = Field(description="code of the function and of what it calls, bytes")
-    stack_bytes: Count = Field(description="at the deepest of its calls")
+    stack_bytes: Count = Field(description="stack of the deepest call chain, bytes")
     helpers: tuple[str, ...] = Field(
         description="functions of the compiler's library that it calls; their stack is not counted"
     )
@@ -239,28 +241,30 @@ class FunctionCost(Part):
 class ReplayedRows(Part):
     """Recordings that were replayed."""
 
-    runs: Count = Field(description="runs that were replayed")
-    rows: Count = Field(description="rows in them")
+    runs: Count = Field(description="number of runs that were replayed")
+    rows: Count = Field(description="number of rows of these runs")
     mismatches: Count = Field(description="rows that differ from the reference in any bit")
-    first_mismatches: tuple[str, ...] = Field(description="the first of them with all bits")
-    error: str | None = Field(default=None, description="why it could not be replayed to the end")
+    first_mismatches: tuple[str, ...] = Field(description="first rows that differ, with all bits")
+    error: str | None = Field(default=None, description="reason why the replay ended early; null if it did not")
 
 
 class VerifiedTarget(Part):
     """The board test on one target, in one arithmetic."""
 
     name: str = Field(description="name of the target, or the name that a board prints of itself")
-    status: Literal["pass", "fail", "missing"] = Field(description="`missing`: its compiler or emulator is not here")
+    status: Literal["pass", "fail", "missing"] = Field(
+        description="outcome; `missing` if its compiler or emulator is not installed"
+    )
     numeric: str = Field(description="arithmetic")
-    package: str | None = Field(default=None, description="packages that are missing")
-    compiler: str | None = Field(default=None, description="name and version")
+    package: str | None = Field(default=None, description="packages that are missing; null if none is")
+    compiler: str | None = Field(default=None, description="name and version of the compiler")
     flags: str | None = Field(default=None, description="options of the compiler")
     log: str | None = Field(default=None, description="file with the output of a board test that ran elsewhere")
     parts: Count | None = Field(default=None, description="board tests of this arithmetic in that file")
     table_bytes: Count | None = Field(default=None, description=TABLE_BYTES)
     vectors: Count | None = Field(default=None, description="results that were compared")
     mismatches: Count | None = Field(default=None, description="results that differ from the reference")
-    first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
+    first_mismatches: tuple[str, ...] = Field(default=(), description="first results that differ, with all bits")
     instructions: CallCost | None = Field(default=None, description="instructions of a call of the map")
     cycles: CallCost | None = Field(default=None, description="cycles of a call of the map")
     ticks: CallCost | None = Field(
@@ -271,106 +275,113 @@ class VerifiedTarget(Part):
     step_cycles: CallCost | None = Field(default=None, description="cycles of a sample")
     step_ticks: CallCost | None = Field(default=None, description="time of a sample, in units of the board's counter")
     step_stack_bytes: Count | None = Field(default=None, description="stack of a sample, bytes")
-    code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked")
-    read_only_bytes: Count | None = Field(default=None, description="constants of them that are linked")
-    ram_bytes: Count | None = Field(default=None, description="their writable static data")
-    functions: dict[str, FunctionCost] | None = Field(default=None, description="public functions by name")
-    error: str | None = Field(default=None, description="why there is no result")
-    replayed: ReplayedRows | None = Field(default=None, description="recordings, where some were given")
+    code_bytes: Count | None = Field(default=None, description="code of runtime and table that is linked, bytes")
+    read_only_bytes: Count | None = Field(
+        default=None, description="constants of runtime and table that are linked, bytes"
+    )
+    ram_bytes: Count | None = Field(default=None, description="writable static data of runtime and table, bytes")
+    functions: dict[str, FunctionCost] | None = Field(default=None, description="cost of the public functions, by name")
+    error: str | None = Field(default=None, description="reason why there is no result; null if there is one")
+    replayed: ReplayedRows | None = Field(default=None, description="replayed recordings; null if none were given")
 
     @property
     def map_cost(self) -> tuple[str, CallCost] | None:
-        """What the counter of the target counts, and the cost of a call of the map in it."""
+        """Unit of the counter of the target, and the cost of a call of the map in it; None if not counted."""
         found = {"instructions": self.instructions, "cycles": self.cycles, "ticks": self.ticks}
         return next(((unit, cost) for unit, cost in found.items() if cost), None)
 
 
 class VerifiedFile(Part):
-    """An emitted file, compared with what the model gives."""
+    """An emitted file, compared with the one that the model gives."""
 
-    file: str = Field(description="its name in `c/`")
+    file: str = Field(description="name of the file in `c/`")
     verdict: Literal["equal", "differs", "missing", "foreign", "edited"] = Field(
         description="`foreign`: gyrotc does not make it; `edited`: the example differs, as its user may edit it"
     )
-    status: PassOrFail = Field(description="whether it is as it has to be")
-    mismatches: Count = Field(description="lines or words that differ; 1 for what has none")
-    line: Count | None = Field(default=None, description="first line that differs, from 1 on")
-    word: Count | None = Field(default=None, description="first word of an image that differs, from 1 on")
-    found: str | None = Field(default=None, description="that line or word in the file")
-    expected: str | None = Field(default=None, description="that line or word as the model gives it")
+    status: PassOrFail = Field(description="`pass` if the file may be used")
+    mismatches: Count = Field(description="number of lines or words that differ; 1 for a file without lines or words")
+    line: Count | None = Field(default=None, description="first line that differs, counted from 1")
+    word: Count | None = Field(default=None, description="first word of an image that differs, counted from 1")
+    found: str | None = Field(default=None, description="content of that line or word in the file")
+    expected: str | None = Field(default=None, description="content of that line or word as the model gives it")
 
 
 class MapError(Part):
     """Departure of the emitted map from the model, in one arithmetic."""
 
     numeric: str = Field(description="arithmetic")
-    status: PassOrFail = Field(description="whether the largest departure keeps to the bound")
-    bound_dph: float = Field(description="proven for every input, deg/h")
+    status: PassOrFail = Field(description="`pass` if the largest departure is within the bound")
+    bound_dph: float = Field(description="proven bound of the departure for any input, deg/h")
     rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
-    worst_dph: float = Field(description="largest found, deg/h")
+    worst_dph: float = Field(description="largest departure found, deg/h")
     arithmetic_dph: float | None = Field(
-        default=None, description="largest in the middle of a cell of inputs, deg/h; only of `--exhaustive`"
+        default=None, description="largest departure in the middle of a cell of inputs, deg/h; with `--exhaustive` only"
     )
-    mean_dph: float | None = Field(default=None, description="mean there, deg/h; only of `--exhaustive`")
-    inputs_visited: Count = Field(description="inputs that were tried")
+    mean_dph: float | None = Field(
+        default=None, description="mean departure in the middle of a cell, deg/h; with `--exhaustive` only"
+    )
+    inputs_visited: Count = Field(description="number of inputs that were tried")
     mismatches: Count | None = Field(
-        default=None, description="inputs that differ from integers computed separately; only of `--exhaustive`"
+        default=None,
+        description="number of inputs that differ from integers computed separately; with `--exhaustive` only",
     )
-    first_mismatches: tuple[str, ...] = Field(default=(), description="the first of them with all bits")
+    first_mismatches: tuple[str, ...] = Field(default=(), description="first inputs that differ, with all bits")
 
 
 class LogPart(Part):
     """A board test in a log."""
 
-    line: Count = Field(description="at which it begins")
+    line: Count = Field(description="line at which it begins")
     numeric: str = Field(description="arithmetic")
     vectors: Count = Field(description="results that were compared")
     mismatches: Count = Field(description="results that differ from the reference")
 
 
 class ReadLog(Part):
-    """A log that was read: every line of it is accounted for."""
+    """A log of board tests; every line of it is accounted for."""
 
-    file: str = Field(description="its name")
-    lines: Count = Field(description="in all")
-    parts: tuple[LogPart, ...] = Field(description="board tests in it")
+    file: str = Field(description="name of the log")
+    lines: Count = Field(description="number of lines")
+    parts: tuple[LogPart, ...] = Field(description="board tests in the log")
     absent: tuple[str, ...] = Field(description="arithmetics that the board did not test")
-    outside: Count = Field(description="lines that belong to no board test")
-    first_outside: tuple[str, ...] = Field(description="the first of them")
+    outside: Count = Field(description="number of lines that belong to no board test")
+    first_outside: tuple[str, ...] = Field(description="first lines that belong to no board test")
 
 
 class EmittedWith(Part):
     """Options of `emit` with which `c/` was made."""
 
-    numeric: tuple[str, ...] | None = Field(description="arithmetics asked for by `--numeric`, or null")
-    zero_at_c: float | None = Field(description="`--zero-at`, C, or null")
+    numeric: tuple[str, ...] | None = Field(description="arithmetics asked for by `--numeric`; null if not given")
+    zero_at_c: float | None = Field(description="temperature of `--zero-at`, C; null if not given")
 
 
 class WorstError(Part):
     """Largest departure of all arithmetics."""
 
-    value: float = Field(description="deg/h")
-    inputs_visited: Count = Field(description="inputs that were tried")
+    value: float = Field(description="largest departure, deg/h")
+    inputs_visited: Count = Field(description="number of inputs that were tried")
 
 
 class _Counted(Result):
-    """What of a verification is there for one axis and for a unit of several."""
+    """Fields that the verification of one axis and of a unit of several have in common."""
 
     schema_: Annotated[Literal["gyrotc.verify/1"], Field(alias="schema")] = "gyrotc.verify/1"
     serial: str = Field(description="gyro serial")
-    axis: Axis = Field(description="null where the recordings have one axis, and of several in one folder")
-    passed: Count = Field(description="targets that passed")
-    failed: Count = Field(description="targets, files and other checks that failed")
-    missing: Count = Field(description="targets whose compiler or emulator is not here")
-    emitted: tuple[VerifiedFile, ...] = Field(description="every file that is or should be in `c/`")
+    axis: Axis = Field(
+        description="axis of the gyro; null if the recordings have one axis, or for several in one folder"
+    )
+    passed: Count = Field(description="number of targets that passed")
+    failed: Count = Field(description="number of targets, files and other checks that failed")
+    missing: Count = Field(description="number of targets whose compiler or emulator is not installed")
+    emitted: tuple[VerifiedFile, ...] = Field(description="all files that are or should be in `c/`")
 
 
 class Verification(_Counted):
-    """What of the emitted code was proven (`gyrotc verify`)."""
+    """Checks of the emitted code against the model (`gyrotc verify`)."""
 
     model_hash: str = Field(description="hash of the model")
     c_hash: str = Field(description="SHA-256 over names and contents of the emitted files")
-    targets: tuple[VerifiedTarget, ...] = Field(description="every target that was tried, and boards")
+    targets: tuple[VerifiedTarget, ...] = Field(description="all targets that were tried, and boards")
     log: ReadLog | None = Field(
         default=None, description="log of a board test that ran elsewhere; null if none was read"
     )
@@ -378,9 +389,9 @@ class Verification(_Counted):
         default=(), description="boards whose entries were dropped, because they ran another model or other code"
     )
     options: EmittedWith | None = Field(default=None, description="options of `emit`")
-    errors: tuple[MapError, ...] = Field(description="one for each arithmetic")
+    errors: tuple[MapError, ...] = Field(description="departure of the map, for each arithmetic")
     error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")
-    worst_error_dph: WorstError = Field(description="largest departure that was found")
+    worst_error_dph: WorstError = Field(description="largest departure of all arithmetics")
 
     @property
     def not_installed(self) -> tuple[list[str], list[str]]:
@@ -391,6 +402,6 @@ class Verification(_Counted):
 
 
 class JointVerification(_Counted):
-    """The same for a folder with several axes."""
+    """Checks of the emitted code of a folder with several axes."""
 
     axes: dict[str, Verification] = Field(description="verification of each axis")

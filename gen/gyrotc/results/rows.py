@@ -1,4 +1,4 @@
-"""Which rows of recordings were used, and why the others were not."""
+"""Counts of rows: those that were used, and those that were left out, by the reason."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STATED = (
 
 
 class RowsCount(Part):
-    """Rows that were read: those that are kept, and those that are left out."""
+    """Count of rows that were read: those kept and those left out."""
 
     read: Count = Field(description="rows between the start and the end of the run")
     kept: Count = Field(description="rows that may be used")
@@ -25,7 +25,7 @@ class RowsCount(Part):
 
     @property
     def bad(self) -> int:
-        """Rows that are left out because of what they show."""
+        """Number of rows that are left out because of what they show."""
         return sum(rows for reason, rows in self.left_out.items() if reason not in STATED)
 
     def words(self) -> str:

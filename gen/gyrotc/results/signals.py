@@ -1,4 +1,4 @@
-"""Signals that end a job are raised where it can clean up, and wait while a result changes places."""
+"""Signals that end a job: they raise an exception, and wait while a result takes its place."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class _State:
 
 
 def raise_on_signals() -> None:
-    """From now on SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread; those ignored stay so."""
+    """Let SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread; a signal that is ignored stays so."""
     for number in _ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _on_signal)
@@ -43,7 +43,7 @@ def _on_signal(number: int, _frame: FrameType | None) -> None:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Inside, a signal waits until the outermost block has ended. Other threads are never interrupted anyway."""
+    """Let a signal wait until the outermost block has ended. Other threads are never interrupted."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -58,6 +58,6 @@ def deferred() -> Iterator[None]:
 
 
 def die_of(number: int) -> None:
-    """Ends the process by the signal itself, so that a shell sees 128 + number and stops its loop."""
+    """End the process by the signal itself, so that a shell sees 128 + number and stops its loop."""
     signal.signal(number, signal.SIG_DFL)
     os.kill(os.getpid(), number)
