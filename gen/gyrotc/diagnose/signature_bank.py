@@ -7,7 +7,6 @@ Reading makes nothing but the classes of a bank, plain values and arrays.
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import importlib
 import inspect
@@ -253,7 +252,6 @@ def direction_of(records: Records) -> FloatArray:
     return records.columns(lambda h: play(DIRECTION_C, h.temperature_c) - h.temperature_c)
 
 
-_MAKERS = ("causes", "target", "diagnose")  # packages whose code decides what a bank holds
 _CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
 _OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}
 _NUMPY = {
@@ -295,10 +293,8 @@ class _Reader(pickle.Unpickler):
         raise pickle.UnpicklingError(f"{module}.{name} has no place in a bank")
 
 
-@functools.cache
 def _code() -> str:
-    """Hash of the code that makes a bank: a new version makes new banks."""
-    package = Path(__file__).parents[1]
-    files = [path for name in _MAKERS for path in sorted((package / name).rglob("*.py"))]
-    files += [Path(inspect.getfile(t.features)) for t in diagnosable_causes().values() if t.features is not None]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in dict.fromkeys(files))).hexdigest()
+    """Return the hash of the program and of causes that are registered from outside it: others make other banks."""
+    features = (cause.features for cause in diagnosable_causes().values())
+    files = sorted({inspect.getfile(one) for one in features if one is not None})
+    return hashlib.sha256(b"".join([cache.program_of().encode(), *(Path(f).read_bytes() for f in files)])).hexdigest()
