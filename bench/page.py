@@ -1,4 +1,4 @@
-"""Make docs/results.md: an overview of the records, and a table for each with the command that measures it again."""
+"""Make docs/results.md: an overview of the records, and the figures of each that answer a question of a reader."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from .records import Record, measured_with, read_record, rounded, write_record
 _HEAD = """# Results
 
 This page answers how accurate gyrotc is, what its code costs on the target, how often its statements are true, and what
-was verified. You can measure every figure again with the command of its record; `make bench` lists the campaigns and
-their duration. A figure that misses its aim is marked **(missed)**.
+was verified. A figure that misses its aim is marked **(missed)**.
+
+Each record is of the sources of its commit and date, not of later ones; `git diff --stat COMMIT -- gen libc include`
+shows what has changed since. The command measures it again, and the record has all that was measured.
 
 RMS is that of compensated means over 100 s, and the noise floor is the RMS of the noise alone. No recording of a laser
 gyro is public: the measured gyros are small MEMS gyros ([real.md](real.md)), and all others are simulated.
@@ -57,6 +59,7 @@ class Count:
     hits: int
     of: int
     is_missed: bool = False
+    aim: str = ""
 
     def __str__(self) -> str:
         text = f"{self.hits} of {self.of}"
@@ -71,31 +74,26 @@ class ResultsTable:
         text: Sentences above the table.
         head: Titles of the columns.
         rows: Cells of each row.
-        more: Tables of the same record that follow.
     """
 
     text: str
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
-    more: Sequence[ResultsTable] = ()
 
     def markdown(self) -> str:
-        """Return sentences and table, and those that follow."""
+        """Return sentences and table."""
         rule = ["---:" if title.endswith(" ") else "---" for title in self.head]
         lines = [[title.strip() for title in self.head], rule, *([str(cell) for cell in row] for row in self.rows)]
-        own = f"{self.text.strip()}\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
-        return "\n".join([own, *(table.markdown() for table in self.more)])
+        return f"{self.text.strip()}\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
     def missed(self) -> Iterator[str]:
         """Yield the rows that have a figure that misses its aim."""
         for row in self.rows:
             if any(isinstance(cell, Figure | Count) and cell.is_missed for cell in row):
                 yield " | ".join(map(str, row))
-        for table in self.more:
-            yield from table.missed()
 
 
-def figures_table(text: str, figures: Iterable[tuple[str, Figure]]) -> ResultsTable:
+def figures_table(text: str, figures: Iterable[tuple[str, Figure | Count]]) -> ResultsTable:
     """Return a table with a figure, its value and its aim in each row."""
     return ResultsTable(text, ("figure", "measured ", "aim "), [(what, figure, figure.aim) for what, figure in figures])
 
@@ -122,11 +120,11 @@ def write(docs: Path) -> None:
             table: ResultsTable = importlib.import_module(module).table(record)
             with_ = record["measured"]
             missed = len(list(table.missed())) or "none"
+            kept = f"[{name}](results/{name}.json)"
             place = f"[{title}](#{_anchor(title)})"
-            overview.append((place, f"`{command}`", with_["commit"], with_["date"], missed))
-            made = f"Measured by `{command}` on commit {with_['commit']}, {with_['date']}; {with_['machine']}."
-            parts.append(f"## {title}\n\n{table.markdown()}\n{made}\n")
-    head = ("what", "command", "commit", "date", "lines with a missed aim ")
+            overview.append((place, f"`{command}`", kept, with_["commit"], with_["date"], missed))
+            parts.append(f"## {title}\n\n{table.markdown()}")
+    head = ("what", "command", "record", "commit", "date", "missed ")
     (docs / "results.md").write_text("\n".join([ResultsTable(_HEAD, head, overview).markdown(), *parts]), "utf-8")
 
 

@@ -22,7 +22,6 @@ _TEXT = """
 RMS is divided by the RMS of the simulated noise, so that 1 is a perfect correction. Ten gyros of each scenario are
 trained on six runs and judged on six others. CPU seconds are those of one process with one thread.
 """
-_GRID, _ANY = "gyrotc, grid", "gyrotc, any candidates"
 
 
 def measure(settings: Settings) -> Record:
@@ -41,14 +40,12 @@ def table(record: Record) -> ResultsTable:
 def _accuracy(record: Record) -> Iterator[tuple[str, Figure]]:
     found = record["accuracy"]
     smooth, *ripple = found["default"]
-    paper = next(method for method in found["methods"] if method["name"] == "paper: mrbf_paper")
     changes = [abs(v) for one in found["more_centers"] for v in one["largest"].values()]
     *ours, _ = record["invariance"]["rows"]
     same = min(change["same"] for row in ours for change in row["changes"].values())
     yield "RMS ÷ noise, smooth maps, median", Figure(smooth["ratio"]["median"], ".4f", at_most=1.006)
     yield "RMS ÷ noise, smooth maps, worst", Figure(smooth["ratio"]["worst"], ".4f", at_most=1.015)
     yield "RMS ÷ noise, maps with ripple, worst", Figure(max(x["ratio"]["worst"] for x in ripple), ".4f", at_most=1.02)
-    yield "RMS ÷ noise, the paper's method, median", Figure(paper["ratio"]["median"], ".4f")
     left_out = max(x["median"] for x in found["left_out"])
     yield "RMS ÷ noise at a ramp rate that training has not seen, median", Figure(left_out, ".4f", at_most=1.03)
     yield "largest change of RMS ÷ noise with up to 60 centers", Figure(max(changes), ".4f", at_most=0.005)
@@ -68,28 +65,9 @@ def _accuracy(record: Record) -> Iterator[tuple[str, Figure]]:
 
 
 def _speed(speed: dict[str, Any]) -> Iterator[tuple[str, Figure]]:
-    small = next(x for x in speed["selection"] if (x["samples"], x["widths"]) == (1728, 7))
-    large = next(x for x in speed["selection"] if x["samples"] == 172800)
-    grid, anywhere = (_row(large["rows"], name) for name in (_GRID, _ANY))
-    selection_s = _row(small["rows"], _GRID)["seconds"]
-    yield "CPU seconds of orthogonal least squares, size of the paper", Figure(selection_s, ".4f", at_most=0.01)
-    varpro_s = _row(speed["varpro"], "gyrotc")["seconds"]
-    yield "CPU seconds of variable projection, six Gaussians", Figure(varpro_s, ".4f", at_most=0.007)
-    yield (
-        "CPU seconds of selecting from 2,000 candidates on a grid, 172,800 samples",
-        Figure(grid["seconds"], ".2f", at_most=0.3),
-    )
-    yield "CPU seconds of selecting from 2,000 candidates anywhere", Figure(anywhere["seconds"], ".2f", at_most=18.0)
-    yield "peak memory of these two, GiB", Figure(max(grid["peak_gib"], anywhere["peak_gib"]), ".2f", at_most=0.5)
-    kohonen_s = _row(speed["kohonen"], "gyrotc")["seconds"]
-    yield "CPU seconds of the Kohonen network", Figure(kohonen_s, ".3f", at_most=0.1)
     raw = speed["raw"]
     yield (
         "CPU seconds from six recordings of 2.88 million rows to verified C",
         Figure(raw["seconds"], ".1f", at_most=10),
     )
     yield "peak memory of this, GiB", Figure(raw["peak_gib"], ".2f", at_most=0.5)
-
-
-def _row(rows: list[dict[str, Any]], name: str) -> dict[str, Any]:
-    return next(row for row in rows if row["name"] == name)

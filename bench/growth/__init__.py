@@ -7,7 +7,6 @@ Runs: of 8 h in rows of 10 s. Centers: as many as are asked for. Units: serials 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from ..campaigns import Settings
 from ..page import Figure, ResultsTable, figures_table
@@ -19,7 +18,8 @@ from .importing import importing
 
 _SERIALS, _MEGABYTES = 1000, 2000.0
 _TEXT = """
-Whole commands with interpreter and imports, at the largest size of each series.
+Whole commands with interpreter and imports. The exponent is that of the CPU seconds as a power of the size, between the
+two largest sizes.
 """
 _PEAK_MIB = 477.0
 _CPU_S = {("runs", "fit"): 3.0, ("centers", "fit"): 4.0, ("rows", "fit"): 30.0}
@@ -40,22 +40,24 @@ def measure(settings: Settings) -> Record:
 
 def table(record: Record) -> ResultsTable:
     """Return CPU seconds and peak memory with their aims."""
-    head = ("command", "size", "CPU seconds ", "aim ", "peak MiB ", "aim ")
-    rest = figures_table(_REST, [*_of_slopes(record), *_of_a_build(record), *_of_a_fleet(record)])
-    return ResultsTable(_TEXT, head, [_of_command(row) for row in record["rows"]], [rest, _of_an_import(record)])
+    parts = (_of_rows, _of_commands, _of_slopes, _of_a_build, _of_a_fleet, _of_an_import)
+    return figures_table(_TEXT, [figure for part in parts for figure in part(record)])
 
 
-_REST = """
-The exponent is that of the CPU seconds as a power of the size, between the two largest sizes.
-"""
+def _of_rows(record: Record) -> Iterator[tuple[str, Figure]]:
+    long = [row for row in record["rows"] if row["what"] in ("rows", "gradient")]
+    commands = ", ".join(f"`{name}`" for name in dict.fromkeys(row["command"] for row in long))
+    rows = max(row["sizes"][-1]["size"] for row in long)
+    peak = max(row["sizes"][-1]["peak_mib"] for row in long)
+    yield f"{commands} of {rows:,} rows, largest peak MiB", Figure(peak, ".0f", at_most=_PEAK_MIB)
 
 
-def _of_command(row: dict[str, Any]) -> tuple[object, ...]:
-    what, command, largest = row["what"], row["command"], row["sizes"][-1]
-    words = f"{largest['size']:,.0f} {'rows, with a state in the table' if what == 'gradient' else what}"
-    seconds = Figure(largest["seconds"], ".1f", at_most=_CPU_S.get((what, command)))
-    memory = Figure(largest["peak_mib"], ".0f", at_most=_PEAK_MIB if what in ("rows", "gradient") else None)
-    return f"`{command}`", words, seconds, seconds.aim, memory, memory.aim
+def _of_commands(record: Record) -> Iterator[tuple[str, Figure]]:
+    for row in record["rows"]:
+        if (row["what"], row["command"]) in _CPU_S:
+            largest, aim = row["sizes"][-1], _CPU_S[row["what"], row["command"]]
+            words = f"`{row['command']}` of {largest['size']:,} {row['what']}, CPU seconds"
+            yield words, Figure(largest["seconds"], ".1f", at_most=aim)
 
 
 def _of_slopes(record: Record) -> Iterator[tuple[str, Figure]]:
@@ -75,7 +77,6 @@ def _of_a_build(record: Record) -> Iterator[tuple[str, Figure]]:
 def _of_a_fleet(record: Record) -> Iterator[tuple[str, Figure]]:
     fleet = record["fleet"]
     words = f"`fleet` of {fleet['serials']:,} serials"
-    yield f"{words}, elapsed seconds in {fleet['jobs']} processes", Figure(fleet["elapsed_s"], ".0f")
     yield f"{words}, CPU seconds of a serial", Figure(fleet["cpu_s"] / fleet["serials"], ".2f")
     if "bytes" in fleet:
         kilobytes = fleet["bytes"] / fleet["serials"] / 1e3
@@ -89,12 +90,7 @@ def _of_a_fleet(record: Record) -> Iterator[tuple[str, Figure]]:
     yield f"`lot` of {fleet['serials']:,} units, peak MiB", Figure(fleet["lot_mib"], ".0f", at_most=381.0)
 
 
-def _of_an_import(record: Record) -> ResultsTable:
+def _of_an_import(record: Record) -> Iterator[tuple[str, Figure]]:
     found = record["import"]
-    rows = []
-    for name, one in found["readers"].items():
-        if "failed" not in one:
-            memory = Figure(one["peak_mib"], ".0f", at_most=1024.0 if name == "gyrotc import" else None)
-            rows.append((name, f"{one['elapsed_s']:.0f}", memory, memory.aim))
-    text = f"A CSV file of {found['rows']:,} rows, read by `gyrotc import` and by other readers:"
-    return ResultsTable(text, ("reader", "elapsed seconds ", "peak MiB ", "aim "), rows)
+    words = f"`import` of a CSV file of {found['rows']:,} rows, peak MiB"
+    yield words, Figure(found["readers"]["gyrotc import"]["peak_mib"], ".0f", at_most=1024.0)

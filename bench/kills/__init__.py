@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from ..campaigns import Settings, say
-from ..page import Figure, ResultsTable
+from ..page import Figure, ResultsTable, figures_table
 from ..records import ROOT, Record
 from .driver import ACTIONS, compiled_shim
 
@@ -24,10 +24,9 @@ _COMMANDS = 300
 _TEXT = """
 {ended:,} jobs are interrupted by a signal (KILL, TERM, INT) or by a disk error (EIO; ENOSPC from then on) at one of
 their calls that change a file; commands also by a signal at a random time, and `fleet` in its worker processes too.
-Each way of writing (a folder, one entry, several entries, a part of a folder, a file) is interrupted at {calls}, with
-and without an exchange of names. Wrong: a result that is neither the earlier one nor the new one, or anything left
-after the next job. Without an exchange of names, a disk that is full between the two renames leaves the place empty
-until the next job, which counts as wrong. Interrupted commands: {commands}.
+Each way of writing is interrupted at {calls}, with and without an exchange of names. Wrong is a result that is
+neither the earlier one nor the new one, or anything left after the next job. Without an exchange of names, a disk that
+is full between the two renames leaves the place empty until the next job, which counts as wrong.
 """
 
 
@@ -47,15 +46,11 @@ def measure(settings: Settings) -> Record:
 
 
 def table(record: Record) -> ResultsTable:
-    """Return how many jobs were ended in which way."""
-    of_commands = sorted(record["counts"]["commands"].items())
-    commands = {name: count for name, count in of_commands if name not in (*ACTIONS, "calls", "wrong")}
-    words = ", ".join(f"`{name}` {count}" for name, count in commands.items())
-    rows = []
-    for name, counted in record["counts"].items():
-        ended = (counted.get(action, 0) for action in ACTIONS)
-        rows.append((name, counted.get("calls", ""), *ended, Figure(counted["wrong"], at_most=0)))
-    head = ("interrupted", "calls ", *(f"{action} " for action in ACTIONS), "wrong ")
+    """Return how many interrupted jobs left a wrong result."""
     every = record.get("every", 1)
     calls = "every call" if every == 1 else f"one call in {every}"
-    return ResultsTable(_TEXT.format(ended=record["ended"], calls=calls, commands=words), head, rows)
+    figures = []
+    for name, counted in record["counts"].items():
+        ended = sum(counted.get(action, 0) for action in ACTIONS)
+        figures.append((f"wrong results, {name}, of {ended:,} interrupted", Figure(counted["wrong"], at_most=0)))
+    return figures_table(_TEXT.format(ended=record["ended"], calls=calls), figures)

@@ -228,14 +228,7 @@ def _one(job: tuple[Case, int, int]) -> dict[str, Any]:
     return measured(*job)
 
 
-WAYS = {
-    "lot": "with the lot",
-    "auto": "without: model selection",
-    "mrbf": "without: a map",
-    "mean curve + offset": "mean curve and offset",
-    "PCA regression": "PCA regression",
-    "pooled GPR": "pooled GPR",
-}
+_WAYS = ("lot", "auto", "mrbf", "mean curve + offset", "PCA regression", "pooled GPR")
 
 
 def quoted(case: dict[str, Any]) -> dict[str, Any]:
@@ -246,7 +239,7 @@ def quoted(case: dict[str, Any]) -> dict[str, Any]:
     reported = {name: case[name] for name in ("case", "family", "text", "learnt_s", "unrelated_refused")}
     return reported | {
         "best_power": case.get("best_power"),
-        "ways": {way: found for way in WAYS if (found := _spread([row[way] for row in short if way in row]))},
+        "ways": {way: found for way in _WAYS if (found := _spread([row[way] for row in short if way in row]))},
         "better": float(np.mean([row["lot"][0] <= row["auto"][0] for row in short])),
         "coverage": np.mean([row["coverage"] for row in short], axis=0).tolist(),
         "refused": float(np.mean([not row["accepted"] for row in short])),

@@ -195,9 +195,10 @@ def _times(bench: Sequence[Mapping[str, Any]]) -> str:
         return f"{paper} The campaign accuracy has not measured ours."
     verdict = "confirmed" if modified < 0.9 * random else "not confirmed"
     return (
-        f"{paper} Here one model over all six takes {random:.3f} s and {modified:.3f} s of CPU time ([results.md]"
-        f"(results.md)), so that a faster training of the modified network is {verdict}. Both factorise normal "
-        "equations with the same number of candidates; the Kohonen network is additional."
+        f"{paper} Here one model over all six takes {random:.3f} s and {modified:.3f} s of CPU time "
+        f"([results/accuracy.json](results/accuracy.json)), so that a faster training of the modified network is "
+        f"{verdict}. Both factorise normal equations with the same number of candidates; the Kohonen network is "
+        "additional."
     )
 
 

@@ -30,10 +30,9 @@ _DETAILS = {"own": own.table, "other": other.table}
 _TEXT = """
 `gyrotc diagnose` on {recordings} recordings of each of two worlds, with seeds {seeds} that were drawn after the method
 was finished. k = d/6, where d is the signal-to-noise ratio of the hidden effect after the best static map is removed.
-The own world (tests/blind) has the causes of the catalogue, but its own integration, maps, hysteresis and noise. The
-other world (tests/blind/other) has heat conduction by finite volumes, relays, ripples, other noise spectra, noise that
-is declared wrong in half of the recordings, and effects that are not in the catalogue ("foreign"). A clean recording
-has no effect.
+The own world has the causes of the catalogue, but its own integration, maps, hysteresis and noise. The other world has
+heat conduction by finite volumes, relays, ripples, other noise, noise that is declared wrong in half of the recordings,
+and effects that are not in the catalogue ("foreign").
 
 ![Stated probability of a cause and share that is true, both worlds](reliability.svg)
 """

@@ -8,8 +8,7 @@ from bench.records import Record
 _TEXT = """
 [proof.md](proof.md) explains what each tool proves. Every pair of positions of a fixed-point table is computed by the
 generated C, by integers that are not compiled from `libc/`, and by the model in float64. An alarm is a place that
-Frama-C Eva could not prove free of run-time errors for every input; [proof.md](proof.md) argues each. The proof is of
-the sources of the commit that is named below, not of later ones.
+Frama-C Eva could not prove free of run-time errors for every input; [proof.md](proof.md) argues each.
 """
 
 
