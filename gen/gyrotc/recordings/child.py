@@ -49,7 +49,7 @@ _START = f"import sys; sys.path[:] = sys.argv[4:]; from {__name__} import serve;
 
 
 def open_in_child(opener: Opener, path: Path) -> LoggerFile:
-    """Opens a file by a function that runs in a child process.
+    """Open a file by a function that runs in a child process.
 
     Raises:
         InputError: The function refuses the file, crashes on it, or needs more memory or time than is allowed.
@@ -87,7 +87,7 @@ class _ChildTable(LoggerTable):
         )
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """As `LoggerTable.chunks`."""
+        """Yield rows in order; see `LoggerTable.chunks`."""
         stream = self.child.ask({"do": "start", "table": self.index, "names": list(names)})["stream"]
         first = 0
         while (answer := self.child.ask({"do": "next", "stream": stream}))["rows"] is not None:
@@ -100,7 +100,7 @@ class _ChildTable(LoggerTable):
             first += len(batch)
 
     def place(self, row: int) -> str:
-        """Where a row stands, as the reader of the file says it."""
+        """Return the place of a row in the words of the reader of the file."""
         return str(self.child.ask({"do": "place", "table": self.index, "row": row})["place"])
 
 
@@ -188,7 +188,7 @@ def _exactly(stream: Any, size: int) -> bytes:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends a child, whatever it does."""
+    """End a child, whatever it does."""
     process.kill()
     process.wait()
     for stream in (process.stdin, process.stdout):
@@ -201,7 +201,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def serve(module: str, function: str, cpu_s: str) -> None:
-    """Answers requests for one file, line by line, until there are no more."""
+    """Answer requests for one file, line by line, until there are no more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # a library that prints does not answer
@@ -214,7 +214,7 @@ def serve(module: str, function: str, cpu_s: str) -> None:
 
 
 def _limit(cpu_s: int) -> None:
-    """Limits this process: memory besides what libraries take now, processor time, files."""
+    """Limit this process: memory beyond that of the libraries now, processor time, files."""
     memory = max(int(ceiling("memory_gib") * 2**30), _MIN_MEMORY)
     for kind, soft, hard in (
         (resource.RLIMIT_CORE, 0, 0),
@@ -230,7 +230,7 @@ def _limit(cpu_s: int) -> None:
 
 
 def _data_bytes() -> int:
-    """What counts against the limit of data now."""
+    """Return the bytes that count against the limit of data now."""
     try:
         pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[5]
     except OSError:  # no Linux, where the limit of data does not bind either
@@ -310,7 +310,7 @@ def _stated(table: LoggerTable) -> dict[str, Any]:
 
 
 def _stream_of(chunk: Chunk) -> pa.Buffer:
-    """Rows as an Arrow stream of one batch."""
+    """Return rows as an Arrow stream of one batch."""
     batch = pa.RecordBatch.from_arrays([_array(v) for v in chunk.columns.values()], names=list(chunk.columns))
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, batch.schema) as stream:

@@ -173,7 +173,7 @@ class CsvFile(Source):
             raise InputError(name, f"cannot be read ({error.strerror})", "a readable file") from error
 
     def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
-        """As `Source.read`, fast."""
+        """Read columns by the fast parser; see `Source.read`."""
         unique = [f"{index} {name}" for index, name in enumerate(self.names)]
         wanted = {unique[self.names.index(name)]: pa.float64() for name in columns}
         most = self._most_rows()
@@ -201,7 +201,7 @@ class CsvFile(Source):
         return min(ends, self.size // (2 * len(self.names))) + 1
 
     def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
-        """As `Source.scan`, line by line."""
+        """Read line by line what `read` cannot; see `Source.scan`."""
         cells: list[array[float]] = [array("d") for _ in self.names]
         lines = array("q")
         seen = _Faults()

@@ -44,7 +44,7 @@ class Problems:
         self.marks: dict[str, tuple[Mark, ...]] = {}
 
     def add(self, problem: InputError, *marks: Mark) -> None:
-        """Keeps the problem, and by its text the rows that it is about.
+        """Keep a problem, and by its text the rows that it is about.
 
         Raises:
             InputError: The problem itself, if problems are not collected.
@@ -66,7 +66,7 @@ _SERIAL_FORM = "1 to 64 of the characters A-Z a-z 0-9 . _ -, at least one of the
 
 
 def check_serial(serial: str) -> str:
-    """Checks a serial and returns it.
+    """Check a serial and return it.
 
     Raises:
         ValueError: It is no legal serial; the message says what is expected.
@@ -250,7 +250,7 @@ class RunEntry(_Part):
 
 
 class GyroFacts(_Part):
-    """What `dataset.toml` and the map of a logger state alike of a gyro and how it was recorded."""
+    """Facts of a gyro and its recording that `dataset.toml` and the import map of a logger have in common."""
 
     description: str = ""
     earth_rate: Literal["removed", "none", "compute"] | None = None
@@ -279,7 +279,7 @@ class Description(GyroFacts):
 
 
 def parse_description(path: Path, problems: Problems) -> Description | None:
-    """Reads and checks `dataset.toml`; every wrong field is a problem of its own.
+    """Read and check `dataset.toml`; every wrong field is a problem of its own.
 
     Returns:
         The description; where fields were wrong, what remains without them; None if nothing usable remains.
@@ -307,13 +307,13 @@ def parse_description(path: Path, problems: Problems) -> Description | None:
 
 
 def _causes(details: list[ErrorDetails]) -> list[ErrorDetails]:
-    """Without what only follows: a wrong run does not count, and then there may be too few."""
+    """Drop errors that follow from others: a wrong run does not count, and then there may be too few."""
     wrong_run = any(d["loc"][0] == "run" and len(d["loc"]) > 1 for d in details)
     return [d for d in details if not (wrong_run and d["type"] == "too_short" and d["loc"] == ("run",))]
 
 
 def _dropped(content: dict[str, Any], detail: ErrorDetails) -> bool:
-    """Takes a wrong field out of the content so that the rest can be looked at; False if that cannot be."""
+    """Take a wrong field out of the content, so that the rest can be checked; return False if that is impossible."""
     location = detail["loc"]
     if location[0] == "run":
         if len(location) < 3 or location[2] == "file":
@@ -327,7 +327,7 @@ def _dropped(content: dict[str, Any], detail: ErrorDetails) -> bool:
 
 
 def _tuples(value: Any) -> Any:
-    """Lists as tuples, which is what strict pydantic wants; free facts stay lists."""
+    """Return lists as tuples, which strict pydantic wants; free facts stay lists."""
     if isinstance(value, dict):
         return {k: v if k == "meta" else _tuples(v) for k, v in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
@@ -422,7 +422,7 @@ class Layout:
 
 
 def arrange(file: str, names: Sequence[str], columns: Columns, problems: Problems) -> Layout | None:
-    """Finds the meaning of the columns of a file; None (and problems) if they do not make a recording."""
+    """Find the meaning of the columns of a file; return None, and report problems, if they make no recording."""
     before = len(problems)
     _check_names(file, names, problems)
     for kind, name in (("time", columns.time), ("temperature", columns.temperature)):
@@ -488,7 +488,7 @@ class Fault:
 
 
 def column_faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator[Fault]:
-    """Faults of the numbers of one file, at most one for each column and kind."""
+    """Yield faults of the numbers of one file, at most one for each column and kind."""
     good_time = True
     for name, values in columns.items():
         if _lie_within(values, (-_LARGEST, _LARGEST)):
@@ -513,7 +513,7 @@ def column_faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator
 
 
 def rate_faults(name: str, rate: FloatArray) -> Iterator[Fault]:
-    """Rates that no gyro has, deg/h; NaN passes."""
+    """Yield rates that no gyro has, deg/h; NaN passes."""
     yield from _within(name, rate, _RATE_DPH, "deg/h")
 
 
@@ -562,7 +562,7 @@ def _within(name: str, values: FloatArray, limits: tuple[float, float], unit: st
 
 
 def _lie_within(values: FloatArray, limits: tuple[float, float]) -> bool:
-    """Whether all values do; without arrays as long as the recording. NaN does not."""
+    """Test whether all values are within limits, without arrays as long as the recording; NaN is not."""
     return len(values) == 0 or bool(limits[0] <= values.min() and values.max() <= limits[1])
 
 

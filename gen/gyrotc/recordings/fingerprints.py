@@ -39,7 +39,7 @@ _INVERSE_GOLDEN = np.uint64(pow(int(_GOLDEN), -1, 2**64))
 
 @dataclass(frozen=True, slots=True)
 class Fingerprints:
-    """What is kept of a recording's rows: increasing hashes of windows, shape (n,), first and last row, their times."""
+    """Fingerprints of a recording's rows: increasing hashes of windows, shape (n,), first and last row, their times."""
 
     hash: RowHashes
     first: NDArray[np.int32]

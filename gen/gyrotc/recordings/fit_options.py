@@ -36,7 +36,7 @@ AUTO = "auto"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildOptions:
-    """How a model is trained: `[fit]` of a data set, `[options]` of a fleet, options of Python callers.
+    """Options of training: `[fit]` of a data set, `[options]` of a fleet, arguments of Python callers.
 
     Attributes:
         method: `auto`: the simplest correction that holds on unseen history; or one of `METHODS`.

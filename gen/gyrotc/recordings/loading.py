@@ -62,18 +62,18 @@ __all__ = [
 
 
 def place_of(description: Description, index: int) -> str:
-    """Where a run stands, for messages."""
+    """Return the place of a run, for messages."""
     return f"{FILE}, run {index + 1} ({description.run[index].file})"
 
 
 def in_entry(entry: RunEntry, time_s: FloatArray) -> NDArray[np.bool_]:
-    """Which times belong to a run."""
+    """Return a mask of the times that belong to a run."""
     gaps = tuple(Exclusion(gap.from_s, gap.to_s, gap.reason) for gap in entry.exclude)
     return inside(time_s, entry.from_s, entry.to_s, gaps)
 
 
 def check_description(description: Description, applied: Applied | None, exam_only: bool, problems: Problems) -> None:
-    """Checks that there is a training run, that Earth's rate can be computed, that the model given was subtracted."""
+    """Check that there is a training run, that Earth's rate can be computed, and that a stated model was subtracted."""
     if not exam_only and all(entry.role != "train" for entry in description.run):
         expected = "at least one training run"
         problems.add(InputError(f"{FILE}, field role", "no run has the role train", expected))
@@ -91,7 +91,7 @@ def check_description(description: Description, applied: Applied | None, exam_on
 
 
 def check_spans(description: Description, problems: Problems) -> None:
-    """Checks that spans and exclusions have a length, and that no row of a file belongs to two runs."""
+    """Check that spans and exclusions have a length, and that no row of a file belongs to two runs."""
     for index, entry in enumerate(description.run):
         stretches = [("from_s", entry.from_s, entry.to_s)]
         stretches += [(f"exclude.{k}.from_s", gap.from_s, gap.to_s) for k, gap in enumerate(entry.exclude)]
@@ -147,7 +147,7 @@ Suspected = tuple[str, Suspicion]
 
 
 def check_channel_units(description: Description, recordings: Mapping[str, Recording], problems: Problems) -> None:
-    """Checks that every unit is that of a column: a typing error must not pass."""
+    """Check that every unit is that of a column: a typing error must not pass."""
     channels = {name for r in recordings.values() for name in r.layout.channels}
     for name in description.units:
         if name not in NATIVE_UNITS and name not in channels:
@@ -156,7 +156,7 @@ def check_channel_units(description: Description, recordings: Mapping[str, Recor
 
 
 def check_devices(recordings: Mapping[str, Recording], problems: Problems) -> None:
-    """Checks that no column that names the gyro has two values: one data set is of one gyro."""
+    """Check that no column that names the gyro has two values: one data set is of one gyro."""
     for column in dict.fromkeys(column for recording in recordings.values() for column in recording.devices):
         files: dict[float, str] = {}
         for name, recording in recordings.items():
@@ -174,7 +174,7 @@ def check_devices(recordings: Mapping[str, Recording], problems: Problems) -> No
 
 
 def suspected(description: Description, recordings: Mapping[str, Recording]) -> Iterator[Suspected]:
-    """What contradicts the units of each file."""
+    """Yield what contradicts the units of each file."""
     noise = description.noise.arw_deg_per_sqrt_h if description.noise else None
     for name, recording in recordings.items():
         found = suspicions(
@@ -190,7 +190,7 @@ def suspected(description: Description, recordings: Mapping[str, Recording]) -> 
 def suspected_of_earth(
     axis: str | None, runs: Sequence[Run], recordings: Mapping[str, Recording]
 ) -> Iterator[Suspected]:
-    """Runs whose mean is Earth's component along the axis in another unit, where that is computed."""
+    """Find runs whose mean is Earth's component along the axis in another unit, if that component is computed."""
     for run in runs:
         recording = recordings[run.file]
         layout = recording.layout
@@ -207,7 +207,7 @@ def suspected_of_earth(
 
 
 def judge(suspicions: Sequence[Suspected], trust: bool, problems: Problems) -> list[tuple[str, str]]:
-    """Refuses what contradicts its unit; where the user's word is taken, the file and what it was taken against."""
+    """Refuse values that contradict their unit; return file and contradiction if the user overrules them."""
     trusted: list[tuple[str, str]] = []
     seen = set()
     for name, one in suspicions:
@@ -233,7 +233,7 @@ def load(
     applied: Applied | None = None,
     exam_only: bool = False,
 ) -> Dataset:
-    """Reads the description of a data set and checks every file.
+    """Read the description of a data set and check every file.
 
     Args:
         folder: The data set.
@@ -302,7 +302,7 @@ def applied_model(folder: Path) -> Path | None:
 
 
 def axes_of(folder: Path) -> tuple[str, ...]:
-    """Axes that `load` can choose from; empty where the recordings have one rate.
+    """Return the axes that `load` can choose from; empty if the recordings have one rate.
 
     Raises:
         InputError: The description or the header of the first recording is wrong.
@@ -317,7 +317,7 @@ def axes_of(folder: Path) -> tuple[str, ...]:
 
 
 def asked_axes(folder: Path, axis: str | None) -> tuple[str | None, ...]:
-    """Axes that a job does: the one that is named, else all that the recordings have; (None,): they have one rate.
+    """Return the axes of a job: the one named, else all that the recordings have; (None,) if they have one rate.
 
     Args:
         axis: x, y or z; "all": of recordings that have axes; None: what there is.
@@ -342,7 +342,7 @@ def load_reporting(
     exam_only: bool = False,
     once: bool = False,
 ) -> Dataset | None:
-    """As `load`, with problems reported to `problems`.
+    """Read a data set as `load` does, and report problems to `problems`.
 
     Args:
         once: Leave out rows that another run of the same role has.
@@ -487,7 +487,7 @@ def _recordings(folder: Path, description: Description, problems: Problems) -> t
 
 
 def _earth(description: Description, index: int, axis: str | None, problems: Problems) -> EarthRate | None:
-    """Earth's rate for one run where the description wants it computed."""
+    """Return Earth's rate for a run if the description asks to compute it."""
     if description.earth_rate != "compute":
         return None
     entry, where = description.run[index], place_of(description, index)

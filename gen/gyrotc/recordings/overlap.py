@@ -49,7 +49,7 @@ def shared_rows(runs: Sequence[Run], recordings: Mapping[str, Recording], proble
 
 
 def counted_once(runs: Mapping[int, Run], shared: Sequence[SharedRows]) -> dict[int, Run]:
-    """Runs of which rows that another one has are left out; none of which too little would remain."""
+    """Return the runs without the rows that another run has; a run of which too little would remain stays whole."""
     kept = {}
     for number, run in runs.items():
         twice = [one for one in shared if one.file == run.file]
@@ -84,7 +84,7 @@ def _refused(shared: SharedRows) -> InputError:
 
 
 def _stretches(one: Run, other: Run, windows: NDArray[np.int64]) -> Iterator[SharedRows]:
-    """Windows in common, each as far as the rows go on being the same."""
+    """Yield stretches in common, each extended as far as the rows are the same."""
     first, second = _span(one), _span(other)
     for _ in range(_MOST):
         if len(windows) == 0:
@@ -115,7 +115,7 @@ def _span(run: Run) -> _Span:
 
 
 def _times(time_s: FloatArray, first: int, end: int, period_s: float) -> tuple[float, float]:
-    """From the first row to the row that follows the last."""
+    """Return the times from the first row to the row that follows the last."""
     end = min(end, len(time_s))
     return float(time_s[first]), float(time_s[end] if end < len(time_s) else time_s[-1] + period_s)
 

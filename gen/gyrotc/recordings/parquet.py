@@ -62,7 +62,7 @@ class ParquetBatches:
         _refuse_bomb(name, self.size, max(unpacked, 8 * self.rows * len(self.schema)))
 
     def batches(self, columns: Sequence[str], most: int = CHUNK_ROWS) -> Iterator[pa.RecordBatch]:
-        """Batches of columns, at most so many rows each.
+        """Yield batches of columns, at most `most` rows each.
 
         Raises:
             InputError: The file is damaged, or a text is longer than any that is a number or a stamp.
@@ -106,7 +106,7 @@ def _with_texts(name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
 
 
 def _unpacked(metadata: pq.FileMetaData) -> int:
-    """Bytes of all pages once unpacked, as the file states them.
+    """Return the bytes of all pages once unpacked, as the file states them.
 
     Of row groups, not of columns: pyarrow ends the process where a damaged file lacks the description of a column.
     """
@@ -154,7 +154,7 @@ class ParquetFile(Source):
             raise InputError(name, f"cannot be read ({error.strerror})", "a whole Parquet file") from error
 
     def read(self, columns: Sequence[str]) -> dict[str, FloatArray]:
-        """As `Source.read`, batch by batch; never None."""
+        """Read columns batch by batch, never None; see `Source.read`."""
         rows = self._batches.rows
         need_memory(_COPIES * 8.0 * rows * len(columns), self.name, f"{rows} rows of {len(columns)} columns")
         read = {column: np.empty(rows) for column in columns}
@@ -169,7 +169,7 @@ class ParquetFile(Source):
         return read
 
     def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
-        """As `Source.scan`: a Parquet file has no cells that are no numbers."""
+        """Read all columns, since no cell of a Parquet file can be anything but a number; see `Source.scan`."""
         columns = self.read(self.names)
         return columns, list(range(1, self._batches.rows + 1)), []
 

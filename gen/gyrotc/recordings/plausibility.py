@@ -1,4 +1,4 @@
-"""What the values of a recording look like, compared with the units that are declared for them.
+"""Compare the values of a recording with their declared units.
 
 Each test rests on what no gyro, no chamber and no thermometer does, not on what is usual; what merely looks odd
 passes. Values in another unit than the declared one that break none of these bounds cannot be detected, and pass.
@@ -30,7 +30,7 @@ _LARGEST_DPH = 15.05  # of a component of Earth's rate, rounded up
 
 
 def earth_rate_warning(stated: str | None, mean_dph: float) -> str:
-    """What to say of a mean rate that could be Earth's where nothing is stated; empty where all is well."""
+    """Return a warning about a mean rate that could be Earth's if nothing is stated; empty if all is well."""
     if stated is not None or abs(mean_dph) > _LARGEST_DPH:
         return ""
     return (
@@ -100,7 +100,7 @@ def _curve(run: Run, recording: Recording, description: Description, entry: RunE
 
 
 def _earth(description: Description, entry: RunEntry, axes: tuple[str, ...]) -> tuple[float, ...] | None:
-    """Earth's rate along every axis, where it is to be computed and the angles of all are stated."""
+    """Return Earth's rate along every axis, if it is to be computed and all angles are stated."""
     if description.earth_rate != "compute" or description.latitude_deg is None:
         return None
     found = []
@@ -170,7 +170,7 @@ def suspicions(
     earth_stated: bool,
     noise: float | None = None,
 ) -> Iterator[Suspicion]:
-    """What contradicts the units of one file.
+    """List what contradicts the units of a file.
 
     Args:
         evidence: Of its rows, in gyrotc's units.
@@ -270,7 +270,7 @@ def _sustained(time: FloatArray, temperature: FloatArray) -> float:
 
 
 def _of_pairs(values: FloatArray) -> FloatArray:
-    """Means of the first and second value, the third and fourth and so on; an odd last one is left out."""
+    """Return the means of the first and second value, the third and fourth and so on; an odd last one is left out."""
     half = len(values) // 2 * 2
     return np.asarray((values[:half:2] + values[1:half:2]) / 2.0)
 

@@ -46,7 +46,7 @@ class Evidence:
         self._rest = np.empty((0, 2 + rates))
 
     def add(self, time_s: FloatArray, temperature_c: FloatArray, rates_dph: list[FloatArray]) -> None:
-        """Adds rows; those without a finite value in every column are left out."""
+        """Add rows; those without a finite value in every column are left out."""
         for start in range(0, len(time_s), _PART):
             part = slice(start, start + _PART)
             self._add(np.column_stack([time_s[part], temperature_c[part], *(rate[part] for rate in rates_dph)]))
@@ -67,16 +67,16 @@ class Evidence:
 
     @property
     def cells(self) -> FloatArray:
-        """Means of the cells, shape (n, 2 + rates): time, temperature, rates."""
+        """Return the means of the cells, shape (n, 2 + rates): time, temperature, rates."""
         return self._cells[: self._count]
 
     @property
     def stuck(self) -> bool:
-        """Whether most rates repeat the one before: their scatter is that of the resolution."""
+        """Test whether most rates repeat the one before, so that their scatter is that of the resolution."""
         return 2 * self.same > self.rows * (self._cells.shape[1] - 2)
 
     def _filled(self, block: FloatArray) -> FloatArray:
-        """Takes as many rows as there is room for; the rows that are left."""
+        """Take as many rows as there is room for, and return the rest."""
         per = self._rows_per_cell
         n = min(len(block) // per, _MOST_CELLS - self._count)
         means = block[: n * per].reshape(n, per, -1).mean(axis=1)
@@ -186,7 +186,7 @@ def in_time(rows: Rows, late_s: float, row_period_s: float) -> Rows:
 
 
 def unknown_times(columns: Mapping[str, FloatArray], layout: Layout, channels: Sequence[str]) -> dict[str, FloatArray]:
-    """Times of the rows that `known_rows` leaves out, by the reason."""
+    """Return the times of the rows that `known_rows` leaves out, by the reason."""
     unknown = {}
     no_temperature = _missing(columns[layout.temperature])
     if no_temperature is not None:
@@ -200,13 +200,13 @@ def unknown_times(columns: Mapping[str, FloatArray], layout: Layout, channels: S
 
 
 def _missing(values: FloatArray) -> NDArray[np.bool_] | None:
-    """Which values are NaN; None: none is."""
+    """Return a mask of the values that are NaN; None if none is."""
     with np.errstate(over="ignore", invalid="ignore"):  # a sum beyond float64 is no NaN among the values
         return np.isnan(values) if np.isnan(np.sum(values)) else None
 
 
 def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequence[str]) -> dict[str, FloatArray]:
-    """Rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
+    """Return the rows with a temperature and every channel: a row with a cell that is NaN is a missing sample.
 
     A rate that is NaN keeps its row: the temperature is known, and the rate counts nowhere.
     """
@@ -222,7 +222,7 @@ def known_rows(columns: dict[str, FloatArray], layout: Layout, channels: Sequenc
 
 
 def _converted(columns: dict[str, FloatArray], units: Mapping[str, Conversion]) -> dict[str, FloatArray]:
-    """Columns in gyrotc's units."""
+    """Return columns in gyrotc's units."""
     return {name: units[name](values) if name in units else values for name, values in columns.items()}
 
 
@@ -241,7 +241,7 @@ def open_recording(
     pulse_weight_arcsec: float | None,
     problems: Problems,
 ) -> Recording | None:
-    """Opens and checks one file; None (and problems) if it is not in order."""
+    """Open and check a file; return None, and report problems, if it is not in order."""
     before = len(problems)
     try:
         file = open_file(name, path)
@@ -277,7 +277,7 @@ def _by_kind(layout: Layout) -> dict[str, Sequence[str]]:
 
 
 def open_file(name: str, path: Path) -> Source:
-    """Opens a file by the ending of its name.
+    """Open a file by the ending of its name.
 
     Raises:
         InputError: There is none, or it is not what its name says.
@@ -286,7 +286,7 @@ def open_file(name: str, path: Path) -> Source:
 
 
 class _Contents(NamedTuple):
-    """What is kept of the rows of a file: fields of `Recording`."""
+    """Figures of the rows of a file: fields of `Recording`."""
 
     evidence: Evidence
     fingerprints: Fingerprints

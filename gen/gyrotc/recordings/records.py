@@ -1,4 +1,4 @@
-"""What a data set is in memory: a description with its runs; rows are read only when they are asked for."""
+"""A data set in memory: a description with its runs; rows are read when they are asked for."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Rows:
         return len(self.time_s)
 
     def has_channel(self, name: str) -> bool:
-        """Whether `channel` knows it."""
+        """Test whether there is a channel of this name."""
         return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
 
     def channel(self, name: str) -> FloatArray:
@@ -116,7 +116,7 @@ class Applied:
 
 @dataclass(frozen=True, slots=True)
 class DeclaredNoise:
-    """What noise the unit is declared to have; None where nothing is said."""
+    """Declared noise of the unit; None if it is not stated."""
 
     arw_deg_per_sqrt_h: float | None = None
     bias_instability_dph: float | None = None
@@ -171,12 +171,12 @@ class Run:
         return self.reader()
 
     def in_span(self, time_s: FloatArray) -> NDArray[np.bool_]:
-        """Which times (s on the file's clock) belong to the run: from_s <= t < to_s and not excluded."""
+        """Return a mask of the times (s on the file's clock) of the run: from_s <= t < to_s and not excluded."""
         return inside(time_s, self.from_s, self.to_s, self.exclude)
 
 
 def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """Runs of one role with spans of one file that touch as one, in order of file and time; copies of a run once.
+    """Join runs of one role whose spans of a file touch, in order of file and time; copies of a run count once.
 
     So neither the order of runs in a description, nor where a recording is cut, nor how often it was handed over
     changes what is learnt.
@@ -204,7 +204,7 @@ def joined_runs(runs: Sequence[Run]) -> tuple[Run, ...]:
 def inside(
     time_s: FloatArray, from_s: float | None, to_s: float | None, exclude: tuple[Exclusion, ...]
 ) -> NDArray[np.bool_]:
-    """Which times belong to a span without its exclusions; None: no limit on that side."""
+    """Return a mask of the times in a span without its exclusions; None means no limit on that side."""
     result = np.ones(np.shape(time_s), dtype=bool)
     if from_s is not None:
         result &= time_s >= from_s

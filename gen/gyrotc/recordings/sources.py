@@ -63,7 +63,7 @@ class _LastRead:
 
 
 def _bytes(columns: dict[str, FloatArray]) -> int:
-    """Of whole arrays in memory, where columns are parts of larger ones."""
+    """Return the bytes of whole arrays in memory; columns may be parts of larger ones."""
     return sum((values if values.base is None else values.base).nbytes for values in columns.values())
 
 
@@ -93,7 +93,7 @@ class Source(ABC):
 
     @abstractmethod
     def read(self, columns: Sequence[str]) -> dict[str, FloatArray] | None:
-        """Columns as float64, NaN where a value is missing; None if only `scan` can read the file.
+        """Read columns as float64, NaN for a missing value; None if only `scan` can read the file.
 
         Raises:
             InputError: The file is damaged.
@@ -101,7 +101,7 @@ class Source(ABC):
 
     @abstractmethod
     def scan(self) -> tuple[dict[str, FloatArray], list[int], list[Fault]]:
-        """Reads what can be read of a file that `read` cannot make numbers of.
+        """Read what can be read of a file that `read` cannot make numbers of.
 
         Returns:
             All columns of the rows that are whole (NaN where a cell is no number), the place of each row, and
@@ -113,7 +113,7 @@ class Source(ABC):
         """Place of a row (0 is the first) in the file: number of its line, or of the row counted from 1."""
 
     def columns(self, names: Sequence[str]) -> dict[str, FloatArray] | None:
-        """As `read`; not to write to. Small files that were read last are not read again: a job asks three times."""
+        """Read columns, not to be written to. Small files are kept: a job asks for them three times."""
         kept = _last_read.of(self)
         if not all(name in kept for name in names):
             if self.size > _KEPT_BYTES:
@@ -126,7 +126,7 @@ class Source(ABC):
         return {name: kept[name] for name in names}
 
     def keep_as_read(self) -> None:
-        """Sets `sha256`; `check_unchanged` refers to the file as it is now."""
+        """Set `sha256`; `check_unchanged` refers to the file as it is now."""
         self.sha256 = self._hash()
         self._stamp = self._stat()
 

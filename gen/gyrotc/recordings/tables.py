@@ -1,4 +1,4 @@
-"""What every format of a logger becomes: tables of named columns, read in chunks or whole.
+"""Tables of named columns, read in chunks or whole: the form that every format of a logger takes.
 
 A file holds one table (CSV) or many (the sheets of a spreadsheet, the groups of a measurement file). Columns are named
 `table/column` where there are many. An importer knows what its format says of units and of time; it guesses nothing.
@@ -111,7 +111,7 @@ class LoggerTable(ABC):
 
     @abstractmethod
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """Rows in order, with the columns asked for.
+        """Yield rows in order, with the columns asked for.
 
         Raises:
             InputError: A row that cannot be read, with its place and the change that goes on.
@@ -122,11 +122,11 @@ class LoggerTable(ABC):
         return f"row {row + 1}" if not self.name else f"{self.name}, row {row + 1}"
 
     def cut_in_two(self, file: str, row: int) -> str:
-        """What makes two files of the rows before and from a row, in words or commands."""
+        """Return words or commands that make two files of the rows before and from a row."""
         return f"a file with the rows before {self.place(row)}, and one with the rows from there on"
 
     def turned_round(self, file: str) -> str:
-        """What makes a file with the rows in reverse order, in words or commands."""
+        """Return words or commands that make a file with the rows in reverse order."""
         return "a file in which the rows are sorted by time"
 
     def column(self, name: str) -> Column | None:
@@ -159,7 +159,7 @@ class LoggerFile:
     unread: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuses tables of more rows or columns than are allowed.
+        """Refuse tables of more rows or columns than allowed.
 
         Raises:
             InputError: There is one.
@@ -207,7 +207,7 @@ class ArrayTable(LoggerTable):
     parts: Mapping[str, ReadPart] = field(default_factory=dict)
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """As `Table.chunks`."""
+        """Yield rows in order; see `Table.chunks`."""
         for first in range(0, self.rows, CHUNK_ROWS):
             last = min(first + CHUNK_ROWS, self.rows)
             values = {name: np.asarray(self.parts[name](first, last)) for name in names}
@@ -215,7 +215,7 @@ class ArrayTable(LoggerTable):
 
 
 def part_of(values: Any) -> ReadPart:
-    """Reads an array that is in memory."""
+    """Read an array that is in memory."""
     return lambda first, last: values[first:last]
 
 
@@ -278,7 +278,7 @@ def grouped(
 
 
 def rate_of(name: str, value: float) -> tuple[float, str] | None:
-    """Rows per second that a single number of that name states, with the reason; None if it does not."""
+    """Return the rows per second that a single number of that name states, with the reason; None if it states none."""
     plain = name.lower().rsplit("/", 1)[-1].rsplit(".", 1)[-1]
     if not np.isfinite(value) or value <= 0.0:
         return None

@@ -122,7 +122,7 @@ class _Size:
 
 @dataclass(frozen=True, slots=True)
 class Conversion:
-    """From the unit of a file to gyrotc's own: value · factor + offset.
+    """Conversion from the unit of a file to gyrotc's own: value · factor + offset.
 
     Attributes:
         unit: The unit as it was written.
@@ -136,11 +136,11 @@ class Conversion:
 
     @property
     def changes(self) -> bool:
-        """Whether there is anything to convert."""
+        """True if there is anything to convert."""
         return self.factor != 1.0 or self.offset != 0.0
 
     def __call__(self, values: FloatArray) -> FloatArray:
-        """Values in gyrotc's own unit; the same array where that is the file's."""
+        """Return values in gyrotc's own unit; the same array if that is the file's unit."""
         if not self.changes:
             return values
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out or refused with its row
@@ -156,7 +156,7 @@ class Conversion:
 
 @cache
 def conversion(text: str, kind: str) -> Conversion:
-    """How values of a unit become gyrotc's own.
+    """Return the conversion of a unit to gyrotc's own.
 
     Args:
         text: A unit, a number of one: "deg/s", "°/h", "K", "0.01 s", "deg/s / 131" (131 counts make 1 deg/s), or a
@@ -247,7 +247,7 @@ def _line(node: ast.expr) -> tuple[Fraction, Fraction]:
 
 
 def quantity_of(text: str) -> Quantity | None:
-    """What is measured in a unit: time, temperature or rate; None for anything else or no unit at all."""
+    """Return the quantity of a unit: time, temperature or rate; None for anything else or no unit at all."""
     kinds: tuple[Quantity, ...] = ("rate", "temperature", "time")
     for kind in kinds:
         try:
@@ -265,7 +265,7 @@ def channel_unit(name: str) -> str | None:
 
 
 def channel_kind(name: str, declared: Mapping[str, str]) -> Quantity | None:
-    """What an auxiliary channel measures, by its declared unit or by its name."""
+    """Return the quantity of an auxiliary channel, by its declared unit or by its name."""
     unit = declared.get(name) or channel_unit(name)
     return quantity_of(unit) if unit else None
 
@@ -352,7 +352,7 @@ def _defined(name: str) -> _Size:
 
 
 def declared(units: Mapping[str, str], columns: Mapping[str, Sequence[str]]) -> dict[str, Conversion]:
-    """Conversions by column name.
+    """Return conversions by column name.
 
     Args:
         units: `[units]`: "time", "temperature", "rate", and channels by their names.
@@ -433,7 +433,7 @@ _NO_TEMPERATURE = {
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What a name says.
+    """Meaning of a name.
 
     Attributes:
         kind: Time, temperature, rate, or None.
@@ -483,7 +483,7 @@ def split_unit(name: str) -> tuple[str, str | None, str]:
 
 
 def meaning(name: str, unit: str | None, table: str = "") -> Meaning:
-    """What a column of that name and (where the file gives one) that unit holds."""
+    """Return the meaning of a column with that name and, if the file gives one, that unit."""
     base, in_name, why = split_unit(name)
     kind = quantity_of(unit) if unit else None
     if unit is None and in_name is not None:

@@ -41,7 +41,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> str:
-    """What cells hold: "number", "stamp", "text", or "empty".
+    """Return the kind of some cells: "number", "stamp", "text" or "empty".
 
     Args:
         thousands: The mark between thousands, where it is stated.
@@ -55,7 +55,7 @@ def kind_of_cells(cells: Sequence[str], decimal: str, thousands: str = "") -> st
 
 
 def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
-    """Whether a cell is a number, with marks between thousands where nothing else can be meant, or as stated."""
+    """Test whether a cell is a number; marks between thousands count if they can be nothing else, or as stated."""
     if len(cell) > LONGEST_NUMBER:
         return False
     if thousands and re.fullmatch(rf"[^{re.escape(thousands)}]{{1,4}}({re.escape(thousands)}\d{{3}})+(\D.*)?", cell):
@@ -69,7 +69,7 @@ def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
 
 
 def is_infinite(cell: str) -> bool:
-    """Whether a cell holds the word for infinity, with or without a sign."""
+    """Test whether a cell holds the word for infinity, with or without a sign."""
     return cell.lstrip("+-").lower() in _INFINITE
 
 
@@ -89,7 +89,7 @@ def plain_number(cell: str, decimal: str, thousands: str) -> str:
 
 
 def plain_lines(lines: bytes, delimiter: str, thousands: str, *, spaced_sign: bool) -> bytes:
-    """Lines of cells, in UTF-8, likewise; the decimal mark stays.
+    """Return lines of cells in UTF-8 with plain numbers; the decimal mark stays.
 
     Args:
         spaced_sign: Signs are separate from the digits.

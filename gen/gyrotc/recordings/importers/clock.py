@@ -30,7 +30,7 @@ _TIME_OF_DAY = {"%H", "%M", "%S"}
 
 
 def _code(column: Column) -> str | None:
-    """What part of a time a column of numbers is named after; None where its name says more, or something else."""
+    """Return the part of a time that a column of numbers is named after; None if its name says more."""
     name = words_of_name(column.name)
     if column.kind != "number" or len(name) != 1:
         return None
@@ -38,7 +38,7 @@ def _code(column: Column) -> str | None:
 
 
 def clock_columns(columns: Sequence[Column]) -> list[Column]:
-    """Columns of numbers that make a time of day, or a date and one, in order; none where some part is missing."""
+    """List the columns of numbers that make a time of day, with or without a date; none if a part is missing."""
     found = {code: column for column in reversed(columns) if (code := _code(column)) is not None}
     dated = {"%Y", "%m", "%d"} & set(found)
     if not set(found) >= _TIME_OF_DAY or len(dated) not in (0, 3):
@@ -140,7 +140,7 @@ class Clock:
 
     @property
     def names(self) -> list[str]:
-        """Columns that it reads."""
+        """Names of the columns that it reads."""
         return [column.name for column in self._columns]
 
     @property
@@ -154,20 +154,20 @@ class Clock:
 
     @property
     def needs_zone(self) -> bool:
-        """Whether stamps with a date lack a zone."""
+        """True if stamps with a date lack a zone."""
         dated = self._stamps is not None and self._stamps.dated
         return bool(self._columns) and not self._known_zone and dated
 
     @property
     def zero_ns(self) -> int | None:
-        """Nanoseconds since 1970 at time 0; None: it counts from something else."""
+        """Nanoseconds since 1970 at time 0; None if the clock counts from something else."""
         if not self._columns:
             return _nanoseconds(self._table.started) if self._table.started is not None else None
         stamps = self._stamps is not None or self._columns[0].kind == "stamp"
         return int(self.origin) if stamps and self.origin is not None else None
 
     def follow(self, other: Clock) -> None:
-        """Counts from the same zero as another clock that has begun.
+        """Count from the same zero as another clock that has begun.
 
         Raises:
             InputError: Nothing says how one clock is ahead of the other.
@@ -186,17 +186,17 @@ class Clock:
 
     @property
     def known_zone(self) -> bool:
-        """Whether the times are those of UTC."""
+        """True if the times are those of UTC."""
         return self._known_zone or (not self._columns and self._table.started is not None)
 
     @property
     def counts(self) -> bool:
-        """Whether a column counts the time."""
+        """True if a column counts the time."""
         return bool(self._columns)
 
     @property
     def words(self) -> str:
-        """What the times are, in words."""
+        """Kind of the times, in words."""
         if not self._columns:
             return "rows at a fixed rate" + (" from a stated start" if self._table.started else "")
         zone = "a known zone" if self._known_zone else "no zone"
@@ -204,7 +204,7 @@ class Clock:
         return f"stamps of {zone}" if stamps else "a counter of time"
 
     def __call__(self, chunk: Chunk) -> FloatArray:
-        """Times of the rows of a chunk, s; NaN where there is none.
+        """Return the times of the rows of a chunk, s; NaN if a row has none.
 
         Raises:
             InputError: A text that is no stamp of the form, with its place.

@@ -1,4 +1,4 @@
-"""How a CSV file is written: encoding, comments, delimiter, decimal mark, header, and what a cell holds.
+"""Recognise the dialect of a CSV file: encoding, comments, delimiter, decimal mark, header, kinds of cells.
 
 What is decided can be seen and overruled: it stands in the map under `[csv]`.
 """
@@ -39,7 +39,7 @@ def in_comments(
 
 
 def _rejoined(cells: list[str], count: int) -> list[str]:
-    """Cells between blanks, each unit in brackets with the name before it, where there are more than columns."""
+    """Join each unit in brackets to the name before it, if cells between blanks are more than columns."""
     if len(cells) <= count:
         return cells
     joined: list[str] = []
@@ -80,7 +80,7 @@ def header_of(
 
 
 def _labelled(above: Sequence[tuple[int, list[str]]], count: int) -> tuple[int, list[str]]:
-    """Units of a line that says so in its first cell, anywhere above the rows, and that of its abscissa."""
+    """Return number and units of the last line above the rows whose first cell says that it holds units."""
     line, units = 0, [""] * count
     for k, cells in above:
         if cells and _UNITS_LABEL.fullmatch(cells[0]) and any(quantity_of(cell) for cell in cells[1:] if cell):
@@ -102,7 +102,7 @@ def _padded(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _is_units(cells: Sequence[str]) -> bool:
-    """Whether a line holds units: at least half of its words are, or two fifths and two of them,
+    """Test whether a line holds units: at least half of its words are units, or two fifths and two of them,
     and one of them is of time, temperature or rate.
     """
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
@@ -116,7 +116,7 @@ def _is_units(cells: Sequence[str]) -> bool:
 
 
 def _with_group(groups: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Names under headings: each heading holds until the next one."""
+    """Return names under headings; each heading holds until the next one."""
     joined, heading = [], ""
     for group, name in zip(groups, names, strict=True):
         heading = group or heading
@@ -145,7 +145,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How a CSV file is written.
+    """Dialect of a CSV file.
 
     Attributes:
         encoding: Name of the codec.
@@ -182,7 +182,7 @@ class Dialect:
     facts: dict[str, str] = field(default_factory=dict)
 
     def kept(self) -> dict[str, str]:
-        """What a map keeps of the dialect for the next file of the logger."""
+        """Return what an import map keeps of the dialect for the next file of the logger."""
         found = {"encoding": self.encoding, "delimiter": self.delimiter, "decimal": self.decimal}
         return found | ({"thousands": self.thousands} if self.thousands else {})
 
@@ -239,7 +239,7 @@ def dialect_of(name: str, head: bytes, given: CsvMap, *, whole: bool) -> Dialect
 
 
 def _kept(name: str, lines: Sequence[str], comment: tuple[str, ...]) -> list[tuple[int, str]]:
-    """Lines that hold something, with their numbers.
+    """List the lines that hold something, with their numbers.
 
     Raises:
         InputError: There is none.
@@ -262,7 +262,7 @@ def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]]
 
 
 def _digits(cells: Sequence[str], decimal: str, given: CsvMap) -> dict[str, Any]:
-    """How numbers are written besides their decimal mark."""
+    """Find the form of numbers besides their decimal mark."""
     spaced_sign = any(cell[:2] in ("+ ", "- ") for cell in cells)
     return {"thousands": given.thousands or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
 
@@ -343,12 +343,12 @@ def _separators(name: str, lines: Sequence[str], given: CsvMap) -> tuple[str, st
 
 
 def _holds_number(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a line says what rows hold: names that come again do not."""
+    """Test whether a line holds a number, and is no repeated line of names."""
     return any(is_number(cell, decimal) for cell in cells)
 
 
 def _instead(name: str, line: str) -> str:
-    """What goes on where lines are no rows of numbers."""
+    """Return what a user can do if lines are no rows of numbers."""
     if line.lstrip()[:1] in ("{", "["):
         return "a table: records of JSON as CSV or Parquet, one column for each field"
     if re.search(r"\w[=:] ?[-+]?[0-9.]", line):

@@ -90,7 +90,7 @@ class CsvTable(LoggerTable):
     size: int = 0
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """As `Table.chunks`: a chunk for each block of lines."""
+        """Yield rows in order, a chunk for each block of lines; see `Table.chunks`."""
         first = 0
         left = Counter({"above the stated line of names": self.dialect.ignored})
         for lines, number, done in self._blocks():
@@ -265,7 +265,7 @@ class CsvTable(LoggerTable):
 
 
 def _commands(file: str, *commands: str) -> str:
-    """Commands of a shell on a file of text, unpacked first where it is packed."""
+    """Return shell commands on a file of text, which unpack it first if it is packed."""
     packed = file.lower().endswith(".gz")
     name = shlex.quote(file[: -len(".gz")] if packed else file)
     unpacked = [f"gunzip -k {shlex.quote(file)}"] if packed else []
@@ -277,7 +277,7 @@ def _whole(values: Sequence[Any]) -> bool:
 
 
 def _values(column: pa.Array) -> Any:
-    """Numbers as numpy arrays, text as it is."""
+    """Return numbers as numpy arrays and text as it is."""
     return column if pa.types.is_string(column.type) else column.to_numpy(zero_copy_only=False)
 
 
@@ -304,7 +304,7 @@ def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Col
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Names that differ: one without a name, or there twice, gets its number."""
+    """Return distinct names: a column without a name, or with one that repeats, gets its number."""
     seen: set[str] = set()
     result = []
     for k, name in enumerate(names, start=1):
@@ -315,7 +315,7 @@ def _unique(names: Sequence[str]) -> list[str]:
 
 
 def _stated_rate(dialect: Dialect) -> dict[str, Any]:
-    """Rows per second where a line above the header states them: `Sample rate: 100 Hz`."""
+    """Return the rows per second that a line above the header states, as in `Sample rate: 100 Hz`."""
     for key, value in dialect.facts.items():
         found = re.match(r"([\d.,]+)\s*(k?hz|/s|sps|samples/s)?", value.lower())
         number = number_in(found[1].replace(",", ".")) if found else None

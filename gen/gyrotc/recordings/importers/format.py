@@ -1,4 +1,4 @@
-"""What each format of loggers that is no text says of itself."""
+"""Describe the formats of loggers that are no text."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ class ImportedRun:
     exam: bool = False
 
     def result(self) -> ImportedFile:
-        """What `gyrotc import` says of it."""
+        """Return the result of `gyrotc import`."""
         source = self.sources[0].model_dump()
         return ImportedFile(
             file=self.file,
@@ -190,7 +190,7 @@ _MOST_NAMES = 12  # that are listed in a line of a terminal
 
 
 def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator[str]:
-    """How a file is read, a line for each column."""
+    """Yield the interpretation of a file, a line for each column."""
     table = f", table {plan.main.name}" if plan.main.name else ""
     yield f"{file.path.name}: {file.format}{table}"
     if plan.time:
@@ -226,7 +226,7 @@ def preview(rows: ImportedRows) -> Iterator[str]:
 
 
 def import_summary(out: Path, runs: Sequence[ImportedRun]) -> Iterator[str]:
-    """What was written."""
+    """Yield a summary of the runs that were written."""
     for run in runs:
         yield f"{out / run.file}: {_counted(run)}"
         for text in run.trusted:
@@ -288,7 +288,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What is asked for besides files and map.
+    """Options of an import besides files and map.
 
     Attributes:
         serial: Serial of the gyro; else that of the map, of the file, or the name of the folder.
@@ -305,14 +305,14 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What was written: the serial, the kept map, and the runs."""
+    """An imported data set: the serial, the map that was kept, and the runs."""
 
     serial: str
     map: Map
     runs: tuple[ImportedRun, ...]
 
     def result(self) -> ImportedFiles:
-        """What `gyrotc import` says of it."""
+        """Return the result of `gyrotc import`."""
         return ImportedFiles(
             gyrotc_version=__version__,
             serial=self.serial,
@@ -323,7 +323,7 @@ class Imported:
         )
 
     def findings(self) -> tuple[Finding, ...]:
-        """Rows that were left out, and units that were taken against what the values say, as `check` tells them."""
+        """Findings about rows that were left out and units that contradict their values, as `check` has them."""
         said = [
             (id, run.file, text)
             for run in self.runs
@@ -347,7 +347,7 @@ def import_files(
     say: Say | None = None,
     progress: Progress = silent,
 ) -> Imported | None:
-    """Imports files, each as a run, into a new folder.
+    """Import files, each as a run, into a new folder.
 
     Args:
         chosen: What is known of the logger; what it leaves open is proposed from the first file.
@@ -444,7 +444,7 @@ class _Import:
     def _run(
         self, file: LoggerFile, rows: ImportedRows, chunks: Iterable[RowsChunk], name: str, target: Path | None
     ) -> ImportedRun:
-        """Reads one file, and writes its run where there is a target."""
+        """Read one file, and write its run if there is a target."""
         layout = rows.layout
         columns_of = ["time_s", "temperature_c", *(layout.axes.values() or [layout.value]), *layout.channels]
         with ExitStack() as stack:
@@ -496,7 +496,7 @@ def _of_several(devices: Mapping[str, str]) -> InputError:
 
 
 def _refuse_loss(files: Sequence[Path], out: Path) -> None:
-    """Refuses to replace an imported data set by one that lacks some of its recordings.
+    """Refuse to replace an imported data set by one that lacks some of its recordings.
 
     Raises:
         InputError: `out` holds recordings of other files.
@@ -515,7 +515,7 @@ def _refuse_loss(files: Sequence[Path], out: Path) -> None:
 
 
 def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bool:
-    """Whether the last run is the exam: as stated, else as a person answers; nobody there: no.
+    """Decide whether the last run is the exam: as stated, else as a person answers, else not.
 
     Raises:
         InputError: There is only one run.
@@ -529,7 +529,7 @@ def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bo
 
 
 def _judged_by(runs: Sequence[ImportedRun]) -> str:
-    """What will judge a correction made of these runs."""
+    """Return a sentence about the runs that will judge a correction."""
     if runs[-1].exam:
         return f"{runs[-1].file} is the exam; the other runs are trained on"
     hint = "" if len(runs) < 2 else ": --exam makes the last run the exam"
@@ -537,7 +537,7 @@ def _judged_by(runs: Sequence[ImportedRun]) -> str:
 
 
 def _judged(file: LoggerFile, rows: ImportedRows, chosen: Map, options: ImportOptions) -> list[str]:
-    """Values against their units; what the user's word is taken against.
+    """Compare values with their units, and return the contradictions that the user's word overrules.
 
     Raises:
         InputError: They contradict them, and nobody says that they are right.
@@ -561,7 +561,7 @@ _REFUSED = (
 
 
 def open_logger_file(path: Path, chosen: Map) -> LoggerFile:
-    """Opens a file of any known format.
+    """Open a file of any known format.
 
     Raises:
         InputError: It is of none, damaged, or its library is missing; the message says what goes on.

@@ -1,4 +1,4 @@
-"""Which lines of a CSV file are rows: all of one layout, or the file is refused with the line where that changes.
+"""Tell rows of a CSV file from other lines; a file whose rows change their layout is refused, with the line.
 
 Where the rows begin is guessed from the last lines of the head. What is above them may only be what a logger writes
 above rows: names, units, and lines that say something. A line of numbers there is a row, and no row is passed over.
@@ -33,7 +33,7 @@ class Row:
 
 
 def can_be_row(cells: Sequence[str], decimal: str) -> bool:
-    """Whether cells can be a row: two numbers or more, fewer words than numbers and stamps, and no word leads.
+    """Test whether cells can be a row: two numbers or more, fewer words than numbers and stamps, no word in front.
 
     `Range: 400, 500` is none, because a word says what its numbers are. A word of which most are digits is no such
     word: it is a stamp of a form that is not known.
@@ -87,7 +87,7 @@ def check_between(name: str, lines: Sequence[tuple[int, str]], count: int, delim
 
 
 def rows_among(lines: Sequence[tuple[int, str]], delimiter: str, decimal: str) -> list[Row]:
-    """Lines that can be rows in any dialect; and those that repeat the words of another one: `IMU,0,20.1,10.2`."""
+    """List the lines that can be rows in any dialect, and those that repeat the words of another: `IMU,0,20.1,10.2`."""
     split = [split_line(text, delimiter) for _, text in lines]
     words = [_words(cells, decimal) for cells in split]
     often = Counter(words)
@@ -149,7 +149,7 @@ def parted(name: str, line: int, *, names: bool) -> str:
 
 
 def _damaged(name: str, first: int, last: int, count: int, expected: int) -> tuple[str, str]:
-    """Lines that do not fit the others: what was found, and the command that takes them out."""
+    """Return what is wrong with lines that do not fit the others, and the command that takes them out."""
     place = f"{first}" if first == last else f"{first},{last}"
     found = f"{_cells(count)}, and {expected} in the lines around it"
     if name.lower().endswith(_SHEETS):

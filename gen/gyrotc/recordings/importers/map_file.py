@@ -40,7 +40,7 @@ class ColumnMap(_Part):
     pulses: Text | None = None
 
     def values(self) -> dict[str, str]:
-        """What is measured, by role: rate, rate_x, rate_y, rate_z or pulses."""
+        """Columns of measured values by role: rate, rate_x, rate_y, rate_z or pulses."""
         roles = ("rate", "rate_x", "rate_y", "rate_z", "pulses")
         return {role: getattr(self, role) for role in roles if getattr(self, role)}
 
@@ -104,7 +104,7 @@ class Map(GyroFacts):
 
 
 def load_map(path: Path) -> Map:
-    """Reads a map.
+    """Read an import map.
 
     Raises:
         InputError: It is no map; the field is named.
@@ -169,7 +169,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class ImportPlan:
-    """What is read of a file.
+    """Columns and rows that are read of a file.
 
     Attributes:
         main: The table with the rates; its rows are the rows of the run.

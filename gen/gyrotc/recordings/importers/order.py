@@ -48,7 +48,7 @@ class Times:
     before_s: FloatArray
 
     def place(self, k: int) -> str:
-        """Where a row is."""
+        """Return the place of a row, for messages."""
         return f"{self.file}, {self.table.place(self.chunk.row(int(self.rows[k])))}"
 
     def text(self, k: int) -> str:
@@ -75,7 +75,7 @@ def out_of_order(times: Times, at: int) -> InputError:
 
 
 def _of_equal_times(times: Times) -> Iterator[str]:
-    """What goes on where several rows have one time."""
+    """Yield what a user can do if several rows have one time."""
     for column in times.table.columns:
         counts = Counter(cell for cell in column.sample if cell)
         of_sensors = len(counts) > 1 and min(counts.values()) >= _MIN_REPEATS and column.name not in times.clock.names
@@ -88,7 +88,7 @@ def _of_equal_times(times: Times) -> Iterator[str]:
 
 
 def _of_falling_times(times: Times, at: int) -> str:
-    """What goes on where the time falls at a row."""
+    """Return what a user can do if the time falls at a row."""
     steps = np.diff(times.time_s)
     if np.count_nonzero(steps < 0.0) > 0.5 * len(steps):
         return f"rows from the oldest to the newest: {times.table.turned_round(times.file)}"
@@ -108,7 +108,7 @@ def _about_an_hour(seconds: float, steps: FloatArray) -> bool:
 
 
 def refuse_skipped_hour(times: Times) -> None:
-    """Refuses stamps without a zone that skip an hour at night, as when summer time begins.
+    """Refuse stamps without a zone that skip an hour at night, as when summer time begins.
 
     Raises:
         InputError: They do.

@@ -85,7 +85,7 @@ class Units:
 
 
 def said(missing: Sequence[_Missing]) -> Iterator[str]:
-    """What is missing, once for each kind."""
+    """Yield what is missing, once for each kind."""
     for kind, column in {kind: column for kind, column, _ in reversed(missing)}.items():
         yield f"no unit of the {kind} in column {column!r}"
 
@@ -94,7 +94,7 @@ _HEXADECIMAL = re.compile(r"(?=.*[A-Fa-f])[0-9A-Fa-f]+h?|[0-9A-Fa-f]+h")
 
 
 def increments(file: LoggerFile) -> str:
-    """What to do with a file of increments of angle; empty where there are none."""
+    """Return what to do with a file of angle increments; empty if it has none."""
     for table in file.tables:
         for column in table.columns:
             name, unit, _ = split_unit(column.name)
@@ -132,7 +132,7 @@ def name_it(kind: str) -> str:
 
 
 def nameless(file: LoggerFile) -> str:
-    """All that has to be said where no column has a name; empty where one has."""
+    """Return all that has to be stated if no column has a name; empty if one has."""
     names = [column.name for table in file.tables for column in table.columns]
     if any(not name.startswith("column ") for name in names):
         return ""
@@ -149,7 +149,7 @@ _MOST_CHANNELS = 12  # that are proposed: a person has to read the list
 
 
 def propose(file: LoggerFile, chosen: Map, ask: Ask) -> ImportPlan:
-    """What is read of a file under a map, the open choices made from names.
+    """Plan the reading of a file under a map; open choices are made from names.
 
     Args:
         chosen: What is stated already, by a map and options.
@@ -275,7 +275,7 @@ def _values(file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map) -> lis
 
 
 def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str], chosen: Map) -> None:
-    """Pulses have an angle.
+    """Check that a weight is stated for pulses.
 
     Raises:
         InputError: It stands nowhere.
@@ -286,7 +286,7 @@ def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str],
 
 
 def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
-    """Columns of rates of a table with role and reason, and how much speaks for them; none where it is unclear."""
+    """List the rate columns of a table with role and reason, and their score; none if it is unclear."""
     pulses = [c for c in table.columns if words_of_name(c.name)[:1] == ["pulses"]]
     if pulses:
         return [("pulses", pulses[0], "its name")], 5
@@ -356,7 +356,7 @@ def _instance(name: str) -> str:
 
 
 def _time(file: LoggerFile, main: LoggerTable, chosen: Map) -> tuple[list[tuple[Column, str]], float | None, str]:
-    """Columns of time with reasons; or rows per second with the reason."""
+    """Find the columns of time, or the rows per second, with the reason."""
     if chosen.time.rate_hz is not None:
         return [], chosen.time.rate_hz, "rows are counted, as stated"
     if chosen.columns.time:

@@ -81,7 +81,7 @@ class ImportedRows:
 
     @property
     def layout(self) -> Layout:
-        """Columns of the rows that are given."""
+        """Meaning of the columns of the rows."""
         roles = [choice.role for choice in self.plan.values]
         axes = {role[-1]: NAMES_OF_COLUMNS[role] for role in roles if role.startswith("rate_")}
         value = "" if axes else NAMES_OF_COLUMNS[roles[0]]
@@ -89,7 +89,7 @@ class ImportedRows:
         return Layout("time_s", NAMES_OF_COLUMNS["temperature"], value, roles == ["pulses"], axes, channels)
 
     def chunks(self) -> Iterator[RowsChunk]:
-        """Rows by column name, and the share of the file that was read.
+        """Yield rows by column name, with the share of the file that was read.
 
         Raises:
             InputError: A row that cannot be taken, with its place and the change that goes on.
@@ -149,7 +149,7 @@ class ImportedRows:
         return chunk.only(picked)
 
     def notes(self) -> Iterator[str]:
-        """What a person may want to state, by the rows that were left out."""
+        """Yield remarks on what a person may want to state, judged by the rows that were left out."""
         if hint := self.hint():
             yield f"most rows are left out{hint}"
 
@@ -182,14 +182,14 @@ class ImportedRows:
         return self._held(name, values) if self.chosen.hold and name in self._holds else values
 
     def _numbers(self, column: Any) -> FloatArray:
-        """Values as the file has them, NaN where the map says that a number is no reading."""
+        """Return the values of the file; NaN if the map says that a number is no reading."""
         values = np.asarray(column).astype(np.float64)
         if self._missing:
             values[np.isin(values, self._missing)] = np.nan
         return values
 
     def _held(self, name: str, values: FloatArray) -> FloatArray:
-        """Values in which each reading holds until the next one."""
+        """Hold each reading until the next one."""
         at = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
         held = np.where(at >= 0, values[np.maximum(at, 0)], self._holds[name])
         self._holds[name] = float(held[-1]) if len(held) else self._holds[name]
@@ -263,7 +263,7 @@ class ImportedRows:
             self.first_rows = {name: [float(v) for v in values[:3]] for name, values in columns.items()}
 
     def _whole(self, columns: dict[str, FloatArray]) -> tuple[dict[str, FloatArray], NDArray[np.int64]]:
-        """Rows without a missing value, and their numbers in the chunk."""
+        """Return the rows without a missing value, and their numbers in the chunk."""
         good = np.ones(len(columns["time_s"]), dtype=bool)
         for name, values in columns.items():
             missing = ~np.isfinite(values) & good
@@ -276,7 +276,7 @@ class ImportedRows:
     def _in_order(
         self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk
     ) -> tuple[dict[str, FloatArray], NDArray[np.int64]]:
-        """Without rows that repeat the one before in every value; times must go on.
+        """Drop rows that repeat the one before in every value, and check that times increase.
 
         Raises:
             InputError: They do not.
@@ -314,7 +314,7 @@ class ImportedRows:
             self.left_out[reason] += count
 
     def _check(self, kept: dict[str, FloatArray], rows: NDArray[np.int64], chunk: Chunk) -> None:
-        """Values that no gyro and no chamber gives.
+        """Refuse values that no gyro and no chamber gives.
 
         Raises:
             InputError: There is one.
@@ -347,7 +347,7 @@ _MAX_SHARE = 0.2
 
 
 def conversion_of(choice: Choice) -> Conversion | None:
-    """How a column is converted; None where it is taken as it is."""
+    """Return the conversion of a column; None if it is taken as it is."""
     if choice.unit is None or choice.role == "pulses":
         return None
     kind = "rate" if choice.role.startswith("rate") else choice.role
@@ -378,7 +378,7 @@ def _unit_of_time(column: Column, table: LoggerTable) -> str | None:
 
 
 RowsChunk = tuple[dict[str, FloatArray], float]
-"""Rows by column name, and the share of the file that was read."""
+"""Yield rows by column name, with the share of the file that was read."""
 FileFormat = Literal["csv", "parquet"]
 _GROUP_ROWS = 2**20  # of a row group: Arrow's own default
 
@@ -407,7 +407,7 @@ class RunFile:
             )
 
     def write(self, columns: dict[str, NDArray[np.float64]]) -> None:
-        """Appends rows."""
+        """Append rows."""
         arrays = [pa.array(columns[field.name]).cast(field.type) for field in self._schema]
         table = pa.Table.from_arrays(arrays, schema=self._schema)
         if isinstance(self._writer, pyarrow.parquet.ParquetWriter):

@@ -1,4 +1,4 @@
-"""Which rows of a table are taken, and which gyro they are of: one column picks rows, one names the device."""
+"""Select rows of a table: one column picks rows, another names the device that they are of."""
 
 from __future__ import annotations
 
@@ -83,11 +83,11 @@ class Device:
 
     @property
     def names(self) -> list[str]:
-        """Columns that it reads."""
+        """Names of the columns that it reads."""
         return [self._column.name] if self._column is not None else []
 
     def look(self, chunk: Chunk) -> None:
-        """Looks at the rows of a chunk.
+        """Check the rows of a chunk.
 
         Raises:
             InputError: They are of several devices, or of another one than the rows before.

@@ -50,7 +50,7 @@ _DIGITS_ONLY = re.compile(r"(%[A-Za-z])+")
 
 
 def forms_of(sample: Sequence[str]) -> list[str]:
-    """Forms that all texts of a sample have; two where day and month cannot be distinguished.
+    """List the forms that all texts of a sample have; two if day and month cannot be distinguished.
 
     Forms with a fraction that none of the texts has are left out.
     """
@@ -67,7 +67,7 @@ _ZONES = ("", "%z", " %z", " UTC", " GMT")
 
 
 def _candidates(text: str) -> Iterator[str]:
-    """Forms that one text has: a date, a time of day, or both and perhaps a zone."""
+    """Yield the forms that a text has: a date, a time of day, or both, with or without a zone."""
     if not _MAYBE.match(text):
         return
     for date in _DATES:
@@ -84,7 +84,7 @@ def _candidates(text: str) -> Iterator[str]:
 
 
 def _clocks(text: str) -> Iterator[str]:
-    """Forms of times of day, perhaps with a zone, that a text has."""
+    """Yield the forms of times of day that a text has, with or without a zone."""
     for time in _TIMES:
         begins = _compiled(time).match(text)
         if begins is not None:
@@ -177,7 +177,7 @@ class Stamps:
         self._last = -1
 
     def parse(self, texts: Any) -> tuple[IntArray, NDArray[np.bool_]]:
-        """Nanoseconds since 1970 (since midnight for a form without a date), and which texts were understood."""
+        """Return nanoseconds since 1970 (since midnight without a date), and a mask of the texts understood."""
         if pa.types.is_null(texts.type):
             texts = texts.cast(pa.string())
         trimmed = pc.utf8_trim(texts, ' "')
@@ -196,8 +196,10 @@ class Stamps:
         return ns, good
 
     def _ahead(self, local: IntArray, good: NDArray[np.bool_]) -> IntArray:
-        """Nanoseconds that local times are ahead of UTC. The hour repeated at the end of summer time is recognised by
-        the local time going back in it.
+        """Return by how many nanoseconds local times are ahead of UTC.
+
+        In the hour that is repeated at the end of summer time, local time goes back once; the rows behind are of the
+        second pass.
         """
         if isinstance(self._zone, int) or self._zone is None:
             return np.full(len(local), (self._zone or 0) * 1_000_000_000, dtype=np.int64)
@@ -215,7 +217,7 @@ class Stamps:
         return first
 
     def _over_midnight(self, ns: IntArray, good: NDArray[np.bool_]) -> IntArray:
-        """Times of day that go on after midnight."""
+        """Continue times of day after midnight."""
         chosen = ns[good]
         before = np.r_[self._last if self._last >= 0 else chosen[:1], chosen[:-1]]
         falls = np.cumsum(chosen < before - _DAY_NS // 2)
@@ -255,14 +257,14 @@ class _Parts:
         return self.whole("I") % 12 + 12 * half
 
     def fraction(self) -> IntArray:
-        """Nanoseconds of the fraction."""
+        """Return the nanoseconds of the fraction."""
         if not self.has("f"):
             return np.zeros(len(self._parts), dtype=np.int64)
         padded = pc.utf8_rpad(pc.fill_null(self.text("f"), ""), 9, "0")
         return np.asarray(padded.cast(pa.int64()).to_numpy(zero_copy_only=False), dtype=np.int64)
 
     def offset(self) -> IntArray:
-        """Seconds east of UTC."""
+        """Return the seconds east of UTC."""
         if not self.has("z"):
             return np.zeros(len(self._parts), dtype=np.int64)
         known = {text: _offset_s(text) for text in pc.unique(self.text("z")).to_pylist()}
@@ -280,7 +282,7 @@ def _offset_s(text: str | None) -> int:
 
 
 def _days(get: _Parts) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Days since 1970, and which dates there are."""
+    """Return days since 1970, and a mask of the dates that exist."""
     n = len(get.whole("M"))
     if not (get.has("d") or get.has("j")):
         return np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
@@ -304,7 +306,7 @@ def _days(get: _Parts) -> tuple[IntArray, NDArray[np.bool_]]:
 
 
 def _offsets(ns: IntArray, zone: ZoneInfo, good: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
-    """Nanoseconds that local times are ahead of UTC, the first and the second time that they come.
+    """Return by how many nanoseconds local times are ahead of UTC at their first and second occurrence.
 
     The zone's rules are asked once for each quarter of an hour.
     """

@@ -56,7 +56,7 @@ def open_hdf5(path: Path) -> LoggerFile:
 
 
 class _Contents:
-    """What a file holds.
+    """Contents of a file.
 
     Attributes:
         entries: Its columns, and what is not read.
@@ -107,7 +107,7 @@ class _Contents:
 
 
 def _refuse_elsewhere(path: Path, name: str, node: Any) -> None:
-    """Values that lie in other files are not read: a file of others may name any file of the user, or a pipe.
+    """Refuse values that lie in other files: a file from elsewhere may name any file of the user, or a pipe.
 
     Links to other files need no test, `visititems` does not follow them.
     """
@@ -154,14 +154,14 @@ def _part_of_field(node: Any, field: str) -> ReadPart:
 
 
 def _part_of(node: Any, index: int | None, tall: bool) -> ReadPart:
-    """Reads a vector, a column of a matrix, or a row of one that lies on its side (as MATLAB stores it)."""
+    """Read a vector, a column of a matrix, or a row of a transposed one (as MATLAB stores it)."""
     if index is None:
         return lambda a, b: numbers(node[a:b])
     return lambda a, b: numbers(node[a:b, index] if tall else node[index, a:b])
 
 
 def _stated_rate(node: Any) -> tuple[float, str] | None:
-    """Rows per second that an attribute states."""
+    """Return the rows per second that an attribute states."""
     for key, value in node.attrs.items():
         if isinstance(value, int | float | np.number) and (found := rate_of(key, float(value))):
             return found

@@ -70,7 +70,7 @@ def open_mat(path: Path) -> LoggerFile:
 
 
 def _need_memory(path: Path) -> None:
-    """Refuses variables that take more memory than is allowed, by their sizes; a few packed bytes may be gigabytes.
+    """Refuse variables that take more memory than allowed, by their sizes; a few packed bytes may be gigabytes.
 
     A variable is unpacked, then made an array, so it is there twice for a moment.
     """
@@ -81,7 +81,7 @@ def _need_memory(path: Path) -> None:
 
 
 def _leaves(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
-    """Fields of structs under their full names."""
+    """Yield the fields of structs under their full names."""
     if hasattr(value, "_fieldnames") and deep:
         for field in value._fieldnames:
             yield from _leaves(f"{name}.{field}", getattr(value, field), deep - 1)

@@ -40,7 +40,7 @@ class ParquetTable(LoggerTable):
     file: ParquetBatches
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """As `LoggerTable.chunks`."""
+        """Yield rows in order; see `LoggerTable.chunks`."""
         at = 0
         for batch in self.file.batches(list(names) or [self.columns[0].name], CHUNK_ROWS):
             values = {n: _values_of(batch.column(k)) for k, n in enumerate(batch.schema.names)}
@@ -77,7 +77,7 @@ def _column_of(field: pa.Field, file: ParquetBatches) -> Column:
 
 
 def _values_of(column: pa.Array) -> Any:
-    """Values of a column of Arrow as those of a chunk."""
+    """Return the values of a column of Arrow as those of a chunk."""
     if pa.types.is_string(column.type):
         return column
     if pa.types.is_timestamp(column.type):

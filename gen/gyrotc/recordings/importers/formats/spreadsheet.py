@@ -66,7 +66,7 @@ def open_spreadsheet(path: Path) -> LoggerFile:
 
 
 def _refuse_archive(path: Path) -> None:
-    """Refuses a ZIP archive of other files, by the name of its first file.
+    """Refuse a ZIP archive of other files, by the name of its first file.
 
     Raises:
         InputError: It is one.

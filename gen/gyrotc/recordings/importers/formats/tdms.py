@@ -55,7 +55,7 @@ _CUT = "the file ends within its last segment: the rows that it states behind ar
 
 @contextmanager
 def _log(nptdms: ModuleType) -> Iterator[StringIO]:
-    """What the library logs while a file is open; it is not printed."""
+    """Collect what the library logs while a file is open, so that it is not printed."""
     handler = nptdms.log.log_manager.console_handler
     said = StringIO()
     before = handler.setStream(said)
@@ -101,7 +101,7 @@ def _why_unread(channel: Any) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Rhythm:
-    """When the samples of a channel were taken."""
+    """Start and interval of the samples of a channel."""
 
     rows: int
     increment_s: float | None
