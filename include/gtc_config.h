@@ -135,7 +135,8 @@
 #define GTC_SAVE_WORDS                                                                                             \
     (10 + (2 * GTC_WITH_TERMS) + GTC_MAX_SLOPE_BLOCKS                                                              \
      + ((1 + (GTC_MAX_TERMS * GTC_WITH_CHANNELS)) * (13 + GTC_WITH_CHANNELS))                                      \
-     + (2 * GTC_MAX_TERMS * GTC_WITH_RETAINED) + (GTC_WITH_UNCERTAINTY * (9 + (5 * GTC_WITH_TERMS))))
+     + (2 * GTC_MAX_TERMS * GTC_WITH_RETAINED) + (GTC_WITH_UNCERTAINTY * (6 + (5 * GTC_WITH_TERMS)))               \
+     + (3 * GTC_WITH_REZERO))
 
 /* What of it sets the layout of a saved state. */
 #define GTC_SAVE_OPTIONS                                                                                           \
@@ -143,6 +144,7 @@
      + (128UL * (uint_least32_t)GTC_WITH_UNCERTAINTY)                                                              \
      + (256UL * (uint_least32_t)GTC_MAX_TERMS)                                                                     \
      + (4096UL * (uint_least32_t)GTC_WITH_RETAINED)                                                                \
+     + (8192UL * (uint_least32_t)GTC_WITH_REZERO)                                                                  \
      + (65536UL * (uint_least32_t)GTC_MAX_SLOPE_BLOCKS))
 
 /* What this runtime holds, in the bits of a table's `parts` (gtc_table.h). */

@@ -36,7 +36,6 @@ typedef struct {
     float input[2];             /* of the map: C, C/block */
     float slope;                /* as far as it is known, C/block */
     float first_temp;           /* sample with which the front end began, C */
-    float unshifted;            /* correction without the re-zero */
     uint_least32_t slope_known; /* 0: there was no correction yet, 1: nothing is known of the slope, 2: `slope` is */
     uint_least32_t missing;     /* samples of the block that the correction was made of */
 #if GTC_WITH_TERMS
@@ -65,9 +64,12 @@ struct gtc_f32_state {
     uint_least32_t elapsed;    /* blocks since init */
     uint_least32_t off_blocks; /* blocks without power before it */
 #endif
-#if GTC_WITH_UNCERTAINTY
+#if GTC_WITH_REZERO
+    float unshifted;   /* correction without the shift */
     float shift;       /* of the constant: gtc_f32_rezero() */
     float shift_sigma; /* 1 sigma of the constant with it */
+#endif
+#if GTC_WITH_UNCERTAINTY
     gtc_f32_uncertainty_t uncertainty;
 #endif
     float window[GTC_MAX_SLOPE_BLOCKS]; /* [age]: block mean; age 0 is the newest */
@@ -105,7 +107,6 @@ typedef struct {
     int_least32_t input[2];     /* of the map: C, C/block */
     int_least32_t slope;        /* as far as it is known, C/block */
     int_least32_t first_temp;   /* sample with which the front end began, C */
-    int_least32_t unshifted;    /* correction without the re-zero */
     uint_least32_t slope_known; /* 0: there was no correction yet, 1: nothing is known of the slope, 2: `slope` is */
     uint_least32_t missing;     /* samples of the block that the correction was made of */
 #if GTC_WITH_TERMS
@@ -134,9 +135,12 @@ struct gtc_q31_state {
     uint_least32_t elapsed;    /* blocks since init */
     uint_least32_t off_blocks; /* blocks without power before it */
 #endif
-#if GTC_WITH_UNCERTAINTY
+#if GTC_WITH_REZERO
+    int_least32_t unshifted;   /* correction without the shift */
     int_least32_t shift;       /* of the constant: gtc_q31_rezero() */
     int_least32_t shift_sigma; /* 1 sigma of the constant with it */
+#endif
+#if GTC_WITH_UNCERTAINTY
     gtc_q31_uncertainty_t uncertainty;
 #endif
     int_least32_t window[GTC_MAX_SLOPE_BLOCKS]; /* [age]: block mean; age 0 is the newest */

@@ -50,7 +50,7 @@
 #define GTC_NETWORK_WORDS 8U /* n_centers, w0, linear T, linear slope, region: T0, T1, slope0, slope1 */
 #define GTC_CENTER_WORDS 5U  /* T: center, gain; slope: center, gain; weight (q31: s, k; s, k; weight) */
 #define GTC_TERM_WORDS 8U    /* kind, channel + 65536 * number of the fallback model, then six parameters of the kind */
-#define GTC_SIGMA_RULES 12U  /* words of `sigma` behind its two grids, before one for each term */
+#define GTC_SIGMA_RULES 12U  /* words of `sigma` behind its grids, before one for each term */
 #define GTC_PROBE_WORDS 4U   /* temperature, slope, bias, status */
 
 #if GTC_WITH_F32
@@ -78,7 +78,7 @@ struct gtc_f32_table {
     uint_least32_t n_terms;        /* 0 ... GTC_MAX_TERMS */
     uint_least32_t coverage_cells[2]; /* cells in T and slope over the envelope; 0, 0: none */
     uint_least32_t sigma_cells[2];    /* the same for the uncertainty; 0, 0: none */
-    uint_least32_t n_sigma;           /* words of the uncertainty: 0, or 2 grids, GTC_SIGMA_RULES, one a term */
+    uint_least32_t n_sigma;           /* words of the uncertainty: 0, or its grids, GTC_SIGMA_RULES, one a term */
     uint_least32_t n_probes;          /* known answers */
     uint_least32_t n_fallback_models;       /* networks behind those of the map, each for a term whose channel is lost */
     const gtc_word_t *serial;      /* [GTC_SERIAL_WORDS], as given by the gyro's maker */
@@ -87,7 +87,8 @@ struct gtc_f32_table {
     const gtc_word_t *guards;      /* [n_channels][GTC_GUARD_WORDS], the temperature first */
     const gtc_word_t *terms;       /* [n_terms][GTC_TERM_WORDS] */
     const gtc_word_t *coverage;    /* one bit a cell, T fastest, 32 cells a word, low bit first */
-    const gtc_word_t *sigma;       /* [covered, uncovered][slope cell][T cell] deg/h, 1 sigma; rules; terms */
+    const gtc_word_t *sigma;       /* [covered, uncovered][slope cell][T cell] deg/h, 1 sigma (without coverage only
+                                      the first grid); rules; terms */
     const gtc_word_t *probes;      /* [n_probes][GTC_PROBE_WORDS] */
     uint_least32_t crc;            /* CRC-32 over all of the above */
 };

@@ -197,14 +197,6 @@ static int envelope_fits(const TABLE *table)
     }
     return fit;
 }
-
-/* With every word in its range no sum leaves float32. */
-static int sums_fit(const gtc_word_t *network, const gtc_word_t *centers)
-{
-    (void)network;
-    (void)centers;
-    return 1;
-}
 #endif
 
 #include "gtc_open.inl"

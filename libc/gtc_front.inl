@@ -31,14 +31,15 @@
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
-/* Puts a correction in force, moved by the shift of the constant: the only place that writes one, but for init. */
+/* Puts a correction in force, with the shift of the constant where it was moved: the only place that writes one, but
+ * for init. */
 static void put_in_force(STATE *state, const TABLE *table, WIDE bias, int_least32_t status)
 {
     int_least32_t remarks = status;
     NUM limited = within_authority(table, bias, &remarks);
 
-#if GTC_WITH_UNCERTAINTY
-    state->uncertainty.unshifted = limited;
+#if GTC_WITH_REZERO
+    state->unshifted = limited;
     if ((state->shift > NUM_ZERO) || (state->shift < NUM_ZERO)) {
         limited = within_authority(table, add(limited, state->shift), &remarks);
     }
@@ -256,7 +257,7 @@ static int_least32_t window_slope(const STATE *state, const TABLE *table, NUM *s
     }
     n_sum_kd = scaled(n, sum_kd);
     sum_k_sum_d = scaled(sum_k, sum_d);
-    *slope = (NUM)rounded_quotient(diff(n_sum_kd, sum_k_sum_d), (n * sum_kk) - (sum_k * sum_k));
+    *slope = NARROW(rounded_quotient(diff(n_sum_kd, sum_k_sum_d), (n * sum_kk) - (sum_k * sum_k)));
     return GTC_OK;
 }
 
@@ -696,7 +697,7 @@ static void start_state(STATE *state, const TABLE *table, uint_least32_t period_
 #if GTC_WITH_CHANNELS
     set_fallback_means(state, table);
 #endif
-#if GTC_WITH_UNCERTAINTY
+#if GTC_WITH_REZERO
     rezero_clear(state, table);
 #endif
 #if GTC_WITH_RETAINED

@@ -153,7 +153,9 @@ static const range_t term_limits[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
 };
 #endif
 
+#if GTC_WITH_UNCERTAINTY
 static const range_t sigma_limits[1] = {
     RANGE(0.0F, 7.5e6F,                0, 2147483647),               /* sigma */
 };
+#endif
 #endif

@@ -25,6 +25,12 @@
 #define SQUARE float /* (deg/h)^2 */
 #define NUM_ZERO 0.0F
 
+/* A sum as the number that it fits in, and as a factor of a product: in float32 both are the sum itself. */
+#define NARROW(sum) sum
+#define FACTOR(sum) sum
+
+#define HAS_SUM_LIMITS 0 /* 1: words in their ranges may have sums that are too large, which sums_fit() finds */
+
 /* A table member as a number and as the word of an image; an array element as a number.
  * MISRA 20.7: every argument is a member, an element or a constant; parentheses would be in the emitted text. */
 #define MEMBER(member) member.value

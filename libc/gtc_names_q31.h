@@ -25,6 +25,12 @@
 #define SQUARE uint_least64_t /* square of the bias' unit; fewer than 16 squares of 2^30 are added */
 #define NUM_ZERO 0
 
+/* A sum as the number that it fits in, and as a factor of a product. MISRA 20.7: every argument is a name or a call. */
+#define NARROW(sum) (int_least32_t)sum
+#define FACTOR(sum) (int_least32_t)limit_factor(sum)
+
+#define HAS_SUM_LIMITS 1 /* 1: words in their ranges may have sums that are too large, which sums_fit() finds */
+
 /* A table member as a number and as the word of an image; an array element as a number.
  * MISRA 20.7: every argument is a member, an element or a constant; parentheses would be in the emitted text. */
 #define MEMBER(member) member

@@ -373,14 +373,6 @@ static inline float rounded_quotient(float num, uint_least32_t den)
 
 /* ---- terms and uncertainty ------------------------------------------------------------- */
 
-#if GTC_WITH_UNCERTAINTY || GTC_WITH_PLAY || GTC_WITH_CURVE || GTC_WITH_PRODUCT
-/* A factor: every number is one. */
-static inline float limit_factor(float x)
-{
-    return x;
-}
-#endif
-
 #if GTC_WITH_UNCERTAINTY || GTC_WITH_RETAINED || GTC_WITH_CHANNELS
 /* factor (a - b) */
 static inline float scaled_difference(float a, float b, float factor)

@@ -58,14 +58,21 @@ static int arrays_fit(const TABLE *table)
             && is_array(table->terms, table->n_terms) && is_array(table->probes, table->n_probes)) ? 1 : 0;
 }
 
-/* A table's words of uncertainty are all there, or none. */
+#if GTC_WITH_UNCERTAINTY
+/* A table's words of uncertainty are all there, or none, and in their ranges. */
 static int sigma_fits(const TABLE *table)
 {
     const uint_least32_t cells = table->sigma_cells[0] * table->sigma_cells[1];
-    const uint_least32_t whole = (2U * cells) + GTC_SIGMA_RULES + table->n_terms;
+    const uint_least32_t whole = (sigma_grids(table) * cells) + GTC_SIGMA_RULES + table->n_terms;
+    int fit = ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole))) ? 1 : 0;
+    uint_least32_t i;
 
-    return ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole))) ? 1 : 0;
+    for (i = 0U; i < table->n_sigma; i++) {
+        fit &= numbers_fit(&table->sigma[i], sigma_limits, 1U);
+    }
+    return fit;
 }
+#endif
 
 /* Whole numbers in their ranges, from number `first` of their list on. */
 static int wholes_fit(const TABLE *table, uint_least32_t first)
@@ -213,7 +220,10 @@ static int network_fits(const TABLE *table, const gtc_word_t *network, const gtc
     for (i = 0U; i < network[NETWORK_CENTERS].bits; i++) {
         fit &= numbers_fit(&centers[i * GTC_CENTER_WORDS], center_limits, GTC_CENTER_WORDS);
     }
-    return fit & sums_fit(network, centers);
+#if HAS_SUM_LIMITS
+    fit &= sums_fit(network, centers);
+#endif
+    return fit;
 }
 
 static int networks_fit(const TABLE *table)
@@ -232,31 +242,34 @@ static int networks_fit(const TABLE *table)
     return fit;
 }
 
-/* Parameters of the terms, and the uncertainties. */
-static int rest_fits(const TABLE *table)
+#if GTC_WITH_TERMS
+/* The parameters of all terms. */
+static int parameters_fit(const TABLE *table)
 {
-    int fit = sigma_fits(table);
+    int fit = 1;
     uint_least32_t i;
 
-#if GTC_WITH_TERMS
     for (i = 0U; i < table->n_terms; i++) {
         const gtc_word_t *const term = term_of(table, i);
 
         fit &= numbers_fit(&term[TERM_PARAMETERS], term_limits[term[TERM_KIND].bits - 1U],
                            GTC_TERM_WORDS - TERM_PARAMETERS);
     }
-#endif
-    for (i = 0U; i < table->n_sigma; i++) {
-        fit &= numbers_fit(&table->sigma[i], sigma_limits, 1U);
-    }
     return fit;
 }
+#endif
 
 /* 1 if this build of the runtime can use the table: no function meets a run-time error with it; else 0. */
 static int is_usable(const TABLE *table)
 {
     return (is_readable(table) && wholes_fit(table, 0U) && members_fit(table)
-            && networks_fit(table) && guards_fit(table) && rest_fits(table)) ? 1 : 0;
+#if GTC_WITH_TERMS
+            && parameters_fit(table)
+#endif
+#if GTC_WITH_UNCERTAINTY
+            && sigma_fits(table)
+#endif
+            && networks_fit(table) && guards_fit(table)) ? 1 : 0;
 }
 
 /* ---- a table from an image ----------------------------------------------------------------------- */

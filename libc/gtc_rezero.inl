@@ -14,6 +14,7 @@
 int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)
 {
     int status = (snapshot == NULL) ? GTC_E_ARG : is_started(state, table);
+    SQUARE constant;
 
     if (status != GTC_OK) {
         return status;
@@ -22,8 +23,13 @@ int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)
         return GTC_E_ABSENT;
     }
     status = PUBLIC(bias)(state, table, &snapshot->bias);
-    snapshot->sigma = square_root(add_squares(variance(state, table), variance_of_constant(state, table)));
-    snapshot->correlation_s = rule(table, RULE_CORRELATION);
+#if GTC_WITH_REZERO
+    constant = variance_of_constant(state, table);
+#else
+    constant = variance_between(table);
+#endif
+    snapshot->sigma = square_root(add_squares(variance(state, table), constant));
+    snapshot->correlation_s = ELEMENT(rules_of(table)[RULE_CORRELATION]);
     snapshot->age_blocks = (state->uncertainty.slope_known == 0U) ? 0U : state->input[0].held_blocks;
     snapshot->status = (int_least32_t)status;
     return status;
@@ -37,7 +43,7 @@ int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)
 /* The variance of the constant after a rest: `rest` of the correction and of the noise, `of_map` of the correction. */
 static SQUARE variance_left(const TABLE *table, SQUARE prior, SQUARE rest, SQUARE of_map)
 {
-    const SQUARE between = squared(rule(table, RULE_BETWEEN));
+    const SQUARE between = variance_between(table);
     const SQUARE least = part_of_square(share_of(between, of_map), of_map);
     const SQUARE left = part_of_square(share_of(prior, rest), rest);
 
@@ -65,7 +71,7 @@ static int update_constant(STATE *state, const TABLE *table, NUM mean_rate, uint
     const NUM most = MEMBER(table->rezero);
     const SQUARE prior = variance_of_constant(state, table);
     const SQUARE of_map = variance(state, table);
-    const SQUARE rest = add_squares(of_map, divide_square(squared(rule(table, RULE_NOISE)), seconds));
+    const SQUARE rest = add_squares(of_map, divide_square(squared(ELEMENT(rules_of(table)[RULE_NOISE])), seconds));
     int_least32_t remarks = GTC_OK;
     WIDE shift;
 
@@ -97,7 +103,7 @@ int PUBLIC(rezero)(STATE *state, const TABLE *table, NUM mean_rate, uint_least32
         }
     }
     if (status >= GTC_OK) {
-        put_in_force(state, table, state->uncertainty.unshifted, state->status);
+        put_in_force(state, table, state->unshifted, state->status);
     }
     return status;
 }

@@ -12,7 +12,7 @@ static inline NUM saturate(WIDE x, NUM least, NUM most, int_least32_t *remarks)
     NUM nearest = least;
 
     if ((x >= least) && (x <= most)) {
-        nearest = (NUM)x;
+        nearest = NARROW(x);
     } else {
         *remarks |= GTC_CLAMPED;
         if (x > most) {

@@ -8,7 +8,7 @@
 
 #if GTC_WITH_SAVE
 /* Changes with the order of the words. */
-#define SAVE_MAGIC 0x47545337UL
+#define SAVE_MAGIC 0x47545338UL
 
 /* Words before the state: magic, options, CRC of the table. */
 #define SAVE_HEAD 3U
@@ -158,16 +158,13 @@ static void carry_term(cursor_t *at, STATE *state, const TABLE *table, uint_leas
 #endif
 
 #if GTC_WITH_UNCERTAINTY
-/* What the uncertainty is computed from, and the shift of the constant. */
-static void carry_uncertainty(cursor_t *at, STATE *state, const TABLE *table)
+/* What the uncertainty is computed from. */
+static void carry_uncertainty(cursor_t *at, STATE *state)
 {
-    const NUM most = MEMBER(table->rezero);
-
     carry_number(at, &state->uncertainty.input[0]);
     carry_number(at, &state->uncertainty.input[1]);
     carry_number(at, &state->uncertainty.slope);
     carry_temp(at, &state->uncertainty.first_temp);
-    carry_number(at, &state->uncertainty.unshifted);
     carry_bits(at, &state->uncertainty.slope_known);
     carry_count(at, &state->uncertainty.missing, MAX_SAMPLES_PER_BLOCK);
 #if GTC_WITH_TERMS
@@ -177,6 +174,16 @@ static void carry_uncertainty(cursor_t *at, STATE *state, const TABLE *table)
     carry_bits(at, &state->uncertainty.terms_since);
     carry_bits(at, &state->uncertainty.terms_known);
 #endif
+}
+
+#endif
+
+#if GTC_WITH_REZERO
+static void carry_shift(cursor_t *at, STATE *state, const TABLE *table)
+{
+    const NUM most = MEMBER(table->rezero);
+
+    carry_number(at, &state->unshifted);
     carry_within(at, &state->shift, -most, most);
     carry_number(at, &state->shift_sigma);
 }
@@ -202,7 +209,10 @@ static int carry_state(STATE *state, const TABLE *table, gtc_word_t *to, const g
     }
 #endif
 #if GTC_WITH_UNCERTAINTY
-    carry_uncertainty(&at, state, table);
+    carry_uncertainty(&at, state);
+#endif
+#if GTC_WITH_REZERO
+    carry_shift(&at, state, table);
 #endif
     return at.is_sound;
 }
@@ -261,7 +271,7 @@ static void retain(STATE *state, const TABLE *table, uint_least32_t off_blocks)
 #if GTC_WITH_CHANNELS
     set_fallback_means(state, table);
 #endif
-#if GTC_WITH_UNCERTAINTY
+#if GTC_WITH_REZERO
     if (off_blocks != 0U) {
         rezero_clear(state, table);
     }

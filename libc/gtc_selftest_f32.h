@@ -11,12 +11,13 @@
 #ifndef GTC_SELFTEST_F32_H_INCLUDED
 #define GTC_SELFTEST_F32_H_INCLUDED
 
-#define N_ARITHMETIC 12U /* rows of vectors */
+#define N_ARITHMETIC 12U /* rows of vectors ... */
+#define N_OPERATIONS 6U  /* ... each with the results of so many operations */
 #define N_JOINED 3U /* rows of operands ... */
 #define N_SHAPES 8U /* ... for so many sums of products, as the runtime has them */
 
 /* a, b, c and then a + b, a - b, a * b, a / b, a * b + c, c - a * b */
-static const uint_least32_t vectors[N_ARITHMETIC][9] = {
+static const uint_least32_t vectors[N_ARITHMETIC][3U + N_OPERATIONS] = {
     /* product and sum: 0; fused: 2^-24 */
     {0x3F800800UL, 0x3F800800UL, 0xBF801000UL, 0x40000800UL, 0x00000000UL,
      0x3F801000UL, 0x3F800000UL, 0x00000000UL, 0xC0001000UL},
@@ -78,9 +79,16 @@ static inline float load(const volatile uint_least32_t *bits)
     return word.value;
 }
 
-static inline int is_expected(float x, uint_least32_t row, uint_least32_t column)
+/* Whether n numbers have these bits. */
+static int are_bits(const float *numbers, const uint_least32_t *bits, uint_least32_t n)
 {
-    return (bits_of(x) == vectors[row][column]) ? 1 : 0;
+    uint_least32_t i;
+    int equal = 1;
+
+    for (i = 0U; i < n; i++) {
+        equal &= (bits_of(numbers[i]) == bits[i]) ? 1 : 0;
+    }
+    return equal;
 }
 
 static inline int row_works(uint_least32_t row)
@@ -88,22 +96,17 @@ static inline int row_works(uint_least32_t row)
     const float a = load(&vectors[row][0]);
     const float b = load(&vectors[row][1]);
     const float c = load(&vectors[row][2]);
-    float sum;
-    float difference;
+    float results[N_OPERATIONS];
     float product;
-    float quotient;
-    float added;
-    float taken;
 
-    sum = a + b;
-    difference = a - b;
+    results[0] = a + b;
+    results[1] = a - b;
     product = a * b;
-    quotient = a / b;
-    added = product + c;
-    taken = c - product;
-    return is_expected(sum, row, 3U) & is_expected(difference, row, 4U)
-           & is_expected(product, row, 5U) & is_expected(quotient, row, 6U)
-           & is_expected(added, row, 7U) & is_expected(taken, row, 8U);
+    results[2] = product;
+    results[3] = a / b;
+    results[4] = product + c;
+    results[5] = c - product;
+    return are_bits(results, &vectors[row][3], N_OPERATIONS);
 }
 
 /* The results that the runtime's sums of products have, in the shapes in which it has them. */
@@ -141,14 +144,9 @@ static inline void join(const volatile uint_least32_t *row, float results[N_SHAP
 static inline int joined_works(uint_least32_t row)
 {
     float results[N_SHAPES];
-    uint_least32_t i;
-    int works = 1;
 
     join(joined[row], results);
-    for (i = 0U; i < N_SHAPES; i++) {
-        works &= (bits_of(results[i]) == joined[row][4U + i]) ? 1 : 0;
-    }
-    return works;
+    return are_bits(results, &joined[row][4], N_SHAPES);
 }
 
 /* Conversions: to float rounds to nearest even, to integer cuts off. */

@@ -7,7 +7,7 @@
  */
 
 #if GTC_WITH_UNCERTAINTY
-/* Words of a table's uncertainty behind its two grids; then one for each term. */
+/* Words of a table's uncertainty behind its grids; then one for each term. */
 #define RULE_HOLD 0U        /* deg/h per C that a held input may have gone on by at its slope */
 #define RULE_REST 1U        /* deg/h per block for which a correction is held, as T may move at any trained slope */
 #define RULE_SLOPE 2U       /* deg/h per C/block of a slope that is known and not in the correction yet */
@@ -22,15 +22,27 @@
 #endif
 #define RULE_CORRELATION 11U /* s */
 
-/* 1 if a table says how uncertain its corrections are: two grids, rules, and a word for each term. */
+/* 1 if a table says how uncertain its corrections are: grids, rules, and a word for each term. */
 static int has_sigma(const TABLE *table)
 {
     return (table->n_sigma != 0U) ? 1 : 0;
 }
 
-static NUM rule(const TABLE *table, uint_least32_t k)
+/* Number of grids: one for covered cells, one for those that are not, if the table says which are. */
+static uint_least32_t sigma_grids(const TABLE *table)
 {
-    return ELEMENT(table->sigma[(2U * table->sigma_cells[0] * table->sigma_cells[1]) + k]);
+#if GTC_WITH_COVERAGE
+    return (table->coverage == NULL) ? 1U : 2U;
+#else
+    (void)table;
+    return 1U;
+#endif
+}
+
+/* The rules, which are behind the grids. */
+static const gtc_word_t *rules_of(const TABLE *table)
+{
+    return &table->sigma[sigma_grids(table) * table->sigma_cells[0] * table->sigma_cells[1]];
 }
 
 /* ---- what a state takes note of ------------------------------------------------------------------ */
@@ -41,7 +53,6 @@ static void uncertainty_clear(STATE *state)
     state->uncertainty.input[1] = NUM_ZERO;
     state->uncertainty.slope = NUM_ZERO;
     state->uncertainty.first_temp = NUM_ZERO;
-    state->uncertainty.unshifted = NUM_ZERO;
     state->uncertainty.slope_known = 0U;
     state->uncertainty.missing = 0U;
 #if GTC_WITH_TERMS
@@ -103,7 +114,7 @@ static void uncertainty_input(STATE *state, const TABLE *table, NUM temp, NUM as
         if ((filled >= 2U) && (filled < table->slope_blocks)) {
             const WIDE d = diff(state->input[0].mean, state->uncertainty.first_temp);
 
-            state->uncertainty.slope = (NUM)rounded_quotient(scaled(2U, d), (2U * filled) - 1U);
+            state->uncertainty.slope = NARROW(rounded_quotient(scaled(2U, d), (2U * filled) - 1U));
         } else {
             state->uncertainty.slope_known = 1U;
         }
@@ -113,8 +124,8 @@ static void uncertainty_input(STATE *state, const TABLE *table, NUM temp, NUM as
 /* ---- the parts of a variance ------------------------------------------------------------------------- */
 
 /* Of the map, from the grid of covered or that of uncovered cells: where it was asked, but with the slope that the
- * correction should have had, where one is known that is not in it yet. */
-static SQUARE variance_of_map(const STATE *state, const TABLE *table)
+ * correction should have had, where one is known that is not in it yet; `unknown` where the input is no number. */
+static SQUARE variance_of_map(const STATE *state, const TABLE *table, SQUARE unknown)
 {
     NUM slope = state->uncertainty.input[1];
     uint_least32_t cell[2];
@@ -125,13 +136,15 @@ static SQUARE variance_of_map(const STATE *state, const TABLE *table)
         slope = state->uncertainty.slope;
     }
     if (locate(table, state->uncertainty.input[0], slope, &in) < 0) {
-        return squared(rule(table, RULE_NONE));
+        return unknown;
     }
     cells_of(table, &in, table->sigma_cells, cell);
     index = (cell[1] * table->sigma_cells[0]) + cell[0];
-    if ((state->status & GTC_UNCOVERED) != 0) {
+#if GTC_WITH_COVERAGE
+    if (((state->status & GTC_UNCOVERED) != 0) && (sigma_grids(table) == 2U)) {
         index += table->sigma_cells[0] * table->sigma_cells[1];
     }
+#endif
     return squared(ELEMENT(table->sigma[index]));
 }
 
@@ -146,7 +159,7 @@ static WIDE without_readings(const STATE *state, WIDE x)
 }
 
 /* Of an input that went on while nothing was read. */
-static SQUARE variance_of_age(const STATE *state, const TABLE *table)
+static SQUARE variance_of_age(const STATE *state, const gtc_word_t *rules)
 {
     WIDE moved;
     SQUARE square;
@@ -154,31 +167,31 @@ static SQUARE variance_of_age(const STATE *state, const TABLE *table)
     if ((state->input[0].held_blocks == 0U) && (state->uncertainty.missing == 0U)) {
         return NO_SQUARE;
     }
-    moved = limit_factor(scaled_difference(state->uncertainty.slope, NUM_ZERO, rule(table, RULE_HOLD)));
+    moved = FACTOR(scaled_difference(state->uncertainty.slope, NUM_ZERO, ELEMENT(rules[RULE_HOLD])));
     square = squared(without_readings(state, moved));
-    return add_squares(square, squared(without_readings(state, rule(table, RULE_REST))));
+    return add_squares(square, squared(without_readings(state, ELEMENT(rules[RULE_REST]))));
 }
 
 /* Of a slope that the correction does not have: while it is held, as the temperature may then turn to any slope, and
  * while the window fills. */
-static SQUARE variance_of_slope(const STATE *state, const TABLE *table)
+static SQUARE variance_of_slope(const STATE *state, const gtc_word_t *rules)
 {
     SQUARE square = NO_SQUARE;
 
     if (state->input[0].held_blocks != 0U) {
-        square = squared(rule(table, RULE_TURN));
+        square = squared(ELEMENT(rules[RULE_TURN]));
     } else if ((state->status & GTC_WARMING) == 0) {
         /* it has the slope */
     } else if (state->uncertainty.slope_known != 2U) {
-        square = squared(rule(table, RULE_START));
+        square = squared(ELEMENT(rules[RULE_START]));
     } else {
-        square = squared(scaled_difference(state->uncertainty.slope, NUM_ZERO, rule(table, RULE_SLOPE)));
+        square = squared(scaled_difference(state->uncertainty.slope, NUM_ZERO, ELEMENT(rules[RULE_SLOPE])));
     }
     return square;
 }
 
 /* Of inputs beyond the envelope. */
-static SQUARE variance_beyond(const STATE *state, const TABLE *table)
+static SQUARE variance_beyond(const STATE *state, const TABLE *table, const gtc_word_t *rules)
 {
     SQUARE sum = NO_SQUARE;
     int_least32_t ignored = GTC_OK;
@@ -190,21 +203,21 @@ static SQUARE variance_beyond(const STATE *state, const TABLE *table)
         const NUM high = MEMBER(table->envelope[(2U * k) + 1U]);
         const NUM edge = saturate(x, low, high, &ignored);
 
-        sum = add_squares(sum, squared(scaled_difference(x, edge, rule(table, RULE_BEYOND + k))));
+        sum = add_squares(sum, squared(scaled_difference(x, edge, ELEMENT(rules[RULE_BEYOND + k]))));
     }
     return sum;
 }
 
 #if GTC_WITH_RETAINED || GTC_WITH_CHANNELS
 /* Of what terms do not know of the time before they began, or of a channel that is held, lost or beyond its range. */
-static SQUARE variance_of_terms(const STATE *state, const TABLE *table)
+static SQUARE variance_of_terms(const STATE *state, const TABLE *table, const gtc_word_t *rules)
 {
     SQUARE sum = squared(state->uncertainty.edge_effect);
     uint_least32_t i;
 
     for (i = 0U; i < table->n_terms; i++) {
         const uint_least32_t kind = term_of(table, i)[TERM_KIND].bits;
-        const NUM word = rule(table, GTC_SIGMA_RULES + i);
+        const NUM word = ELEMENT(rules[GTC_SIGMA_RULES + i]);
 
         if (((state->uncertainty.terms_known >> i) & 1U) != 0U) {
             /* it went on from where it was, or the mean of its channel is new and within its range */
@@ -234,19 +247,20 @@ static SQUARE variance_of_terms(const STATE *state, const TABLE *table)
  * nothing is known. */
 static SQUARE variance(const STATE *state, const TABLE *table)
 {
-    const SQUARE unknown = squared(rule(table, RULE_NONE));
+    const gtc_word_t *const rules = rules_of(table);
+    const SQUARE unknown = squared(ELEMENT(rules[RULE_NONE]));
     SQUARE sum;
 
     if ((state->status & GTC_FALLBACK) != 0) {
-        sum = squared(rule(table, RULE_FALLBACK));
+        sum = squared(ELEMENT(rules[RULE_FALLBACK]));
     } else if (state->uncertainty.slope_known == 0U) {
         sum = unknown;
     } else {
-        sum = add_squares(variance_of_map(state, table), variance_of_age(state, table));
-        sum = add_squares(sum, variance_of_slope(state, table));
-        sum = add_squares(sum, variance_beyond(state, table));
+        sum = add_squares(variance_of_map(state, table, unknown), variance_of_age(state, rules));
+        sum = add_squares(sum, variance_of_slope(state, rules));
+        sum = add_squares(sum, variance_beyond(state, table, rules));
 #if GTC_WITH_RETAINED || GTC_WITH_CHANNELS
-        sum = add_squares(sum, variance_of_terms(state, table));
+        sum = add_squares(sum, variance_of_terms(state, table, rules));
 #endif
     }
     return square_or(sum, unknown);
@@ -254,16 +268,24 @@ static SQUARE variance(const STATE *state, const TABLE *table)
 
 /* ---- the constant of a power-on ------------------------------------------------------------------- */
 
+/* Variance of the constant from power-on to power-on. */
+static SQUARE variance_between(const TABLE *table)
+{
+    return squared(ELEMENT(rules_of(table)[RULE_BETWEEN]));
+}
+
+#if GTC_WITH_REZERO
 /* No shift; the constant is as uncertain as from power-on to power-on. */
 static void rezero_clear(STATE *state, const TABLE *table)
 {
     state->shift = NUM_ZERO;
-    state->shift_sigma = has_sigma(table) ? rule(table, RULE_BETWEEN) : NUM_ZERO;
+    state->shift_sigma = has_sigma(table) ? ELEMENT(rules_of(table)[RULE_BETWEEN]) : NUM_ZERO;
 }
 
-/* Variance of the constant. */
+/* Variance of the constant, which a re-zero makes smaller. */
 static SQUARE variance_of_constant(const STATE *state, const TABLE *table)
 {
-    return square_or(squared(state->shift_sigma), squared(rule(table, RULE_BETWEEN)));
+    return square_or(squared(state->shift_sigma), variance_between(table));
 }
+#endif
 #endif

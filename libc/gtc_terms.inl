@@ -91,7 +91,7 @@ static void memory_apply(const STATE *state, const TABLE *table, uint_least32_t 
 /* A parameter that goes with the temperature: value + growth (T - reference of T). */
 static NUM over_temp(NUM value, NUM growth, NUM x, NUM middle)
 {
-    return (NUM)limit_factor(add(value, scaled_difference(x, middle, growth)));
+    return FACTOR(add(value, scaled_difference(x, middle, growth)));
 }
 #endif
 
@@ -101,8 +101,8 @@ static NUM over_temp(NUM value, NUM growth, NUM x, NUM middle)
 static void play_step(STATE *state, const TABLE *table, uint_least32_t i, NUM x)
 {
     const NUM width = parameter(table, i, PLAY_WIDTH);
-    const NUM low = (NUM)diff(x, width);
-    const NUM high = (NUM)add(x, width);
+    const NUM low = NARROW(diff(x, width));
+    const NUM high = NARROW(add(x, width));
     NUM *const z = state->term[i];
 
     if (*z > high) {
@@ -240,7 +240,7 @@ static void add_effect(const STATE *state, const TABLE *table, uint_least32_t i,
         const WIDE usual = (fallback_model != 0U) ? fallback_value(table, fallback_model, effect) : NUM_ZERO;
         const WIDE beyond = diff(added, usual);
 
-        effect->edge_effect = (NUM)limit_factor(add(effect->edge_effect, (beyond < NUM_ZERO) ? -beyond : beyond));
+        effect->edge_effect = FACTOR(add(effect->edge_effect, (beyond < NUM_ZERO) ? -beyond : beyond));
     }
 #else
     (void)state;
@@ -275,12 +275,13 @@ static void auxiliary_apply(const STATE *state, const TABLE *table, uint_least32
 static void curve_apply(const STATE *state, const TABLE *table, uint_least32_t i, NUM x, EFFECT *effect)
 {
     const gtc_word_t *const term = term_of(table, i);
-    NUM mean = NUM_ZERO;
-    WIDE sum;
+    NUM reading = NUM_ZERO;
 
     (void)x;
-    if (get_channel_mean(state, table, i, effect, &mean) != 0) {
-        mean = (NUM)limit_factor(mean);
+    if (get_channel_mean(state, table, i, effect, &reading) != 0) {
+        const NUM mean = FACTOR(reading);
+        WIDE sum;
+
         sum = scaled_difference(mean, ELEMENT(term[TERM_PARAMETERS + CURVE_REFERENCE]),
                                     ELEMENT(term[TERM_PARAMETERS + CURVE_SLOPE]));
         sum = add(sum, gaussians_of_channel(mean, &term[TERM_PARAMETERS + CURVE_GAIN]));

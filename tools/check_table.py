@@ -405,7 +405,7 @@ def sigma_of(model: Model) -> tuple[list[float], int]:
         return [], -1
     r, per_block = known["rules"], model.per_block
     covered = [s for row in known["rows"] for s in row]
-    uncovered = [s for row in known.get("uncovered") or known["rows"] for s in row]
+    uncovered = [s for row in known.get("uncovered") or known["rows"] for s in row] if model.raw["coverage"] else []
     grids = [math.sqrt(max(s * s - r["between_dph"] ** 2, 0.0)) for s in covered + uncovered]
     rules = [
         r["hold_dph_per_c"], r["rest_dph_per_min"] * per_block, r["slope_dph_per_c_per_min"] / per_block,
@@ -417,7 +417,7 @@ def sigma_of(model: Model) -> tuple[list[float], int]:
 
 
 def check_sigma(model: Model, image: Image) -> Iterator[str]:
-    """The uncertainty: two grids, rules, a number for each term."""
+    """The uncertainty: its grids, rules, a number for each term."""
     wanted, time_at = sigma_of(model)
     if len(wanted) != image.one("n_sigma"):
         yield f"n_sigma is {image.one('n_sigma')}, the model says {len(wanted)}"

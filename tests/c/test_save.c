@@ -207,7 +207,8 @@ TEST(a_state_of_the_other_arithmetic_is_refused)
 #define INPUT_AT (WINDOW_AT + GTC_MAX_SLOPE_BLOCKS)
 #define TERM_AT (INPUT_AT + (14 * (GTC_MAX_TERMS + 1)))
 #define UNCERTAINTY_AT (TERM_AT + (2 * GTC_MAX_TERMS))
-#define SHIFT_AT (UNCERTAINTY_AT + 12)
+#define UNSHIFTED_AT (UNCERTAINTY_AT + 11)
+#define SHIFT_AT (UNSHIFTED_AT + 1)
 
 /* CRC of a saved state, bit by bit: over all words before it. */
 static void resealed(gtc_word_t words[WORDS])
@@ -289,8 +290,8 @@ TEST(a_state_of_a_range_below_0_is_restored)
 TEST(uncertainties_that_no_call_leaves_are_refused_with_a_right_crc)
 {
     static const int at[11] = {
-        UNCERTAINTY_AT, UNCERTAINTY_AT + 1, UNCERTAINTY_AT + 2, UNCERTAINTY_AT + 3, UNCERTAINTY_AT + 7, UNCERTAINTY_AT + 8, UNCERTAINTY_AT + 4, UNCERTAINTY_AT + 9,
-        SHIFT_AT, SHIFT_AT, SHIFT_AT + 1,
+        UNCERTAINTY_AT, UNCERTAINTY_AT + 1, UNCERTAINTY_AT + 2, UNCERTAINTY_AT + 3, UNCERTAINTY_AT + 6,
+        UNCERTAINTY_AT + 7, UNSHIFTED_AT, UNCERTAINTY_AT + 8, SHIFT_AT, SHIFT_AT, SHIFT_AT + 1,
     };
     static const uint_least32_t to[11] = {
         MISSING_BITS, MISSING_BITS, MISSING_BITS, 0x70000000UL, 0x70000000UL, 0x70000000UL, MISSING_BITS, MISSING_BITS,

@@ -408,7 +408,7 @@ TEST(the_largest_words_give_a_sigma)
         CHECK(snapshot_of(&state).sigma > VALUE(TABLE.rezero));
     }
     CHECK(rezero(&state, DPH(0.001), 1U) >= 0);
-    shift = (num_t)(bias_of(&state) - state.uncertainty.unshifted);
+    shift = (num_t)(bias_of(&state) - state.unshifted);
     CHECK((shift >= -VALUE(TABLE.rezero)) && (shift <= VALUE(TABLE.rezero)));
 }
 
@@ -466,7 +466,7 @@ TEST(a_state_that_was_overwritten_is_as_uncertain_as_one_that_knows_nothing)
 static num_t *number_of(state_t *state, int k)
 {
     num_t *const numbers[11] = {&state->uncertainty.input[0], &state->uncertainty.input[1], &state->uncertainty.slope, &state->uncertainty.first_temp,
-                                &state->uncertainty.lowest,   &state->uncertainty.highest,  &state->uncertainty.unshifted, &state->bias,
+                                &state->uncertainty.lowest,   &state->uncertainty.highest,  &state->unshifted, &state->bias,
                                 &state->shift_sigma,    &state->shift,       &state->uncertainty.edge_effect};
 
     return numbers[k];
@@ -485,7 +485,7 @@ TEST(a_number_that_was_overwritten_never_makes_the_correction_sure)
     CHECK_INT(GTC_OK, init(&whole, &TERMS, PERIOD));
     terms_ramp(&whole, &temp, C(1) / 64, C(12), 10);
     CHECK(missed(&whole, 2U * N) >= 0);
-    sure = NUMBER(TERMS.sigma[(2U * TERMS.sigma_cells[0] * TERMS.sigma_cells[1]) + 9U]); /* of the constant alone */
+    sure = NUMBER(TERMS.sigma[(TERMS.n_sigma - TERMS.n_terms - GTC_SIGMA_RULES) + 9U]); /* of the constant alone */
     for (k = 0; k < 44; k++) {
         state_t state = whole;
         num_t shift;

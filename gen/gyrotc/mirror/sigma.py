@@ -21,7 +21,7 @@ from .front_end import FROM_MAP, Steps
 from .recursions import Course, NumberArray, TableKind, TermOutcome
 from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
-#: Words of a table's uncertainty behind its two grids, without those of the terms.
+#: Words of a table's uncertainty behind its grids, without those of the terms.
 RULES = 12
 
 _PART = 2**30  # its square and a few more fit 64 bits
@@ -147,7 +147,7 @@ SQUARES: dict[str, Squares] = {"f32": Squares(), "q31": _Q31()}
 
 
 class Rule:
-    """Places of the rules behind the two grids, as in gtc_sigma.inl."""
+    """Places of the rules behind the grids, as in gtc_sigma.inl."""
 
     HOLD, REST, SLOPE, START, TURN, BEYOND, BEYOND_SLOPE, FALLBACK, NONE, BETWEEN, NOISE, CORRELATION = range(RULES)
 
@@ -273,7 +273,7 @@ def variances(table: Table, evidence: SigmaEvidence) -> NumberArray:
 def _rules(table: Table) -> NumberArray:
     """Rules, then the words of the terms."""
     cells = table.sigma_cells[0] * table.sigma_cells[1]
-    return table.numbers(table.sigma)[2 * cells :]
+    return table.numbers(table.sigma)[table.sigma_grids * cells :]
 
 
 def _of_map(table: Table, evidence: SigmaEvidence) -> NumberArray:

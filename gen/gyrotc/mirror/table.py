@@ -123,6 +123,11 @@ class Table:
         return self.guards.size // ARRAYS["guards"]
 
     @property
+    def sigma_grids(self) -> int:
+        """Grids of sigma: one for covered cells, and one for the others if the table says which are covered."""
+        return 2 if self.coverage.size else 1
+
+    @property
     def parts(self) -> int:
         """Parts of the runtime that the table needs, one bit each."""
         parts = functools.reduce(lambda found, kind: found | 1 << int(kind), self.records("terms")[:, 0], 0)

@@ -83,9 +83,9 @@ def _refused(table: Table, frac_bits: int) -> Iterator[str]:
     if not low <= table.numbers([table.fallback])[0] <= high:
         yield "fallback is beyond the authority"
     cells = table.sigma_cells[0] * table.sigma_cells[1]
-    words = 2 * cells + RULES + table.terms.size // ARRAYS["terms"]
+    words = table.sigma_grids * cells + RULES + table.terms.size // ARRAYS["terms"]
     if table.sigma.size and (cells == 0 or table.sigma.size != words):
-        yield "sigma has not a word for each of its cells, twice, each rule and each term"
+        yield f"sigma has not {table.sigma_grids} words for each of its cells, one for each rule and each term"
     yield from _guards(table, guard, guard_whole)
     records = table.records("networks")
     if int(records[:, 0].sum(dtype=np.uint64)) != table.n_centers:

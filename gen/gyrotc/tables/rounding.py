@@ -46,9 +46,9 @@ def sigma_values(model: Model, frac_bits: int | None = None) -> NDArray[np.float
     known = model.uncertainty_dph
     if known is None or known.rules is None:
         return np.zeros(0)
-    biases = [*_grids(known, known.rules), *_rules(known.rules, model.block_s), *known.rules.terms]
-    values = np.array(biases)
-    correlation = 2 * known.cells[0] * known.cells[1] + len(_rules(known.rules, model.block_s)) - 1
+    grids, rules = _grids(model, known, known.rules), _rules(known.rules, model.block_s)
+    values = np.array([*grids, *rules, *known.rules.terms])
+    correlation = len(grids) + len(rules) - 1
     if frac_bits is None:
         return values
     scale = np.full(values.size, 2.0**frac_bits)
@@ -56,10 +56,11 @@ def sigma_values(model: Model, frac_bits: int | None = None) -> NDArray[np.float
     return np.asarray(np.rint(np.minimum(values * scale, 2.0**31 - 1)))
 
 
-def _grids(known: Uncertainty, rules: Rules) -> list[float]:
-    """Covered cells, uncovered ones, without the constant from power-on to power-on."""
-    both = np.array([known.rows, known.uncovered or known.rows])
-    separate = np.sqrt(np.maximum(both**2 - rules.between_dph**2, 0.0))
+def _grids(model: Model, known: Uncertainty, rules: Rules) -> list[float]:
+    """Covered cells, then uncovered ones if the table says which they are; without the constant of a power-on."""
+    uncovered = [] if model.coverage is None else [known.uncovered or known.rows]
+    grids = np.array([known.rows, *uncovered])
+    separate = np.sqrt(np.maximum(grids**2 - rules.between_dph**2, 0.0))
     return [float(sigma) for sigma in separate.reshape(-1)]
 
 

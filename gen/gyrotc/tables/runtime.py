@@ -111,7 +111,12 @@ def _derived(options: Options) -> dict[str, int]:
     }
     uncertainty = options["GTC_WITH_UNCERTAINTY"]
     derived["GTC_SAVE_OPTIONS"] = (
-        64 * channels + 128 * uncertainty + 256 * terms + 4096 * retained + 65536 * options["GTC_MAX_SLOPE_BLOCKS"]
+        64 * channels
+        + 128 * uncertainty
+        + 256 * terms
+        + 4096 * retained
+        + 8192 * options["GTC_WITH_REZERO"]
+        + 65536 * options["GTC_MAX_SLOPE_BLOCKS"]
     )
     derived["GTC_SAVE_WORDS"] = (
         10
@@ -119,7 +124,8 @@ def _derived(options: Options) -> dict[str, int]:
         + options["GTC_MAX_SLOPE_BLOCKS"]
         + derived["GTC_MAX_CHANNELS"] * (13 + channels)
         + 2 * terms * retained
-        + uncertainty * (9 + 5 * derived["GTC_WITH_TERMS"])
+        + uncertainty * (6 + 5 * derived["GTC_WITH_TERMS"])
+        + 3 * options["GTC_WITH_REZERO"]
     )
     return derived
 
@@ -146,8 +152,9 @@ def _texts(folders: tuple[Path, Path], items: tuple[tuple[str, int], ...]) -> di
     for arithmetic in NUMERICS:
         if options[f"GTC_WITH_{arithmetic.upper()}"]:
             names = _macros(places[f"gtc_names_{arithmetic}.h"].read_text(encoding="ascii"))
+            own = {"HAS_SUM_LIMITS": int(names.pop("HAS_SUM_LIMITS").body)}
             name = f"gtc_{arithmetic}.c"
-            text = _plain(_joined(places, name, '#include "gtc.h"\n'), options, names)
+            text = _plain(_joined(places, name, '#include "gtc.h"\n'), options | own, names)
             texts[name] = _with_ranges_of(arithmetic, text)
     return texts
 

@@ -5,9 +5,9 @@
  *
  * Valid:       -20.00 ... 60.00 C, -3.000 ... 3.000 C/min; outside, the value at the edge with GTC_CLAMPED
  * Block:       10 s; gtc_<n>_init() takes any sample period of which a whole number makes a block
- * f32:         780 bytes of read-only data, 212 of them parameters; |error| <= 5.51e-06 deg/h against the model (terms excluded)
+ * f32:         772 bytes of read-only data, 212 of them parameters; |error| <= 5.51e-06 deg/h against the model (terms excluded)
  * f32 fallback models: 32 of these parameters are added for channels that are lost; of each |error| <= 1.26e-06 deg/h
- * q31:         780 bytes of read-only data, 212 of them parameters; |error| <= 9.38e-05 deg/h against the model (terms excluded)
+ * q31:         772 bytes of read-only data, 212 of them parameters; |error| <= 9.38e-05 deg/h against the model (terms excluded)
  * q31 fallback models: 32 of these parameters are added for channels that are lost; of each |error| <= 1.93e-05 deg/h
  * Runtime:     gtc.h and gtc_<n>.c beside it, the smallest that holds it
  *
@@ -39,9 +39,9 @@ extern "C" {
 #define GTC_TEST_T_N_CHANNELS 2 /* numbers of a sample */
 #define GTC_TEST_T_CHANNEL_0 "temperature_c" /* C, of the gyro's own sensor */
 #define GTC_TEST_T_CHANNEL_1 "supply_v" /* unit as recorded */
-#define GTC_TEST_T_F32_TABLE_BYTES 780UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_T_F32_TABLE_BYTES 772UL /* read-only data, with pointers of 32 bits */
 #define GTC_TEST_T_Q31_BIAS_FRAC_BITS 24 /* bias in 2^-this deg/h */
-#define GTC_TEST_T_Q31_TABLE_BYTES 780UL /* read-only data, with pointers of 32 bits */
+#define GTC_TEST_T_Q31_TABLE_BYTES 772UL /* read-only data, with pointers of 32 bits */
 
 extern const gtc_f32_table_t gtc_test_t_f32;
 extern const gtc_q31_table_t gtc_test_t_q31;

@@ -63,7 +63,7 @@ static void any_state(void)
     state.uncertainty.slope = any_number(0);
     state.uncertainty.lowest = ANY_PLAUSIBLE();
     state.uncertainty.highest = ANY_PLAUSIBLE();
-    state.uncertainty.unshifted = any_number(0);
+    state.unshifted = any_number(0);
     state.uncertainty.edge_effect = any_number(0);
     state.uncertainty.missing = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     state.uncertainty.terms_since = Frama_C_unsigned_long_interval(0, 0xFFFFFFUL);
