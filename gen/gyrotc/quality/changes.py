@@ -11,25 +11,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import stdtrit
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, parts_of
 from ..common.statistics import CHI2_95_ONE, NORMAL_95, noise_of
 from .findings import ValueWithLimits
 from .fits import (
     LEAST_ENERGY,
     LONGEST_GAP_S,
+    Regression,
     RowArrays,
     RunCells,
+    RunFit,
     SmoothFit,
-    WalkNoise,
+    WhiteRuns,
+    gains_of_pairs,
     knots_and_noise,
     likeliest_noise,
     maps_of,
+    own_energy,
     run_cells,
 )
 
@@ -61,6 +64,7 @@ _GAIN_PLACES = 60  # of a run that are tried for one; then it is placed anew
 _LEAST_GAIN = 0.1  # of a change of gain: smaller ones are what terms and temperatures of runs do to a slope
 _AT_STEP = 4.0  # standard errors of a gain at a step that is known: one in 16,000 by chance
 _LEAST_OTHERS = 2  # of two runs nobody knows which one differs
+_TOGETHER = 2**15  # values that are looked at together: as many as a cache holds
 _ROUNDS = 3  # in which all changes of a run are placed anew
 
 
@@ -108,18 +112,18 @@ class _At:
         return self.begin_s + 0.5 * self.duration_s
 
     def columns(self, time_s: FloatArray, cell_s: float, curve: FloatArray) -> list[FloatArray]:
-        """What a change of size 1 adds to cells with these means of time; of a gain first the step that goes with it.
+        """Return what a change of size 1 adds to cells with these means of time; of a gain first its own step.
 
         Args:
             curve: The map along the run, deg/h, that a gain changes.
         """
-        since = time_s - self.begin_s
         if self.kind == "gain":
-            behind = np.asarray(since >= 0.0, dtype=np.float64)
+            behind = np.asarray(time_s >= self.begin_s, dtype=np.float64)
             return [behind, curve * behind]
-        return [self._column(since, cell_s)]
+        return [self.column(time_s - self.begin_s, cell_s)]
 
-    def _column(self, since: FloatArray, cell_s: float) -> FloatArray:
+    def column(self, since: FloatArray, cell_s: float) -> FloatArray:
+        """Return what a step, a transition or a drift of size 1 adds to cells at these times since its beginning, s."""
         if self.kind == "drift":
             return np.asarray(np.maximum(since, 0.0) / _HOUR_S)
         if self.duration_s <= cell_s:
@@ -150,8 +154,9 @@ def changes_in_cells(cells: Sequence[RunCells], rows_of: Callable[[int], RowArra
     for _ in range(2):
         if found:
             beside = [_columns(one, k, found, curves) for k, one in enumerate(coarse)]
-            noise, _ = likeliest_noise(coarse, maps_of(coarse, knots_c), beside, noise)
-        search = _Search(fine, maps_of(fine, knots_c), noise.in_cells(min(one.cell_s for one in fine)), curves)
+            noise, _ = likeliest_noise(Regression(coarse, maps_of(coarse, knots_c)), beside, noise)
+        regression = Regression(fine, maps_of(fine, knots_c))
+        search = _Search(regression.white(noise.in_cells(min(one.cell_s for one in fine))), curves)
         found = search.found(found)
         if not found:
             return []
@@ -187,11 +192,15 @@ def _within(one: Change, gain: Change) -> bool:
 
 
 def _columns(cells: RunCells, run: int, changes: Sequence[_At], curves: Sequence[FloatArray]) -> FloatArray | None:
-    """Columns of the changes of a run; `curves`: times and the map along each run, shape (2, n)."""
+    """Return the columns of the changes of a run, shape (k, n), if there are any.
+
+    Args:
+        curves: Times and the map along each run, shape (2, n).
+    """
     t = cells.time_s
-    curve = np.interp(t, *curves[run])
-    found = [c for at in changes if at.run == run for c in at.columns(t, cells.cell_s, curve)]
-    return np.column_stack(found) if found else None
+    own = [at for at in changes if at.run == run]
+    curve = np.interp(t, *curves[run]) if own else t
+    return np.stack([c for at in own for c in at.columns(t, cells.cell_s, curve)]) if own else None
 
 
 def _over_s(cells: RunCells) -> float:
@@ -199,14 +208,28 @@ def _over_s(cells: RunCells) -> float:
     return max(_STEP_S, 2.0 * cells.cell_s)
 
 
+@dataclass(frozen=True, slots=True)
+class _Looked:
+    """What a run shows at the places of the search.
+
+    Attributes:
+        sizes: Sizes over errors of changes at every cell, shape (n,), by what is tried.
+        gains: Changes of gain that are tried.
+        with_step, alone: Squares of their sizes over errors, each with its step and beside it.
+    """
+
+    sizes: dict[_Tried, FloatArray]
+    gains: list[_At]
+    with_step: FloatArray
+    alone: FloatArray
+
+
 class _Search:
     """Runs with the noise that their changes are judged against."""
 
-    def __init__(
-        self, cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: WalkNoise, curves: list[FloatArray]
-    ) -> None:
-        self._cells, self._maps, self._noise, self._curves = cells, maps, noise, curves
-        self._looks = _KINDS * sum(len(one) for one in cells)
+    def __init__(self, runs: WhiteRuns, curves: list[FloatArray]) -> None:
+        self._runs, self._cells, self._curves = runs, runs.regression.cells, curves
+        self._looks = _KINDS * sum(len(one) for one in self._cells)
         chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
         self._limit = _MARGIN * chance
         # What noise makes of a change of size over error 1: of each shape, and how much more of each run
@@ -230,35 +253,36 @@ class _Search:
                 break
         return found
 
-    def _measure(self, found: Sequence[_At]) -> tuple[SmoothFit, list[dict[_Tried, FloatArray]]]:
-        """The fit beside what was found, and sizes over errors at all places; the first time also their scale."""
-        fit = self._fit(found)
-        self._curves[:] = [np.stack([one.time_s, fit.curve[k]]) for k, one in enumerate(self._cells)]
-        looked = [_looked(fit, k) for k in range(len(self._cells))]
+    def _measure(self, found: Sequence[_At]) -> list[_Looked]:
+        """Return what the runs show beside what was found; the first time also what noise makes of each shape."""
+        fit, looked, rests = self._fit(found), list[_Looked](), list[FloatArray]()
+        self._curves[:] = [np.stack([one.time_s, fit.curve(k)]) for k, one in enumerate(self._cells)]
+        for k in range(len(self._cells)):
+            of_run = fit.of_run(k)
+            rests.append(of_run.rest)
+            looked.append(_looked(of_run, self._curves[k][1], self._gains_to_try(k, found)))
         if not self._scale:
-            for shape in dict.fromkeys(shape for of_run in looked for shape in of_run):
-                overall = noise_of(np.concatenate([of_run[shape] for of_run in looked if shape in of_run]))
+            for shape in dict.fromkeys(shape for of_run in looked for shape in of_run.sizes):
+                overall = noise_of(np.concatenate([of_run.sizes[shape] for of_run in looked if shape in of_run.sizes]))
                 self._scale[shape] = max(overall, fit.sigma)
-            white = noise_of(np.concatenate(fit.rest))
-            self._louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in fit.rest]
-        return fit, looked
+            white = noise_of(np.concatenate(rests))
+            self._louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in rests]
+        return looked
 
     def _fit(self, changes: Sequence[_At]) -> SmoothFit:
-        columns = [_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)]
-        return SmoothFit.of(self._cells, self._maps, self._noise, columns)
+        return self._runs.fit([_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)])
 
     def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
         """Of every run the clearest change, if it is clear; of a departure that comes back both steps."""
-        fit, looked = self._measure(found)
-        for k, of_run in enumerate(looked):
+        for k, looked in enumerate(self._measure(found)):
             if sum(at.run == k for at in found) >= _MOST:
                 continue
-            tried = list(of_run)
-            far = np.abs([z / (self._louder[k] * self._scale[shape]) for shape, z in of_run.items()])
+            tried = list(looked.sizes)
+            far = np.abs([z / (self._louder[k] * self._scale[shape]) for shape, z in looked.sizes.items()])
             for at in found:
                 if at.run == k:
                     far[:, np.abs(self._cells[k].time_s - at.middle_s) <= self._separation_s(k)] = 0.0
-            gain = self._gain(fit, k, found)
+            gain = self._clearest_gain(looked, k, found)
             if gain is not None and gain[0] > float(far.max()) ** 2 + self._limit:
                 yield gain[1]
                 continue
@@ -288,64 +312,70 @@ class _Search:
         t = self._cells[run].time_s
         return bool(t[0] + _GAIN_S <= time_s <= t[-1] - _GAIN_S)
 
-    def _gain(self, fit: SmoothFit, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
-        """The likeliest change of gain of a run and what it gains with its step; None where none is clear.
+    def _gains_to_try(self, run: int, found: Sequence[_At]) -> list[_At]:
+        """Return changes of gain at places in all of a run and, last, at the steps that are known.
 
         Two other runs at least say what the curve is.
         """
         cells = self._cells[run]
-        if len(self._cells) <= _LEAST_OTHERS or any(at.run == run and at.kind == "gain" for at in found):
-            return None
         edge = round(_GAIN_S / cells.cell_s)
         every = max(round(0.25 * _GAIN_S / cells.cell_s), (len(cells) - 2 * edge) // _GAIN_PLACES, 1)
         places = cells.time_s[edge : len(cells) - edge : every].tolist()
+        known = any(at.run == run and at.kind == "gain" for at in found)
+        if len(self._cells) <= _LEAST_OTHERS or known or not places:
+            return []
         steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
-        tried = [_At(run, "gain", float(t)) for t in (*places, *(s for s in steps if self._shows_gain(run, s)))]
-        if not places:
+        return [_At(run, "gain", s) for s in (*places, *(s for s in steps if self._shows_gain(run, s)))]
+
+    def _clearest_gain(self, looked: _Looked, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
+        """Return the likeliest change of gain of a run and what it gains with its step, if one is clear."""
+        if not looked.gains:
             return None
-        gains = self._gains(fit, tried, [])
-        alone = gains - self._gains(fit, [replace(at, kind="step") for at in tried], [])
-        least = np.full(len(tried), self._limit)
-        least[len(places) :] = _AT_STEP
-        clear = np.where(alone > least**2, gains, 0.0)
+        noise = self._white(run) ** 2
+        # Those at steps that are known come last
+        at_steps = sum(at.run == run and at.kind == "step" and self._shows_gain(run, at.middle_s) for at in found)
+        places = len(looked.gains) - at_steps
+        least = np.full(len(looked.gains), self._limit)
+        least[places:] = _AT_STEP
+        clear = np.where(looked.alone / noise > least**2, looked.with_step / noise, 0.0)
         best = int(np.argmax(clear))
         if clear[best] == 0.0:
             return None
-        return (np.inf if best >= len(places) else float(gains[best])), tried[best]
+        return (np.inf if best >= places else float(clear[best])), looked.gains[best]
 
     def _placed_anew(self, run: int, found: list[_At]) -> list[_At]:
         """All changes of a run, each at its best place beside the others; without those that are not clear then."""
-        others = [at for at in found if at.run != run]
-        fit, own = self._fit(others), [at for at in found if at.run == run]
+        others, own = [at for at in found if at.run != run], [at for at in found if at.run == run]
+        fit = self._fit(others).of_run(run)
         for _ in range(_ROUNDS):
             before = list(own)
             for k, at in enumerate(before):
-                own[k] = self._best(at, fit, own[:k] + own[k + 1 :])
+                own[k] = self._best(at, self._beside(fit, own[:k] + own[k + 1 :]))
             own = self._at_steps(fit, own)
             if before == own:
                 break
         while own:
             own = [at for k, at in enumerate(own) if all(self._differ(at, o) for o in own[:k])]
-            gains = [self._alone(fit, at, own[:k] + own[k + 1 :]) for k, at in enumerate(own)]
+            gains = [self._alone(self._beside(fit, own[:k] + own[k + 1 :]), at) for k, at in enumerate(own)]
             over = [g - (_AT_STEP if at.kind == "gain" else self._limit) ** 2 for g, at in zip(gains, own, strict=True)]
             if min(over) > 0.0:
                 break
             del own[int(np.argmin(over))]
         return others + own
 
-    def _at_steps(self, fit: SmoothFit, own: list[_At]) -> list[_At]:
+    def _at_steps(self, fit: RunFit, own: list[_At]) -> list[_At]:
         """With each gain at the step that it may be the cause of: then one step fewer has to be clear."""
         for gain in [at for at in own if at.kind == "gain"]:
             for step in [at for at in own if at.kind == "step" and self._shows_gain(at.run, at.middle_s)]:
                 rest = [at for at in own if at not in (gain, step)]
-                moved = replace(gain, begin_s=step.middle_s)
-                both = self._gains(fit, [step], rest)[0] + self._gains(fit, [gain], [*rest, step])[0]
-                if both - self._gains(fit, [moved], rest)[0] < self._limit**2:
+                moved, beside = replace(gain, begin_s=step.middle_s), self._beside(fit, rest)
+                both = self._gains(beside, [step])[0] + self._gains(self._beside(beside, [step]), [gain])[0]
+                if both - self._gains(beside, [moved])[0] < self._limit**2:
                     return self._at_steps(fit, [*rest, moved])
         return own
 
-    def _best(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> _At:
-        """The likeliest place and duration.
+    def _best(self, at: _At, fit: RunFit) -> _At:
+        """The likeliest place and duration; `fit`: beside the other changes of the run.
 
         Of steps and transitions it is what is more likely, each of both kinds being as likely beforehand and all
         durations of a kind alike; a drift where it is nearly as likely as they are.
@@ -357,21 +387,28 @@ class _Search:
         if at.kind == "gain":
             every = max(len(near) // _GAIN_PLACES, 1)
             tried = [at] + [replace(at, begin_s=float(t)) for t in near[::every] if self._shows_gain(at.run, t)]
-            place = tried[int(np.argmax(self._gains(fit, tried, others)))]
+            place = tried[int(np.argmax(self._gains(fit, tried)))]
             near = cells.time_s[np.abs(cells.time_s - place.begin_s) <= every * cells.cell_s]
             tried = [place] + [replace(at, begin_s=float(t)) for t in near if self._shows_gain(at.run, t)]
-            return tried[int(np.argmax(self._gains(fit, tried, others)))]
+            return tried[int(np.argmax(self._gains(fit, tried)))]
         durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
         shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
         shapes += [replace(at, kind="step", duration_s=d) for d in durations]
+        local = _StepGains(fit, float(near[0]) - max(durations), float(near[-1]) + max(durations))
+        white = self._white(at.run) ** 2
+
+        def gains_of(shape: _At, begins_s: list[float]) -> FloatArray:
+            if shape.kind == "drift":
+                return self._gains(fit, [replace(shape, begin_s=s) for s in begins_s])
+            return local.of(shape, begins_s) / white
+
         best: list[tuple[float, _At]] = []
         for shape in shapes:
-            tried = [replace(shape, begin_s=float(t) - 0.5 * shape.duration_s) for t in near]
-            gains = self._gains(fit, tried, others)
-            one = tried[int(np.argmax(gains))]
-            tried = [replace(one, begin_s=one.begin_s + d * cells.cell_s) for d in _PARTS]
-            gains = self._gains(fit, tried, others)
-            best.append((float(gains.max()), tried[int(np.argmax(gains))]))
+            begins = [float(t) - 0.5 * shape.duration_s for t in near]
+            begin = begins[int(np.argmax(gains_of(shape, begins)))]
+            begins = [begin + d * cells.cell_s for d in _PARTS]
+            gains = gains_of(shape, begins)
+            best.append((float(gains.max()), replace(shape, begin_s=begins[int(np.argmax(gains))])))
         most = max(gain for gain, _ in best)
         if at.kind == "drift":
             gain, drift = best.pop(0)
@@ -383,32 +420,39 @@ class _Search:
         steps = len(mean) == 1 or mean[0] >= mean[1]
         return max(over if steps else lasting, key=lambda pair: pair[0])[1]
 
-    def _gains(self, fit: SmoothFit, tried: Sequence[_At], others: Sequence[_At]) -> FloatArray:
-        """Twice the gain of log-likelihood of each of some changes of one kind and run, beside others of it."""
-        run, beside = tried[0].run, self._of(others, tried[0].run)
-        columns = self._of(tried, run)
-        if tried[0].kind != "gain":
-            return self._gain_of(fit, run, columns, beside)
-        steps = columns[:, ::2]
-        found = self._gain_of(fit, run, steps, beside)
-        for k in range(len(tried)):
-            both = np.column_stack([beside, steps[:, k]])
-            found[k] += self._gain_of(fit, run, columns[:, 2 * k + 1 : 2 * k + 2], both)[0]
-        return found
+    def _gains(self, fit: RunFit, tried: Sequence[_At]) -> FloatArray:
+        """Return twice the gain of log-likelihood of each of some changes of one kind and run; of a gain with its step.
 
-    def _alone(self, fit: SmoothFit, at: _At, others: Sequence[_At]) -> float:
-        """Twice the gain of log-likelihood of one change; of a gain without its step."""
+        Args:
+            fit: Beside the other changes of the run.
+        """
+        run = tried[0].run
+        if tried[0].kind == "gain":
+            backwards = fit.backwards()
+            gains = _gains_of(fit, (np.cumsum(backwards, axis=1), backwards), self._curves[run][1], tried)[0]
+        else:
+            inner, energy = fit.amplitudes(self._of(tried, run))
+            gains = inner**2 / np.maximum(energy, 1e-300)
+        return np.asarray(gains / self._white(run) ** 2)
+
+    def _alone(self, fit: RunFit, at: _At) -> float:
+        """Return twice the gain of log-likelihood of one change; of a gain without its step."""
+        inner, energy = self._amplitude(fit, at)
+        return inner**2 / max(energy, 1e-300) / self._white(at.run) ** 2
+
+    def _amplitude(self, fit: RunFit, at: _At) -> tuple[float, float]:
+        """Return the inner product and the energy of a change; of a gain beside its step."""
         columns = self._of([at], at.run)
-        beside = np.column_stack([self._of(others, at.run), columns[:, :-1]])
-        return float(self._gain_of(fit, at.run, columns[:, -1:], beside)[0])
+        inner, energy = fit.beside(columns[:-1]).amplitudes(columns[-1:])
+        return float(inner[0]), float(energy[0])
 
-    def _gain_of(self, fit: SmoothFit, run: int, columns: FloatArray, beside: FloatArray) -> FloatArray:
-        inner, energy = fit.amplitudes(run, columns, beside)
-        return np.asarray(inner**2 / np.maximum(energy, 1e-300)) / self._white(run) ** 2
+    def _beside(self, fit: RunFit, others: Sequence[_At]) -> RunFit:
+        return fit.beside(self._of(others, others[0].run)) if others else fit
 
     def _of(self, changes: Sequence[_At], run: int) -> FloatArray:
         columns = _columns(self._cells[run], run, changes, self._curves)
-        return np.zeros((len(self._cells[run]), 0)) if columns is None else columns
+        assert columns is not None
+        return columns
 
     def _white(self, run: int) -> float:
         """Standard deviation of what is white of a run."""
@@ -418,20 +462,20 @@ class _Search:
         """The change with its limits; None where it falls into a gap over which the noise may move as far."""
         cells, others = self._cells[at.run], [o for o in found if o is not at and o.run == at.run]
         fit, white = self._fit([o for o in found if o.run != at.run]), self._white(at.run)
-        columns = self._of([at], at.run)
-        beside = np.column_stack([self._of(others, at.run), columns[:, :-1]])
-        inner, energy = (float(v[0]) for v in fit.amplitudes(at.run, columns[:, -1:], beside))
+        of_run = self._beside(fit.of_run(at.run), others)
+        inner, energy = self._amplitude(of_run, at)
         size, error = inner / energy, white / float(np.sqrt(energy))
         kind, duration, gap_s = at.kind, 0.0, self._gap_at(at) if at.kind == "step" else 0.0
         if gap_s > 0.0:
-            error = float(np.hypot(error, white * np.sqrt(self._noise.level * gap_s / self._noise.cell_s)))
+            noise = self._runs.noise
+            error = float(np.hypot(error, white * np.sqrt(noise.level * gap_s / noise.cell_s)))
             if gap_s > LONGEST_GAP_S or abs(size) < self._limit * error:
                 return None
             time = _across_gap(at, rows, gap_s + cells.cell_s)
         elif kind in ("drift", "gain"):
-            time = self._begins(at, fit, others)
+            time = self._begins(at, of_run)
         else:
-            near = rows[2] - np.interp(rows[0], cells.time_s, fit.curve[at.run])
+            near = rows[2] - np.interp(rows[0], cells.time_s, fit.curve(at.run))
             time = _placed(at, near, rows[0], _NEAR_CELLS * cells.cell_s)
             if at.duration_s > _over_s(cells):
                 kind, duration = "transition", at.duration_s
@@ -451,7 +495,7 @@ class _Search:
         gaps = [(float(t[k]), gap) for k, gap in self._cells[at.run].behind_gap]
         return next((gap for end, gap in gaps if end - gap - cell_s < at.middle_s <= end + cell_s), 0.0)
 
-    def _begins(self, at: _At, fit: SmoothFit, others: Sequence[_At]) -> ValueWithLimits:
+    def _begins(self, at: _At, fit: RunFit) -> ValueWithLimits:
         """The beginning of a drift, or the place of a change of gain, with the times that are nearly as likely.
 
         A cell more on either side: it may be in the midst of one, and rows bear the time of their end or their start.
@@ -460,7 +504,7 @@ class _Search:
         near = t[np.abs(t - at.begin_s) < _HOUR_S]
         if at.kind == "gain":
             near = np.array([s for s in near if self._shows_gain(at.run, s)] or [at.begin_s])
-        gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near], others)
+        gains = self._gains(fit, [replace(at, begin_s=float(s)) for s in near])
         likely = near[gains >= gains.max() - (_PLACED_95 if at.kind == "gain" else CHI2_95_ONE)]
         return float(near[int(np.argmax(gains))]), float(likely[0]) - 2.0 * cell_s, float(likely[-1]) + cell_s
 
@@ -496,36 +540,120 @@ _Tried = tuple[str, float]  # kind, and how long it lasts, s
 _STEP: _Tried = ("step", 0.0)
 
 
-def _looked(fit: SmoothFit, run: int) -> dict[_Tried, FloatArray]:
-    """Sizes over errors of changes at every cell of a run, shape (n,), by what is tried: no more than fits into it.
+def _looked(fit: RunFit, curve: FloatArray, gains: list[_At]) -> _Looked:
+    """Return what a run shows of changes at every cell, no more than fit into it, and of some changes of gain.
 
-    The filter does not change with time: the inner products of a change at every place are a correlation.
+    The filter does not change with time: the inner products of steps at all places, and the sums of these, are those of
+    every other shape.
     """
-    cells = fit.cells[run]
-    n = len(cells)
-    ages = np.arange(0.5, n) * cells.cell_s
-    shapes: dict[_Tried, FloatArray] = {
-        ("step", d): fit.white(run, np.clip(ages / max(d, cells.cell_s) + 0.5 * (d == 0.0), 0.0, 1.0)) for d in _TRIED_S
+    n, cell_s = len(fit.cells), fit.cells.cell_s
+    shapes = _shapes(n, cell_s)
+    backwards = fit.backwards()
+    begun = np.cumsum(backwards, axis=1)
+    white = fit.white(np.stack([shape.values for shape in shapes]))
+    energy = np.cumsum(white**2, axis=1)
+    left = energy.copy()
+    for part in parts_of(len(fit.fitted), max(_TOGETHER // n, 1)):
+        for k, held in enumerate(_held(begun[part], shapes)):
+            left[k] -= np.einsum("ij,ij->j", held, held)
+    sizes = {}
+    for k, inner in enumerate(_held(begun[-1:], shapes)):
+        good, shape = left[k] > LEAST_ENERGY * energy[k], shapes[k]
+        good[: _EDGE + round(shape.tried[1] / cell_s)] = False
+        good[n - _EDGE :] = False
+        sizes[shape.tried] = np.where(good, inner[0] / np.sqrt(np.where(good, left[k], 1.0)), 0.0)[::-1]
+    return _Looked(sizes, gains, *_gains_of(fit, (begun, backwards), curve, gains))
+
+
+class _Shape(NamedTuple):
+    """A shape that the search tries: its values at the cells from its first one on are piecewise linear.
+
+    Attributes:
+        tried: What it is.
+        values: Shape (n,).
+        first, each, last: By how much it steps at its first cell, at each behind it, and at the last that changes it.
+        behind: How many cells that one is behind the first.
+    """
+
+    tried: _Tried
+    values: FloatArray
+    first: float
+    each: float
+    last: float
+    behind: int
+
+
+def _shapes(n: int, cell_s: float) -> list[_Shape]:
+    """Return the shapes that fit into so many cells."""
+    ages = np.arange(0.5, n) * cell_s
+    values: dict[_Tried, FloatArray] = {
+        ("step", d): np.clip(ages / max(d, cell_s) + 0.5 * (d == 0.0), 0.0, 1.0) for d in _TRIED_S
     }
     for length in _BACK_S:
-        behind = round(length / cells.cell_s)
+        behind = round(length / cell_s)
         if 2 <= behind < n:
-            back = shapes[_STEP].copy()
-            back[behind:] -= shapes[_STEP][: n - behind]
-            shapes["back", length] = back
-    shapes["drift", 0.0] = fit.white(run, np.arange(0.0, n) * cells.cell_s / _HOUR_S)
-    size = next_fast_len(2 * n, real=True)
-    beside = np.column_stack([fit.own[run], fit.shared[run]])
-    of_rest, of_beside = rfft(fit.rest[run], size), rfft(beside, size, axis=0)
-    found = {}
-    for tried, shape in shapes.items():
-        h = np.conj(rfft(shape, size))
-        inner = irfft(of_rest * h, size)[:n]
-        held = irfft(of_beside * h[:, None], size, axis=0)[:n]
-        energy = np.cumsum(shape**2)[::-1]
-        left = energy - np.sum(held**2, axis=1)
-        good = left > LEAST_ENERGY * energy
-        good[:_EDGE] = False
-        good[max(n - _EDGE - round(tried[1] / cells.cell_s), 0) :] = False
-        found[tried] = np.where(good, inner / np.sqrt(np.where(good, left, 1.0)), 0.0)
+            values["back", length] = np.asarray(np.arange(n) < behind, dtype=np.float64)
+    values["drift", 0.0] = np.arange(0.0, n) * cell_s / _HOUR_S
+    found = []
+    for tried, shape in values.items():
+        steps = np.diff(shape, prepend=0.0)
+        last = int(np.flatnonzero(steps)[-1])
+        found.append(_Shape(tried, shape, float(steps[0]), float(steps[1]), float(steps[last]), last))
     return found
+
+
+def _held(begun: FloatArray, shapes: Sequence[_Shape]) -> Iterator[FloatArray]:
+    """Yield the inner products of rows with each shape that begins at each cell, the last cell first, shape (k, n).
+
+    Args:
+        begun: Those of a step, shape (k, n).
+    """
+    rows, n = begun.shape
+    pad = 1 + max(shape.behind for shape in shapes if shape.behind < n - 1)
+    begun = np.concatenate([np.zeros((rows, pad)), begun], axis=1)
+    total = np.cumsum(begun, axis=1)
+    for shape in shapes:
+        held, behind = shape.first * begun[:, pad:], shape.behind
+        if behind >= n - 1:
+            held += shape.each * total[:, pad - 1 : -1]
+        elif behind > 0:
+            held += shape.last * begun[:, pad - behind : -behind]
+            if behind > 1 and shape.each != 0.0:
+                held += shape.each * (total[:, pad - 1 : -1] - total[:, pad - behind : -behind])
+        yield held
+
+
+def _gains_of(
+    fit: RunFit, sums: tuple[FloatArray, FloatArray], curve: FloatArray, tried: Sequence[_At]
+) -> tuple[FloatArray, FloatArray]:
+    """Return squares of sizes over errors of changes of gain of a curve, with their steps and beside them.
+
+    Args:
+        sums: Inner products with steps and with single cells (`RunFit.backwards`).
+    """
+    begun = np.searchsorted(fit.cells.time_s, [at.begin_s for at in tried])
+    last_first = len(curve) - 1 - begun
+    gain = np.cumsum(sums[1] * curve[::-1], axis=1)[:, last_first]
+    return gains_of_pairs(sums[0][:, last_first], gain, fit.gain_products(curve, begun))
+
+
+class _StepGains:
+    """Gains of log-likelihood of steps and transitions near a place; what they have in common is computed once."""
+
+    def __init__(self, fit: RunFit, from_s: float, to_s: float) -> None:
+        """Prepare; `from_s`, `to_s`: before and behind all that is tried."""
+        self._cell_s, time = fit.cells.cell_s, fit.cells.time_s
+        first, end = np.searchsorted(time, (from_s - self._cell_s, to_s + self._cell_s)).tolist()
+        first, end = min(first, len(time) - 1), min(end + 1, len(time))
+        self._time = time[first:end]
+        self._products = fit.step_products(first, end)
+        begun = np.cumsum(fit.backwards(), axis=1)[:, len(time) - end : len(time) - first][:, ::-1]
+        self._held, self._inner = begun[:-1], begun[-1]
+
+    def of(self, shape: _At, begins_s: Sequence[float]) -> FloatArray:
+        """Return squares of sizes over errors of a shape that begins at some times."""
+        since = self._time - np.array(begins_s)[:, None]
+        steps = np.diff(shape.column(since, self._cell_s), axis=1, prepend=0.0)
+        raw = np.einsum("ij,ij->i", steps @ self._products, steps)
+        energy = own_energy(raw, self._held @ steps.T)
+        return np.asarray((steps @ self._inner) ** 2 / np.maximum(energy, 1e-300))

@@ -10,16 +10,17 @@ largest likelihood.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from ..common.arrays import FloatArray
+from ..common.arrays import FloatArray, IntArray
 from ..common.metrics import median_step
-from ..common.statistics import TOLERANCE, cell_means, orthonormal, running_mean
+from ..common.statistics import cell_means, running_mean
 from ..mirror.recursions import first_order, play
 
 RowArrays = tuple[FloatArray, FloatArray, FloatArray]
@@ -34,6 +35,9 @@ _LEVELS = 10.0 ** np.arange(-7.0, 0.5)  # variance of the level's walk over the 
 _SLOPES = 10.0 ** np.arange(-13.0, -2.0, 1.5)  # of the slope's walk; at the lowest it moves nothing in a day
 _START = (4, 2)  # where the search over both begins
 _LEAST_SLOPE = 1e-14  # below it the equation of the filter has no solution in float64
+# Share of a column's energy that must be its own: far above the rounding of sums of products (1e-15), also divided by
+# the root of this share.
+_RIDGE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +101,18 @@ class WalkNoise:
         return 0.5 * float(np.log(self.variance() / self.in_cells(cell_s).variance() * (cell_s / self.cell_s)))
 
     def white(self, columns: FloatArray, cell_s: float) -> FloatArray:
-        """Columns of a run with cells of any length, filtered so that noise comes out white, as large in every run."""
-        own = self.in_cells(cell_s)
-        b, a, _ = _filter(own.level, own.slope)
+        """Columns of a run with cells of any length, filtered so that noise comes out white, as large in every run.
+
+        Args:
+            columns: One for each row, shape (..., n).
+        """
+        b, a, _ = self.filter_of(cell_s)
         return np.asarray(_filtered(b, a, columns) * np.exp(self.log_scale(cell_s)))
+
+    def filter_of(self, cell_s: float) -> tuple[FloatArray, FloatArray, float]:
+        """Return numerator, denominator and variance of what comes out of the filter for cells of a length."""
+        own = self.in_cells(cell_s)
+        return _filter(own.level, own.slope)
 
 
 @lru_cache(maxsize=256)
@@ -115,100 +127,274 @@ def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
 def _filtered(numerator: FloatArray, denominator: FloatArray, columns: FloatArray) -> FloatArray:
     from scipy.signal import lfilter  # 0.4 s: most recordings have nothing to be looked for with it
 
-    return np.asarray(lfilter(numerator, denominator, columns, axis=0))
+    return np.asarray(lfilter(numerator, denominator, columns))
 
 
-@dataclass(frozen=True, slots=True)
+class Regression:
+    """Rates of all runs and the columns that they are fitted with, one for each row of a matrix.
+
+    The rows of each run are the columns of its own (level, trend, warm-up, levels behind long gaps; zeros where it has
+    fewer than others), those of the map, and its rate.
+
+    Attributes:
+        cells: Of the runs.
+    """
+
+    def __init__(self, cells: Sequence[RunCells], maps: Sequence[FloatArray]) -> None:
+        """Join runs with the columns of the map at their cells (`maps_of`)."""
+        self.cells = tuple(cells)
+        own = [_own_columns(one) for one in cells]
+        self._own = max(len(of_run) for of_run in own)
+        self._rows = [
+            np.concatenate([of_run, np.zeros((self._own - len(of_run), len(one))), of_map, one.rate_dph[None, :]])
+            for one, of_run, of_map in zip(cells, own, maps, strict=True)
+        ]
+        for rows, one in zip(self._rows, cells, strict=True):
+            rows[-1] -= one.rate_dph.mean()
+        # What plain least squares say is taken off first, so that sums of squares keep their digits
+        plain = _Solution(np.stack([rows @ rows.T for rows in self._rows]), self._own)
+        for k, rows in enumerate(self._rows):
+            rows[-1] -= plain.amplitudes(k) @ rows[:-1]
+        self._taken = plain.of_map()
+
+    def white(self, noise: WalkNoise) -> WhiteRuns:
+        """Return the runs through the filter of a noise."""
+        rows = [noise.white(rows, one.cell_s) for rows, one in zip(self._rows, self.cells, strict=True)]
+        return WhiteRuns(self, noise, rows, self._own)
+
+    def curve(self, run: int, amplitudes: FloatArray) -> FloatArray:
+        """Return the map along a run, deg/h; `amplitudes`: of its columns, in what plain least squares have left."""
+        return np.asarray((self._taken + amplitudes) @ self._rows[run][self._own : -1])
+
+
+def _own_columns(cells: RunCells) -> FloatArray:
+    """Return level, trend, warm-up, and levels behind long gaps of a run, shape (k, n)."""
+    n = len(cells)
+    columns: list[FloatArray] = [np.ones(n), np.arange(n) / n]
+    columns += [np.exp((cells.time_s[0] - cells.time_s) / tau) for tau in _WARM_UP_S]
+    columns += [np.asarray(np.arange(n) >= k, dtype=np.float64) for k, gap in cells.behind_gap if gap > LONGEST_GAP_S]
+    return np.stack(columns)
+
+
+class WhiteRuns:
+    """A regression through the filter of one noise; its sums of products are those of every fit with this noise."""
+
+    def __init__(self, regression: Regression, noise: WalkNoise, rows: Sequence[FloatArray], own: int) -> None:
+        self.regression, self.noise, self._rows, self._own = regression, noise, rows, own
+        self._products = np.stack([of_run @ of_run.T for of_run in rows])
+
+    def fit(self, changes: Sequence[FloatArray | None]) -> SmoothFit:
+        """Fit all runs.
+
+        Args:
+            changes: Columns of what changes in each run, not yet white, shape (k, n) each; None: nothing.
+        """
+        cells = self.regression.cells
+        more = [
+            None if columns is None else self.noise.white(columns, one.cell_s)
+            for columns, one in zip(changes, cells, strict=True)
+        ]
+        extra = max(0 if columns is None else len(columns) for columns in more)
+        if extra == 0:
+            return SmoothFit(self, self._rows, _Solution(self._products, self._own))
+        rows, products = list[FloatArray](), np.zeros((len(cells), *(extra + np.array(self._products.shape[1:]))))
+        products[:, extra:, extra:] = self._products
+        for k, (columns, of_run) in enumerate(zip(more, self._rows, strict=True)):
+            found = np.zeros((extra, of_run.shape[1]))
+            if columns is not None:
+                found[: len(columns)] = columns
+                products[k, :extra, :extra] = found @ found.T
+                products[k, :extra, extra:] = found @ of_run.T
+                products[k, extra:, :extra] = products[k, :extra, extra:].T
+            rows.append(np.concatenate([found, of_run]))
+        return SmoothFit(self, rows, _Solution(products, extra + self._own))
+
+
+class _Solution:
+    """Least squares of all runs from their sums of products: first each run's own columns, then the map.
+
+    A column of which the others hold all but a billionth of its energy gets next to nothing: what is left of it is
+    rounding. Sums of products show no less.
+    """
+
+    def __init__(self, products: FloatArray, own: int) -> None:
+        """Solve; `products`: of own columns, map and rate of each run, shape (runs, k + p + 1, k + p + 1)."""
+        energy = np.diagonal(products, axis1=1, axis2=2)
+        self.own_scale = _inverse_root(energy[:, :own])
+        self.map_scale = _inverse_root(energy[:, own:-1].sum(axis=0))
+        scaled = products[:, :own, :own] * self.own_scale[:, :, None] * self.own_scale[:, None, :]
+        self.own_root = np.linalg.cholesky(scaled + _RIDGE * np.eye(own))
+        self.held = np.linalg.solve(self.own_root, self.own_scale[:, :, None] * products[:, :own, own:])
+        left = (products[:, own:, own:] - self.held.transpose(0, 2, 1) @ self.held).sum(axis=0)
+        scaled = left[:-1, :-1] * self.map_scale[:, None] * self.map_scale
+        self.map_root = np.linalg.cholesky(scaled + _RIDGE * np.eye(len(self.map_scale)))
+        self.map_held = np.linalg.solve(self.map_root, self.map_scale * left[:-1, -1])
+        self.left = max(float(left[-1, -1] - self.map_held @ self.map_held), 1e-300)
+        pivots = (np.diagonal(root, axis1=-2, axis2=-1) ** 2 for root in (self.own_root, self.map_root))
+        self.rank = sum(int(np.count_nonzero(pivot > 2.0 * _RIDGE)) for pivot in pivots)
+
+    def of_map(self) -> FloatArray:
+        """Return the amplitudes of the map's columns."""
+        return np.asarray(self.map_scale * np.linalg.solve(self.map_root.T, self.map_held))
+
+    def amplitudes(self, run: int) -> FloatArray:
+        """Return the amplitudes of a run's own columns and of the map's."""
+        held, of_map = self.held[run], self.of_map()
+        own = np.linalg.solve(self.own_root[run].T, held[:, -1] - held[:, :-1] @ of_map)
+        return np.concatenate([self.own_scale[run] * own, of_map])
+
+
+def _inverse_root(energy: FloatArray) -> FloatArray:
+    return np.asarray(np.where(energy > 0.0, 1.0 / np.sqrt(np.where(energy > 0.0, energy, 1.0)), 0.0))
+
+
 class SmoothFit:
     """Runs, made white and fitted.
 
     Attributes:
-        cells: Of the runs.
-        noise: Whose filter made them white.
-        own: Orthonormal columns of each run, white: its level, trend and changes, shape (n, k).
-        shared: Columns of the map beside them, orthonormal over all runs together, shape (n, p).
-        rest: What of the white rates is left, shape (n,).
         sigma: Standard deviation of the white part of a cell, deg/h.
+        log_likelihood: Its logarithm, but for what all noises and changes have in common.
     """
 
-    cells: tuple[RunCells, ...]
-    noise: WalkNoise
-    own: tuple[FloatArray, ...]
-    shared: tuple[FloatArray, ...]
-    rest: tuple[FloatArray, ...]
-    sigma: float
-    log_likelihood: float
-    curve: tuple[FloatArray, ...]
-
-    @staticmethod
-    def of(
-        cells: Sequence[RunCells], maps: Sequence[FloatArray], noise: WalkNoise, changes: Sequence[FloatArray | None]
-    ) -> SmoothFit:
-        """Fits all runs.
-
-        Args:
-            maps: Columns of the map at the cells of each run (`maps_of`).
-            changes: Columns of what changes in each run, shape (n, k) each; None: nothing.
-        """
-        own, white, rates, whole = list[FloatArray](), list[FloatArray](), list[FloatArray](), list[FloatArray]()
-        for one, of_map, change in zip(cells, maps, changes, strict=True):
-            n = len(one)
-            columns: list[FloatArray] = [np.ones(n), np.arange(n) / n]
-            columns += [np.exp((one.time_s[0] - one.time_s) / tau) for tau in _WARM_UP_S]
-            columns += [] if change is None else list(change.T)
-            columns += [
-                np.asarray(np.arange(n) >= k, dtype=np.float64) for k, gap in one.behind_gap if gap > LONGEST_GAP_S
-            ]
-            q = orthonormal(noise.white(np.column_stack(columns), one.cell_s))
-            own.append(q)
-            both = noise.white(np.column_stack([of_map, one.rate_dph - one.rate_dph.mean()]), one.cell_s)
-            whole.append(np.sum(both[:, :-1] ** 2, axis=0))
-            both -= q @ (q.T @ both)
-            white.append(both[:, :-1])
-            rates.append(both[:, -1])
+    def __init__(self, runs: WhiteRuns, rows: Sequence[FloatArray], solution: _Solution) -> None:
+        self._runs, self._rows, self._solution = runs, rows, solution
+        cells, noise = runs.regression.cells, runs.noise
+        n = sum(len(one) for one in cells)
+        left = solution.left / max(n - solution.rank, 1)
+        self.sigma = float(np.sqrt(left / noise.variance()))
         log_scale = sum(len(one) * noise.log_scale(one.cell_s) for one in cells)
-        ends = np.cumsum([len(one) for one in cells])[:-1]
-        stacked, y = np.concatenate(white), np.concatenate(rates)
-        norm = np.sqrt(np.sum(whole, axis=0))  # what is left of a column that the own ones hold is rounding
-        stacked[:, np.linalg.norm(stacked, axis=0) <= TOLERANCE * norm] = 0.0
-        shared = orthonormal(stacked)
-        amplitudes = shared.T @ y
-        rest = y - shared @ amplitudes
-        free = max(len(y) - shared.shape[1] - sum(q.shape[1] for q in own), 1)
-        left = max(float(rest @ rest) / free, 1e-300)
-        by_column = np.linalg.lstsq(shared.T @ stacked, amplitudes, rcond=None)[0] if shared.size else amplitudes
-        return SmoothFit(
-            tuple(cells),
-            noise,
-            tuple(own),
-            tuple(np.split(shared, ends)),
-            tuple(np.split(rest, ends)),
-            float(np.sqrt(left / noise.variance())),
-            -0.5 * len(y) * float(np.log(left)) + log_scale,
-            tuple(of_map @ by_column if shared.size else np.zeros(len(of_map)) for of_map in maps),
-        )
+        self.log_likelihood = -0.5 * n * float(np.log(left)) + log_scale
 
-    def white(self, run: int, columns: FloatArray) -> FloatArray:
-        """Columns of a run through its filter."""
-        return self.noise.white(columns, self.cells[run].cell_s)
+    def curve(self, run: int) -> FloatArray:
+        """Return the map along a run, deg/h."""
+        return self._runs.regression.curve(run, self._solution.of_map())
 
-    def amplitudes(self, run: int, columns: FloatArray, beside: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of each column the inner product with the rates and its energy, both beside all else that is fitted.
+    def of_run(self, run: int) -> RunFit:
+        """Return the fit of one run."""
+        s, rows = self._solution, self._rows[run]
+        own = len(s.own_root[run])
+        fitted = np.linalg.solve(s.own_root[run], np.diag(s.own_scale[run])) @ rows[:own]
+        shared = s.map_scale[:, None] * (rows[own:-1] - s.held[run][:, :-1].T @ fitted)
+        shared = np.linalg.inv(s.map_root) @ shared
+        rest = rows[-1] - s.held[run][:, -1] @ fitted - s.map_held @ shared
+        return RunFit(self._runs.regression.cells[run], self._runs.noise, np.concatenate([fitted, shared]), rest)
+
+
+@dataclass(frozen=True, slots=True)
+class RunFit:
+    """One run of a fit, white.
+
+    Attributes:
+        cells: Of the run.
+        noise: Whose filter made it white.
+        fitted: Orthonormal rows of what is fitted (those of the map over all runs together), shape (k, n).
+        rest: What of the white rates is left, shape (n,).
+    """
+
+    cells: RunCells
+    noise: WalkNoise
+    fitted: FloatArray
+    rest: FloatArray
+
+    def white(self, columns: FloatArray) -> FloatArray:
+        """Return columns of the run, shape (..., n), through its filter."""
+        return self.noise.white(columns, self.cells.cell_s)
+
+    def beside(self, columns: FloatArray) -> RunFit:
+        """Return the fit beside further columns of the run, not yet white, shape (k, n)."""
+        if not len(columns):
+            return self
+        white = self.white(columns)
+        held = white @ self.fitted.T
+        energy = np.einsum("ij,ij->i", white, white)
+        left = white @ white.T - held @ held.T
+        scale = _inverse_root(energy)
+        root = np.linalg.cholesky(left * scale[:, None] * scale + _RIDGE * np.eye(len(energy)))
+        more = np.linalg.solve(root, scale[:, None] * (white - held @ self.fitted))
+        # Only over all runs together is the rest orthogonal to the map: the columns themselves count
+        inner = np.linalg.solve(root, scale * (white @ self.rest))
+        return replace(self, fitted=np.concatenate([self.fitted, more]), rest=self.rest - inner @ more)
+
+    def amplitudes(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return of each column the inner product with the rates and its energy, both beside all that is fitted.
 
         Args:
-            columns: Of the run, not yet white, shape (n, k).
-            beside: Further columns of the run that are fitted with each, shape (n, j).
+            columns: Of the run, not yet white, shape (k, n).
         """
-        d, o = self.white(run, columns), self.white(run, beside)
-        held_d, held_o = (np.concatenate([self.own[run].T @ v, self.shared[run].T @ v]) for v in (d, o))
-        inner, raw = d.T @ self.rest[run], np.sum(d * d, axis=0)
-        energy = raw - np.sum(held_d * held_d, axis=0)
-        if o.shape[1]:
-            of_both, of_beside = d.T @ o - held_d.T @ held_o, o.T @ o - held_o.T @ held_o
-            solved = np.linalg.lstsq(of_beside, np.column_stack([of_both.T, o.T @ self.rest[run]]), rcond=None)[0]
-            inner = inner - of_both @ solved[:, -1]
-            energy = energy - np.sum(of_both.T * solved[:, :-1], axis=0)
-        return inner, np.maximum(energy, LEAST_ENERGY * raw)
+        white = self.white(columns)
+        return white @ self.rest, own_energy(np.einsum("ij,ij->i", white, white), self.fitted @ white.T)
+
+    def backwards(self) -> FloatArray:
+        """Return the inner products of `fitted` and, last, `rest` with what the filter makes of a 1 in each cell.
+
+        The last cell comes first: the filter transposed is the filter that runs backwards. Sums over cells are then
+        the inner products with a step, at each cell.
+        """
+        return self.white(np.concatenate([self.fitted, self.rest[None, :]])[:, ::-1])
+
+    def gain_products(self, curve: FloatArray, cells: IntArray) -> GainProducts:
+        """Return the products of steps at some cells, not the first, and of a curve from there on, white.
+
+        The filter makes of a curve that begins at a cell the white curve, without what the curve before the cell leaves
+        in the two states of the filter: a step, and an impulse through its denominator.
+        """
+        n = len(self.cells)
+        _, a, _ = self.noise.filter_of(self.cells.cell_s)
+        step, white = self.white(np.ones(n)), self.white(curve)
+        given = curve * step[0]  # as large as the filter makes them
+        impulse = _filtered(np.array([0.0, 1.0]), a, np.r_[1.0, np.zeros(n - 1)])
+        of_step = (white[cells] - given[cells]) / step[0]
+        of_impulse = white[cells] - given[cells] + given[cells - 1] - a[2] * white[cells - 1]
+
+        def until_end(one: FloatArray, other: FloatArray) -> FloatArray:
+            return np.asarray(np.cumsum(one * other)[n - 1 - cells])
+
+        steps, mixed, impulses = until_end(step, step), until_end(step, impulse), until_end(impulse, impulse)
+        with_step = np.cumsum(self.white(white[::-1]))[n - 1 - cells]
+        with_impulse = _filtered(np.array([0.0, 1.0]), a, white[::-1])[n - 1 - cells]
+        products = with_step - of_step * steps - of_impulse * mixed
+        squares = until_end(white[::-1], white[::-1]) - of_step * with_step - of_impulse * with_impulse
+        squares += -of_step * products - of_impulse * (with_impulse - of_step * mixed - of_impulse * impulses)
+        return GainProducts(steps, products, squares)
+
+    def step_products(self, first: int, end: int) -> FloatArray:
+        """Return the inner products of steps at the cells of a span with one another, shape (cells, cells)."""
+        n, count = len(self.cells), end - first
+        step = self.white(np.ones(n))
+        behind = step[n - end : n - first][::-1]
+        products = np.outer(behind, behind)
+        products[-1] = np.correlate(step[: n - first], step[: n - end + 1], "valid")[::-1]
+        products[:, -1] = products[-1]
+        for k in range(count - 2, -1, -1):
+            products[k, :-1] += products[k + 1, 1:]
+        return np.asarray(products)
+
+
+class GainProducts(NamedTuple):
+    """Squares of steps, their products with the gains that begin with them, and squares of these, shape (k,) each."""
+
+    steps: FloatArray
+    mixed: FloatArray
+    gains: FloatArray
+
+
+def gains_of_pairs(step: FloatArray, gain: FloatArray, products: GainProducts) -> tuple[FloatArray, FloatArray]:
+    """Return squares of sizes over errors of changes of gain, with their steps and beside them.
+
+    Args:
+        step, gain: Inner products of the columns of each with what is fitted and, last, the rates.
+    """
+    energy = own_energy(products.steps, step[:-1])
+    mixed = products.mixed - np.einsum("ij,ij->j", step[:-1], gain[:-1])
+    inner = gain[-1] - mixed / energy * step[-1]
+    own = products.gains - np.einsum("ij,ij->j", gain[:-1], gain[:-1]) - mixed**2 / energy
+    alone = inner**2 / np.maximum(np.maximum(own, LEAST_ENERGY * products.gains), 1e-300)
+    return step[-1] ** 2 / energy + alone, alone
+
+
+def own_energy(raw: FloatArray, held: FloatArray) -> FloatArray:
+    """Return the energies of columns beside what holds parts of them; `held`: these parts, shape (k, columns)."""
+    return np.asarray(np.maximum(raw - np.einsum("ij,ij->j", held, held), LEAST_ENERGY * raw))
 
 
 LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
@@ -216,65 +402,68 @@ LEAST_ENERGY = 1e-3  # of a change's own, below which what is fitted beside it h
 
 
 def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
-    """Columns of a map over temperature and its rate at the cells of each run, shape (n, p)."""
+    """Return the columns of a map over temperature and its rate at the cells of each run, shape (p, n)."""
     from scipy.interpolate import BSpline  # as `_filtered`
 
     low = min(float(one.temperature_c.min()) for one in cells)
     high = max(float(one.temperature_c.max()) for one in cells)
     if high - low < _LEAST_SPAN_C:
-        return [np.zeros((len(one), 0)) for one in cells]
+        return [np.zeros((0, len(one))) for one in cells]
     inner = np.linspace(low, high, max(int(np.ceil((high - low) / knots_c)), 1) + 1)
     knots = np.r_[[low] * 3, inner, [high] * 3]
     found = []
     for one in cells:
         x = np.clip(one.temperature_c, low, high)
-        pieces = BSpline.design_matrix(x, knots, 3).toarray()[:, 1:]  # with the first they add up to a level
+        pieces = BSpline.design_matrix(x, knots, 3).toarray()[:, 1:].T  # with the first they add up to a level
         slope = running_mean(np.gradient(one.temperature_c, one.time_s), max(round(_SLOPE_S / one.cell_s), 1))
         r, u = 60.0 * slope, (x - 0.5 * (low + high)) / (high - low)
-        found.append(np.column_stack([pieces, r, r * u, r * u * u, r * np.abs(r), r * r]))
+        found.append(np.concatenate([pieces, [r, r * u, r * u * u, r * np.abs(r), r * r]]))
     return found
 
 
 def knots_and_noise(cells: Sequence[RunCells]) -> tuple[float, WalkNoise]:
     """Return the distance of the map's knots, C, and the likeliest noise beside that map.
 
-    The distance is that of Schwarz's criterion (BIC): a bend that all passages show is no change.
+    The distance is that of Schwarz's criterion (BIC), each beside the noise of the coarser map: a bend that all
+    passages show is no change.
     """
+    n = sum(len(one) for one in cells)
     found: tuple[float, WalkNoise] | None = None
     least = np.inf
     for knots_c in _KNOTS_C:
         maps = maps_of(cells, knots_c)
-        noise, likelihood = likeliest_noise(cells, maps, [None] * len(cells), found and found[1])
-        n = sum(len(one) for one in cells)
-        criterion = maps[0].shape[1] * float(np.log(n)) - 2.0 * likelihood
-        if found and (criterion > least or 2 * maps[0].shape[1] > n):
+        price = len(maps[0]) * float(np.log(n))
+        regression = Regression(cells, maps)
+        nothing = [None] * len(cells)
+        if found is None:
+            noise, likelihood = likeliest_noise(regression, nothing)
+        elif 2 * len(maps[0]) > n or price - 2.0 * regression.white(found[1]).fit(nothing).log_likelihood > least:
             break
-        found, least = (knots_c, noise), criterion
+        else:
+            noise, likelihood = likeliest_noise(regression, nothing, found[1])
+        found, least = (knots_c, noise), price - 2.0 * likelihood
     assert found is not None
     return found
 
 
 def likeliest_noise(
-    cells: Sequence[RunCells],
-    maps: Sequence[FloatArray],
-    changes: Sequence[FloatArray | None],
-    start: WalkNoise | None = None,
+    regression: Regression, changes: Sequence[FloatArray | None], start: WalkNoise | None = None
 ) -> tuple[WalkNoise, float]:
     """Return the walks of the largest likelihood beside changes that are known, and its logarithm.
 
     Args:
-        changes: As for `SmoothFit.of`.
+        changes: As for `WhiteRuns.fit`.
         start: Noise of this function at which the search begins; it ends at the same place from others.
     """
     known: dict[tuple[int, int], float] = {}
-    cell_s = min(one.cell_s for one in cells)
+    cell_s = min(one.cell_s for one in regression.cells)
 
     def noise_at(at: tuple[int, int]) -> WalkNoise:
         return WalkNoise(float(_LEVELS[at[0]]), float(_SLOPES[at[1]]), cell_s)
 
     def likelihood(at: tuple[int, int]) -> float:
         if at not in known:
-            known[at] = SmoothFit.of(cells, maps, noise_at(at), changes).log_likelihood
+            known[at] = regression.white(noise_at(at)).fit(changes).log_likelihood
         return known[at]
 
     best, last = _START, (-1, -1)

@@ -91,18 +91,17 @@ def _magnitudes(groups: FloatArray) -> FloatArray:
 def _partition(values: FloatArray, penalty: float) -> list[int]:
     """Return the bounds of the partition into constant parts with the least squares and a penalty for each.
 
-    Killick, Fearnhead and Eckley, J. Am. Stat. Assoc. 107 (2012) 1590.
+    Jackson et al., IEEE Signal Process. Lett. 12 (2005) 105.
     """
+    n = len(values)
     total, squares = np.r_[0.0, np.cumsum(values)], np.r_[0.0, np.cumsum(values**2)]
-    best, last = np.full(len(values) + 1, -penalty), np.zeros(len(values) + 1, dtype=int)
-    candidates = np.array([0])
-    for end in range(1, len(values) + 1):
-        cost = squares[end] - squares[candidates] - (total[end] - total[candidates]) ** 2 / (end - candidates)
-        reached = best[candidates] + cost
+    best, last = np.full(n + 1, -penalty), np.zeros(n + 1, dtype=int)
+    ends = np.arange(n + 1.0)
+    for end in range(1, n + 1):
+        reached = best[:end] - squares[:end] - (total[end] - total[:end]) ** 2 / (end - ends[:end])
         at = int(np.argmin(reached))
-        best[end], last[end] = reached[at] + penalty, candidates[at]
-        candidates = np.r_[candidates[reached <= best[end]], end]
-    bounds = [len(values)]
+        best[end], last[end] = squares[end] + reached[at] + penalty, at
+    bounds = [n]
     while bounds[-1] > 0:
         bounds.append(int(last[bounds[-1]]))
     return bounds[::-1]

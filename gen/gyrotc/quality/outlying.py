@@ -225,10 +225,11 @@ def _fades(off: FloatArray) -> bool:
 
 def _line(values: FloatArray) -> FloatArray:
     """Return the repeated-median line of a few values; fewer than half of them may be wrong (Siegel, 1982)."""
-    x = np.arange(len(values), dtype=np.float64)
-    run = x[:, None] - x[None, :]
-    np.fill_diagonal(run, np.nan)
-    slope = float(np.median(np.nanmedian((values[:, None] - values[None, :]) / run, axis=1)))
+    n = len(values)
+    x = np.arange(n, dtype=np.float64)
+    others = ~np.eye(n, dtype=bool)
+    rise, run = ((of[:, None] - of[None, :])[others].reshape(n, n - 1) for of in (values, x))
+    slope = float(np.median(np.median(rise / run, axis=1)))
     return np.asarray(np.median(values - slope * x) + slope * x)
 
 

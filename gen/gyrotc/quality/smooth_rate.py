@@ -6,6 +6,8 @@ where rows are slow. The fit is robust: a minority of disturbed rows does not mo
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.interpolate import BSpline
 
@@ -29,6 +31,8 @@ _MIN_CELLS = 8
 # Cells at most: bounds the time of the fit.
 _MAX_CELLS = 10_000
 _ROUNDS = 6
+# The fit has settled when it moves by less than this share of the noise of a cell.
+_SETTLED = 0.05
 # Tukey's bisquare in standard deviations: 95 % efficient for normal noise.
 _BISQUARE = 4.685
 
@@ -83,20 +87,35 @@ def _robust_fit(columns: FloatArray, y: FloatArray) -> FloatArray:
 
     A scale that followed the bisquare would shrink to a part of the rows and drop the others (Yohai, 1987).
     """
-    sigma, coefficients = 0.0, np.zeros(columns.shape[1])
-    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    unit = columns / scale
-    for k in range(2 * _ROUNDS):
-        rest = y - unit @ coefficients
-        size = np.abs(rest)
-        if k <= _ROUNDS:
-            sigma = MAD_TO_SIGMA * float(np.median(size))
-        if sigma == 0.0:
-            break
-        if k < _ROUNDS:
-            weight = 1.0 / np.maximum(size, 0.1 * sigma)
-        else:
-            weight = np.maximum(1.0 - (size / (_BISQUARE * sigma)) ** 2, 0.0) ** 2
-        weighted = unit * weight[:, None]
-        coefficients = np.linalg.lstsq(weighted.T @ unit, weighted.T @ y, rcond=1e-12)[0]
-    return np.asarray(coefficients / scale)
+    norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    unit = columns / norm
+
+    def settled(rest: FloatArray, weight_of: Callable[[FloatArray], FloatArray], known: float | None) -> FloatArray:
+        """Return the coefficients after rounds with weights of what the last one left, in its own scale or a known one.
+
+        Args:
+            rest: What the first round takes its weights from.
+        """
+        coefficients = np.zeros(columns.shape[1])
+        for _ in range(_ROUNDS):
+            sigma = _scale_of(rest) if known is None else known
+            if sigma == 0.0:
+                break
+            weighted = unit * weight_of(np.abs(rest) / sigma)[:, None]
+            coefficients = np.linalg.lstsq(weighted.T @ unit, weighted.T @ y, rcond=1e-12)[0]
+            before, rest = rest, y - unit @ coefficients
+            if np.abs(rest - before).max() < _SETTLED * sigma:
+                break
+        return coefficients
+
+    least = settled(y, lambda size: 1.0 / np.maximum(size, 0.1), None)
+    rest = y - unit @ least
+    sigma = _scale_of(rest)
+    if sigma == 0.0:
+        return np.asarray(least / norm)
+    bisquare = settled(rest, lambda size: np.maximum(1.0 - (size / _BISQUARE) ** 2, 0.0) ** 2, sigma)
+    return np.asarray(bisquare / norm)
+
+
+def _scale_of(rest: FloatArray) -> float:
+    return MAD_TO_SIGMA * float(np.median(np.abs(rest)))
