@@ -127,7 +127,7 @@ class Envelope(_Frozen):
 
 
 class Coverage(_Frozen):
-    """Where training data was: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
+    """Cells with training data: `rows[j][i]` is "1" for cell i of T and j of dT/dt over the envelope."""
 
     cells: CellCounts = Field(description="numbers of cells of T and of dT/dt, equal in size over the envelope")
     rows: tuple[Annotated[str, Field(pattern="^[01]+$")], ...] = Field(
@@ -150,7 +150,7 @@ BiasAmount = Annotated[float, Field(ge=0.0, le=7.5e6)]
 
 
 class Rules(_Frozen):
-    """How the uncertainty grows where a correction is not as it was trained, 1 σ; docs/design.md gives the reasons."""
+    """Growth of the uncertainty of a correction unlike those trained on, 1 σ; docs/design.md gives the reasons."""
 
     hold_dph_per_c: BiasAmount = Field(
         description="for each C by which a held temperature may have continued at its slope, deg/h/C"
@@ -279,12 +279,12 @@ class Term(_Frozen):
 
     @property
     def cause(self) -> Cause:
-        """What the catalogue knows of it."""
+        """Cause of the catalogue."""
         return CATALOGUE[self.id]
 
     @property
     def table(self) -> Tabled:
-        """How it stands in a table."""
+        """Form of the cause in a table."""
         table = self.cause.table
         assert table is not None
         return table
@@ -447,13 +447,13 @@ class Model(_Frozen):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know of the recordings, from `meta`; whoever wrote these wrote it."""
+        """Warnings about the recordings from `meta`, in the words of whoever wrote them."""
         found = self.meta.get("warnings", ())
         return tuple(map(str, found)) if isinstance(found, list | tuple) else (str(found),)
 
     @property
     def fallback_models(self) -> tuple[Network, ...]:
-        """Those of the terms that have one, in their order."""
+        """Fallback models of the terms that have one, in their order."""
         return tuple(t.fallback_model for t in self.terms if t.fallback_model is not None)
 
     @property
@@ -470,7 +470,7 @@ class Model(_Frozen):
 
     @property
     def n_centers(self) -> int:
-        """Of the map."""
+        """Number of centers of the map."""
         return sum(len(n.centers) for n in self.networks)
 
     @property
@@ -576,7 +576,7 @@ class Model(_Frozen):
         return self.model_copy(update=changes) if changes else self
 
     def zeroed_at(self, temperature_c: float) -> Model:
-        """The same model with the constant shifted so that the map is 0 at this temperature and slope 0."""
+        """Return the model with its constant shifted so that the map is 0 at a temperature and slope 0."""
         offset = float(self.map_dph(temperature_c, 0.0))
         networks = tuple(n.model_copy(update={"w0": n.w0 - offset}) for n in self.networks)
         return self.model_copy(update={"networks": networks, "fallback_dph": self.fallback_dph - offset})
@@ -611,7 +611,7 @@ class Model(_Frozen):
         return digest_of(self.to_dict())
 
     def save(self, path: Path) -> None:
-        """Writes `model.json` to a temporary name, then renames."""
+        """Write `model.json` to a temporary name, and rename it."""
         write_atomically(path, self.to_json())
 
 
@@ -632,7 +632,7 @@ def table_id(serial: str, axis: str | None) -> str:
 
 
 def load_model(path: Path) -> Model:
-    """Reads and checks a `model.json`.
+    """Read and check a `model.json`.
 
     Args:
         path: The file, or the folder that holds it.

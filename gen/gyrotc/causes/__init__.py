@@ -52,7 +52,7 @@ CATALOGUE: dict[str, Cause] = {}
 
 
 def register(cause: Cause) -> None:
-    """Puts a cause into the catalogue, by its rank.
+    """Put a cause into the catalogue, by its rank.
 
     Raises:
         ValueError: There is a cause of this id or rank.

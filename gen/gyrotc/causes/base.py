@@ -1,4 +1,4 @@
-"""What a cause of the catalogue is: physics, columns, search, words, and how a table stores it.
+"""A cause of the catalogue: its physics, columns, search and words, and its form in a table.
 
 - `cavity`, `bias`, `record`: how the cause acts on a simulated instrument (`Scene`), at the simulation's own
   rate;
@@ -27,7 +27,7 @@ from ..mirror.recursions import FLOAT64, Recursion, TableKind, first_order, recu
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What recordings can show: the range of their temperatures, C, and the length of the longest run, s."""
+    """Reach of recordings: the range of their temperatures, C, and the length of the longest run, s."""
 
     span_c: float
     longest_s: float
@@ -43,7 +43,7 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class SingleCycle:
-    """How a memory is looked for in a single chamber cycle.
+    """Search for a memory in a single chamber cycle.
 
     Attributes:
         points: How many the grid over its parameter has.
@@ -56,7 +56,7 @@ class SingleCycle:
 
 @dataclass(frozen=True, slots=True)
 class SearchRule:
-    """How diagnosis looks for a cause.
+    """Search of diagnosis for a cause.
 
     Attributes:
         price: Free parameters that it adds to the model: its share of the information criterion.
@@ -102,7 +102,7 @@ def geometric(parameter: Parameter, points: int) -> Callable[[Reach], list[Mappi
 
 @dataclass(frozen=True, slots=True)
 class Tabled:
-    """How a cause stands in a table.
+    """Form of a cause in a table.
 
     Attributes:
         kind: Recursion of the target.
@@ -143,7 +143,7 @@ def blocks_per_tau(block_s: float, tau_s: float) -> float:
 
 
 def octaves_per_block(block_s: float, tau_s: float) -> float:
-    """How many times exp(-t/tau) halves in a block."""
+    """Return how many times exp(-t/tau) halves in a block."""
     return 1.4426950408889634 * block_s / tau_s  # log2(e)
 
 
@@ -154,7 +154,7 @@ def turns(phase_rad: float) -> float:
 
 
 class Telling(IntEnum):
-    """How much the experiment of a cause tells: that of the more telling one of a pair is proposed."""
+    """Information that the experiment of a cause gives; of a pair, the more informative one is proposed."""
 
     LITTLE = 0
     STATIC = 1
@@ -228,7 +228,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What recordings must offer before a cause can be tested."""
+    """Needs of a cause: what recordings must have before it can be tested."""
 
     runs: int = 1
     dates: int = 0
@@ -357,5 +357,5 @@ def lagged(history: History, tau_s: float) -> FloatArray:
 
 
 def weights_of(*names: str) -> Callable[[FloatArray], dict[str, float]]:
-    """Amplitudes that are the weights of the columns, in their order."""
+    """Return a function that names the weights of the columns, in their order, as amplitudes."""
     return lambda weights: dict(zip(names, weights.tolist(), strict=True))

@@ -31,7 +31,7 @@ from .base import (
 
 
 def strength(values: CauseValues, temperature_c: FloatArray) -> FloatArray:
-    """Of the loop at temperatures, deg/h/C."""
+    """Return the strength of the loop at temperatures, deg/h/C."""
     growth, away = values.get("amplitude_dph_per_c_per_c", 0.0), temperature_c - values.get("reference_c", 0.0)
     return np.asarray(values["amplitude_dph_per_c"] + growth * away)
 

@@ -21,7 +21,7 @@ PART = 2**16
 
 
 def give_back() -> None:
-    """What was freed in small parts goes back to the system, where the C library is glibc."""
+    """Give memory that was freed in small parts back to the system, if the C library is glibc."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -45,5 +45,5 @@ def steps_where(values: FloatArray, predicate: Callable[[FloatArray], BoolArray]
 
 
 def parts_of(rows: int, size: int = PART) -> Iterator[slice]:
-    """So many rows, part by part."""
+    """Yield slices of some rows, part by part."""
     return (slice(at, min(at + size, rows)) for at in range(0, rows, size))

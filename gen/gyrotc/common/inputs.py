@@ -68,7 +68,7 @@ def ceiling(name: str) -> float:
 
 
 def set_ceilings(texts: Iterable[str]) -> None:
-    """Moves ceilings, each given as `NAME=VALUE`, for this process and those that it starts.
+    """Move ceilings, each given as `NAME=VALUE`, for this process and those that it starts.
 
     Raises:
         InputError: An unknown name, or no number above 0.
@@ -97,7 +97,7 @@ def _moved(text: str) -> dict[str, float]:
 
 
 def refuse_above(name: str, value: float, where: str, unit: str) -> None:
-    """Raises where `value` (in the ceiling's own measure) is above the ceiling `name`.
+    """Raise `InputError` if `value` (in the ceiling's own measure) is above the ceiling `name`.
 
     Raises:
         InputError: It is.
@@ -109,7 +109,7 @@ def refuse_above(name: str, value: float, where: str, unit: str) -> None:
 
 
 def need_memory(octets: float, where: str, why: str) -> None:
-    """To be called before memory is taken.
+    """Check the memory that is about to be taken.
 
     Raises:
         InputError: More than the ceiling `memory_gib` would be needed.
@@ -127,7 +127,7 @@ _KINDS = (
 
 
 def open_input(path: Path, where: str, expected: str) -> tuple[BinaryIO, int]:
-    """Opens a regular file (or a link to one) for reading, unbuffered.
+    """Open a regular file (or a link to one) for reading, unbuffered.
 
     Anything else is not even opened: a pipe without a writer would wait for ever, and a device has no end.
 
@@ -261,7 +261,7 @@ def parse_json(data: bytes, where: str, expected: str) -> Any:
 
 
 def checked(kind: type[T], content: Any, where: str, text: bytes | None = None) -> T:
-    """What JSON content says, as a pydantic model or another type, every field of the type that it should have.
+    """Validate JSON content as a pydantic model or another type; every field has the type that it should have.
 
     Args:
         text: What the content was parsed from, where it is known: it need not be written again.
@@ -288,9 +288,11 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def refused(error: ValidationError, place: Callable[[str], str], kind: Any = None) -> InputError:
-    """What pydantic refuses as one message; `place` says where a field stands, whose name is empty for the whole.
+    """Return one message for what pydantic refuses.
 
     Args:
+        error: What pydantic refuses.
+        place: Function that says where a field stands; an empty name is the whole.
         kind: The type that was expected, which has the names of fields.
     """
     first = error.errors(include_url=False)[0]
@@ -341,7 +343,7 @@ def _refuse_constant(text: str) -> float:
 
 
 def _look_through(content: Any, where: str, *, finite: bool = False) -> None:
-    """Refuses what is nested too deep, integers of more than 64 bits, and text that is no Unicode.
+    """Refuse content that is nested too deep, integers of more than 64 bits, and text that is no Unicode.
 
     `finite`: also infinities, which a number with a large exponent becomes.
     """

@@ -119,7 +119,7 @@ def _middle(parts: ReadParts, ranks_of: Callable[[int], tuple[int, int]]) -> tup
 
 
 def _farthest(parts: ReadParts, ranks_of: Callable[[int], tuple[int, int]]) -> tuple[float, float]:
-    """As `_middle`, of many: counts their leading digits, goes on with those that have the digits of the ranks."""
+    """Find both middle values of many numbers: count leading digits, and go on with those at the ranks."""
     lowest, below, ranks = -(2 ** (_DIGIT_BITS - 1)), 0, None
     for shift in range(64 - _DIGIT_BITS, -1, -_DIGIT_BITS):
 
@@ -207,7 +207,7 @@ class Averager:
         after_dph: FloatArray,
         scored: NDArray[np.bool_],
     ) -> None:
-        """Adds the next rows, in order of time."""
+        """Add the next rows, in order of time."""
         used = scored & np.isfinite(before_dph) & np.isfinite(after_dph)
         bins = self._bins(time_s)
         if not used.all():
@@ -240,7 +240,7 @@ def average_rows(
     average_s: float,
     from_s: float | None = None,
 ) -> Averages:
-    """As `Averager`, of rows that are in memory together."""
+    """Average rows that are in memory together; see `Averager`."""
     made = Averager(time_s, average_s, from_s)
     made.add(time_s, temperature_c, before_dph, after_dph, scored)
     return made.averages()
@@ -259,7 +259,7 @@ def statistics_of(values: FloatArray) -> dict[str, float | None]:
 
 
 def time_statistics(a: Averages, average_s: float) -> dict[str, float | None]:
-    """What the residual does over longer times.
+    """Compute statistics of the residual over longer times.
 
     RMS of 30-minute means; RMS of the angle that one hour adds up to (1 deg/h is 1 arcsec/s);
     RMS of the first 10 minutes. None where the run is too short.

@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """What a job calls when it begins something; a caller of the job gives it."""
+    """Function of a job's caller that the job calls as it goes on."""
 
     def __call__(self, stage: str, done: float = 0.0, total: float = 0.0, /) -> None:
         """Take note of a stage.

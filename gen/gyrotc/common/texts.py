@@ -1,4 +1,4 @@
-"""Where text of users and files becomes C, HTML, SVG, TOML, CSV, a file name or a line on a terminal.
+"""Make safe C, HTML, SVG, TOML, CSV, file names and terminal lines of the text of users and files.
 
 Nothing else builds such text. Each kind has an allow-list; what is not on it is shown as `<U+00E4>`: visible,
 recognisable, and without a meaning to whatever reads the result. Names of columns, entries of `[meta]`, warnings and
@@ -119,7 +119,7 @@ def c_environment() -> jinja2.Environment:
 
 
 def _only_c(value: Any) -> Any:
-    """What an expression of a C template may give.
+    """Refuse values of a C template's expressions that are no C text.
 
     Raises:
         ValueError: Text that went through no function of this module.
@@ -282,5 +282,5 @@ def terminal_text(text: str) -> str:
 
 
 def terminal_line(text: str) -> str:
-    """As `terminal_text`, in one line: a name with a line break in it cannot pass for a second message."""
+    """Return `terminal_text` in one line: a name with a line break in it cannot pass for a second message."""
     return text if text.isprintable() else _shown(text, lambda char, _: char.isprintable() or char == "\xa0")

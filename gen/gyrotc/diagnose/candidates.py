@@ -237,7 +237,7 @@ def diagnosable_causes() -> dict[str, Cause]:
 
 
 def searched(cause: str) -> SearchRule:
-    """How diagnosis looks for a cause."""
+    """Search of diagnosis for a cause."""
     search = CATALOGUE[cause].search
     assert search is not None
     return search

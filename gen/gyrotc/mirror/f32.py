@@ -86,7 +86,7 @@ class Points:
 
 
 def normalise(table: Table, x: NDArray[np.float32], fused: Fused = _NONE) -> Points:
-    """What the network sees of inputs (T, slope per block) that lie inside the envelope."""
+    """Normalise inputs (T, slope per block) inside the envelope as the network sees them."""
     scale = table.numbers(table.scale)
     z_t = product_plus("grid", x[:, 0] - scale[0], scale[1], _EIGHT, fused) - _EIGHT
     z_r = product_plus("grid", x[:, 1], scale[2], _EIGHT, fused) - _EIGHT
@@ -114,7 +114,7 @@ def biases(table: Table, points: Points, fused: Fused = _NONE) -> NDArray[np.flo
 
 
 def fallback_model(table: Table, number: int, points: Points) -> NDArray[np.float32]:
-    """What the network of this number, from 1 on, makes of inputs."""
+    """Evaluate the network of a number, from 1 on, at inputs."""
     records = table.records("networks")
     first, count = int(records[: number - 1, 0].sum()), int(records[number - 1, 0])
     return _network(table, table.numbers(records[number - 1]), first, count, points, _NONE)

@@ -1,4 +1,4 @@
-"""From samples to the sequence of corrections: counting, blocks, slopes, holds, restarts, fallback.
+"""Form the sequence of corrections from samples: counting, blocks, slopes, holds, restarts, fallback.
 
 docs/numerics.md, section 1, for a whole history at once: blocks are columns of arrays, and every
 float32 operation is the one that the target does, in its order.
@@ -129,7 +129,7 @@ def with_missing(arithmetic: Arithmetic, x: NumberArray, position: NDArray[np.in
 
 
 def follow(arithmetic: Arithmetic, x: NumberArray, settings: Settings) -> Steps:
-    """Follows samples x, shape (n,), from the start of a state on."""
+    """Follow samples x, shape (n,), from the start of a state on."""
     verdict, fallback = _accepted(arithmetic, x, settings)
     x = settings.guard.limited(x)
     valid, mean, count = _block_means(arithmetic, x, verdict, settings.samples_per_block)
@@ -176,7 +176,7 @@ class _Corrections:
 def _block_means(
     arithmetic: Arithmetic, x: NumberArray, verdict: NDArray[np.int8], n: int
 ) -> tuple[NDArray[np.bool_], NumberArray, NDArray[np.int64]]:
-    """Which blocks are valid, their means (0 where no sample was accepted), and how many were."""
+    """Return a mask of valid blocks, their means (0 without an accepted sample), and the count of accepted samples."""
     used = _used(verdict, n)
     step = n * max(1, _PART // n)
     parts = [
@@ -343,7 +343,7 @@ class SampleStream:
         return rows if self.placed is None else self.placed[rows]
 
     def positions(self, part: slice) -> NDArray[np.integer]:
-        """Of some rows."""
+        """Return the positions of some rows."""
         if self.placed is not None:
             return self.placed[part]
         return np.arange(*part.indices(len(self)), dtype=_number_type(len(self)))

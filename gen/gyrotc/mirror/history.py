@@ -196,7 +196,7 @@ def channel_at(
 
 
 def _clamped(readings: NumberArray, guard: Guarded, own: Steps, n: int) -> NDArray[np.bool_]:
-    """Whether the mean of each correction has a reading that was taken as the edge of the range."""
+    """Return a mask of the corrections whose mean has a reading that was taken as the edge of its range."""
     edge = own.accepted & (guard.limited(readings) != readings)
     restarts = own.at[own.is_restart]
     used = edge.copy()
@@ -256,7 +256,7 @@ class FollowedHistory:
         return len(self.stream)
 
     def rows(self, part: slice) -> Replay:
-        """What a part of the rows gets, in steps of 1: of a long recording all of it would fill memory."""
+        """Replay a part of the rows, in steps of 1; a long recording as a whole would fill memory."""
         position, steps = self.stream.positions(part), self.corrections
         in_force = steps.in_force(position)
         begun = in_force >= 0
@@ -321,7 +321,7 @@ def follow_history(
 
 
 def _fallback_model(table: Table, number: int, outcome: TermOutcome, shown: CourseChannel, steps: Steps) -> NumberArray:
-    """What a term adds without its channel, where that is asked for; else 0."""
+    """Return what a term adds without its channel, where a fallback model stands for it; else 0."""
     asked = np.flatnonzero((shown.is_away | ((shown.remarks & CLAMPED) != 0)) & (steps.kind == FROM_MAP))
     found = np.zeros_like(outcome.added)
     found[asked] = fallback_model(table, number, outcome.temperature[asked], outcome.slope[asked])
@@ -403,7 +403,7 @@ class Replay:
 
 
 def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_per_block: int) -> Replay:
-    """Feeds a history to a fresh state.
+    """Feed a history to a fresh state.
 
     Args:
         table: The table.
@@ -417,7 +417,7 @@ def replay(table: Table, channels: Words, *, missed: NDArray[np.int64], samples_
 
 
 def answers(table: Table, vectors: KnownInputs) -> NDArray[np.uint32]:
-    """What `board_test.c` prints for a table: (status, bits) of every result, shape (n, 2).
+    """Return the answers that `board_test.c` prints for a table: (status, bits) of every result, shape (n, 2).
 
     In order: the self-test; every map vector; `init`; every step of the history, whose status is that of
     the call plus 256 times that of `gtc_<n>_bias` after it; with uncertainties the bits of sigma, spread over a word,
@@ -486,7 +486,7 @@ def evaluate_map(table: Table, inputs: Words, fused: f32.Fused = frozenset()) ->
 
 
 def fallback_model(table: Table, number: int, temperature: NDArray[Any], slope: NDArray[Any]) -> NDArray[Any]:
-    """What stands for a term whose channel is not known.
+    """Evaluate the fallback model of a term whose channel is not known.
 
     Args:
         table: The table.

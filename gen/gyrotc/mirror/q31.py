@@ -54,7 +54,7 @@ class Points:
 
 
 def normalise(table: Table, x: IntArray) -> Points:
-    """What the network sees of inputs (T, slope per block in 2^-16 C) inside the envelope, shape (n, 2)."""
+    """Normalise inputs (T, slope per block in 2^-16 C) inside the envelope as the network sees them, shape (n, 2)."""
     low_t, _, low_r, _ = (int(v) for v in table.numbers(table.envelope))
     return Points(_position(x[:, 0], low_t, table.scale[0]), _position(x[:, 1], low_r, table.scale[1]))
 
@@ -82,7 +82,7 @@ def biases(table: Table, points: Points) -> IntArray:
 
 
 def fallback_model(table: Table, number: int, points: Points) -> IntArray:
-    """What the network of this number, from 1 on, makes of inputs."""
+    """Evaluate the network of a number, from 1 on, at inputs."""
     networks = table.numbers(table.records("networks"))
     return _network(table, networks[number - 1], int(networks[: number - 1, 0].sum()), points)
 

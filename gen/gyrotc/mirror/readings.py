@@ -155,18 +155,18 @@ class _Judge:
         return self._arithmetic.limit(self._guard.max_step, self._guard.max_rate, self._time_us(gap))
 
     def forget_candidate(self) -> None:
-        """Makes the next reading that does not follow the first of a series."""
+        """Make the next reading that does not follow the first of a series."""
         self._candidate_gap = None
 
     def hold(self, count: int) -> None:
-        """Lets `count` samples pass, none of which is accepted."""
+        """Let `count` samples pass, none of which is accepted."""
         self._gap += count
         self._series += count
         if self._candidate_gap is not None:
             self._candidate_gap += count
 
     def take(self, x: Any) -> int:
-        """Decides on a reading that is there and sound."""
+        """Decide on a reading that is present and sound."""
         if self._follows(x):
             return self._accepted(x, READING_ACCEPTED)
         if self._confirms(x):

@@ -102,7 +102,7 @@ class TableKind(IntEnum):
 
     @property
     def reads_channel(self) -> bool:
-        """Whether it reads an auxiliary channel."""
+        """True if it reads an auxiliary channel."""
         return self in (TableKind.AUXILIARY, TableKind.CURVE, TableKind.PRODUCT)
 
 
@@ -142,7 +142,7 @@ class CourseChannel:
 
 @dataclass(slots=True)
 class TermOutcome:
-    """What the map gets for every correction (slope per block), what is added to it, and remarks as status bits.
+    """Inputs of the map for every correction (slope per block), additions to its result, and remarks as status bits.
 
     `away`: of each term that reads a channel, where that is held, lost or beyond its range. `edge`: what terms add of
     readings at the edge of their range, beyond what they add without a reading, as magnitudes.
@@ -167,7 +167,7 @@ class Recursion:
         self.p = parameters
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
-        """Changes the outcome of every correction; `channel`: that of the term."""
+        """Change the outcome of every correction; `channel` is that of the term."""
         raise NotImplementedError
 
 

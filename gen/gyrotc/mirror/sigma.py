@@ -1,4 +1,4 @@
-"""How uncertain every correction of a history is: what `gtc_<n>_snapshot` gives, from numpy alone.
+"""Compute sigma of every correction of a history, as `gtc_<n>_snapshot` gives it, from numpy alone.
 
 Mirror of libc/gtc_sigma.inl, and of the last part of libc/gtc_num_<n>.h; docs/design.md gives the rules with their
 reasons. A square is a float32 number, or an unsigned one of 64 bits in the square of the bias' unit; in fixed point
@@ -73,7 +73,7 @@ class Squares:
         return np.asarray(word * (_ONE - left))
 
     def _left(self, gain: Any, blocks: int) -> Any:
-        """What a memory has taken of a difference after so many blocks."""
+        """Return the share of a difference that a memory has taken after some blocks."""
         factor, left = _ONE - gain, _ONE
         while blocks:
             if blocks & 1:
@@ -154,7 +154,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class SigmaEvidence:
-    """What a state knows of its corrections, one entry each, in numbers of the table's arithmetic.
+    """Facts that a state holds about its corrections, one entry each, in numbers of the table's arithmetic.
 
     Attributes:
         status: Of the correction.
@@ -235,7 +235,7 @@ def _extremes(of: np.ufunc, course: Course, is_restart: NDArray[np.bool_]) -> Nu
 
 
 def _drift(table: Table, steps: Steps, began: IntArray, blocks: IntArray) -> tuple[NDArray[np.bool_], NumberArray]:
-    """Whether the slope is known, and it: that of the window, or from the start of the front end on."""
+    """Return a mask of known slopes, and the slopes: of the window, or from the start of the front end on."""
     warming = (steps.remarks & WARMING) != 0
     young = (blocks >= 2) & (blocks < table.slope_blocks)
     start = steps.temperature[began]
@@ -299,7 +299,7 @@ def _of_age(table: Table, evidence: SigmaEvidence) -> NumberArray:
 
 
 def _without_readings(do: Squares, evidence: SigmaEvidence, x: Any) -> NumberArray:
-    """What x, of a block, comes to while the correction is held, and in what its block lacks of readings."""
+    """Scale x, of a block, to the time that the correction is held and that its block lacks readings."""
     return np.asarray(do.times(evidence.age, x) + do.part(evidence.missing, evidence.samples, x))
 
 
@@ -319,7 +319,7 @@ def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> NumberArray:
 
 
 def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[NumberArray]:
-    """What each term does not know of the time before it began, or of a channel that is not read."""
+    """Yield for each term the sigma of the time before it began, or of a channel that is not read."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)
     for i, record in enumerate(table.records("terms")):

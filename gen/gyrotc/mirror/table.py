@@ -101,7 +101,7 @@ class Table:
 
     @property
     def fallback_models(self) -> tuple[int, ...]:
-        """Of every term the number of its fallback model among the networks, from 1 on; 0: it has none."""
+        """Number of each term's fallback model among the networks, from 1 on; 0: it has none."""
         return tuple(int(word) >> 16 for word in self.records("terms")[:, 1])
 
     @property

@@ -48,7 +48,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Emission:
-    """What was written: the tables by arithmetic, and the arithmetics that `quantise` refused, with why."""
+    """Emitted tables by arithmetic, and the arithmetics that `quantise` refused, with the reason."""
 
     tables: dict[str, Table]
     refused: dict[str, str]
@@ -117,7 +117,7 @@ def emitted_tables(folder: Path, model: Model) -> dict[str, Table]:
 
 
 def write_texts(out: Path, texts: Mapping[str, bytes], model: Model) -> None:
-    """Puts a folder with exactly these files in place of `out/c`, and the model beside it.
+    """Put a folder with exactly these files in place of `out/c`, and the model beside it.
 
     Raises:
         InputError: Something in `out` was not written by gyrotc, or these were changed since.
@@ -302,7 +302,7 @@ def _upwards(bound: float) -> str:
 
 
 def _macros(model: Model, emission: Emission) -> Iterator[dict[str, str]]:
-    """What a program needs of a table before it runs: name behind GTC_<ID>_, text, comment."""
+    """Yield macros that a program needs of a table before it runs: name behind GTC_<ID>_, text, comment."""
     (t0, t1), (r0, r1) = model.envelope.temperature_c, model.envelope.slope_c_per_min
     yield _macro("BLOCK_US", c_code(f"{round(model.block_s * 1e6)}UL"), "block length, microseconds")
     edges = (("T_MIN_C", t0), ("T_MAX_C", t1), ("SLOPE_MIN_C_PER_MIN", r0), ("SLOPE_MAX_C_PER_MIN", r1))

@@ -84,7 +84,7 @@ def _wider(bounds: Range, least: float = 0.0) -> Range:
 
 
 def _granted(model: Model, table: Table) -> Range:
-    """What the map may give, deg/h: its range with the margin."""
+    """Return the authority of the map, deg/h: its range with the margin."""
     envelope = (model.envelope.temperature_c, model.envelope.slope_c_per_min)
     lines = [np.linspace(*ends, cells + 1) for ends, cells in zip(envelope, _GRID_CELLS, strict=True)]
     grid = _lattice(*lines)
@@ -104,7 +104,7 @@ def _granted(model: Model, table: Table) -> Range:
 
 
 def _ridges(model: Model, axis: int, cell: float) -> NDArray[np.float64]:
-    """Where along an axis (0: C, 1: C/min) Gaussians and regions lie that are narrow beside a cell of the grid."""
+    """Return places along an axis (0: C, 1: C/min) of Gaussians and regions narrower than a cell of the grid."""
     unit = (model.scale.temperature_c[1], model.scale.slope_c_per_min)[axis]
     places: list[float] = []
     for network in model.networks:
@@ -140,7 +140,7 @@ def _effects(model: Model) -> Range:
 
 
 def _effect(model: Model, term: Term) -> Range:
-    """What the parameters of a term allow within the envelope and the guard of its channel, deg/h."""
+    """Return the range of a term within the envelope and the guard of its channel, deg/h."""
     kind, values = term.table.kind, term.table.parameters(term.parameters, model.block_s)
     low, high = model.envelope.temperature_c
     if kind.reads_channel:
@@ -158,7 +158,7 @@ def _effect(model: Model, term: Term) -> Range:
 
 
 def _of_channel(kind: TableKind, values: Sequence[float], temperature_c: Range, readings: Range) -> Range:
-    """What a term of a channel can add at these temperatures and readings, 0 among it, deg/h."""
+    """Return the range of a term of a channel over temperatures and readings, deg/h; it contains 0."""
     slopes, reference, bells = [values[0]], values[1], (0.0, 0.0)
     if kind == TableKind.CURVE:
         reference, bells = values[2], (values[3], values[5])
@@ -284,13 +284,13 @@ class _Ramps:
         return np.where(self.falls[:, None], np.minimum(down, share), share)
 
     def lines(self, cells: int) -> FloatArray:
-        """Coordinates of a grid over the envelope that has every edge among its lines."""
+        """Return the lines of a grid over the envelope that has every edge among them."""
         low, high = self.envelope
         points = np.concatenate([np.linspace(low, high, cells + 1), self.edges.ravel(), self.near.ravel()])
         return np.unique(np.clip(points[np.isfinite(points)], low, high))
 
     def count(self, x: FloatArray) -> NDArray[np.bool_]:
-        """Whether a network can count between two lines, shape (n, len(x) - 1)."""
+        """Return a mask of the networks that can count between two lines, shape (n, len(x) - 1)."""
         if x.size == 1:
             return (x >= self.near[:, :1]) & (x <= self.near[:, 1:])
         return (x[None, 1:] > self.near[:, :1]) & (x[None, :-1] < self.near[:, 1:])

@@ -92,7 +92,7 @@ def _flushed(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _lost(network: Network, largest: NDArray[np.float64]) -> float:
-    """What the numbers make that were too small for the table, deg/h."""
+    """Return the most that numbers too small for the table would have added, deg/h."""
     values = np.array([network.w0, network.linear[0] * largest[0], network.linear[1] * largest[1]])
     small = np.abs([network.w0, *network.linear]) < _TINY
     weights = np.array(network.weights, dtype=np.float64)
@@ -110,7 +110,7 @@ def _numbers(words: Words) -> NDArray[np.float64]:
 
 
 def _normalised(scale: Words, temperature: float, slope: float) -> tuple[float, float]:
-    """What the target makes of an input, without its rounding."""
+    """Normalise an input as the target does, without its rounding."""
     offset, gain_t, gain_r = _numbers(scale).tolist()
     return (temperature - offset) * gain_t, slope * gain_r
 

@@ -54,7 +54,7 @@ class InputScale:
     gain: int
 
     def position(self, value: float) -> float:
-        """Where an input (2^-16 C) lies among the middles of the cells; not rounded."""
+        """Return the position of an input (2^-16 C) among the middles of the cells, not rounded."""
         return (value - self.low) * self.per_unit - 0.5
 
     @property
@@ -180,7 +180,7 @@ class _Gaussians:
     fraction: int
 
     def fits(self) -> bool:
-        """Whether every argument, and every factor of one, fits its word."""
+        """True if every argument, and every factor of one, fits its word."""
         reach = np.maximum(np.abs(self.offset), np.abs(self.offset + self.factor * (POSITIONS - 1)))
         return bool(np.max(reach, initial=0) <= _LARGEST_ARGUMENT and np.max(self.factor, initial=0) <= _MAX_FACTOR)
 
@@ -280,7 +280,7 @@ def _chosen(surface: Surface, keep: NDArray[np.bool_]) -> Surface:
 
 
 def _fraction(surface: Surface) -> int:
-    """As many fraction bits as the farthest argument leaves."""
+    """Return the number of fraction bits that the farthest argument leaves."""
     fraction = _FINEST
     while not _rounded(surface, fraction).fits():
         fraction -= 1

@@ -48,7 +48,7 @@ class Options(BaseModel):
 
 
 class EmissionRecord(Numbered):
-    """What `emit` wrote into `c/`, a pure function of the model and the options."""
+    """Record of the files that `emit` wrote into `c/`, a pure function of the model and the options."""
 
     schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")] = "gyrotc.emission/1"
     serial: str = Field(description="gyro serial")
@@ -97,7 +97,7 @@ def _text(record: EmissionRecord) -> bytes:
 
 
 class _Stored(Options):
-    """What of a record is accepted before `verify` has made it again: the options."""
+    """The part of a record that is accepted before `verify` has made it again: the options."""
 
     schema_: Annotated[Literal["gyrotc.emission/1"], Field(alias="schema")]
 

@@ -1,4 +1,4 @@
-"""What both arithmetics' tables share: settings, coverage bits, guards, terms, sigma, exact solving.
+"""Parts that tables of both arithmetics share: settings, coverage bits, guards, terms, sigma, exact solving.
 
 A table is a pure function of its model, whatever processor makes it; `np.exp`, `@` and LAPACK are not.
 Here are the few functions needed, in operations that IEEE 754 defines, in a fixed order.
@@ -65,7 +65,7 @@ def _grids(model: Model, known: Uncertainty, rules: Rules) -> list[float]:
 
 
 def _rules(rules: Rules, block_s: float) -> list[float]:
-    """In the order of gtc_sigma.inl; the last one is a time."""
+    """Return the rules in the order of gtc_sigma.inl; the last one is a time."""
     per_min = block_s / _S_PER_MIN
     return [
         rules.hold_dph_per_c,
@@ -248,7 +248,7 @@ def channel_names(model: Model) -> list[str]:
 
 
 def term_size_dph(model: Model) -> float:
-    """What the terms may add, as far as the envelope bounds it, deg/h."""
+    """Return the most that the terms can add within the envelope, deg/h."""
     low, high = model.envelope.temperature_c
     sizes = []
     for kind, _, values in (_term_record(model, term) for term in model.terms):

@@ -98,7 +98,7 @@ def stated_needs(header: str) -> dict[str, int]:
 
 
 def _derived(options: Options) -> dict[str, int]:
-    """What gtc_config.h concludes from the options."""
+    """Return the settings that gtc_config.h derives from the options."""
     terms = options["GTC_MAX_TERMS"]
     channels = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.reads_channel)
     retained = max(options["GTC_WITH_MEMORY"], options["GTC_WITH_PLAY"])

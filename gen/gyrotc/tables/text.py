@@ -17,7 +17,7 @@ _EXAMPLE_US = 10000  # 100 samples a second
 
 
 def example_values(model: Model) -> dict[str, Any]:
-    """What the example reads: the middle of the envelope, and of each further channel what is used when it is lost."""
+    """Return the readings of the example: the middle of the envelope, and the substitute of each further channel."""
     middle = round(sum(model.envelope.temperature_c) / 2.0, 1)
     readings = [middle, *(guard_of(model, name).fallback for name in channel_names(model))]
     return {
@@ -87,7 +87,7 @@ class _Array:
 
 @dataclass(frozen=True, slots=True)
 class TableText:
-    """What `table.c.j2` prints of one arithmetic."""
+    """Text of a table for `table.c.j2`, in one arithmetic."""
 
     numeric: str
     title: str
@@ -96,7 +96,7 @@ class TableText:
 
 
 def table_text(table: Table, model: Model) -> TableText:
-    """Decodes the image's words into named members; the order is that of gtc_table.h."""
+    """Decode the words of an image into named members, in the order of gtc_table.h."""
     comments = _row_comments(model)
     words = iter(table.words[_HEAD_WORDS:])
     counts: dict[str, list[int]] = {}
@@ -147,7 +147,7 @@ def _array_lengths(counts: dict[str, list[int]]) -> dict[str, int]:
 
 
 def _row_comments(model: Model) -> dict[str, list[str]]:
-    """What a row of an array says in the units of the trade."""
+    """Return comments that give a row of an array in deg/h, C and C/min."""
     centers = [
         f"{t:.2f} C, {r:+.3f} C/min; widths {_width(d_t)}, {_width(d_r)}; {w:+.3e} deg/h"
         for n in (*model.networks, *model.fallback_models)

@@ -124,7 +124,7 @@ def _draws(seed: int, count: int) -> NDArray[np.uint32]:
 
 @functools.cache
 def _steps_of(doublings: int) -> NDArray[np.uint32]:
-    """What 2^doublings steps make of each octet of a state, the others being 0, shape (4, 256)."""
+    """Return the state 2^doublings steps after each octet, the others being 0, shape (4, 256)."""
     bits = np.uint32(1) << np.arange(32, dtype=np.uint32)
     if doublings:
         half = _steps_of(doublings - 1)

@@ -221,7 +221,7 @@ def _read_costs(lines: list[LogLine], position: int) -> tuple[dict[str, Cost], i
 
 
 def compared_words(output: BoardOutput, expected: LogWords) -> BoardComparison:
-    """Compares the words of a board test with the reference's (status, bits), shape (n, 2).
+    """Compare the words of a board test with the reference's (status, bits), shape (n, 2).
 
     Raises:
         CheckFailed: Another number of results.
@@ -265,7 +265,7 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
 
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
-    """Compiles runtime, table and a test program for each arithmetic."""
+    """Compile runtime, table and a test program for each arithmetic, and run it."""
     n_channels = next(iter(job.tables.values())).n_channels
     files = table_files(job.c_folder, job.model, tuple(job.tables))
     if not job.board_test:
@@ -318,7 +318,7 @@ def _shared(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> _
 
 
 def _ran(job: Job, target: Target, numeric: str, shared: _Shared, work: Path, c: Path) -> dict[str, Any]:
-    """What a target showed of one arithmetic, by the names of `VerifiedTarget`."""
+    """Run a target in one arithmetic; return its results by the names of `VerifiedTarget`."""
     defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
     if target.counts:
         defines.append('BOARD_HEADER="board.h"')
@@ -356,7 +356,7 @@ def _output_of(text: str, job: Job, numeric: str) -> BoardOutput:
 
 
 def check_identity(output: BoardOutput, job: Job) -> None:
-    """Refuses the output of another model."""
+    """Refuse the output of another model."""
     if (output.id, output.model) != (job.model.id, int(job.model.hash[:8], 16)):
         raise CheckFailed(
             f"the output is of table {output.id}, model {output.model:08x}..., "
@@ -453,7 +453,7 @@ def _compared(job: Job, vectors: Vectors, part: BoardOutput) -> BoardComparison:
 
 
 def _entry(job: Job, log: Path, name: str, parts: Sequence[tuple[BoardOutput, BoardComparison]]) -> VerifiedTarget:
-    """What one board showed of one arithmetic; the cost of the calls is that of the last part."""
+    """Return the entry of a board in one arithmetic; the cost of the calls is that of the last part."""
     mismatches = sum(c.mismatches for _, c in parts)
     several = len(parts) > 1
     first = [f"part at line {p.line}, {text}" if several else text for p, c in parts for text in c.first]

@@ -42,7 +42,7 @@ _BEYOND = 2**16  # bytes that are read of a file beyond its right length
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is to be verified: emitted C, its tables, and what the reference answers to its vectors."""
+    """Input of a verification: emitted C, its tables, and the answers of the reference to its vectors."""
 
     c_folder: Path
     model: Model
@@ -61,8 +61,10 @@ def c_hash(c_folder: Path) -> str:
 
 
 def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
-    """Options and tables of an emitted folder. Where its record is damaged, those of `gyrotc emit` without options:
-    the record is then among the files that differ.
+    """Make options and tables of an emitted folder again.
+
+    If its record is damaged, they are those of `gyrotc emit` without options; the record is then among the files that
+    differ.
 
     Raises:
         InputError: There is no emitted folder.
@@ -79,7 +81,7 @@ def made_again(c_folder: Path, model: Model) -> tuple[Options, Emission]:
 
 
 def texts_again(model: Model, options: Options, emission: Emission) -> dict[str, bytes]:
-    """What must lie in an emitted folder, by name."""
+    """Return the contents that an emitted folder must have, by name."""
     return emit_texts(
         model,
         emission,
@@ -161,7 +163,7 @@ def _content(path: Path, length: int) -> bytes | None:
 
 
 def _differing(name: str, found: bytes | None, data: bytes, *, allowed: bool) -> VerifiedFile:
-    """How much differs, and the first place: a line, or a word of an image."""
+    """Compare a file; return how much differs, and the first place: a line, or a word of an image."""
     if found is None:
         what = "no regular file that can be read"
         return VerifiedFile(file=name, verdict="differs", status="fail", mismatches=1, found=what)

@@ -30,7 +30,7 @@ _SOURCE = Path(__file__).resolve().parent / "exhaustive.c"
 
 @dataclass(frozen=True, slots=True)
 class Visited:
-    """What came of visiting all pairs of positions.
+    """Result of visiting all pairs of positions.
 
     `worst_dph` is the largest departure from the model over all inputs that a pair stands for (at the
     corners of its cell), `arithmetic_dph` that at the middle of the cell, `mean_dph` the mean departure there.
@@ -53,7 +53,7 @@ def visit_all(
     trusted: bool = False,
     progress: Progress = silent,
 ) -> Visited:
-    """Visits every pair of positions, or every `every`-th slice of slopes.
+    """Visit every pair of positions, or every `every`-th slice of slopes.
 
     Args:
         model: The model that the table was made of.
@@ -100,7 +100,7 @@ def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trust
 
 
 def _numbers(model: Model, table: Table) -> Iterator[str]:
-    """What exhaustive.c reads: integers of the table's words, then the model in float64."""
+    """Yield the input of exhaustive.c: integers of the table's words, then the model in float64."""
     per_block = model.block_s / 60.0
     low_t, high_t, low_r, high_r = table.numbers(table.envelope).tolist()
     gain_t, gain_r, narrow = table.scale

@@ -65,7 +65,7 @@ def verify(
     trust_code: bool = False,
     progress: Progress = silent,
 ) -> Verification:
-    """Verifies `folder/c` against `folder/model.json`; what `verify.json` holds.
+    """Verify `folder/c` against `folder/model.json`; return the content of `verify.json`.
 
     Args:
         folder: What `build` or `emit` wrote.
@@ -229,7 +229,7 @@ def _error(job: Job, model: Model, vectors: Vectors, numeric: str) -> MapError:
 
 
 def _every_input(job: Job, model: Model, progress: Progress) -> MapError:
-    """The same for every input of the fixed-point table."""
+    """Measure the departure of the map over every input of the fixed-point table."""
     table = job.tables["q31"]
     visited = visit_all(job.c_folder, model, table, trusted=job.trusted, progress=progress)
     sound = visited.mismatches == 0 and visited.worst_dph <= table.error_bound_dph

@@ -58,7 +58,7 @@ class ReplayCase:
 
 @dataclass(frozen=True, slots=True)
 class ReplayedPart:
-    """What the compiled code answered to some rows.
+    """Answers of the compiled code to some rows.
 
     Attributes:
         rows: Which of the file.
@@ -77,7 +77,7 @@ class ReplayedPart:
     words: Words
 
     def differences(self) -> Iterator[str]:
-        """In words, with the number of the row."""
+        """Yield the differences in words, with the number of the row."""
         for row in self.wrong.tolist():
             texts = [
                 " ".join(f"{int(words[row]):08x}" for words in side) for side in (self.words, _words_of(self.reference))
@@ -148,7 +148,7 @@ def replay_program(
 
 
 def replay_on(target: Target, program: Path, history: ReplayCase) -> Iterator[ReplayedPart]:
-    """Feeds a recording to the compiled code and compares every step with the reference; part by part.
+    """Feed a recording to the compiled code, part by part, and compare every step with the reference.
 
     Raises:
         CheckFailed: The program did not run to its end.
@@ -213,7 +213,7 @@ def replay_dataset(
     dataset: Dataset,
     progress: Progress,
 ) -> list[VerifiedTarget]:
-    """Replays every run on every target whose board test ran; the entries, with `replayed` in theirs."""
+    """Replay every run on every target whose board test ran, and add `replayed` to its entries."""
     with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         lanes = {}
         for number, entry in enumerate(entries):

@@ -52,7 +52,7 @@ _groups: set[int] = set()  # of processes that run now
 
 @dataclass(frozen=True, slots=True)
 class ProgramRun:
-    """How a program ended and what it printed."""
+    """Exit status and output of a program."""
 
     returncode: int
     stdout: bytes
@@ -91,7 +91,7 @@ def confined(
 
 
 def end_all() -> None:
-    """Ends what other threads run: the job is interrupted, and nobody waits for it any more."""
+    """End the programs that other threads run: the job is interrupted, and nobody waits for them any more."""
     for group in tuple(_groups):
         _end(group)
 
@@ -108,7 +108,7 @@ def run_to_end(
     stdin: ByteStream = subprocess.DEVNULL,
     printed: IO[bytes] | None = None,
 ) -> ProgramRun:
-    """Runs a command in `folder` to its end.
+    """Run a command in `folder` to its end.
 
     Args:
         printed: Takes what it prints, which the result then is without.
@@ -131,7 +131,7 @@ def run_to_end(
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """All that a compiler or a program sees of the user's environment: where programs are."""
+    """Return the part of the user's environment that a compiler or a program sees: where programs are."""
     path = os.environ.get("PATH", os.defpath)
     return {"PATH": path, "HOME": str(folder), "TMPDIR": str(folder), "LANG": "C", "LC_ALL": "C"}
 
@@ -183,7 +183,7 @@ class Target(BaseModel):
         return (*C_FLAGS, *self.flags)
 
     def compiling(self) -> Target:
-        """What of it the compiler sees: targets that are alike in this have the same objects."""
+        """Return the part of a target that the compiler sees; targets alike in it have the same objects."""
         return Target(name=self.name, compiler=self.compiler, package="", flags=self.flags, bare=self.bare)
 
 
@@ -217,7 +217,7 @@ def all_targets() -> dict[str, Target]:
 def compile_objects(
     target: Target, sources: Sequence[Path], folder: Path, *, include: Path, defines: Sequence[str] = ()
 ) -> list[Path]:
-    """Compiles each source into `folder`; returns the objects.
+    """Compile each source into `folder` and return the objects.
 
     Raises:
         CheckFailed: The compiler refused; the message holds its first lines.
@@ -253,7 +253,7 @@ class Object:
     graph: str
 
     def put(self, path: Path) -> Path:
-        """Writes the file; returns its path."""
+        """Write the file and return its path."""
         write_own(path, self.code)
         return path
 
@@ -277,7 +277,7 @@ def forget_objects() -> None:
 
 
 def shared_object(target: Target, source: Path, work: Path, *, include: Path, fresh: bool = False) -> Object:
-    """Compiles a source, or takes what an earlier call made of the same text, headers, flags, compiler and gyrotc.
+    """Compile a source, or take the object of an earlier call with the same text, headers, flags, compiler and gyrotc.
 
     Args:
         work: A folder for the compiler.
@@ -353,7 +353,7 @@ def compiler_identity(compiler: str) -> list[str]:
 
 @functools.cache
 def _processor() -> str:
-    """What tells the code that `-march=native` makes here from that of another machine; empty: not known."""
+    """Return what tells the code of `-march=native` here from that of another machine; empty if not known."""
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
         lines = re.findall(r"^(?:model name|vendor_id|cpu family|model|flags|Features|CPU \w+)\s*:.*$", text, re.M)
@@ -386,7 +386,7 @@ def link(target: Target, objects: Sequence[Path], program: Path) -> None:
 def compile_c(
     target: Target, sources: Sequence[Path], program: Path, *, include: Path, defines: Sequence[str] = ()
 ) -> None:
-    """Compiles and links a program, objects beside it.
+    """Compile and link a program, with its objects beside it.
 
     Raises:
         CheckFailed: The compiler or the linker refused.
@@ -398,7 +398,7 @@ def compile_c(
 def run_program(
     target: Target, program: Path, data: Iterable[bytes] = (), printed: IO[bytes] | None = None
 ) -> ProgramRun:
-    """Runs a program with `data` on its standard input; bounded in time. `printed` as of `run_to_end`.
+    """Run a program with `data` on its standard input, for a bounded time. `printed` is that of `run_to_end`.
 
     Raises:
         CheckFailed: It did not end.
@@ -468,7 +468,7 @@ def printed_by_compiler(target: Target, command: list[str], folder: Path) -> byt
 
 
 def _links(target: Target) -> bool:
-    """Whether an empty program can be built: a compiler may lack the C library of the target."""
+    """Test whether an empty program can be built: a compiler may lack the C library of the target."""
     if target.bare:  # its parts are linked in, whose objects are those that will be needed
         return _links_empty(target)
     flags = tuple(f for f in target.flags if not f.startswith("-O") and f != "-march=native")
