@@ -18,7 +18,7 @@ from ..common.metrics import HALF_HOUR_S, HOUR_S, MAD_TO_SIGMA, Averager, Averag
 from ..mirror.history import FollowedHistory, follow_history
 from ..mirror.table import Table
 from ..model import Model
-from ..recordings.records import Run
+from ..recordings.records import Rows, Run
 from ..results.base import Estimate
 from ..results.diagnosed import GainOnUnseen
 from ..tables.emission import quantise_all
@@ -35,13 +35,16 @@ _FAR = 4.0  # robust standard deviations: a difference beyond says no more of th
 def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
     """What the emitted tables of each model leave on runs, bit for bit, on the rows that all of them correct.
 
+    A target is switched on with its gyro: where the file goes on from before the power-on of a run, the replay begins
+    at the power-on.
+
     At which temperatures is not asked (NaN): beside the histories they would be what fills memory.
     """
     tables = [next(iter(quantise_all(model, None).tables.values())) for model in models]
     found: list[list[Averages]] = [[] for _ in models]
     for run in runs:
         histories = [_followed(run, model, table) for model, table in zip(models, tables, strict=True)]
-        rows = replace(run.rows(), temperature_c=np.zeros(0))
+        rows = replace(_rows_since_power_on(run), temperature_c=np.zeros(0))
         inside = run.in_span(rows.time_s)
         averagers = [Averager(masked(rows.time_s, inside), average_s) for _ in models]
         for at in parts_of(len(rows)):
@@ -63,7 +66,7 @@ def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
 
     So what a call of `sample` returns is not known; corrections, and which blocks are valid, are.
     """
-    rows = replace(run.rows(), rate_dph=np.zeros(0))
+    rows = replace(_rows_since_power_on(run), rate_dph=np.zeros(0))
     channels, missed, per_block = replay_inputs(rows, run, model, table)
     del rows
     history = follow_history(table, channels, missed=missed, samples_per_block=per_block)
@@ -73,6 +76,15 @@ def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
         stream=replace(stream, samples=np.zeros(0, dtype=stream.samples.dtype)),
         corrections=replace(corrections, accepted=np.broadcast_to(np.bool_(True), corrections.accepted.shape)),
     )
+
+
+def _rows_since_power_on(run: Run) -> Rows:
+    rows = run.rows()
+    first = 0 if run.power_on_s is None else int(np.searchsorted(rows.time_s, run.power_on_s))
+    if not 0 < first < len(rows):
+        return rows
+    channels = {name: values[first:] for name, values in rows.channels.items()}
+    return Rows(rows.time_s[first:], rows.temperature_c[first:], rows.rate_dph[first:], channels)
 
 
 def floor_of(records: Records, left_dph: FloatArray, average_s: float) -> float:

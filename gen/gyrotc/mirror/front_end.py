@@ -397,7 +397,7 @@ def missed_before(time_s: NDArray[np.float64], row_period_s: float) -> NDArray[n
 
 
 def blocks_since_power_on(rows: Rows, run: Run, block_s: float) -> int:
-    """Return the number of whole blocks from power-on to the first row; 0 if power-on is unknown or came later."""
+    """Return the number of blocks from power-on to the first row; negative if it came later, 0 if it is unknown."""
     if run.power_on_s is None:
         return 0
-    return max(round((float(rows.time_s[0]) - run.power_on_s) / block_s), 0)
+    return round((float(rows.time_s[0]) - run.power_on_s) / block_s)

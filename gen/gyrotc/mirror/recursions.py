@@ -114,7 +114,7 @@ class Course:
         temperature: Mean of the block that ended (of the last valid block where it is not valid itself), or the
             sample that started the front end, shape (n,).
         closes: Whether a block ended; False: a sample started the front end, first or anew, shape (n,).
-        elapsed: Blocks since power-on, shape (n,).
+        elapsed: Blocks since power-on, negative before it, shape (n,).
     """
 
     temperature: NumberArray
@@ -213,7 +213,7 @@ class _WarmUp(Recursion):
     """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
-        outcome.added = outcome.added + self.do.fading(course.elapsed, self.p[0], self.p[1])
+        outcome.added = outcome.added + self.do.fading(np.maximum(course.elapsed, 0), self.p[0], self.p[1])
 
 
 class _Harmonic(Recursion):

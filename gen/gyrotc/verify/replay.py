@@ -108,7 +108,7 @@ def replay_inputs(rows: Rows, run: Run, model: Model, table: Table) -> tuple[Wor
     missed = missed_before(rows.time_s, run.row_period_s)
     per_block = samples_per_block(model.block_s, run.row_period_s)
     if any(term.cause.needs.power_on for term in model.terms):
-        before = per_block * blocks_since_power_on(rows, run, model.block_s)
+        before = per_block * max(blocks_since_power_on(rows, run, model.block_s), 0)
         if before > _MOST_MISSED:
             found = f"power-on {before * run.row_period_s:.4g} s before the first row"
             raise InputError(run.file, found, f"at most {_MOST_MISSED} rows of {run.row_period_s:.4g} s")
