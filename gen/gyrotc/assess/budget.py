@@ -1,4 +1,4 @@
-"""How well figures of recordings are known, and the uncertainty budget of a correction (JCGM 100:2008).
+"""Uncertainty of figures from recordings, and the uncertainty budget of a correction (JCGM 100:2008).
 
 The measurand is true bias less correction, at a moment of use inside the calibrated envelope at which the correction
 is neither held nor clamped; noise of the rate is not part of it. What recordings say of the map (noise, fit, power-on)
@@ -79,7 +79,7 @@ def part(
 
 
 def thermometer(model: Model, instruments: Sequence[Instrument]) -> Contribution | str:
-    """Of the temperatures, or why it is not known."""
+    """Return the contribution of the temperatures, or the reason why it is not known."""
     found = _stated(instruments, "temperature")
     if found is None:
         return "thermometer: no uncertainty of its temperatures between calibration and use is stated"
@@ -97,7 +97,7 @@ def thermometer(model: Model, instruments: Sequence[Instrument]) -> Contribution
 
 
 def reference(model: Model, instruments: Sequence[Instrument]) -> Contribution | str:
-    """Of the rate that recordings are referred to, or why it is not known."""
+    """Return the contribution of the reference rate of the recordings, or the reason why it is not known."""
     found = _stated(instruments, "rate")
     if found is None:
         rate = model.meta.get("earth_rate")
@@ -133,7 +133,7 @@ def _gradient(model: Model) -> float:
 
 
 def arithmetic(verification: Verification | None) -> Contribution | str:
-    """Of rounding, or why it is not known."""
+    """Return the contribution of rounding, or the reason why it is not known."""
     if verification is None or not verification.errors:
         return "arithmetic of the target: no bound was proven"
     return part(
@@ -146,7 +146,7 @@ def arithmetic(verification: Verification | None) -> Contribution | str:
 
 
 def ageing(limits: Limits | None, changes: Changes | None) -> Contribution | str:
-    """To the end of the interval, or why it is not known."""
+    """Return the contribution of ageing to the end of the interval, or the reason why it is not known."""
     interval = limits.interval if limits else None
     if interval is None:
         return "ageing: no interval until the next calibration is stated"
@@ -461,7 +461,7 @@ def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]], constant_dph: fl
 def _of_windows(
     judged: Sequence[Averages], runs: Sequence[EvaluatedRun], average_s: float
 ) -> Iterable[tuple[str, FigureUncertainty]]:
-    """Of the worst run's figure: RMS of m normal numbers, of which sqrt(1/2m) is unknown."""
+    """Return the uncertainty of the worst run's figure: that of an RMS of m normal numbers is sqrt(1/2m) of it."""
     names: tuple[tuple[Literal["rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph"], float], ...] = (
         ("rms_30min_dph", HALF_HOUR_S),
         ("angle_1h_arcsec", HOUR_S),
@@ -479,7 +479,7 @@ def _of_windows(
 
 
 def _over_floor(rms: FigureUncertainty, rms_dph: float, floor_dph: float, differences: int | None) -> FigureUncertainty:
-    """Of RMS over floor, relative variances added; the floor's is 3/4n of n successive differences (von Neumann)."""
+    """Return the uncertainty of RMS over floor: relative variances added, 3/4n for n differences (von Neumann)."""
     of_floor = float(np.sqrt(0.75 / differences)) if differences else 0.0
     known = f"floor from {differences} successive differences" if differences else "floor of the simulation"
     relative = float(np.hypot(rms.standard / rms_dph, of_floor)) if rms_dph else 0.0

@@ -1,4 +1,4 @@
-"""What a build changed against an earlier one of the same gyro, and the unit's state as found.
+"""Changes of a build since an earlier one of the same gyro, with the state of the unit as found.
 
 A gyro that is calibrated again should give nearly the same map. Where it does not, the difference over the
 envelope is the drift of the gyro, of its thermometer or of the procedure, and belongs into the report.
@@ -104,7 +104,7 @@ class Earlier:
 
 
 def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--previous") -> Earlier:
-    """Reads an earlier result folder of a gyro, of one of its axes where it has several.
+    """Read an earlier result folder of a gyro, or of one of its axes if it has several.
 
     Args:
         folder: The result.
@@ -126,7 +126,7 @@ def load_earlier(folder: Path, serial: str, axis: str | None, option: str = "--p
 
 
 def earlier_models(folder: Path) -> dict[str, Model]:
-    """Models of an earlier result by axis, "" where it has one rate.
+    """Return the models of an earlier result by axis; "" if it has one rate.
 
     Raises:
         InputError: There is none, or one cannot be read.
@@ -148,7 +148,7 @@ def changes_since(
     dataset: Dataset | None = None,
     limits: Limits | None = None,
 ) -> Changes:
-    """What is different from an earlier result.
+    """Compare a result with an earlier one.
 
     Args:
         training: Of the new result: where it was made with the earlier model, it says how far the map has moved.
@@ -195,7 +195,7 @@ def _only(names: Set[str], others: Set[str]) -> tuple[str, ...]:
 
 
 def _changed_hashes(before: dict[str, str], after: dict[str, str]) -> FileChanges:
-    """Of files by name, with their hashes: which came, went, or have other bytes."""
+    """Compare hashes of files by name: new, gone, and with other bytes."""
     other = sorted(name for name in before.keys() & after.keys() if before[name] != after[name])
     return FileChanges(
         new=_only(after.keys(), before.keys()), gone=_only(before.keys(), after.keys()), other_bytes=tuple(other)
@@ -223,7 +223,7 @@ def _moved(old: Model, new: Model, training: Training | None) -> MapDifference |
 
 
 def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None:
-    """How far the maps differ where both were calibrated, deg/h; None where nothing is common.
+    """Compare two maps over their common envelope, deg/h; None if they have none.
 
     Args:
         of_means: What two means differ by although nothing moved; it stands in where a map states no uncertainty.
@@ -255,7 +255,7 @@ def _map(old: Model, new: Model, of_means: float | None) -> MapDifference | None
 
 
 def _figures(earlier: Earlier, model: Model, evaluation: Evaluation) -> Iterator[tuple[str, FigureChange | str]]:
-    """Figures before and after; those of recordings only where both were judged on the same kind."""
+    """Yield figures before and after; those of recordings only if both were judged on the same kind."""
     yield "centers", FigureChange(before=earlier.model.n_centers, after=model.n_centers)
     yield "noise_floor_dph", FigureChange(before=earlier.model.noise_floor_dph, after=model.noise_floor_dph)
     old = earlier.evaluation.judged() if earlier.evaluation else None
@@ -272,7 +272,7 @@ def _ids(evaluation: Evaluation | None) -> set[str]:
 
 
 def _versions(old: Manifest | None, new: Manifest) -> Iterator[tuple[str, TextChange]]:
-    """Programs whose version is another."""
+    """Yield programs whose version differs."""
     before = old.versions | {"gyrotc": old.gyrotc_version} if old else {}
     after = new.versions | {"gyrotc": new.gyrotc_version}
     for name in sorted(before.keys() | after.keys()):

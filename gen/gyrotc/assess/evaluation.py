@@ -111,7 +111,7 @@ def evaluate(
     progress: Progress = silent,
     watch: Watch | None = None,
 ) -> Evaluation:
-    """Evaluates `folder` (model and C) on a data set; what `evaluate.json` holds.
+    """Evaluate `folder` (model and C) on a data set; return the content of `evaluate.json`.
 
     Args:
         numeric: Arithmetic to run; default the first emitted one.
@@ -210,7 +210,7 @@ def _with_what_is_known(result: Evaluation, parts: Sequence[_Part], training: Tr
 
 
 def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, FigureUncertainty] | None:
-    """Of the figures that the model is judged by; where spans were left out, from the scatter of training runs."""
+    """Return the uncertainty of the judged figures; for spans left out, from the scatter of training."""
     role = "exam" if result.exam else "train"
     own = [(p.averages, run) for p, run in zip(parts, result.runs, strict=True) if run.role == role]
     scale = 1.0
@@ -233,7 +233,7 @@ def _uncertainties(result: Evaluation, parts: Sequence[_Part]) -> dict[str, Figu
 
 
 def _residual_test(result: Evaluation, parts: Sequence[_Part]) -> ResidualTest | None:
-    """Of what remains without spikes and bursts, which findings name; what was left out in turn has none of them."""
+    """Test the residual without spikes and bursts, which findings name; what was left out in turn has none of them."""
     judged = result.judged()
     if judged is None:
         return None
@@ -270,7 +270,7 @@ def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Targe
 def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
 ) -> Iterator[AnsweredRows]:
-    """Feeds all rows of a file to the compiled code and to the reference, and compares every step; part by part."""
+    """Feed all rows of a file, part by part, to the compiled code and to the reference, and compare every step."""
     history = replay_case_of(rows, run, model, table)
     if program is None:
         for part in history.parts():
@@ -449,13 +449,13 @@ def trace_at(path: Path, each: int) -> Iterator[Callable[[Sequence[FloatArray], 
 
 
 def _arrow(values: NDArray[Any]) -> pa.Array:
-    """Numbers as Arrow has them; `pa.array` would load pandas where that is installed."""
+    """Return numbers as an Arrow array; `pa.array` would load pandas if that is installed."""
     buffer = pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, buffer])
 
 
 def _means(columns: list[FloatArray], each: int) -> list[FloatArray]:
-    """Means of every `each` rows of columns, of which the third counts most: rows in which it is NaN do not."""
+    """Return means of every `each` rows of columns; rows in which the third is NaN do not count."""
     if each == 1:
         return columns
     starts = np.arange(0, columns[0].size, each)

@@ -1,4 +1,4 @@
-"""What a user should know about a model and the data behind it, computed from the data.
+"""Findings about a model and the data behind it, computed from the data.
 
 A finding has an id that stays stable, a text, and the numbers behind it. Findings never stop a job. They follow
 from figures alone: no name of a file, folder or serial plays a part.
@@ -42,7 +42,7 @@ def residual_test(
     floor_dph: float | None,
     floor_lengths: Sequence[int] | None = None,
 ) -> ResidualTest | None:
-    """Holds what remains of the judged runs against white noise; None without an RMS or a noise floor.
+    """Compare the residual of the judged runs with white noise; None without an RMS or a noise floor.
 
     Args:
         judged: Means of what remains of these runs, deg/h, each of shape (n,).
@@ -66,7 +66,7 @@ def residual_test(
 
 @functools.lru_cache(maxsize=64)
 def _limits(lengths: tuple[int, ...], of_floor: tuple[int, ...] | None) -> tuple[float | None, float, float]:
-    """What white noise of runs of these lengths gives: most autocorrelation; least and most RMS over the floor."""
+    """Return the limits for white noise in runs of these lengths: autocorrelation, least and most RMS over floor."""
     rng = np.random.default_rng(_SEED)
     draws = max(_DRAWS // 8, min(_DRAWS, _MOST // sum(lengths)))
     correlations, ratios = [], np.empty(draws)
@@ -213,7 +213,7 @@ def _coverage(model: Model) -> Iterator[Finding]:
 
 
 def _weights(model: Model) -> Iterator[Finding]:
-    """Weights that cancel one another are a lever for rounding and for every input out of the ordinary.
+    """Report weights that cancel one another: a lever for rounding and for every unusual input.
 
     Those of a polynomial written as wide Gaussians cancel as they must; it ends at the edge of the envelope.
     """
@@ -232,7 +232,7 @@ def _weights(model: Model) -> Iterator[Finding]:
 
 
 def _outliers(result: Mapping[str, Any]) -> Iterator[Finding]:
-    """Runs whose mean residual, or whose scatter, is not that of the others."""
+    """Report runs whose mean residual or scatter differs from that of the others."""
     runs = [run for run in result["runs"] if run["after"]["rms_dph"] is not None]
     if len(runs) < _LEAST_RUNS:
         return

@@ -61,7 +61,7 @@ def decided(
     constant: float | None = None,
     allowed: Sequence[tuple[Verdict, str]] = (),
 ) -> Limit:
-    """Holds an amount with its uncertainty against a limit, by a decision rule.
+    """Compare an amount and its uncertainty with a limit, by a decision rule.
 
     Args:
         name: Name of the limit, as in the limits file.
@@ -146,13 +146,13 @@ def _bare(name: str, measured: float | None, bound: float, sign: float, why: str
 
 
 class StatedInstrument(Instrument):
-    """The same as a person writes it: a field that is not known is refused."""
+    """An instrument as a person writes it: an unknown field is refused."""
 
     model_config = ConfigDict(extra="forbid")
 
 
 def instruments_in(meta: Mapping[str, Any], others: Sequence[Instrument] = ()) -> tuple[Instrument, ...]:
-    """Those of `[[meta.instrument]]`, and of the limits file those whose names are not among them.
+    """Return the instruments of `[[meta.instrument]]`, and those of the limits file with other names.
 
     Raises:
         InputError: An entry is no table, or a field of it is wrong or not known.
@@ -247,7 +247,7 @@ class Covers(_Part):
 
 
 class Required(_Part):
-    """What must be there, and what must not."""
+    """Properties that a unit must have, and that it must not."""
 
     arithmetics: Annotated[tuple[Numeric, ...], BeforeValidator(_as_tuple)] = ()
     targets: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()  # bit for bit, in all their arithmetics
@@ -264,13 +264,13 @@ class Required(_Part):
 
     @property
     def left_out(self) -> tuple[RuntimePart, ...]:
-        """Parts that the product does not need. A re-zero weighs uncertainties: it goes with them."""
+        """Parts that the product does not need. A re-zero weighs uncertainties, so it goes with them."""
         parts: tuple[RuntimePart, ...] = get_args(RuntimePart)
         return tuple(p for p in parts if not getattr(self, p) or (p == "rezero" and not self.uncertainty))
 
 
 class Recalibration(_Part):
-    """How long a calibration is meant to hold, and what the bias of the type does in that time."""
+    """Interval of the calibration, and the drift of the bias of the type in that time."""
 
     days: Annotated[float, Field(gt=0.0, le=36525.0)]
     drift_dph_per_year: UpperBound = None  # the most that units of the type do
@@ -296,7 +296,7 @@ class Limits(_Part):
 
 
 def load_limits(path: Path) -> Limits:
-    """Reads and checks a limits file.
+    """Read and check a limits file.
 
     Raises:
         InputError: It cannot be read, is no TOML, or a field is wrong or not known.
@@ -355,7 +355,7 @@ def held_against(limits: Limits, model: Model, evaluation: Evaluation, verificat
 
 
 def _measured(model: Model, evaluation: Evaluation, verification: Verification | None) -> dict[str, Any]:
-    """Figures by the names of limits; None: not measured."""
+    """Return the figures by the names of limits; None: not measured."""
     found = evaluation.judged()
     judged = found[1] if found else None
     cells = "".join(model.coverage.rows) if model.coverage else ""

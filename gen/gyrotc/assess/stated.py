@@ -57,7 +57,7 @@ def check_stated(
 
 
 def _check_figures(evaluation: Evaluation, where: str) -> None:
-    """Figures of all runs of a role are those of its runs together.
+    """Check that the figures of a role are those of its runs together.
 
     Raises:
         InputError: They are not.
@@ -181,7 +181,7 @@ def _limits(content: dict[str, Any], where: str) -> Limits:
 
 
 def _refuse_departure(stated: Any, found: Any, where: str) -> None:
-    """Refuses two JSON values that differ by more than rounding, by the first field that does."""
+    """Refuse two JSON values that differ by more than rounding; the message names the first field that does."""
     if isinstance(stated, dict) and isinstance(found, dict) and stated.keys() == found.keys():
         for name in stated:
             _refuse_departure(stated[name], found[name], f"{where}.{name}")

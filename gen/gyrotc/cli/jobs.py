@@ -56,7 +56,7 @@ def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
 
 
 def _not_shipped(result: Diagnosed) -> str:
-    """Why no extension is."""
+    """Return the reason why no extension is shipped."""
     reason = result.shipping.reason if result.physical and result.shipping else "no cause was named"
     return f"no extension is shipped: {reason}"
 

@@ -30,7 +30,7 @@ EXIT_STATUS = 70
 
 
 def crash_line(error: BaseException) -> str:
-    """Writes the report of an unexpected exception; the line that the user sees, with its id and its place.
+    """Write the report of an unexpected exception, and return the line for the user, with its id and place.
 
     The id follows from where the program failed, so that the same fault has the same id everywhere.
     """
@@ -52,7 +52,7 @@ def crash_line(error: BaseException) -> str:
 
 
 def _kept(number: str, text: str) -> str:
-    """Where the report is: the user's folder of state, else the one of temporary files."""
+    """Write the report to the user's folder of state, else to that of temporary files, and return its path."""
     from platformdirs import user_state_path
 
     state = user_state_path("gyrotc", appauthor=False)
@@ -101,7 +101,7 @@ _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # names of glibc's mallopt
 
 
 def _returning_columns() -> None:
-    """Columns of long recordings go back to the system when they are freed, where the C library is glibc.
+    """Give columns of long recordings back to the system when they are freed, if the C library is glibc.
 
     Left to itself it keeps what was freed of up to 32 MiB; so does the allocator that Arrow brings along.
     """
@@ -133,7 +133,7 @@ def _quiet_start() -> None:
 
 
 def flushed(status: int) -> int:
-    """What is still to be printed is: the command's status, or that of what went wrong, which is reported once."""
+    """Print what is still buffered; return the command's status, or that of a failure, which is reported once."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()
@@ -153,7 +153,7 @@ def _failed(error: OSError) -> int:
 
 
 def _without_warnings() -> None:
-    """What libraries warn of or log is no news for who typed a command, here and in processes of a fleet.
+    """Silence warnings and logs of libraries, here and in processes of a fleet: they are no news to a user.
 
     Whoever asks for warnings (`PYTHONWARNINGS`, `python -W`) gets them; in tests each one is an error (`pytest.ini`).
     """
@@ -183,7 +183,7 @@ def application() -> Typer:
 
 
 def run(arguments: list[str]) -> int:
-    """Runs one command in this process and returns its exit status; errors become one message on stderr.
+    """Run one command in this process and return its exit status; an error becomes one message on stderr.
 
     Signals, threads and warnings are the caller's, so that a program or a test may run many commands.
     """

@@ -48,7 +48,7 @@ def written_place(path: Path | None) -> Path | None:
 
 
 def _json_place(path: Path | None) -> Path | None:
-    """As `written_place`; with `-` the JSON alone has standard output, and all text goes to standard error."""
+    """Check the place of JSON output; with `-` the JSON alone has standard output, and text goes to the other."""
     if path != STANDARD_OUTPUT:
         return written_place(path)
     OUT.stderr = True
@@ -135,7 +135,7 @@ AcceptOption = Annotated[
 
 
 def _result_place(folder: Path) -> Path:
-    """Checks that a folder holds a result; names the one beside it that does."""
+    """Check that a folder holds a result; the message names a folder beside it that does."""
     if _holds_result(folder):
         return folder
     near = next((place for place in (folder.parent, *_below(folder)) if _holds_result(place)), None)

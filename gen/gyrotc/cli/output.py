@@ -15,7 +15,7 @@ from ..common.texts import terminal_line, terminal_text
 
 
 class Loudness:
-    """How much is reported, for this process."""
+    """Amount of reporting of this process."""
 
     quiet = False
     verbose = False

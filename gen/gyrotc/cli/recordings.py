@@ -164,7 +164,7 @@ def _columns(stated: list[str]) -> dict[str, Any]:
 
 
 def _joins(files: list[Path], tolerance_s: float | None) -> list[dict[str, Any]]:
-    """Options as `[[join]]` of a map.
+    """Return options as `[[join]]` of a map.
 
     Raises:
         InputError: One of the two is missing.
@@ -248,7 +248,7 @@ def _simulate_lot(
     pulses: bool,
     format: RunFormat,
 ) -> None:
-    """Simulates a lot of gyros."""
+    """Simulate a lot of gyros."""
     from ..simulate.data_set import RowForm
     from ..simulate.lot import LotOrder, simulate_lot
 

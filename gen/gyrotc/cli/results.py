@@ -72,7 +72,7 @@ def prior_lines(training: Training) -> Iterator[str]:
 
 
 def prediction_line(training: Training) -> str:
-    """What training expects of recordings that it has not seen, or why it does not say."""
+    """Return what training predicts for unseen recordings, or the reason why there is no prediction."""
     ratio = training.predicted_rms_ratio
     floor = f"noise floor {sci(training.noise_floor_dph)} deg/h"
     if ratio is None:
@@ -104,7 +104,7 @@ def _known(number: int | None) -> str:
 
 
 def verified_line(result: Verification) -> str:
-    """Where the bits were those of the reference, in one line."""
+    """Return the targets with the bits of the reference, in one line."""
     agreed: dict[str, list[str]] = {}
     for entry in result.targets:
         if entry.status == "pass":
@@ -135,7 +135,7 @@ def not_installed_lines(result: Verification) -> Iterator[str]:
 
 
 def verify_notes(result: Verification) -> Iterator[str]:
-    """What is not installed, and what differs, with all bits; one line each."""
+    """Yield what is not installed, and what differs, with all bits; one line each."""
     yield from not_installed_lines(result)
     for entry in result.targets:
         who = f"{entry.name} {entry.numeric}"
@@ -159,7 +159,7 @@ def verify_notes(result: Verification) -> Iterator[str]:
 
 
 def _log_notes(log: ReadLog) -> Iterator[str]:
-    """What a log holds, to its last line."""
+    """Yield the contents of a log, to its last line."""
     found = ", ".join(f"{part.numeric} from line {part.line}" for part in log.parts)
     yield f"{log.file}: {log.lines} lines; compared: {found}; {log.outside} lines outside of the board test"
     yield from (f"{log.file}, outside: {line}" for line in log.first_outside)
@@ -168,7 +168,7 @@ def _log_notes(log: ReadLog) -> Iterator[str]:
 
 
 def file_notes(result: Verification | JointVerification) -> Iterator[str]:
-    """Which files are not as gyrotc makes them, with the first place that differs; else one line."""
+    """Yield the files that differ from what gyrotc makes, with the first place; one line if none does."""
     from ..results.release import Verification
 
     for file in result.emitted:
@@ -283,7 +283,7 @@ _JUDGED_ON = {"exam": "exam runs", "left_out": "spans left out", "train": "the t
 
 
 def change_lines(changes: Changes) -> Iterator[str]:
-    """What is different from an earlier result."""
+    """Yield the changes since an earlier result."""
     if changes.same_model:
         yield "against the earlier result: the same model"
     elif changes.map is None:

@@ -45,7 +45,7 @@ from .results import (
 
 @contextmanager
 def evaluation_folders(folder: Path, trace: Path | None, recordings: Path) -> Iterator[tuple[Path, Path | None]]:
-    """Where to write the figures and the traces, so that both take their places when the block ends well.
+    """Provide folders for the figures and the traces; both take their places if the block ends well.
 
     Args:
         folder: The result folder, which gets `evaluate.json` and the decisions that follow from it.
@@ -127,7 +127,7 @@ def fit(
 
 
 def _map_place(path: Path | None) -> Path | None:
-    """Checks the file of `--map` before the work begins."""
+    """Check the file of `--map` before the work begins."""
     if path is not None and path.suffix not in (".csv", ".json"):
         raise InputError("--map", repr(path.name), "a name that ends in .csv or .json")
     return written_place(path)

@@ -49,7 +49,7 @@ class Unit:
 
     @property
     def refused(self) -> str:
-        """Why no result folder may have this name; empty if it may."""
+        """Reason why no result folder may have this name; empty if it may."""
         if self.folder.casefold() in OF_FLEET:
             return "is a name in the folder of a fleet; give the data set another name"
         if not self.folder.strip("-xyz") or self.folder.startswith("."):
@@ -59,7 +59,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """What is to be done, and how.
+    """The units of a fleet and the options of their builds.
 
     `releases`: Reasons, by serial, for which units are released although a finding bars them.
     `skipped`: Folders of a folder that was given as a manifest that hold no recordings.
@@ -100,7 +100,7 @@ class _Manifest(_Part):
 
 
 def load_manifest(path: Path) -> Fleet:
-    """Reads a manifest; a folder is one too: each of its folders with recordings is a data set.
+    """Read a manifest; a folder is one too: each of its folders with recordings is a data set.
 
     Raises:
         InputError: It cannot be read, a field is wrong, nothing is named, or two results would have one name.
@@ -156,7 +156,7 @@ def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
 
 
 def _has_recordings(folder: Path) -> bool:
-    """Whether a folder is a data set. One that cannot be read may be one: its job will say what is wrong."""
+    """Test whether a folder is a data set. One that cannot be read may be one: its job will say what is wrong."""
     if folder.name.startswith("."):
         return False
     try:
@@ -177,7 +177,7 @@ def _is_empty(folder: Path) -> bool:
 
 
 def _is_result(folder: Path) -> bool:
-    """Whether gyrotc made it of recordings: also a fleet's folder holds CSV files."""
+    """Test whether gyrotc made a folder of recordings: a fleet's folder holds CSV files, too."""
     if (folder / SUMMARY[0]).is_file():
         return True
     try:

@@ -36,7 +36,7 @@ _POINTS = 160  # of the residual that a picture shows
 
 
 def gyro_facts(runs: Sequence[tuple[str, Averages]]) -> Facts:
-    """Facts of a gyro from the means of its runs, each with its file."""
+    """Compute the facts of a gyro from the means of its runs, each with its file."""
     used = [(file, a) for file, a in runs if a.time_s.size]
     steps = [step_in(a.after_dph) for _, a in used]
     compared = [_compared(file, a, step) for (file, a), step in zip(used, steps, strict=True)]

@@ -89,7 +89,7 @@ def curves_of_units(entries: Sequence[FleetEntry], outliers: set[str]) -> Markup
 
 
 def why_outlier(known: Mapping[str, FleetEntry], reason: Reason) -> Markup:
-    """What shows why a gyro is an outlier; `known`: entries with facts by name."""
+    """Draw what shows why a gyro is an outlier; `known` has the entries with facts by name."""
     entry = known[reason.name]
     series = entry.facts.series if entry.facts else None
     over_time = series and reason.file in (None, series.file) and (reason.time_s is not None or reason.id in _IN_TIME)
@@ -139,7 +139,7 @@ _PICTURES = 60  # of outliers; of more, the words say enough
 
 
 def summary_of(entries: Sequence[FleetEntry]) -> FleetSummary:
-    """What `fleet.json` says."""
+    """Return the content of `fleet.json`."""
     counts = Counter(entry.status for entry in entries)
     copied = copies(entries)
     entries = with_copies(entries, copied)
@@ -207,7 +207,7 @@ def write_summary(out: Path, entries: Sequence[FleetEntry]) -> FleetSummary:
 
 
 def _link(out: Path, name: str) -> str | None:
-    """Where a row leads: the unit's page, else its folder; None where there is nothing."""
+    """Return the link of a row: the unit's page, else its folder; None if there is neither."""
     try:
         if (out / name / "report.html").is_file():
             return f"{quote(name)}/report.html"
@@ -253,7 +253,7 @@ class _Kind:
         self.shape_scatter = _scatter(self.shapes, self.shape)
 
     def distance(self, curve: FloatArray) -> float:
-        """How far a curve lies from the usual one, in robust standard deviations: as it is, or about its mean."""
+        """Return the distance of a curve, as it is or about its mean, from the usual one, in robust sigmas."""
         both = np.isfinite(curve) & self.seen
         if both.sum() < _LEAST_BINS:
             return np.inf
@@ -329,7 +329,7 @@ def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
 
 
 def _in_order(entries: Sequence[FleetEntry], kinds: Sequence[_Kind]) -> Iterator[Reason]:
-    """In the order of what explains most: a later reason of the same gyro follows from an earlier one."""
+    """Yield reasons, those that explain most first: a later reason of the same gyro follows from an earlier one."""
     for rule in (_late, _thermometers, _mirrored_or_scaled):
         yield from (reason for kind in kinds for reason in rule(kind))
     yield from _own(entries, _OF_RUN)
@@ -343,7 +343,7 @@ def _in_order(entries: Sequence[FleetEntry], kinds: Sequence[_Kind]) -> Iterator
 
 
 def _own(entries: Sequence[FleetEntry], ids: Sequence[str]) -> Iterator[Reason]:
-    """What a gyro's runs show by themselves, by the rules of `check` and `diagnose`."""
+    """Yield reasons that a gyro's own runs show, by the rules of `check` and `diagnose`."""
     for entry in entries:
         if known := [event for event in (entry.facts.own if entry.facts else ()) if event.id in ids]:
             first = min(known, key=lambda event: ids.index(event.id))
@@ -363,7 +363,7 @@ def _late(kind: _Kind) -> Iterator[Reason]:
 
 
 def _lateness(facts: Sequence[Facts]) -> FloatArray:
-    """By how much each gyro's temperatures follow the median of all, s: median over runs; NaN where nothing changes."""
+    """Return the delay of each gyro's temperatures behind the median of all, s; NaN if nothing changes."""
     late: list[list[float]] = [[] for _ in facts]
     for k in range(max(len(f.runs) for f in facts)):
         profiles = [(n, f.runs[k].profile_c) for n, f in enumerate(facts) if k < len(f.runs)]
@@ -445,7 +445,7 @@ def _noise(kind: _Kind) -> Iterator[Reason]:
 
 
 def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
-    """Curves that a turn or a factor brings back to those of their kind."""
+    """Yield curves that a change of sign or a factor brings back to those of their kind."""
     factors = kind.factors()
     logs = np.log(np.maximum(factors, 1e-9))
     usual, scatter = _usual(logs)
@@ -460,7 +460,7 @@ def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
 
 
 def _bias_outlier(kind: _Kind) -> Iterator[Reason]:
-    """What nothing known brings back."""
+    """Yield curves that nothing known brings back."""
     for entry, curve in zip(kind.entries, kind.curves, strict=True):
         if _FAR < (far := kind.distance(curve)) < np.inf:
             text = f"bias over temperature differs from that of {_kin(entry)} ({far:.0f} robust standard deviations)"

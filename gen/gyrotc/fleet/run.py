@@ -52,7 +52,7 @@ def on_processes(jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetE
 
 
 def _pooled(jobs: int, tasks: dict[int, Task]) -> Iterator[tuple[int, FleetEntry]]:
-    """On fresh processes with one thread each: a serial is too small to share."""
+    """Run tasks on fresh processes with one thread each: a serial is too small to share."""
     single_threaded()
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=context, initializer=_end_with_parent)
@@ -120,7 +120,7 @@ class Cluster:
 
 
 def on_dask(cluster: Cluster, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
-    """As `on_processes`, on the workers of a cluster.
+    """Run tasks on the workers of a cluster; see `on_processes`.
 
     Dask gives a task whose worker was lost to another, and fails it when that has happened more often than its
     scheduler allows (`allowed-failures`). What is left when the scheduler or all workers are lost is unfinished.
@@ -172,7 +172,7 @@ def connected(cluster: Cluster) -> Iterator[Any]:
 
 
 def _wait_for_worker(cluster: Cluster, client: Any) -> None:
-    """Returns at once where there is a worker.
+    """Wait until there is a worker.
 
     Raises:
         InputError: None came in time, or the scheduler was lost.
@@ -201,7 +201,7 @@ def _described(cluster: Cluster, client: Any) -> str:
 
 
 def _entry_on_dask(task: Task, result: FleetEntry | tuple[Any, Any, Any]) -> FleetEntry:
-    """What has become of a task: its entry, or type, value and place of what was raised."""
+    """Return the entry of a task, or one made of the type, value and place of what it raised."""
     if isinstance(result, FleetEntry):
         if result.status == "done":  # in the fleet's folder here: a worker may have another folder under that path
             os.listdir(task.out.parent)  # noqa: PTH208 a network file system looks anew
@@ -226,7 +226,7 @@ def run_fleet(
     cluster: Cluster | None = None,
     done: Done | None = None,
 ) -> list[FleetEntry]:
-    """Does every unit that is not done yet and writes the summary; one entry each, in the manifest's order.
+    """Do every unit that is not done yet and write the summary; one entry each, in the manifest's order.
 
     Args:
         out: A folder for each unit goes into it, and the files of the summary.

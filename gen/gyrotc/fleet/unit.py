@@ -55,7 +55,7 @@ def move_away(place: Path) -> str:
 
 
 def clean_units(out: Path, names: Sequence[str]) -> None:
-    """Removes what jobs that were killed left beside results in a fleet's folder; of these names also their locks."""
+    """Remove what killed jobs left beside results in a fleet's folder, and the locks of these names."""
     for name in unfinished_beside(out, names):
         with suppress(InputError):  # a job is at work there
             clean(out / name)
@@ -65,7 +65,7 @@ ENTRY = "entry.json"
 
 
 def write_entry(folder: Path, entry: FleetEntry) -> FleetEntry:
-    """Writes `entry.json` into a unit's result, whose marker will hold its hash; returns it."""
+    """Write `entry.json` into a unit's result, whose marker will hold its hash, and return the entry."""
     write_atomically(folder / ENTRY, json_text(entry.content()))
     return entry
 
@@ -93,7 +93,7 @@ class Task:
     version: str = __version__
 
     def keyed(self) -> Task:
-        """The same with its key."""
+        """Return the task with its key."""
         try:
             return replace(self, key=self.found())
         except OSError:
@@ -128,7 +128,7 @@ def made_before(task: Task) -> FleetEntry | None:
 
 
 def do_unit(task: Task) -> FleetEntry:
-    """Does the job. Whatever goes wrong is reported in the entry: it concerns this serial alone."""
+    """Do the job of a unit. Whatever goes wrong is reported in the entry: it concerns this serial alone."""
     try:
         if task.unit.refused:
             raise InputError(task.unit.name, task.unit.refused)
@@ -200,7 +200,7 @@ def _built(task: Task) -> FleetEntry:
 
 
 def entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> FleetEntry:
-    """What the summary says of the gyro, and what it is compared with others by."""
+    """Return the entry of a gyro: its figures, and the facts that it is compared by."""
     role, judged = built.evaluation.judged() or (None, None)
     floor, after = built.evaluation.noise_floor_dph, judged.after.rms_dph if judged else None
     held, known = built.limits, (built.evaluation.uncertainty or {}).get("rms_dph")
@@ -239,7 +239,7 @@ def entry_of(task: Task, key: str, dataset: Dataset, built: Built, runs: Sequenc
 
 
 def _facts(dataset: Dataset, built: Built, runs: Sequence[tuple[str, Averages]]) -> Facts | None:
-    """What the gyro is compared by; where more than noise is left also what its runs show by themselves."""
+    """Return the facts that a gyro is compared by, with the events of its runs if more than noise is left."""
     facts = gyro_facts(runs)
     if not built.evaluation.structure_left:
         return facts

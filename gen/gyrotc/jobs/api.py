@@ -67,7 +67,7 @@ class Dataset(records.Dataset):
         folder: _Place | None = None,
         **stated: Any,
     ) -> Dataset:
-        """Recordings in memory as a data set, read as `gyrotc import` reads files.
+        """Make a data set of recordings in memory, read as `gyrotc import` reads files.
 
         Args:
             frames: A DataFrame, or one for each run by name; columns are known by their names, an index of times is
@@ -116,7 +116,7 @@ class Dataset(records.Dataset):
 
 
 def load(folder: _Place, *, axis: str | None = None) -> Dataset:
-    """Reads a data set and checks every file.
+    """Read a data set and check every file.
 
     Args:
         folder: The data set, as `gyrotc import` or a person has written it (docs/recordings.md).
@@ -183,7 +183,7 @@ class Picture(str):
 
 @dataclass(frozen=True)
 class Result:
-    """What `build` made.
+    """Result of `build`.
 
     Attributes:
         folder: The result: C files in `c/`, `model.json`, `report.html`, ...
@@ -200,7 +200,7 @@ class Result:
 
     @property
     def evaluation(self) -> Evaluation:
-        """Figures before and after, run by run and together."""
+        """Figures before and after, for each run and together."""
         return self.built.evaluation
 
     @property

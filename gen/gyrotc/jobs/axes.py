@@ -26,7 +26,7 @@ _HOST = "host-gcc-O2"
 
 
 def join_axes(folder: Path, axes: Sequence[str]) -> None:
-    """Fills `folder/c` and `folder/report.html` from `folder/<axis>`.
+    """Fill `folder/c` and `folder/report.html` from `folder/<axis>`.
 
     Proves that all tables link and pass their self-tests in one image.
 
@@ -44,7 +44,7 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
 
 
 def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
-    """Files of every axis's own `c/` by name."""
+    """Return the files of the `c/` of each axis by name."""
     return {
         axis: {p.name: p.read_bytes() for p in sorted((folder / axis / "c").iterdir()) if p.is_file()} for axis in axes
     }
@@ -112,7 +112,7 @@ def verify_axes(
     folder: Path,
     results: Mapping[str, Verification],
 ) -> JointVerification:
-    """What `verify.json` of a unit holds: its axes' results, and the files that stand in `folder/c`.
+    """Verify the axes of a unit; return the content of its `verify.json`: their results, and the files in `folder/c`.
 
     These must be those of the axes' own folders, which `results` judges.
 

@@ -59,7 +59,7 @@ _STAGES = {
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """What `build` made: the model and the JSON objects of its stages.
+    """Model and results of a build.
 
     `refused` names the arithmetics that were refused, with the reason; with `extend` what was diagnosed, with `limits`
     and `previous` the objects of `limits.json` and `changes.json`.
@@ -82,7 +82,7 @@ class Built:
 
     @property
     def unit(self) -> UnitResults:
-        """What every page and certificate of its folder states."""
+        """Results of the unit, for pages and certificates of its folder."""
         return UnitResults(
             self.model,
             self.evaluation,
@@ -98,7 +98,7 @@ class Built:
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """What is asked for besides the options of `fit`."""
+    """Options of a build besides those of the fit."""
 
     numerics: Sequence[str] | None
     extend: bool
@@ -126,7 +126,7 @@ def build(
     ageing_dph: float | None = None,
     progress: Progress = silent,
 ) -> list[Built]:
-    """Recordings in, verified C and a report out; one result for each axis.
+    """Build verified C and a report from recordings; one result for each axis.
 
     `out` is replaced as a whole at the end; until then an older one stays as it was.
 
@@ -285,12 +285,12 @@ def _write(path: Path, result: dict[str, Any]) -> None:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """Of the libraries behind the figures; a fleet asks for each of its serials."""
+    """Return the versions of the libraries behind the figures; a fleet asks for each of its serials."""
     return {name: metadata.version(name) for name in _VERSIONED}
 
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
-    """Hashes of everything in the folder, versions, meta: what a certificate must be able to name."""
+    """Return hashes of everything in the folder, versions and meta, for a certificate."""
     from ..results.cache import program_of  # the package of fleets imports this module
 
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)

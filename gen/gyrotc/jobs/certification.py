@@ -55,7 +55,7 @@ Country = Annotated[str, Field(pattern="^[A-Z]{2}$")]
 
 
 class LaboratoryFacts(BaseModel):
-    """What a laboratory states, in its facts file or in `[meta]` of the data set; None: not stated."""
+    """Facts of a laboratory from its facts file or from `[meta]` of the data set; None: not stated."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -88,14 +88,14 @@ _BUILT = ("model.json", "training.json", "limits.json")  # besides c/: a certifi
 
 @dataclass(frozen=True, slots=True)
 class Certified:
-    """What was written: the files, and whether a PDF could be made."""
+    """Files that were written, and whether a PDF could be made."""
 
     files: tuple[Path, ...]
     pdf: bool
 
 
 def laboratory_facts(meta: Mapping[str, Any], path: Path | None, number: str | None) -> LaboratoryFacts:
-    """What is known: the facts file before `[meta]`, the number of the command line before both.
+    """Collect the facts: the facts file before `[meta]`, the number of the command line before both.
 
     Raises:
         InputError: The file cannot be read, or a field is wrong or not known.
@@ -124,7 +124,7 @@ def certificate(
     draft: bool = False,
     accept_fail: str | None = None,
 ) -> Certified:
-    """Writes `certificate.html`, `dcc.xml` and, where Chromium is there, `certificate.pdf` into `out`.
+    """Write `certificate.html`, `dcc.xml` and, with Chromium, `certificate.pdf` into `out`.
 
     Args:
         folder: What `build` wrote, also of several axes.
@@ -199,7 +199,7 @@ def _last_day(folder: Path, stated: LaboratoryFacts, first: UnitResults) -> str 
 
 
 def unit_of(folder: Path) -> UnitResults:
-    """What a result of one axis says, once it is seen that it is as it was written and follows from itself.
+    """Check that a result of one axis is as it was written and consistent, and return it.
 
     Raises:
         InputError: It does not; or as `unit_in`.

@@ -32,7 +32,7 @@ def diagnose_dataset(
     progress: Progress = silent,
     judged: Judged | None = None,
 ) -> Diagnosis:
-    """Diagnoses a data set and writes the result into a folder.
+    """Diagnose a data set and write the result into a folder.
 
     Args:
         out: Folder that gets `diagnose.json`, `report.html`, pictures and the extended model; None: no files.
@@ -56,7 +56,7 @@ def diagnose_dataset(
 
 
 def _saved(out: Path, found: Diagnosis) -> Diagnosis:
-    """Writes a diagnosis into a folder; its result then names the files."""
+    """Write a diagnosis into a folder; its result then names the files."""
     result, names = found.result, dict[str, Any]()
     if result.extended is not None and found.model is not None:
         found.model.save(out / _MODEL)

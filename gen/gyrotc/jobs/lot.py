@@ -45,7 +45,7 @@ class CalibratedUnit:
 
 
 def load_lot(path: Path) -> Lot:
-    """Reads a lot and holds it against its checksum.
+    """Read a lot and check its checksum.
 
     Raises:
         InputError: It is no lot, or was changed since gyrotc wrote it.
@@ -66,7 +66,7 @@ def checksum_of(lot: Lot) -> str:
 
 
 def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress = silent) -> Lot:
-    """Learns a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
+    """Learn a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
 
     Args:
         axis: Axis of three-axis gyros: each axis is a lot of its own.
@@ -134,7 +134,7 @@ def calibrated_unit(place: Path) -> CalibratedUnit:
 
 
 def _envelope(models: Sequence[Model]) -> Envelope:
-    """Of all units."""
+    """Return the envelope of all units."""
     t = np.array([m.envelope.temperature_c for m in models])
     r = np.array([m.envelope.slope_c_per_min for m in models])
     return (float(t.min()), float(t.max())), (float(r.min()), float(r.max()))
@@ -228,7 +228,7 @@ def _at_rest(lot: Lot) -> AtRest:
 
 
 def _in_words(names: Sequence[tuple[str, str]], found: Learned) -> str:
-    """What was found, in words."""
+    """Return a summary of the lot in words."""
     left, alone = found.left_out_dph
     size = np.bincount(found.state.cluster)
     if alone > 0.0 and left < alone:

@@ -1,4 +1,4 @@
-"""From an earlier calibration to the prior of a unit's recalibration (`--prior DIR`)."""
+"""Make the prior of a unit's recalibration from an earlier calibration (`--prior DIR`)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
 def prior_from(
     folder: Path, dataset: Dataset, *, ageing_dph: float | None = None, limits: Limits | None = None
 ) -> EarlierPrior:
-    """What an earlier result says of a unit today.
+    """Return what an earlier result says of a unit today.
 
     Args:
         folder: What `gyrotc build` wrote of the same gyro.
@@ -45,7 +45,7 @@ def prior_from(
 
 
 def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float | None) -> None:
-    """Refuses options that say different things.
+    """Refuse options that contradict each other.
 
     Raises:
         InputError: They do.
@@ -60,7 +60,7 @@ def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float |
 def with_prior(
     options: FitOptions, dataset: Dataset, folder: Path | None, ageing_dph: float | None, limits: Limits | None = None
 ) -> FitOptions:
-    """Options of a fit with what an earlier result says; as they are where none is named.
+    """Return options of a fit with the prior of an earlier result; unchanged if none is named.
 
     Raises:
         InputError: As `refuse_together` and `prior_from`.
@@ -72,7 +72,7 @@ def with_prior(
 
 
 def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None) -> tuple[float, str]:
-    """How far the bias may have moved, 1 sigma, deg/h, and where that comes from."""
+    """Return the standard deviation of the drift of the bias, deg/h, and the source of this figure."""
     if stated is not None:
         if not (math.isfinite(stated) and stated >= 0.0):
             raise InputError("--ageing", f"{stated:g}", "deg/h, 0 or more")

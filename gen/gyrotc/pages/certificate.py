@@ -51,7 +51,7 @@ class CertifiedRow:
 
     @property
     def conformity(self) -> str:
-        """As the DCC says it; empty without a limit."""
+        """Conformity in the words of the DCC; empty without a limit."""
         return _CONFORMITY.get(self.verdict, "")
 
 
@@ -143,7 +143,7 @@ _LONGEST_S = 120.0  # a page takes two seconds; a browser that hangs must not ho
 
 
 def print_to_pdf(page: Path, pdf: Path) -> bool:
-    """Prints a page of our own; False where no browser is there or it does not do it."""
+    """Print a page of our own; return False if no browser is there or it fails."""
     found = next(filter(None, map(shutil.which, _BROWSERS)), None)
     if found is None:
         return False

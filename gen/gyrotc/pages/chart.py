@@ -178,7 +178,7 @@ class Panel:
         self._add("band", x, low, color, label, far=np.asarray(high, dtype=np.float64))
 
     def errors(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, color: str) -> None:
-        """Bars of uncertainty from `low` to `high`."""
+        """Draw bars of uncertainty from `low` to `high`."""
         self._add("errors", x, low, color, far=np.asarray(high, dtype=np.float64))
 
     def vertical(self, x: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8) -> None:
@@ -194,11 +194,11 @@ class Panel:
         self._add("span", [low, high], [np.nan, np.nan], color, label)
 
     def bars(self, values: ArrayLike, places: ArrayLike, color: str, label: str = "", *, height: float = 0.6) -> None:
-        """Bars from zero to the right; `height` in units of the y axis."""
+        """Draw bars from zero to the right; `height` is in units of the y axis."""
         self._add("bars", values, places, color, label, width=height)
 
     def tops(self, x: ArrayLike) -> None:
-        """Triangles at the upper edge."""
+        """Draw triangles at the upper edge."""
         self._add("tops", x, np.full(np.size(x), np.nan), ACCENT)
 
     def words(self, x: ArrayLike, y: ArrayLike, texts: Sequence[str]) -> None:
@@ -235,7 +235,7 @@ class Panel:
 
 
 def side_by_side(*pictures: Markup | None) -> Markup | None:
-    """Pictures that stand beside each other where there is room; None where there is none."""
+    """Put pictures beside each other where there is room; None without a picture."""
     there = [picture for picture in pictures if picture is not None]
     if not there:
         return None
@@ -246,7 +246,7 @@ def drawing(
     panels: Sequence[Panel], *, columns: int = 1, width: float = FULL, height: float = 190.0,
     heights: Sequence[float] | None = None, share_x: bool = False, share_y: bool = False,
 ) -> Markup:  # fmt: skip
-    """Panels in a grid as one `<svg>` element, with one legend above.
+    """Draw panels in a grid as one `<svg>` element, with one legend above.
 
     Args:
         height: Of the axes of a row, points; `heights`: of each row.
@@ -283,7 +283,7 @@ def drawing(
 
 
 def stacked(*pictures: Markup) -> Markup:
-    """Pictures of one width below each other, as one `<svg>` element."""
+    """Put pictures of one width below each other, as one `<svg>` element."""
     parts, y, wide = [], 0.0, FULL
     for picture in pictures:
         size = _SIZE.search(picture)

@@ -1,4 +1,4 @@
-"""What `gyrotc compare` shows: tables, a picture, and the figures that Ding et al. 2014 print beside them."""
+"""The page of `gyrotc compare`: tables, a picture, and the figures of Ding et al. 2014 beside them."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def _environment(methods: Sequence[Method], k: int, exponent: int) -> Panel:
 
 
 def _together(methods: Sequence[Method]) -> Panel:
-    """How far every method is from the best one, and what it costs."""
+    """Draw the distance of every method from the best one, and its cost."""
     rms = np.array([m.exam_rms_dph for m in methods], dtype=np.float64)
     excess = 100.0 * (rms / rms.min() - 1.0) if rms.min() > 0.0 else np.zeros(len(rms))
     place = np.arange(len(methods))[::-1]

@@ -36,12 +36,12 @@ PICTURES, SERIES = "pictures", "series.json"
 
 
 def is_diagnosis(folder: Path) -> bool:
-    """Whether a folder holds a diagnosis (and not a build)."""
+    """Test whether a folder holds a diagnosis (and not a build)."""
     return (folder / "diagnose.json").is_file() and not (folder / "evaluate.json").exists()
 
 
 def write_diagnosis_page(folder: Path) -> Path:
-    """Writes `folder/report.html` from what stands in the folder; returns its path.
+    """Write `folder/report.html` from what stands in the folder, and return its path.
 
     Raises:
         InputError: `diagnose.json` is missing, or it or `series.json` is broken or of another kind.
@@ -208,7 +208,7 @@ def _statistics(discrepancies: Sequence[Statistic]) -> Markup:
 
 
 def _place(d: ComparedStatistic) -> float:
-    """Where the measured value lies in its simulated range: -1 ... 1 inside."""
+    """Return the place of the measured value in its simulated range: -1 ... 1 inside."""
     half = max(0.5 * (d.simulated_high - d.simulated_low), 1e-300)
     x = (d.measured - 0.5 * (d.simulated_high + d.simulated_low)) / half
     return float(np.sign(x) * min(abs(x), np.sqrt(abs(x))))  # the value itself up to 1, its square root beyond
@@ -233,7 +233,7 @@ def _over_inputs(runs: Sequence[RunSeries], width: int) -> Markup:
 
 
 def _binned(panel: Panel, x: FloatArray, y: FloatArray, term: FloatArray, color: str, label: str) -> None:
-    """Means of y in 24 cells with their standard errors, and of the fitted causes as a line."""
+    """Draw means of y in 24 cells with their standard errors, and those of the fitted causes as a line."""
     edges = np.linspace(x.min(), x.max() + 1e-9, 25)
     cell = np.digitize(x, edges) - 1
     count = np.bincount(cell, minlength=24)

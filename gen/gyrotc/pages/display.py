@@ -22,7 +22,7 @@ def power(exponent: int) -> str:
 
 
 def is_plain(exponent: int) -> bool:
-    """Whether a number of this power of ten is written without one: 0.01 to 99999, on axes, in tables, in sentences."""
+    """Test whether a number of this power of ten is written without one (0.01 to 99999), wherever it stands."""
     return _PLAIN[0] < exponent < _PLAIN[1]
 
 
@@ -118,7 +118,7 @@ def words(key: str) -> str:
 
 
 def limit_words(limit: str) -> str:
-    """What a limit of the limits file is about."""
+    """Return the words for the figure of a limit."""
     return _LIMITS.get(limit) or words(limit.partition(".")[2])
 
 
@@ -191,7 +191,7 @@ def plain(value: Any) -> str:
 
 
 def measured_words(limit: Limit) -> str:
-    """What was measured of a limit, rounded to what is known of it."""
+    """Return the measured figure of a limit, rounded to its uncertainty."""
     if isinstance(limit.measured, float) and limit.expanded_uncertainty:
         return with_uncertainty(limit.measured, limit.expanded_uncertainty)
     if limit.measured is None:
@@ -212,7 +212,7 @@ def bound_words(limit: Limit) -> str:
 
 
 def failure_words(limit: Limit) -> str:
-    """Why a limit is not met, by its key in the limits file; figures are printed as everywhere."""
+    """Return the reason why a limit is not met, with its key in the limits file."""
     name = f"limit {limit.limit} {bound_words(limit)}"
     if limit.verdict == "NOT TESTABLE":
         return f"{name} is not testable: {'; '.join(limit.capped)}"

@@ -47,12 +47,12 @@ class AxisScale:
         return np.asarray(np.sign(values) * np.where(size > edge, far, size))
 
     def place(self, values: FloatArray) -> FloatArray:
-        """Places of numbers: 0 at `low`, 1 at `high`; NaN where a logarithmic axis has none."""
+        """Return the places of numbers: 0 at `low`, 1 at `high`; NaN where a logarithmic axis has none."""
         a, b = self._stretched(np.array([self.low, self.high]))
         return np.asarray((self._stretched(np.asarray(values, dtype=np.float64)) - a) / (b - a))
 
     def ticks(self, most: int) -> list[tuple[float, str]]:
-        """At most about so many round numbers and how they are written."""
+        """Return at most about `most` round numbers with their labels."""
         if math.isinf(self.linear_to):
             return self._powers(most)
         if self.linear_to:

@@ -71,7 +71,7 @@ class _Traced:
 
 
 def _bias_over_time(traced: Sequence[_Traced], constant_dph: float) -> Markup | None:
-    """Bias with a constant and with the map taken off, one panel a run, common scales; marks above rows left out."""
+    """Draw the bias less a constant and less the map, one panel a run, common scales; marks above rows left out."""
     if not traced:
         return None
     rates = np.concatenate([np.r_[one.means.before_dph - constant_dph, one.means.after_dph, 0.0] for one in traced])
@@ -120,13 +120,13 @@ def map_with_centers(model: Model) -> Markup | None:
 
 
 def _shown(limits: tuple[float, float]) -> tuple[float, float]:
-    """Limits of an axis: those of the envelope, widened a little where they are one value."""
+    """Return the limits of an axis: those of the envelope, widened a little if they are one value."""
     low, high = limits
     return limits if high > low else (low - 0.5, high + 0.5)
 
 
 def curve_by_size(training: Training) -> Markup | None:
-    """What each further center brings: error left over the number of centers, the chosen one marked."""
+    """Draw the gain of each further center: error left over the number of centers, the chosen one marked."""
     sizes = training.curves.get("sizes") or []
     if len(sizes) < 2:
         return None
@@ -169,7 +169,7 @@ def calibrations_over_time(history: Sequence[Calibration]) -> Markup | None:
 
 
 def _steps_of_time(history: Sequence[Calibration]) -> tuple[list[float], bool]:
-    """Days since the first where each has a date after the one before, else the number of each."""
+    """Return days since the first if each has a later date than the one before, else the number of each."""
     try:
         days = [float(date.fromisoformat(str(one.date)[:10]).toordinal()) for one in history]
     except ValueError:
@@ -180,7 +180,7 @@ def _steps_of_time(history: Sequence[Calibration]) -> tuple[list[float], bool]:
 
 
 def _moved(panel: Panel, at: Sequence[float], history: Sequence[Calibration]) -> None:
-    """Steps of the map's mean, summed; each with the U of how far the map moved, and filled where that is exceeded."""
+    """Draw the summed steps of the map's mean, each with the U of its movement, filled where that is exceeded."""
     steps = [one.moved_mean_dph or 0.0 for one in history]
     total = np.cumsum(steps) - steps[0]
     panel.horizontal(0.0)
@@ -225,7 +225,7 @@ _LEAST_ROW_BYTES = 12  # six cells and their commas
 
 
 def write_report(folder: Path) -> Path:
-    """Writes `folder/report.html` from what stands in the folder; returns its path.
+    """Write `folder/report.html` from what stands in the folder, and return its path.
 
     Raises:
         InputError: `model.json` or `evaluate.json` is missing or broken, or the unit is not known.
@@ -261,7 +261,7 @@ def axes_page(folder: Path, axes: Sequence[str]) -> str:
 
 
 def write_page(folder: Path, text: str) -> Path:
-    """Writes `folder/report.html`; returns its path.
+    """Write `folder/report.html` and return its path.
 
     Raises:
         InputError: There is one that gyrotc did not write, or that was changed since.
@@ -273,7 +273,7 @@ def write_page(folder: Path, text: str) -> Path:
 
 @functools.cache
 def page_environment() -> jinja2.Environment:
-    """Where pages come from, compiled once in a process.
+    """Return the templates of pages, compiled once in a process.
 
     Filters print figures and words (`words`); the test `moved_input` tells causes that change what the map sees.
     """
@@ -292,7 +292,7 @@ def page_environment() -> jinja2.Environment:
 
 @contextmanager
 def page_from(source: Path) -> Iterator[None]:
-    """Refuses results with which drawing stumbles: it computes nothing, so they are not as they were written.
+    """Refuse results that cannot be drawn: drawing computes nothing, so they are not as they were written.
 
     Raises:
         InputError: It stumbled.
@@ -319,7 +319,7 @@ def _pictures(folder: Path, unit: UnitResults) -> dict[str, Markup | None]:
 
 
 def thermal_picture(folder: Path, unit: UnitResults) -> Markup | None:
-    """Bias of one axis against temperature and what remains of it, from the traces; None where there are none."""
+    """Draw the bias of one axis and its residual against temperature, from the traces; None without traces."""
     means = [one.means for one in _traced(folder, unit)]
     return side_by_side(bias_against_temperature(unit.model, means), *residual_pictures(means))
 
@@ -329,7 +329,7 @@ def _trend(unit: UnitResults) -> Markup | None:
 
 
 def _traced(folder: Path, unit: UnitResults) -> Iterator[_Traced]:
-    """Runs of a result that have a trace."""
+    """Yield the runs of a result that have a trace."""
     for run in unit.evaluation.runs:
         means = trace_means(folder / "trace", run, unit.evaluation.average_s)
         if means is not None and means.time_s.size:

@@ -28,7 +28,7 @@ _SHOWN_ELSEWHERE = ("warnings", "environments", "description", "instrument")  # 
 
 
 def unit_in(folder: Path) -> UnitResults:
-    """What a result folder says of its unit.
+    """Read the results of a unit from its folder.
 
     Raises:
         InputError: `model.json` or `evaluate.json` is missing, or a result is broken.
@@ -70,12 +70,12 @@ class UnitResults:
 
     @property
     def decision(self) -> Verdict | None:
-        """Of the limits and of what was proven; None without limits where nothing failed."""
+        """Verdict from the limits and the proof; None without limits if nothing failed."""
         return decision_of(self.limits, self.verification, self.evaluation)
 
     @property
     def verdict(self) -> str:
-        """The same as text; empty where there is none."""
+        """Verdict as text; empty if there is none."""
         return self.decision or ""
 
     @property
@@ -97,7 +97,7 @@ class UnitResults:
 
     @property
     def counts(self) -> Counter[str]:
-        """How many limits have each verdict."""
+        """Number of limits with each verdict."""
         return Counter(one.verdict for one in self.held)
 
     def named(self, verdict: str) -> str:
@@ -106,12 +106,12 @@ class UnitResults:
 
     @property
     def next_step(self) -> str:
-        """What to do next with the unit."""
+        """Next step with the unit."""
         return next_step(self.evaluation, self.limits, bool(self.failures), diagnosed=self.diagnosis is not None)
 
     @property
     def achieved(self) -> str:
-        """What the table achieves, in a sentence; empty where nothing was measured."""
+        """Achievement of the table in a sentence; empty if nothing was measured."""
         judged = self.judged
         if judged is None or judged.after.rms_dph is None:
             return ""
@@ -121,7 +121,7 @@ class UnitResults:
 
     @property
     def doubt(self) -> str:
-        """Why the table is not all that the recordings show; empty where what remains is noise."""
+        """Reason why the table is not all that the recordings show; empty if the residual is noise."""
         found = self.evaluation.residual_words
         return (
             f"The table does not explain these recordings: what remains is more than noise ({found})" if found else ""
@@ -129,7 +129,7 @@ class UnitResults:
 
     @property
     def lacking(self) -> str:
-        """What the recordings lack for a PASS, the gravest; empty where they lack nothing."""
+        """The gravest lack of the recordings for a PASS; empty if they lack nothing."""
         lacking = [one for one in self.evaluation.requirements if not one.met]
         return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).text if lacking else ""
 
@@ -151,13 +151,13 @@ class UnitResults:
 
     @property
     def left_out(self) -> tuple[LeftOutRows, ...]:
-        """Stretches of rows that training left out for what they show."""
+        """Stretches of rows that training left out because of what they show."""
         rows = self.training.rows if self.training else None
         return rows.stretches if rows else ()
 
     @property
     def capped(self) -> tuple[str, ...]:
-        """Why it is no PASS although it may be within its bounds, and what to record."""
+        """Reasons why it is no PASS although it may be within its bounds, with what to record."""
         return self.limits.capped if self.limits else ()
 
     @property
