@@ -22,7 +22,7 @@ typedef struct {
 #if GTC_WITH_CHANNELS
     uint_least32_t clamped; /* whether any was taken as the edge of its range */
 #endif
-    float near;      /* largest change between samples */
+    float max_change; /* largest that follows: between readings of one period */
     float last;      /* last accepted reading */
     float candidate; /* last reading that does not follow it */
     float base;      /* first accepted reading of the block */
@@ -93,7 +93,7 @@ typedef struct {
 #if GTC_WITH_CHANNELS
     uint_least32_t clamped; /* whether any was taken as the edge of its range */
 #endif
-    uint_least32_t near;     /* largest change between samples, 2^-16 of the channel's unit as the others */
+    uint_least32_t max_change; /* largest that follows: between readings of one period; all in 2^-16 of the unit */
     int_least32_t last;      /* last accepted reading */
     int_least32_t candidate; /* last reading that does not follow it */
     int_least32_t base;      /* first accepted reading of the block */

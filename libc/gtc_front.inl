@@ -18,16 +18,16 @@
 /* A float counts up to here exactly, and sums of words keep to 64 bits. */
 #define MAX_SAMPLES_PER_BLOCK 0x100000UL
 
-/* A block of samples may be off by this part of it. */
+/* The samples of a block may be shorter or longer than the block by one of so many parts of it. */
 #define PERIOD_PARTS 1000U
 
 /* The longest time that is counted, microseconds. What was so long ago is forgotten. */
 #define MAX_US 0xFFFFFFFFUL
 
 /* What becomes of a reading. */
-#define IS_HELD 0
-#define IS_ACCEPTED 1
-#define IS_NEW_START 2
+#define READING_HELD 0
+#define READING_ACCEPTED 1
+#define READING_NEW_START 2
 
 /* ---- the correction ------------------------------------------------------------------------------ */
 
@@ -85,36 +85,39 @@ static void apply_terms(STATE *state, const TABLE *table, NUM temp, NUM slope, E
  * number, that is the fallback. */
 static void make_correction(STATE *state, const TABLE *table, NUM temp, NUM slope, int_least32_t remarks)
 {
-    NUM bias = NUM_ZERO;
-    WIDE total;
-    int status;
+    NUM of_map = NUM_ZERO;
 #if GTC_WITH_TERMS
     EFFECT effect;
+    WIDE bias;
+    int status;
 
     effect.remarks = remarks;
     apply_terms(state, table, temp, slope, &effect);
-    status = map_value(table, effect.temp, effect.slope, &bias);
+    status = map_value(table, effect.temp, effect.slope, &of_map);
 #if GTC_WITH_UNCERTAINTY
     uncertainty_input(state, table, effect.temp, effect.slope, slope, effect.remarks);
 #endif
-    total = bias;
+    bias = of_map;
     if (table->n_terms != 0U) {
-        total = add(total, saturate(effect.added, MEMBER(table->effect[0]), MEMBER(table->effect[1]), &effect.remarks));
+        bias = add(bias, saturate(effect.added, MEMBER(table->effect[0]), MEMBER(table->effect[1]), &effect.remarks));
     }
-    status = (status < 0) ? status : (status | (int)effect.remarks);
+    if (status < 0) {
+        put_in_force(state, table, MEMBER(table->fallback), GTC_HELD | GTC_FALLBACK);
+    } else {
+        put_in_force(state, table, bias, status | (int)effect.remarks);
+    }
 #else
-    status = map_value(table, temp, slope, &bias);
+    const int status = map_value(table, temp, slope, &of_map);
+
 #if GTC_WITH_UNCERTAINTY
     uncertainty_input(state, table, temp, slope, slope, remarks);
-#endif
-    total = bias;
-    status = (status < 0) ? status : (status | (int)remarks);
 #endif
     if (status < 0) {
         put_in_force(state, table, MEMBER(table->fallback), GTC_HELD | GTC_FALLBACK);
     } else {
-        put_in_force(state, table, total, status);
+        put_in_force(state, table, of_map, status | (int)remarks);
     }
+#endif
 }
 
 #if GTC_WITH_RETAINED
@@ -298,19 +301,20 @@ static int is_stuck(INPUT *in, const gtc_word_t *guard, NUM x, uint_least32_t pe
     return ((most != 0U) && (in->same_us >= most)) ? 1 : 0;
 }
 
-/* 1 if x follows the last accepted reading. `near` is kept to save a product in each sample. */
+/* 1 if x follows the last accepted reading. The change allowed in one period is kept in the state, which saves a product
+ * in each sample. */
 static int follows(const STATE *state, const INPUT *in, const gtc_word_t *guard, NUM x)
 {
-    int near = 0;
+    int is_close = 0;
 
     if (in->next_gap_us == state->period_us) {
-        near = is_near(x, in->last, in->near);
+        is_close = is_near(x, in->last, in->max_change);
     } else if (in->next_gap_us != 0U) {
-        near = is_near(x, in->last, largest_change(guard, in->next_gap_us));
+        is_close = is_near(x, in->last, largest_change(guard, in->next_gap_us));
     } else {
         /* there is none */
     }
-    return near;
+    return is_close;
 }
 
 /* 1 if x agrees with the candidate before it: as near as an accepted reading must be to the last one, and no later
@@ -319,12 +323,12 @@ static int agrees(const TABLE *table, const INPUT *in, const gtc_word_t *guard, 
 {
     const uint_least32_t us = in->candidate_us;
     const uint_least32_t blocks = us / table->block_us;
-    int near = 0;
+    int is_close = 0;
 
     if ((us < MAX_US) && (blocks <= guard[GUARD_MISSING].bits)) {
-        near = is_near(x, in->candidate, largest_change(guard, us));
+        is_close = is_near(x, in->candidate, largest_change(guard, us));
     }
-    return near;
+    return is_close;
 }
 
 /* Decides on a reading that does not follow the last accepted one. Such readings make a series while each agrees with
@@ -332,19 +336,19 @@ static int agrees(const TABLE *table, const INPUT *in, const gtc_word_t *guard, 
  * new start; how many polls were missed in between does not matter. Where GUARD_AGREE is 0, any reading is.
  *
  * The first reading of a series sets both of its times to 0, and from then on they grow alike; so series_us is larger
- * than candidate_us from the second reading on. Returns IS_HELD or IS_NEW_START. */
+ * than candidate_us from the second reading on. Returns READING_HELD or READING_NEW_START. */
 static int confirm_candidate(const TABLE *table, INPUT *in, const gtc_word_t *guard, NUM x)
 {
     const uint_least32_t least_us = guard[GUARD_AGREE].bits;
-    int verdict = IS_HELD;
+    int verdict = READING_HELD;
 
     if (least_us == 0U) {
-        verdict = IS_NEW_START;
+        verdict = READING_NEW_START;
     }
     if (!agrees(table, in, guard, x)) {
         in->series_us = 0U;
     } else if ((in->series_us > in->candidate_us) && (in->series_us >= least_us)) {
-        verdict = IS_NEW_START;
+        verdict = READING_NEW_START;
     } else {
         /* too few, or not for long enough */
     }
@@ -376,16 +380,16 @@ static void accept_reading(INPUT *in, NUM x, uint_least32_t period_us)
 /* One reading x within its range: held, accepted, or accepted as a new start, which is the mean until a block ends. */
 static int judge_reading(const STATE *state, const TABLE *table, INPUT *in, const gtc_word_t *guard, NUM x)
 {
-    int verdict = IS_ACCEPTED;
+    int verdict = READING_ACCEPTED;
 
     if (!follows(state, in, guard, x)) {
         verdict = confirm_candidate(table, in, guard, x);
     }
-    if (verdict == IS_HELD) {
+    if (verdict == READING_HELD) {
         add_gap(in, state->period_us);
-        return IS_HELD;
+        return READING_HELD;
     }
-    if (verdict == IS_NEW_START) {
+    if (verdict == READING_NEW_START) {
         in->valid = 0U;
         in->held_blocks = 0U;
         in->mean = x;
@@ -422,14 +426,14 @@ static int take_temperature(STATE *state, const TABLE *table, NUM x)
 #if GTC_WITH_RETAINED
     const int nothing_before = has_no_past(in);
 #endif
-    int verdict = IS_HELD;
+    int verdict = READING_HELD;
 
     if (is_missing(x) || is_stuck(in, guard, x, state->period_us)
         || (!((x >= ELEMENT(guard[GUARD_LOW])) && (x <= ELEMENT(guard[GUARD_HIGH]))))) {
         miss_reading(in, x, state->period_us);
     } else {
         verdict = judge_reading(state, table, in, guard, x);
-        if (verdict == IS_NEW_START) {
+        if (verdict == READING_NEW_START) {
 #if GTC_WITH_RETAINED
             if (nothing_before == 0) {
                 reset_terms(state); /* what a first start finds of a saved state goes on */
@@ -438,7 +442,7 @@ static int take_temperature(STATE *state, const TABLE *table, NUM x)
             restart(state, table, x);
         }
     }
-    return (verdict == IS_HELD) ? GTC_HELD : GTC_OK;
+    return (verdict == READING_HELD) ? GTC_HELD : GTC_OK;
 }
 
 #if GTC_WITH_CHANNELS
@@ -457,8 +461,8 @@ static void take_channel(STATE *state, const TABLE *table, uint_least32_t channe
     }
     x = saturate(reading, ELEMENT(guard[GUARD_LOW]), ELEMENT(guard[GUARD_HIGH]), &remarks);
     verdict = judge_reading(state, table, in, guard, x);
-    if ((verdict != IS_HELD) && (remarks != GTC_OK)) {
-        in->clamped |= (verdict == IS_NEW_START) ? (CLAMPED_NOW | CLAMPED_MEAN) : CLAMPED_NOW;
+    if ((verdict != READING_HELD) && (remarks != GTC_OK)) {
+        in->clamped |= (verdict == READING_NEW_START) ? (CLAMPED_NOW | CLAMPED_MEAN) : CLAMPED_NOW;
     }
 }
 #endif
@@ -704,9 +708,9 @@ static void start_state(STATE *state, const TABLE *table, uint_least32_t period_
     reset_terms(state);
 #endif
     for (i = 0U; i < GTC_MAX_CHANNELS; i++) {
-        state->input[i].near = LIMIT_ZERO;
+        state->input[i].max_change = CHANGE_ZERO;
         if (i < table->n_channels) {
-            state->input[i].near = largest_change(guard_of(table, i), period_us);
+            state->input[i].max_change = largest_change(guard_of(table, i), period_us);
         }
     }
 }
@@ -761,8 +765,8 @@ static int take_slot(STATE *state, const TABLE *table, const NUM *channels)
 }
 
 #if GTC_WITH_TIME
-/* Stamps that are so much earlier than the last one are of samples that come late, microseconds. */
-#define LATEST 0x10000000UL
+/* A sample may come after one that was taken up to so much later (268 s), microseconds. */
+#define LATEST_US 0x10000000UL
 
 /* 1 if every channel has been missing for so long that only time passes any more. */
 static int all_lost(const STATE *state, const TABLE *table)
@@ -858,7 +862,8 @@ int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, 
     }
     since_slot_us = state->phase_us + elapsed_us;
     slots = slots_in(state, since_slot_us);
-    if ((slots == 0U) || (since_slot_us > (MAX_US - LATEST))) {
+    /* Less than half a period after the last slot, or before it: the time is counted modulo 2^32. */
+    if ((slots == 0U) || (since_slot_us > (MAX_US - LATEST_US))) {
         state->phase_us = since_slot_us;
         return ignore_call(state, table);
     }

@@ -21,7 +21,7 @@
 #if GTC_WITH_SAVE
 #define NUM_MOST 0x1.fffffep+127F /* the largest number */
 #endif
-#define LIMIT_ZERO 0.0F
+#define CHANGE_ZERO 0.0F /* no change between readings is allowed */
 #if GTC_WITH_SAVE
 #define NUM_COLDEST (-200.0F) /* C: no envelope goes beyond */
 #endif
@@ -73,11 +73,15 @@ static inline float missing_number(void)
 
 /* ---- the map ---------------------------------------------------------------------------- */
 
-/* With H and G: ((f - H)^2 + G) c = 2^(-f/64) (1 + 6.7e-9), |f| <= 1/2. The table holds the bits of
- * c 2^(-i/64), and i in the bits from which i is subtracted again with the exponent. */
+/* 2^(-u/64) for u >= 0. With i the whole number nearest to u, and f = u - i, so that |f| <= 1/2:
+ *
+ *     2^(-u/64) = 2^(-i/64) 2^(-f/64),    2^(-f/64) = ((f - H)^2 + G) c (1 + 6.7e-9)
+ *
+ * The table has c 2^(-k/64) for k = i mod 64 as the bits of a float, with k 2^17 added. From these bits i 2^17 is
+ * subtracted: its lower six bits take k 2^17 away again, the others lower the exponent by i / 64. */
 #define F32_H 0x1.71549ep+6F
 #define F32_G 0x1.0a69ccp+13F
-/* Bits of c * 2^(-i/64), with i * 2^17 added; docs/numerics.md, section 2, says how it is made. */
+/* docs/numerics.md, section 2, says how it is made. */
 static const uint_least32_t exp2_table[64] = {
     0x3875FE11UL, 0x387557B6UL, 0x3874B8A9UL, 0x387420D7UL, 0x3873902CUL, 0x38730694UL,
     0x387283FAUL, 0x3872084DUL, 0x38719379UL, 0x3871256BUL, 0x3870BE10UL, 0x38705D57UL,
@@ -95,7 +99,7 @@ static const uint_least32_t exp2_table[64] = {
 /* 1.5 * 2^23: what is added to it is rounded to an integer, which then stands in the low bits. */
 #define F32_ROUND 12582912.0F
 #define F32_ROUND_BITS 0x4B400000U
-#define F32_CUT 2048U
+#define F32_CUT 2048U /* from this u on, 2^-32, a Gaussian is 0 */
 
 /* The inputs of a network, as they are and normalised. */
 typedef struct {
@@ -140,7 +144,7 @@ static inline int locate(const TABLE *table, float temp, float slope, POINT *in)
     return (int)remarks;
 }
 
-/* 2^(-u/64), u >= 0; 0 from 2048 on, and where u is not a number. */
+/* 2^(-u/64), u >= 0; 0 from F32_CUT on, and where u is not a number. */
 static inline float exp2_of_minus(float u)
 {
     gtc_word_t whole;
@@ -189,7 +193,7 @@ static inline float network_value(const TABLE *table, const gtc_word_t *network,
     float acc = network[NETWORK_CONSTANT].value;
     float term;
 
-    (void)table;
+    (void)table; /* only fixed point needs it */
     term = network[NETWORK_TEMP].value * in->z_temp;
     acc = acc + term;
     term = network[NETWORK_SLOPE].value * in->z_slope;

@@ -21,7 +21,7 @@
 #if GTC_WITH_SAVE
 #define NUM_MOST 2147483647 /* the largest word */
 #endif
-#define LIMIT_ZERO 0U
+#define CHANGE_ZERO 0U /* no change between readings is allowed */
 #if GTC_WITH_SAVE
 #define NUM_COLDEST (-200L * 65536L) /* 2^-16 C: no envelope goes beyond */
 #endif

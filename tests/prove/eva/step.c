@@ -43,10 +43,10 @@ static void any_input(uint_least32_t least_valid, uint_least32_t most_valid)
     in->base = ANY_PLAUSIBLE();
     in->mean = ANY_PLAUSIBLE();
 #if defined(F32)
-    in->near = any_number(0);
+    in->max_change = any_number(0);
     in->sum = Frama_C_float_interval(-291.0F * MAX_BLOCK, 291.0F * MAX_BLOCK);
 #else
-    in->near = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
+    in->max_change = Frama_C_unsigned_long_interval(0, 0xFFFFFFFFUL);
     in->sum = Frama_C_long_long_interval(-(290LL * 65536LL * (long long)MAX_BLOCK), 290LL * 65536LL * (long long)MAX_BLOCK);
 #endif
 }
