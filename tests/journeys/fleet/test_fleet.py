@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Command
+from conftest import Command, made_once
 from gyrotc.fleet import Fleet, Task, Unit, do_unit, load_manifest, outlying_units, run_fleet, write_summary
 from gyrotc.results import FleetEntry, Marker, result_faults, write_marker
 from gyrotc.tables import needs_of
@@ -75,13 +75,17 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     assert {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")} == before
 
 
-@pytest.fixture
-def fleet(tmp_path: Path) -> Path:
-    """A fleet of two gyros, one with a longer window of the slope."""
+def _fleet(folder: Path) -> None:
     for k in (1, 2):
-        gyro(tmp_path / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
-    run_fleet(load_manifest(tmp_path / "data"), tmp_path / "out", jobs=1)
-    return tmp_path / "out"
+        gyro(folder / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
+    run_fleet(load_manifest(folder / "data"), folder / "out", jobs=1)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The result of a fleet of two gyros, a copy for each test."""
+    whole = made_once(tmp_path_factory, "fleet", _fleet)
+    return Path(shutil.copytree(whole / "out", tmp_path / "out"))
 
 
 def test_a_gyro_takes_80_kilobytes_beside_one_runtime_for_all(fleet: Path) -> None:
