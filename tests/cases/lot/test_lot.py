@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gyrotc._core import posteriors
 from gyrotc.common import InputError
 from gyrotc.jobs import checksum_of, lot_from
 from gyrotc.results import Lot, LotCluster
@@ -266,23 +265,6 @@ def _negative(cluster: LotCluster) -> LotCluster:
     rows = [list(row) for row in cluster.covariance]
     rows[0][0] = -1e6
     return cluster.model_copy(update={"covariance": tuple(tuple(row) for row in rows)})
-
-
-@pytest.mark.parametrize("n", [1, 15, 16, 47, 121])
-def test_posterior_covariances_are_inverses_of_the_sums(n: int) -> None:
-    rng = np.random.default_rng(n)
-    prior = np.diag(rng.uniform(0.5, 2.0, n))
-    factor = rng.normal(size=(3, n, n + 2))
-    precision = factor @ factor.transpose(0, 2, 1)
-    covariance, log_determinant = posteriors(prior, precision)
-    np.testing.assert_allclose(covariance @ (prior + precision), np.broadcast_to(np.eye(n), precision.shape), atol=1e-9)
-    np.testing.assert_array_equal(covariance, covariance.transpose(0, 2, 1))
-    np.testing.assert_allclose(log_determinant, -np.linalg.slogdet(prior + precision)[1], rtol=1e-12)
-
-
-def test_a_sum_that_is_no_precision_is_refused() -> None:
-    with pytest.raises(ValueError, match="not positive definite"):
-        posteriors(-np.eye(2), np.zeros((1, 2, 2)))
 
 
 def test_the_search_for_a_process_finds_the_process() -> None:

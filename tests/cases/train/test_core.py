@@ -374,3 +374,20 @@ def test_a_network_that_only_grows_is_projected_as_if_from_scratch(ridge: float)
         assert network.cost == pytest.approx(again.cost, rel=1e-6)
     last = solver.project(sizes[-1].shapes)
     assert np.array_equal(sizes[-1].weights, last.weights), "what is emitted comes from the columns themselves"
+
+
+@pytest.mark.parametrize("n", [1, 15, 16, 47, 121])
+def test_posterior_covariances_are_inverses_of_the_sums(n: int) -> None:
+    rng = np.random.default_rng(n)
+    prior = np.diag(rng.uniform(0.5, 2.0, n))
+    factor = rng.normal(size=(3, n, n + 2))
+    precision = factor @ factor.transpose(0, 2, 1)
+    covariance, log_determinant = _core.posteriors(prior, precision)
+    np.testing.assert_allclose(covariance @ (prior + precision), np.broadcast_to(np.eye(n), precision.shape), atol=1e-9)
+    np.testing.assert_array_equal(covariance, covariance.transpose(0, 2, 1))
+    np.testing.assert_allclose(log_determinant, -np.linalg.slogdet(prior + precision)[1], rtol=1e-12)
+
+
+def test_a_sum_that_is_no_precision_is_refused() -> None:
+    with pytest.raises(ValueError, match="not positive definite"):
+        _core.posteriors(-np.eye(2), np.zeros((1, 2, 2)))
