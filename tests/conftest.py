@@ -135,6 +135,15 @@ def few_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(vectors, "N_RANDOM", 200)
 
 
+@pytest.fixture
+def in_this_process() -> Iterator[None]:
+    """Do the units of fleets in this process, where processes are not what a test is about."""
+    from jobs import units_in_this_process
+
+    with units_in_this_process():
+        yield
+
+
 @pytest.fixture(scope="session")
 def gyrotc() -> Command:
     return run_gyrotc

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
+from gyrotc.fleet import Task, do_unit
 from gyrotc.jobs import Built, build_into
 from gyrotc.mirror import answers
 from gyrotc.model import load_model
 from gyrotc.recordings import Dataset
-from gyrotc.results import result_folder
+from gyrotc.results import FleetEntry, result_folder
 from gyrotc.tables import emitted_tables, make_vectors
 from gyrotc.train import FitOptions
 from gyrotc.verify import Job
@@ -29,3 +33,14 @@ def built_for_fleet(out: Path, dataset: Dataset, options: FitOptions | None = No
     with result_folder(out, "build") as stage:
         stage.of(dataset.serial)
         return build_into(stage.folder, dataset, options or FitOptions(), **more)
+
+
+@contextmanager
+def units_in_this_process() -> Iterator[None]:
+    """Let fleets do their units in this process: starting another one takes longer than a small gyro."""
+
+    def one_by_one(_jobs: int, tasks: Sequence[Task]) -> Iterator[tuple[int, FleetEntry]]:
+        return ((number, do_unit(task)) for number, task in enumerate(tasks))
+
+    with mock.patch("gyrotc.fleet.run.on_processes", one_by_one):
+        yield

@@ -38,13 +38,7 @@ FILES = {
     "cause of a scenario": ("scenario", 'extends = "paper"\n[[cause]]\nid = {0}\n'),
     "profile of a scenario": ("scenario", 'extends = "paper"\n[[set]]\nrole = "train"\nprofiles = [{0}]\n'),
 }
-# A release is read with the gyros of its fleet, each in a process of its own: some texts are enough.
-CASES = [
-    (file, text)
-    for file in FILES
-    for text in TEXTS
-    if file != "release of a fleet" or text in ("path", "page", "terminal", "right to left")
-]
+CASES = [(file, text) for file in FILES for text in TEXTS]
 COMMANDS = {
     "fleet": ("fleet", "file.toml", "--out", "out"),
     "limits": ("build", "data", "--limits", "file.toml", "--out", "out"),
@@ -56,6 +50,7 @@ def files_in(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("file", "text"), CASES)
 def test_a_text_is_refused_in_one_line_or_obeyed_by_nothing(
     file: str, text: str, tmp_path: Path, gyrotc: Command

@@ -150,7 +150,7 @@ def _foreign(log: Path, folder: Path) -> Iterator[str]:
 
 def test_hostile_files_are_read_or_refused_within_limits(tmp_path: Path) -> None:
     print(f"seed {SEED}")
-    count = int(os.environ.get("GYROTC_HOSTILE_FILES", "40"))
+    count = int(os.environ.get("GYROTC_HOSTILE_FILES", "24"))
     command = [sys.executable, "hostile_files.py", str(tmp_path / "work"), str(count), str(SEED)]
     log = tmp_path / "calls.txt"
     assert shutil.which("strace"), "strace is not installed: tools/setup.sh test installs it"

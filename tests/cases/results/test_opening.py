@@ -14,6 +14,7 @@ import typer
 from conftest import ROOT, run_gyrotc
 from gyrotc.common import InputError
 from gyrotc.results import held, write_atomically
+from jobs import units_in_this_process
 from recordings import columns, toml, write_csv
 
 PACKAGE = ROOT / "gen" / "gyrotc"
@@ -49,7 +50,8 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     before = Path.cwd()
     os.chdir(folder)
     try:
-        assert status("fleet", "data", "--out", "fleet", "--jobs", "1") == 0
+        with units_in_this_process():
+            assert status("fleet", "data", "--out", "fleet") == 0
     finally:
         os.chdir(before)
     return folder

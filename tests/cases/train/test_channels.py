@@ -347,6 +347,7 @@ def _with_channels(recordings: Path) -> Path:
     return manifest
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_fleet_with_channels_makes_what_a_build_with_channels_makes(
     recordings: Path, fitted: Fitted, tmp_path: Path, gyrotc: Command
 ) -> None:

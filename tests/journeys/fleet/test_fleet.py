@@ -22,6 +22,7 @@ from gyrotc.results import FleetEntry, Marker, result_faults, write_marker
 from gyrotc.tables import needs_of
 from gyrotc.train import FitOptions
 from gyrotc.verify import verify
+from jobs import units_in_this_process
 from models import random_model
 from recordings import columns, toml, write_csv
 
@@ -78,7 +79,8 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
 def _fleet(folder: Path) -> None:
     for k in (1, 2):
         gyro(folder / "data" / f"RLG-{k}", f"RLG-{k}", seed=k)
-    run_fleet(load_manifest(folder / "data"), folder / "out", jobs=1)
+    with units_in_this_process():
+        run_fleet(load_manifest(folder / "data"), folder / "out")
 
 
 @pytest.fixture
@@ -160,6 +162,7 @@ def test_the_page_of_a_gyro_is_drawn_when_it_is_asked_for(fleet: Path, gyrotc: C
     assert "RLG-1" in (fleet / "RLG-1" / "report.html").read_text()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyrotc: Command) -> None:
     """What the reference says that the C code does is what the C code does."""
     fleet = Fleet((Unit(three / "RLG-1", None),), FitOptions(), ("f32",), None)
@@ -172,6 +175,7 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
         assert (tmp_path / "quick" / "RLG-1" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     gyro(tmp_path / "a" / "RLG-1", "RLG-1")
     rows = columns(360)
@@ -201,6 +205,7 @@ def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_folder_without_recordings_and_a_result_without_its_recordings_are_named(
     three: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
@@ -213,6 +218,7 @@ def test_a_folder_without_recordings_and_a_result_without_its_recordings_are_nam
     assert (tmp_path / "out" / "RLG-1" / "model.json").is_file()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_two_gyros_under_one_serial_have_both_failed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         gyro(tmp_path / "d" / name, "RLG-1")
@@ -243,6 +249,7 @@ def test_a_killed_fleet_goes_on_where_it_was(tmp_path: Path, gyrotc: Command) ->
     }  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_no_file_of_the_summary_outlives_what_it_says(
     tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -266,6 +273,7 @@ def test_no_file_of_the_summary_outlives_what_it_says(
     assert "unfinished" in (out / "fleet.html").read_text()
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_what_processes_of_a_stopped_fleet_left_goes_with_it_and_with_the_next(tmp_path: Path) -> None:
     """Also beside a result whose gyro is no longer in the manifest; locks of others stay."""
     for k in (1, 2):
@@ -333,6 +341,7 @@ def test_a_scheduler_without_dask_is_refused(tmp_path: Path, gyrotc: Command, mo
     assert done.returncode == 2 and "Dask is not installed" in done.stderr
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_copy_of_a_gyro_under_another_serial_is_named(tmp_path: Path, gyrotc: Command) -> None:
     """Before: such a fleet passed without a word."""
     for k in (1, 2):

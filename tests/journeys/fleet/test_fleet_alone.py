@@ -166,15 +166,15 @@ def test_recordings_are_never_the_place_for_results(place: str, tmp_path: Path) 
     assert {path.name for path in (tmp_path / "d" / "RLG-1").iterdir()} == {"run-01.csv", "dataset.toml"}
 
 
-def test_a_result_is_no_data_set(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+@pytest.mark.usefixtures("in_this_process")
+def test_a_result_is_no_data_set(task: Task) -> None:
     data = task.unit.dataset.parent
     run_fleet(load_manifest(data), data / "out")
     assert [unit.name for unit in load_manifest(data).units] == ["RLG-1"]
 
 
-def test_a_summary_of_somebody_else_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+@pytest.mark.usefixtures("in_this_process")
+def test_a_summary_of_somebody_else_stays(tmp_path: Path) -> None:
     gyro(tmp_path / "d" / "RLG-1", "RLG-1")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "fleet.csv").write_text("aircraft,pilot\n")
@@ -184,10 +184,8 @@ def test_a_summary_of_somebody_else_stays(tmp_path: Path, monkeypatch: pytest.Mo
     assert not (tmp_path / "out" / "RLG-1").exists(), "refused before any work"
 
 
-def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(
-    task: Task, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
+@pytest.mark.usefixtures("in_this_process")
+def test_what_a_killed_job_left_is_cleaned_also_beside_what_is_done(task: Task) -> None:
     out = task.out.parent
     run_fleet(task.fleet, out)
     before = {path.name for path in out.iterdir()}
@@ -319,12 +317,12 @@ def test_wrong_types_in_a_manifest_are_refused(line: str, tmp_path: Path) -> Non
         load_manifest(tmp_path / "fleet.toml")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_summary_never_speaks_of_what_is_being_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fleet that is stopped anywhere leaves a summary that says so."""
     for k in range(2):
         gyro(tmp_path / "d" / f"RLG-{k}", f"RLG-{k}", seed=k)
     fleet, out = load_manifest(tmp_path / "d"), tmp_path / "out"
-    monkeypatch.setattr(run, "on_processes", lambda _, tasks: ((k, do_unit(t)) for k, t in enumerate(tasks)))
     run_fleet(fleet, out)
     assert json.loads((out / "fleet.json").read_text())["done"] == 2
     gyro(tmp_path / "d" / "RLG-1", "RLG-1", seed=5)

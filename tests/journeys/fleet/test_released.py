@@ -22,6 +22,7 @@ def gyro(folder: Path) -> None:
     (folder / "fleet.toml").write_text(MANIFEST)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_barred_unit_stays_so_until_it_is_released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gyro(tmp_path)
     out = tmp_path / "out"

@@ -17,6 +17,7 @@ from gyrotc.recordings import load
 from gyrotc.results import json_text
 from gyrotc.train import FitOptions, joined, predict
 from gyrotc.train.prior import prior_of
+from jobs import units_in_this_process
 from recordings import state_fit
 
 RUNS = """
@@ -49,7 +50,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lot = ("--seed", "5", "--family", "0.95", "--format", "parquet")
     run_here("simulate", place / "whole.toml", *lot, "--units", "5", "--out", place / "whole")
     run_here("simulate", place / "short.toml", *lot, "--units", "6", "--out", place / "short")
-    run_here("fleet", place / "whole", "--out", place / "fleet", "--jobs", "1")
+    with units_in_this_process():
+        run_here("fleet", place / "whole", "--out", place / "fleet")
     reported = run_here("lot", place / "fleet", "--out", place / "lot.json")
     assert "5 units" in reported and "before any run" in reported
     return place
@@ -106,6 +108,7 @@ def test_header_and_report_show_the_lot(world: Path) -> None:
         run_here("build", unit, "--lot", world / "lot.json", "--extend", "--out", world / "no")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> None:
     data, out = world / "few", world / "few-out"
     data.mkdir()
