@@ -34,8 +34,8 @@ from pydantic import (
 
 from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
-from .common.errors import InputError
-from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, read_json
+from .common.errors import InputError, quoted
+from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, read_json, refused
 from .results.files import write_atomically
 from .results.json_text import digest_of, json_text
 
@@ -647,14 +647,12 @@ def load_model(path: Path) -> Model:
     raw = read_json(path, "a model.json", ceiling_name="text_mib")
     if not isinstance(raw, dict) or raw.get("schema") != MODEL_SCHEMA:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-        raise InputError(f"{path}, field schema", repr(found), repr(MODEL_SCHEMA))
+        raise InputError(f"{path}, field schema", quoted(found), repr(MODEL_SCHEMA))
     checksum = raw.pop(CHECKSUM, None)
     try:
         model = Model.from_dict(raw)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"]) or "(whole)"
-        raise InputError(f"{path}, field {field}", first["msg"]) from error
+        raise refused(error, lambda field: f"{path}, field {field or '(whole)'}", Model) from error
     if checksum != model.hash:
         raise InputError(
             f"{path}, field {CHECKSUM}",

@@ -195,7 +195,7 @@ REFUSED: dict[str, Refused] = {
     "serial too long": Refused(
         description(head=f'schema = 1\nserial = "{"R" * 65}"'), ("dataset.toml, field serial", "1 to 64")
     ),
-    "serial no text": Refused(description(head="schema = 1\nserial = 42"), ("field serial", "42", "string")),
+    "serial no text": Refused(description(head="schema = 1\nserial = 42"), ("field serial", "42", "a text")),
     "unknown key": Refused(description(head=HEAD + "\nserail = 1"), ("dataset.toml, field serail", "not known")),
     "unknown key of a run": Refused(
         description(RUN + '\nrol = "train"'), ("dataset.toml, run 1 (run-01.csv), field rol", "not known")

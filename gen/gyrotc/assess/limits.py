@@ -21,8 +21,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from .. import __version__
-from ..common.errors import InputError
-from ..common.inputs import checked, near_field, parse_toml, read_input
+from ..common.errors import InputError, quoted
+from ..common.inputs import checked, parse_toml, read_input, refused
 from ..common.statistics import coverage_factor
 from ..model import Celsius, CelsiusPerMin, Model, RuntimePart
 from ..results.base import Numeric
@@ -164,7 +164,7 @@ def instruments_in(meta: Mapping[str, Any], others: Sequence[Instrument] = ()) -
     for number, entry in enumerate(entries):
         where = f"dataset.toml, field meta.instrument.{number}"
         if not isinstance(entry, Mapping):
-            raise InputError(where, repr(entry)[:60], "a table: [[meta.instrument]]")
+            raise InputError(where, quoted(entry), "a table: [[meta.instrument]]")
         stated.append(checked(StatedInstrument, dict(entry), where))
     names = {one.name for one in stated}
     every = (*stated, *(one for one in others if one.name not in names))
@@ -279,7 +279,7 @@ class Recalibration(_Part):
 class Limits(_Part):
     """The content of a limits file."""
 
-    schema_: Annotated[int, Field(alias="schema", ge=1, le=1)]
+    schema_: Annotated[Literal[1], Field(alias="schema")]
     product: str = ""
     decision_rule: DecisionRule = "guard_band"
     at_most: AtMost = AtMost()
@@ -310,18 +310,11 @@ def load_limits(path: Path) -> Limits:
     try:
         limits = Limits.model_validate(content | own)
     except ValidationError as error:
-        detail = error.errors()[0]
-        where = f"{path}, field {'.'.join(str(part) for part in detail['loc'])}"
-        if detail["type"] == "extra_forbidden":
-            raise InputError(where, "is not known", near_field(Limits, detail["loc"], "docs/limits.md")) from error
-        if detail["type"] == "missing":
-            raise InputError(where, "is missing", "schema = 1") from error
-        expected = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-        raise InputError(where, repr(detail["input"])[:80], expected) from error
+        raise refused(error, lambda field: f"{path}, field {field}", Limits, "docs/limits.md") from error
     known = all_targets()
     for name in limits.needs.targets:
         if name not in known:
-            raise InputError(f"{path}, field needs.targets", repr(name), ", ".join(known))
+            raise InputError(f"{path}, field needs.targets", quoted(name), ", ".join(known))
     return limits
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from .application import app
 from .options import AxisOption, DatasetArg, JsonOption, OutOption, SeedOption
 from .output import tell, write_json
@@ -137,7 +137,7 @@ def _with_keys(content: dict[str, Any], stated: list[str]) -> dict[str, Any]:
         if not value or not isinstance(part, dict) or key not in part or isinstance(part[key], dict):
             known = (f"{name}.{inner}" for name in ("time", "csv") for inner in content[name])
             expected = f"KEY=VALUE with KEY one of table, where, hold, pulse_weight_arcsec, {', '.join(known)}"
-            raise InputError("--set", repr(one), expected)
+            raise InputError("--set", quoted(one), expected)
         part[key] = (*part[key], value) if isinstance(part[key], tuple | list) else value
     return content
 
@@ -158,7 +158,7 @@ def _columns(stated: list[str]) -> dict[str, Any]:
     for one in stated:
         role, _, name = one.partition("=")
         if role not in _ROLES or not name:
-            raise InputError("--column", repr(one), f"ROLE=NAME with ROLE one of {', '.join(_ROLES)}")
+            raise InputError("--column", quoted(one), f"ROLE=NAME with ROLE one of {', '.join(_ROLES)}")
         columns[role] = (*columns.get("time", ()), name) if role == "time" else name
     return columns
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 import typer
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from .application import app
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def schema(
     """
     known = kinds()
     if name is not None and name not in known:
-        raise InputError("schema", repr(name), ", ".join(known))
+        raise InputError("schema", quoted(name), ", ".join(known))
     if name is not None:
         typer.echo(tables(known[name]) if table else schema_text(known[name]), nl=False)
     elif table:

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
-from ..common.errors import CheckFailed, InputError
+from ..common.errors import CheckFailed, InputError, quoted
 from .application import app
 from .options import (
     AgeingOption,
@@ -129,7 +129,7 @@ def fit(
 def _map_place(path: Path | None) -> Path | None:
     """Check the file of `--map` before the work begins."""
     if path is not None and path.suffix not in (".csv", ".json"):
-        raise InputError("--map", repr(path.name), "a name that ends in .csv or .json")
+        raise InputError("--map", quoted(path.name), "a name that ends in .csv or .json")
     return written_place(path)
 
 

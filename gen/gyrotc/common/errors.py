@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command", "short_reason"]
+__all__ = ["CheckFailed", "GyrotcError", "InputError", "install_command", "quoted", "short_reason", "shortened"]
 
 
 class GyrotcError(Exception):
@@ -59,6 +59,20 @@ _MAX_REASON = 120
 def short_reason(error: BaseException | str) -> str:
     """Return what a library says of an error, on one line and not too long for a message."""
     return " ".join(str(error).split())[:_MAX_REASON]
+
+
+_MAX_QUOTED = 60
+"""Characters of a name or value that is refused, in a message of gyrotc: half a line of a terminal."""
+
+
+def quoted(value: object) -> str:
+    """Return a value as Python writes it, not too long for a message."""
+    return shortened(repr(value))
+
+
+def shortened(text: str) -> str:
+    """Return the beginning of a text that is too long for a message, else the text."""
+    return text if len(text) <= _MAX_QUOTED else text[: _MAX_QUOTED - 3] + "..."
 
 
 def install_command(extra: str) -> str:

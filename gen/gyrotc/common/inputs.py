@@ -18,14 +18,15 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, TypeVar, cast, get_args, get_origin
 
 from annotated_types import Interval
 
-from .errors import InputError
+from .errors import InputError, quoted, shortened
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter, ValidationError
+    from pydantic_core import ErrorDetails
 
 
 ENVIRONMENT = "GYROTC_MAX"
@@ -92,7 +93,7 @@ def _moved(text: str) -> dict[str, float]:
         except ValueError:
             moved[name] = math.nan
         if not 0.0 < moved[name] < math.inf:
-            raise InputError(where, repr(value), "a number above 0")
+            raise InputError(where, quoted(value), "a number above 0")
     return moved
 
 
@@ -204,7 +205,6 @@ else:
 T = TypeVar("T")
 
 _LONGEST_INTEGER = 64  # bits, signed; TOML v1.0.0, "Integer"
-_SHOWN = 60  # characters of what is refused: half a line of a terminal
 # A key of more parts than tables may be nested costs the parser the square of their number.
 _LONG_KEY = r"""(?<![\w-])(?:(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){%d}"""
 
@@ -287,21 +287,59 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def refused(error: ValidationError, place: Callable[[str], str], kind: Any = None) -> InputError:
+def refused(error: ValidationError, place: Callable[[str], str], kind: Any = None, page: str = "") -> InputError:
     """Return one message for what pydantic refuses.
 
     Args:
         error: What pydantic refuses.
         place: Function that says where a field stands; an empty name is the whole.
         kind: The type that was expected, which has the names of fields.
+        page: The page that has all names; empty: none has.
     """
     first = error.errors(include_url=False)[0]
-    where = place(".".join(str(part) for part in first["loc"]))
+    where = place(".".join(shortened(str(part)) for part in first["loc"]))
     if first["type"] == "missing":
-        return InputError(where, "is missing")
+        return InputError(where, "is missing", _only_value(kind, first["loc"]))
     if first["type"] == "extra_forbidden":
-        return InputError(where, "is not known", near_field(kind, first["loc"]))
-    return InputError(where, _short(first["input"]), re.sub("^(Input should be|Value error,) ", "", first["msg"]))
+        return InputError(where, "is not known", near_field(kind, first["loc"], page))
+    return InputError(where, *found_and_expected(first))
+
+
+# By pydantic's names of errors; what is in braces is the limit that the error carries.
+_EXPECTATIONS = {
+    "string_type": "a text",
+    "string_too_short": "a text of at least {min_length} characters",
+    "string_too_long": "a text of at most {max_length} characters",
+    "string_pattern_mismatch": "a text of the form {pattern}",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "none_required": "nothing here",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "too_short": "a list of at least {min_length}",
+    "too_long": "a list of at most {max_length}",
+    "dict_type": "a table of names and values",
+    "model_type": "a table of names and values",
+    "model_attributes_type": "a table of names and values",
+    "dataclass_type": "a table of names and values",
+}
+
+
+def found_and_expected(detail: ErrorDetails) -> tuple[str, str]:
+    """Return what stands in a place that pydantic refuses, and what should, for readers who write no Python."""
+    value, message = detail["input"], detail["msg"]
+    known = _EXPECTATIONS.get(detail["type"])
+    expected = known.format(**detail.get("ctx", {})) if known else message.removeprefix("Input should be ")
+    if not isinstance(value, dict | list | tuple):
+        return quoted(value), expected.removeprefix("Value error, ")
+    if known is None and expected == message:  # of several fields together
+        return message.removeprefix("Value error, "), ""
+    return "a table" if isinstance(value, dict) else "a list", expected
 
 
 def near_field(kind: Any, location: Sequence[str | int], page: str = "") -> str:
@@ -312,15 +350,29 @@ def near_field(kind: Any, location: Sequence[str | int], page: str = "") -> str:
         location: Where the field stands, from the whole of it on.
         page: The page that has all names; empty: none has.
     """
+    near = difflib.get_close_matches(str(location[-1]), _fields_beside(kind, location), 1)
+    return " or ".join((*near, *([f"a field named in {page}"] if page else [])))
+
+
+def _only_value(kind: Any, location: Sequence[str | int]) -> str:
+    """Return the line that states a field which has one legal value; empty where it has several."""
+    field = _fields_beside(kind, location).get(str(location[-1]))
+    values = get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
+    return f"{location[-1]} = {values[0]!r}" if len(values) == 1 else ""
+
+
+def _fields_beside(kind: Any, location: Sequence[str | int]) -> dict[str, Any]:
+    """Return the fields, by their names in files, of the pydantic model in which a place lies; none if not known."""
     here = kind
     for part in location[:-1]:
-        fields = getattr(here, "model_fields", {})
-        field = next((one for name, one in fields.items() if part in (name, one.alias)), None)
+        field = _fields_of(here).get(str(part))
         if field is not None:
             here = _model_in(field.annotation)
-    names = [one.alias or name for name, one in getattr(here, "model_fields", {}).items()]
-    near = difflib.get_close_matches(str(location[-1]), names, 1)
-    return " or ".join((*near, *([f"a field named in {page}"] if page else [])))
+    return _fields_of(here)
+
+
+def _fields_of(kind: Any) -> dict[str, Any]:
+    return {one.alias or name: one for name, one in getattr(kind, "model_fields", {}).items()}
 
 
 def _model_in(annotation: Any) -> Any:
@@ -378,11 +430,6 @@ def _look_at(value: Any, where: str) -> None:
             raise InputError(where, "half a surrogate pair in a text", "Unicode text")
     elif isinstance(value, int) and value.bit_length() >= _LONGEST_INTEGER:
         raise InputError(where, f"a whole number of {value.bit_length()} bits", "at most 64 with its sign")
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
 
 MOST_CENTERS = 512

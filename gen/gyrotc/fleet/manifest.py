@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from ..assess.limits import Limits, load_limits
-from ..common.errors import GyrotcError, InputError
+from ..common.errors import GyrotcError, InputError, quoted
 from ..common.inputs import read_toml, refuse_above, refused
 from ..jobs.lot import load_lot
 from ..recordings.fit_options import options_in
@@ -78,7 +78,15 @@ class _Part(BaseModel):
 
 
 _Place = Annotated[str, Field(max_length=4096, pattern=r"^[^\x00-\x1f]+$")]
-_Reason = Annotated[str, Field(max_length=1024, pattern=r"\S")]
+
+
+def _of_words(reason: str) -> str:
+    if not reason.strip():
+        raise ValueError("a reason in words")
+    return reason
+
+
+_Reason = Annotated[str, Field(max_length=1024), AfterValidator(_of_words)]
 _Axis = Literal["x", "y", "z", "all"] | None
 
 
@@ -143,15 +151,15 @@ def _units(folder: Path, axis: str | None) -> Iterator[Unit]:
 def _matching(path: Path, patterns: Sequence[str]) -> Iterator[Path]:
     for pattern in patterns:
         if Path(pattern).is_absolute() or ".." in Path(pattern).parts:
-            raise InputError(f"{path}, field datasets", repr(pattern), "a pattern below the manifest's folder")
+            raise InputError(f"{path}, field datasets", quoted(pattern), "a pattern below the manifest's folder")
         try:
             found = sorted(folder for folder in path.parent.glob(pattern) if _has_recordings(folder))
         except (IndexError, ValueError, OSError, RecursionError, NotImplementedError) as error:
             # ".", "a**", a name that no folder can have
             expected = "a pattern below the manifest's folder, e.g. 2026-*"
-            raise InputError(f"{path}, field datasets", repr(pattern)[:80], expected) from error
+            raise InputError(f"{path}, field datasets", quoted(pattern), expected) from error
         if not found:
-            raise InputError(f"{path}, field datasets", f"{pattern!r} matches no folder of recordings")
+            raise InputError(f"{path}, field datasets", f"{quoted(pattern)} matches no folder of recordings")
         yield from found
 
 

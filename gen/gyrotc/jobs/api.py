@@ -24,7 +24,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..common.errors import InputError, install_command
+from ..common.errors import InputError, install_command, quoted
 from ..common.progress import Progress, silent
 from ..common.texts import file_stem
 from ..model import Model
@@ -86,7 +86,7 @@ class Dataset(records.Dataset):
         """
         runs = {"run": frames} if hasattr(frames, "columns") else dict(frames)
         if exam is not None and (exam not in runs or len(runs) < 2):
-            raise InputError("exam", repr(exam), f"one of several runs: {', '.join(map(str, runs))}")
+            raise InputError("exam", quoted(exam), f"one of several runs: {', '.join(map(str, runs))}")
         if exam is not None:
             runs |= {exam: runs.pop(exam)}  # the last run is the exam
         stated_units = {"rate": rate_unit, "temperature": temperature_unit, "time": time_unit}

@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from ..assess.limits import last_day
 from ..assess.stated import check_stated
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.inputs import checked, read_toml
 from ..pages.certificate import certificate_page, dcc_text, print_to_pdf
 from ..pages.report import thermal_picture
@@ -110,7 +110,7 @@ def laboratory_facts(meta: Mapping[str, Any], path: Path | None, number: str | N
         where = str(path)
     if number is not None:
         if not number.strip():
-            raise InputError("--number", repr(number), "the number of the certificate")
+            raise InputError("--number", quoted(number), "the number of the certificate")
         known["number"] = number
     return checked(LaboratoryFacts, known, where)
 
@@ -239,7 +239,7 @@ def reason_of_release(folder: Path, units: Sequence[UnitResults], reason: str | 
         raise InputError("--accept-fail", f"the verdict is {verdict or 'not stated'}", "no such option")
     line = " ".join(reason.split())
     if not 0 < len(line) <= _LONGEST:
-        raise InputError("--accept-fail", repr(reason)[:40], f"a reason of at most {_LONGEST} characters")
+        raise InputError("--accept-fail", quoted(reason), f"a reason of at most {_LONGEST} characters")
     return line
 
 

@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from ..common.arrays import FloatArray, numpy_of
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.inputs import need_memory, open_input, refuse_above
 from .description import Fault
 from .sources import BLOCK_BYTES, Prefix, Source
@@ -260,7 +260,7 @@ class _Faults:
         if not cell:
             self.add(line, column, "empty", "an empty cell", "a number")
         else:
-            self.add(line, column, "text", repr(cell[:40]), f"a number with a decimal point; {_IMPORT}")
+            self.add(line, column, "text", quoted(cell), f"a number with a decimal point; {_IMPORT}")
         return float("nan")
 
     def faults(self) -> list[Fault]:

@@ -25,8 +25,8 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ..common.arrays import FloatArray
-from ..common.errors import InputError
-from ..common.inputs import PLAUSIBLE_C, near_field, read_toml, refuse_above
+from ..common.errors import InputError, quoted, shortened
+from ..common.inputs import PLAUSIBLE_C, found_and_expected, near_field, read_toml, refuse_above
 from ..common.texts import toml_key, toml_value
 from .records import Mark
 
@@ -162,7 +162,7 @@ def _fact(name: str, value: Any, check: Callable[[Any], Any]) -> Any:
     try:
         return check(value)
     except ValueError as error:
-        facts = {"name": name, "found": _shown(value), "expected": str(error)}
+        facts = {"name": name, "found": quoted(value), "expected": str(error)}
         raise PydanticCustomError("fact", "{expected}", facts) from None
 
 
@@ -345,13 +345,7 @@ def _wrong_field(detail: ErrorDetails, content: dict[str, Any]) -> InputError:
         return InputError(f"{where}.{facts['name']}", facts["found"], facts["expected"])
     if kind == "too_short":
         return InputError(where, "is empty", "at least one [[run]]")
-    expected = re.sub(r"^Input should be |^Value error, ", "", detail["msg"])
-    return InputError(where, _shown(detail["input"]), expected)
-
-
-def _shown(value: object) -> str:
-    text = repr(value) if not isinstance(value, dict | tuple) else type(value).__name__
-    return text if len(text) <= 80 else text[:77] + "..."
+    return InputError(where, *found_and_expected(detail))
 
 
 def _place(location: tuple[int | str, ...], content: dict[str, Any]) -> str:
@@ -361,9 +355,9 @@ def _place(location: tuple[int | str, ...], content: dict[str, Any]) -> str:
     if len(rest) > 1 and rest[0] == "run" and isinstance(rest[1], int):
         run = content["run"][rest[1]]
         name = run.get("file") if isinstance(run, dict) else None
-        parts.append(f"run {rest[1] + 1}" + (f" ({name})" if isinstance(name, str) else ""))
+        parts.append(f"run {rest[1] + 1}" + (f" ({shortened(name)})" if isinstance(name, str) else ""))
         rest = rest[2:]
-    names = [str(part) for part in rest if not isinstance(part, str) or re.fullmatch(r"[\w -]+", part)]
+    names = [shortened(str(part)) for part in rest if not isinstance(part, str) or re.fullmatch(r"[\w -]+", part)]
     if names:
         parts.append("field " + ".".join(names))
     return ", ".join(parts)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type
 
 from annotated_types import Interval
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted, shortened
 from ..common.inputs import MOST_CENTERS, AverageLength, BlockLength, refused
 
 if TYPE_CHECKING:
@@ -110,10 +110,10 @@ def _checked(name: str, value: Any, where: str, *, strict: bool = False) -> Any:
         taken = _kind_of(name).validate_python(value, strict=strict)
     except ValidationError as error:
         if limits := _range_of(name):
-            raise InputError(where, repr(value), f"{_kind_in_words(name)}, {limits}") from error
+            raise InputError(where, quoted(value), f"{_kind_in_words(name)}, {limits}") from error
         raise refused(error, lambda _: where) from error
     if name == "method" and taken not in (AUTO, *METHODS):
-        raise InputError(where, repr(value), "one of " + ", ".join((AUTO, *METHODS)))
+        raise InputError(where, quoted(value), "one of " + ", ".join((AUTO, *METHODS)))
     return taken
 
 
@@ -129,5 +129,5 @@ def options_in(content: Mapping[str, Any], where: str) -> dict[str, Any]:
     """
     known = [option.name for option in fields(BuildOptions)]
     if unknown := next((name for name in content if name not in known), None):
-        raise InputError(f"{where}{unknown}", "is not known", f"one of {', '.join(known)}")
+        raise InputError(f"{where}{shortened(unknown)}", "is not known", f"one of {', '.join(known)}")
     return {name: _checked(name, value, f"{where}{name}", strict=True) for name, value in content.items()}

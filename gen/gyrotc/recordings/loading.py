@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError, ValidationError
 
 from ..common.arrays import FloatArray
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.inputs import refuse_above, refused
 from ..results.files import sha256
 from .description import (
@@ -381,7 +381,7 @@ def load_reporting(
             runs_by_entry[index] = _run(folder, entry, recording, reader)
     runs = list(runs_by_entry.values())
     warnings += [
-        f"{r.file.name}: the last line is unfinished and is left out: {r.file.torn[:60]!r}"
+        f"{r.file.name}: the last line is unfinished and is left out: {quoted(r.file.torn)}"
         for r in recordings.values()
         if r.file.torn
     ]
@@ -439,7 +439,7 @@ def _description(folder: Path, problems: Problems) -> Description | None:
     except PydanticCustomError as error:
         where = f"{folder}, name of the folder as serial"
         expected = f"{error.message()}, or a {FILE} that gives the serial"
-        problems.add(InputError(where, repr(serial), expected))
+        problems.add(InputError(where, quoted(serial), expected))
         serial = UNKNOWN_SERIAL
     try:
         runs = tuple(RunEntry(file=name, power_on_s="unknown") for name in files)
@@ -520,7 +520,7 @@ def _angle(
             if name == axis:
                 return float(angle)
     form = "{x = ..., y = ..., z = ...}" if axis is not None else "..."
-    found = "is missing" if stated is None else repr(stated)
+    found = "is missing" if stated is None else quoted(stated)
     expected = f'{field} = {form}, as earth_rate = "compute"'
     problems.add(InputError(f"{where}, field {field}", found, expected))
     return None

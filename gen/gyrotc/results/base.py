@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.inputs import checked, parse_json, read_input
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def checked_result(content: Any, kind: type[R], where: str, text: bytes | None =
     if not isinstance(content, dict):
         raise InputError(where, "is not a JSON object", f"what gyrotc wrote ({schema})")
     if content.get("schema") != schema:
-        raise InputError(f"{where}, field schema", repr(content.get("schema"))[:60], repr(schema))
+        raise InputError(f"{where}, field schema", quoted(content.get("schema")), repr(schema))
     return checked(kind, content, where, text)
 
 

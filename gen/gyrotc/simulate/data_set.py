@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.progress import Progress, silent
 from ..recordings.description import dataset_toml
 from ..recordings.importers.rows import FileFormat
@@ -94,7 +94,7 @@ class RowForm:
     ) -> RowForm:
         """Return a form; it raises `InputError` for a length or format that is not valid."""
         if format not in ("csv", "parquet"):
-            raise InputError("--format", repr(format), "csv or parquet")
+            raise InputError("--format", quoted(format), "csv or parquet")
         return cls(RowLength.of(row_s, raw_hz), pulses, format)
 
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from ..causes import CATALOGUE
 from ..common.errors import InputError
-from ..common.inputs import read_toml, refuse_above
+from ..common.inputs import read_toml, refuse_above, refused
 from .profile import AboveZero, Step
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
@@ -316,10 +316,7 @@ def read(scenario: str | Path) -> tuple[str, Scenario]:
     try:
         checked = Scenario.model_validate(_content(where, ()))
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        reason = str(first["msg"]).removeprefix("Value error, ")
-        raise InputError(f"{where}, {field}" if field else str(where), reason) from error
+        raise refused(error, lambda field: f"{where}, field {field}" if field else str(where), Scenario) from error
     refuse_above("runs", sum(len(run_set.profiles) for run_set in checked.set), str(where), "runs")
     return where.stem, checked
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.inputs import read_input
 from ..results.base import read_optional
 from ..results.recordings import SimulatedTruth
@@ -81,7 +81,7 @@ class Truth:
         name = Path(runs[file].noise)
         if name.is_absolute() or ".." in name.parts:
             where = f"{self.folder / TRUTH_FILE}, run {file}, field noise"
-            raise InputError(where, repr(str(name)), "a file in the folder of the data set")
+            raise InputError(where, quoted(str(name)), "a file in the folder of the data set")
         return runs[file].noise_step_s, _array(self.folder / name)
 
     def mean_noise_dph(self, file: str, average_s: float) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import CheckFailed, InputError
+from ..common.errors import CheckFailed, InputError, quoted
 from ..common.progress import Progress, Stages, silent
 from ..common.texts import CText, c_code, c_environment, c_literal
 from ..mirror.history import answers
@@ -63,7 +63,7 @@ def quantise_all(model: Model, numerics: Sequence[str] | None, progress: Progres
     """
     unknown = sorted(set(numerics or ()) - set(NUMERICS))
     if unknown:
-        raise InputError("--numeric", repr(unknown[0]), " or ".join(NUMERICS))
+        raise InputError("--numeric", quoted(unknown[0]), " or ".join(NUMERICS))
     tables: dict[str, Table] = {}
     refused: dict[str, str] = {}
     chosen = NUMERICS if numerics is None else tuple(dict.fromkeys(numerics))

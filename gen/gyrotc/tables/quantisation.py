@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import CheckFailed, InputError
+from ..common.errors import CheckFailed, InputError, quoted
 from ..common.inputs import PLAUSIBLE_C, runtime_folders
 from ..mirror.f32 import FUSIBLE
 from ..mirror.front_end import missed_before, samples_per_block
@@ -275,7 +275,7 @@ def quantise(model: Model, numeric: str) -> Table:
         CheckFailed: The arithmetic cannot hold the model.
     """
     if numeric not in _MAKERS:
-        raise InputError("--numeric", repr(numeric), " or ".join(NUMERICS))
+        raise InputError("--numeric", quoted(numeric), " or ".join(NUMERICS))
     return _quantised(_Known(model.hash, model), numeric)
 
 

@@ -13,8 +13,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..common.errors import InputError
-from ..common.inputs import read_input
+from ..common.inputs import read_input, refused
 from ..model import Model
 from ..results.base import Axis, Numbered, Numeric
 from ..results.json_text import json_text
@@ -113,8 +112,5 @@ def read_options(c_folder: Path) -> Options:
     try:
         found = _Stored.model_validate_json(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        where = f"{path}, field {field}" if field else str(path)
-        raise InputError(where, f"is damaged ({first['msg']})", "the record that emit wrote") from error
+        raise refused(error, lambda field: f"{path}, field {field}" if field else str(path), _Stored) from error
     return Options(numeric=found.numeric, zero_at_c=found.zero_at_c, runtime=found.runtime)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 from ..common.progress import Progress, Stages, silent
 from ..model import Model, load_model
 from ..recordings.records import Dataset
@@ -152,7 +152,7 @@ def chosen_targets(names: Sequence[str]) -> list[Target]:
     known = all_targets()
     for name in names:
         if name != "all" and name not in known:
-            raise InputError("--target", repr(name), ", ".join([*known, "all"]))
+            raise InputError("--target", quoted(name), ", ".join([*known, "all"]))
     if not names:
         return [t for t in known.values() if t.default]
     return [t for t in known.values() if "all" in names or t.name in names]

@@ -30,8 +30,8 @@ from typing import IO, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..common.errors import CheckFailed, InputError
-from ..common.inputs import read_toml
+from ..common.errors import CheckFailed
+from ..common.inputs import read_toml, refused
 from ..results import cache
 from ..results.base import NUMERICS
 from ..results.files import write_own
@@ -205,7 +205,7 @@ def load_target(path: Path) -> Target:
     try:
         return Target.model_validate(read_toml(path, "a target file"))
     except ValidationError as error:
-        raise InputError(str(path), str(error), "a target file") from error
+        raise refused(error, lambda field: f"{path}, field {field}", Target) from error
 
 
 def all_targets() -> dict[str, Target]:

@@ -299,7 +299,7 @@ def test_the_runtime_believes_what_the_product_file_says(tmp_path: Path, trained
         ("[guards.temperature_c]\nrange = [-120.0, 150.0]\n", "guards.temperature_c.range", "-90 to 200"),
         ("[guards.temperature_c]\nrange = [0.0, 0.1]\n", "guards.temperature_c.range", "of the recordings"),
         ("[guards.temperature_c]\nstep = 0.0\n", "guards.temperature_c.step", "greater than 0"),
-        ("[guards.temperature_c]\nstep = \"1 C\"\n", "guards.temperature_c.step", "valid number"),
+        ("[guards.temperature_c]\nstep = \"1 C\"\n", "guards.temperature_c.step", "a number"),
         ("[guards.temperature_c]\nstuck_samples = 100\n", "guards.temperature_c.stuck_samples", "docs/limits.md"),
         ("[guards.temperature_c]\nfallback = 1.0\n", "guards.temperature_c.fallback", "from training"),
         ("[guards.supply_v]\nstuck_s = -1.0\n", "guards.supply_v.stuck_s", "greater than or equal to 0"),

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 from conftest import Command
-from gyrotc.common import toml_value
+from gyrotc.assess import load_limits
+from gyrotc.common import InputError, toml_value
+from gyrotc.recordings import load
 
 TEXTS = {
     "path": "../../../outside",
@@ -73,3 +75,48 @@ def test_a_text_is_refused_in_one_line_or_obeyed_by_nothing(
     assert done.returncode == 1 or not any(name.endswith(".json") for name in written)
     for page in here.glob("out/*.html"):
         assert "<script>alert" not in page.read_text("utf-8")
+
+
+LONG = "x" * 5000
+LONG_TEXTS = {
+    "a name in dataset.toml": DATA + f"{LONG} = 1\n",
+    "a serial": DATA.replace('"G1"', f'"{LONG}"'),
+    "the role of a run": DATA + f'role = "{LONG}"\n',
+    "a channel of a run": DATA + f'"{LONG}" = "y"\n',
+    "a training method": DATA + f'[fit]\nmethod = "{LONG}"\n',
+    "a training option": DATA + f"[fit]\n{LONG} = 1\n",
+    "a unit": DATA + f'[units]\nrate = "{LONG}"\n',
+    "a latitude": DATA + f'latitude_deg = "{LONG}"\n',
+    "a day of calibration": DATA + f'[meta]\ncalibrated_on = "{LONG}"\n',
+}
+
+
+@pytest.mark.parametrize("what", LONG_TEXTS)
+def test_a_refusal_shows_only_the_beginning_of_a_long_text(what: str, tmp_path: Path) -> None:
+    """A message has at most a few lines of a terminal, and names the field."""
+    (tmp_path / "dataset.toml").write_text(LONG_TEXTS[what], "utf-8")
+    (tmp_path / "a.csv").write_text("time_s,temperature_c,rate_dph\n0,20,1\n10,20,1\n")
+    with pytest.raises(InputError) as refused:
+        load(tmp_path)
+    assert len(str(refused.value).replace(str(tmp_path), "")) < 600
+    assert all(len(line) < 400 for line in str(refused.value).splitlines())
+
+
+WRONG_LIMITS = {
+    'schema = "1"\n': "field schema: '1'; expected 1",
+    "at_most = 3\n": "field schema: is missing; expected schema = 1",
+    "schema = 1\nat_most = 3\n": "field at_most: 3; expected a table of names and values",
+    'schema = 1\n[at_most]\nrms_dph = "x"\n': "field at_most.rms_dph: 'x'; expected a number",
+    "schema = 1\n[at_most]\nrms_dph = [1.0]\n": "field at_most.rms_dph: a list; expected a number",
+    'schema = 1\n[needs]\ntargets = "avr"\n': "field needs.targets: 'avr'; expected a list",
+    "schema = 1\nproduct = 3\n": "field product: 3; expected a text",
+}
+
+
+@pytest.mark.parametrize("text", WRONG_LIMITS)
+def test_a_wrong_field_of_limits_is_refused_in_words_of_the_file(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "limits.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(InputError) as refused:
+        load_limits(path)
+    assert str(refused.value) == f"{path}, {WRONG_LIMITS[text]}"

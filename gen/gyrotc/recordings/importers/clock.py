@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ...common.arrays import FloatArray
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, conversion, words_of_name
 from .map_file import TimeMap
@@ -235,7 +235,7 @@ class Clock:
             row = int(np.argmax(held & ~good))
             where = f"{self._file}, {self._table.place(chunk.row(row))}, column {self._columns[0].name}"
             hint = f"a stamp of the form {self.form}; --set time.format=... names another"
-            raise InputError(where, repr(texts[row].as_py()), hint)
+            raise InputError(where, quoted(texts[row].as_py()), hint)
         return ns, good
 
     def _since(self, ns: NDArray[np.int64], good: NDArray[np.bool_]) -> FloatArray:
@@ -312,11 +312,11 @@ def _form(file: str, columns: Sequence[Column]) -> str:
     where = f"{file}, column {' and '.join(c.name for c in columns)}"
     if not forms:
         expected = '--set time.format="%Y-%m-%d %H:%M:%S.%f" or another form'
-        raise InputError(where, f"{texts[0] if texts else ''!r} is in no known form of a date and time", expected)
+        raise InputError(where, f"{quoted(texts[0] if texts else '')} is in no known form of a date and time", expected)
     if forms == ["%H:%M"]:
-        found = f"{texts[0]!r}: hours and minutes, or minutes and seconds"
+        found = f"{quoted(texts[0])}: hours and minutes, or minutes and seconds"
         raise InputError(where, found, '--set time.format="%H:%M" or --set time.format="%M:%S"')
     if len(forms) > 1:
         choices = " or ".join(f'--set time.format="{form}"' for form in forms[:3])
-        raise InputError(where, f"{texts[0]!r}: day and month cannot be distinguished", choices)
+        raise InputError(where, f"{quoted(texts[0])}: day and month cannot be distinguished", choices)
     return forms[0]

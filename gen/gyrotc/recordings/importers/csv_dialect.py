@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ..units import quantity_of
 from .cells import DELIMITERS, MISSING_WORDS, is_number, kind_of_cells, split_line, thousands_of
 from .layout import check_between, first_row, rows_among
@@ -304,7 +304,7 @@ def _text(name: str, head: bytes, encoding: str) -> str:
     try:
         text = codecs.getincrementaldecoder(encoding)("strict").decode(head)
     except LookupError as error:
-        raise InputError("[csv] encoding", repr(encoding), "an encoding such as utf-8, utf-16, cp1252") from error
+        raise InputError("[csv] encoding", quoted(encoding), "an encoding such as utf-8, utf-16, cp1252") from error
     except UnicodeDecodeError as error:
         line = head[: error.start].count(b"\n") + 1
         found = f"bytes that are no {encoding}"
@@ -338,7 +338,7 @@ def _separators(name: str, lines: Sequence[str], given: CsvMap) -> tuple[str, st
             if any(kind == "number" for kind in kinds) and (score, counted) > best[:2]:
                 best = (score, counted, (delimiter, decimal))
     if not best[2][0]:
-        raise InputError(name, f"no columns of numbers: {sample[-1][:60]!r}", _instead(name, sample[-1]))
+        raise InputError(name, f"no columns of numbers: {quoted(sample[-1])}", _instead(name, sample[-1]))
     return best[2]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ..csv_file import blocks_of_lines, nuls_at_end, number_in, parsed
 from ..tables import Chunk, Column, LoggerFile, LoggerTable
 from .cells import (
@@ -261,7 +261,7 @@ class CsvTable(LoggerTable):
         if len(row) > 1 and not any(c in one.missing or is_number(c, one.decimal, one.thousands) for c in row):
             raise other_names(self.path.name, line, row)
         hint = f'--set csv.missing="{cell[:20]}" takes it as no reading'
-        raise InputError(f"{self.path.name}, line {line}, column {name}", repr(cell[:40]), f"a number; {hint}")
+        raise InputError(f"{self.path.name}, line {line}, column {name}", quoted(cell), f"a number; {hint}")
 
 
 def _commands(file: str, *commands: str) -> str:

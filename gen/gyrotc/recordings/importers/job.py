@@ -22,7 +22,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ... import __version__
-from ...common.errors import InputError, short_reason
+from ...common.errors import InputError, quoted, short_reason
 from ...common.inputs import open_input, refuse_above
 from ...common.progress import Progress, silent
 from ...results.base import ADVICE, Finding
@@ -77,7 +77,7 @@ def serial_of(stated: str | None, chosen: Map, file: LoggerFile, device: str, ou
     """
     in_file = next((v for k, v in file.facts.items() if re.fullmatch(r"serial( ?(no|nr|number))?\.?", k)), None)
     if device and chosen.serial not in (None, device) and not stated:
-        found = f"the rows are of {device!r}, and the map is of {chosen.serial!r}"
+        found = f"the rows are of {quoted(device)}, and the map is of {chosen.serial!r}"
         raise InputError(file.path.name, found, f"--serial {chosen.serial}, or --serial with that of the gyro")
     in_file = device or in_file
     known = stated or chosen.serial or (re.sub(r"[^A-Za-z0-9._-]+", "-", in_file) if in_file else None)
@@ -86,7 +86,7 @@ def serial_of(stated: str | None, chosen: Map, file: LoggerFile, device: str, ou
         return check_serial(serial)
     except PydanticCustomError as error:
         where = "--serial" if stated else f"the serial {'in the file' if known else 'from the name of the folder'}"
-        raise InputError(where, repr(serial), f"{error.message()}; --serial names one") from error
+        raise InputError(where, quoted(serial), f"{error.message()}; --serial names one") from error
 
 
 def run_name(path: Path, taken: set[str]) -> str:

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from ...common.errors import InputError
-from ...common.inputs import near_field, read_toml
+from ...common.inputs import read_toml, refused
 from ..description import GyroFacts, dataset_toml
 from ..tables import Column, LoggerTable
 from .selection import Where
@@ -121,12 +120,7 @@ def checked_map(content: Any, name: str) -> Map:
     try:
         return Map.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = f"{name}, field {'.'.join(str(part) for part in first['loc'])}"
-        if first["type"] == "extra_forbidden":
-            raise InputError(where, "is not known", near_field(Map, first["loc"], "docs/import.md")) from error
-        expected = first["msg"].removeprefix("Input should be ")
-        raise InputError(where, repr(first["input"])[:80], expected) from error
+        raise refused(error, lambda field: f"{name}, field {field}", Map, "docs/import.md") from error
 
 
 def map_text(chosen: Map) -> str:

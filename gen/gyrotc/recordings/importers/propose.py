@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ..tables import Column, LoggerFile, LoggerTable
 from ..units import NATIVE_UNITS, Meaning, UnitError, channel_unit, conversion, meaning, split_unit, words_of_name
 from .clock import clock_columns, fraction_of
@@ -231,7 +231,7 @@ def _tables(file: LoggerFile, chosen: Map) -> list[LoggerTable]:
     found = [table for table in own if table.name == chosen.table]
     if not found:
         names = ", ".join(table.name for table in own)
-        raise InputError(file.path.name, f"no table {chosen.table!r}", f"--set table=NAME with one of: {names}")
+        raise InputError(file.path.name, f"no table {quoted(chosen.table)}", f"--set table=NAME with one of: {names}")
     return found
 
 
@@ -247,7 +247,7 @@ def _find(file: LoggerFile, name: str, near: LoggerTable | None = None) -> tuple
             if name in (column.name, f"{table.name}/{column.name}", split_unit(column.name)[0]):
                 return table, column
     every = [f"{t.name}/{c.name}" if t.name else c.name for t in file.tables for c in t.columns]
-    raise InputError(file.path.name, f"no column {name!r}", f"one of: {', '.join(every[:40])}")
+    raise InputError(file.path.name, f"no column {quoted(name)}", f"one of: {', '.join(every[:40])}")
 
 
 def _values(file: LoggerFile, tables: Sequence[LoggerTable], chosen: Map) -> list[tuple[str, LoggerTable, Column, str]]:

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ..csv_file import number_in
 from ..devices import MAX_DEVICES, names_device
 from ..tables import Chunk, Column, LoggerTable
@@ -37,7 +37,7 @@ class Where:
         """
         column, equal, value = (part.strip().strip("\"'") for part in text.partition("=="))
         if not (column and equal and value):
-            raise InputError("where", repr(text), "COLUMN == VALUE, such as 'id == 3'")
+            raise InputError("where", quoted(text), "COLUMN == VALUE, such as 'id == 3'")
         return Where(column, _canonical(value))
 
     def __str__(self) -> str:

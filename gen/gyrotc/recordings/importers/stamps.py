@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ...common.arrays import IntArray
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 
 _CODES = {
     "Y": r"(?P<Y>\d{4})",
@@ -149,7 +149,7 @@ def zone_of(text: str) -> ZoneInfo | int:
     try:
         return ZoneInfo(text.strip())
     except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-        raise InputError("[time] zone", repr(text), "a name such as Europe/Berlin or UTC, or +01:00") from error
+        raise InputError("[time] zone", quoted(text), "a name such as Europe/Berlin or UTC, or +01:00") from error
 
 
 class Stamps:
