@@ -122,7 +122,8 @@ def extend(
     say("measuring the gain")
     single_cycle, average_s = refitting.single_cycle, refitting.average_s
     correctable = [is_corrected(cause) for cause in causes]
-    effects = completed(refitting.train, [Effect.of(c) for c in itertools.compress(causes, correctable)])
+    named = [Effect.of(c) for c in itertools.compress(causes, correctable)]
+    effects = completed(refitting.train, named, refitting.arguments["power_on"])
     stages = [effects[:k] for k in range(len(effects) + 1)]
     chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, causes)
     if single_cycle and effects:  # found together: one alone is another model

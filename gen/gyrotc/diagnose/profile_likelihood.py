@@ -308,7 +308,9 @@ def _take(base: _Base, at: slice, shares: FloatArray) -> _Base | None:
 
 _PAIR = 10.0  # what a pair must gain over the best single cause
 _MEMBER = 15.0  # what each of a pair must gain beside the other
-_SMALLEST = 0.03  # ... and of the pair's gain: what is less may be the imperfection of the other
+# Share of the pair's gain that each must gain beside the other: what is less may be the imperfection of its form. What
+# differs between runs alone has no form within them, so it leaves no such rest.
+_SMALLEST = 0.03
 _LEADING = 0.35  # share of a pair's gain that its best single cause must have
 SEPARATION = 0.7
 """Difference of the logarithms of the parameters of two states of one kind: a factor of two. Nearer ones are one
@@ -335,8 +337,10 @@ def clear_pair(singles: list[Point], best: Point, size: int) -> Point | None:
     alone = {id: max(p.gain for p in singles if p.members[0].id == id) for id in {m.id for m in best.members}}
     if best.criterion(size) < best_of(singles, size).criterion(size) + _PAIR:
         return None
-    least = max(_MEMBER, _SMALLEST * best.gain)
-    if any(best.gain - gain < least for gain in alone.values()):
-        return None
+    families = {id: CATALOGUE[id].family for id in alone}
+    for other, gain in alone.items():
+        formless = families[other] == "between_runs" and set(families.values()) != {"between_runs"}
+        if best.gain - gain < (_MEMBER if formless else max(_MEMBER, _SMALLEST * best.gain)):
+            return None
     leading = max(p.gain for p in singles)
     return best if leading >= _LEADING * best.gain else None

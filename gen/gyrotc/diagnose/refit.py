@@ -20,6 +20,7 @@ from ..causes import CATALOGUE
 from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, CauseValues, History, Scene
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, Averages, average_rows
+from ..common.statistics import orthonormal
 from ..mirror.front_end import blocks_since_power_on
 from ..mirror.recursions import Course, CourseChannel, TermOutcome
 from ..quality.judgement import Judged
@@ -30,7 +31,7 @@ from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_bas
 from ..train.fitting import FrontEnd, samples_of
 from ..train.methods import fit
 from ..train.plausibility import longest_same_s
-from ..train.process import fit_process
+from ..train.process import TrainingHistory, smooth
 from ..train.result import Fit, predict
 from ..train.simple import without_rate
 from .bridged import BridgedCourse
@@ -80,7 +81,6 @@ def _energy(bins: DetrendedBins, columns: list[FloatArray]) -> float:
     return float(((q.T @ bins.residual) ** 2).sum())
 
 
-_LEVELLINGS = 3  # map and offsets in turn: what one takes of the other shrinks by its share each time
 _RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 
@@ -309,11 +309,17 @@ def _chosen(
 
 
 def completed(
-    runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None = None
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    power_on: NDArray[np.int64],
+    kept: Sequence[NDArray[np.bool_]] | None = None,
 ) -> list[Effect]:
     """The effects, with the strength over T of loops and the overtones of a ripple that the samples show.
 
-    Each is found beside the other effects, on the samples `kept` (default: all).
+    Each is found beside the other effects and the intercepts of power-ons, on the samples `kept` (default: all).
+
+    Args:
+        power_on: Number of the power-on of each run.
 
     Raises:
         TrainingFailed: The model of map and noise cannot be solved.
@@ -321,11 +327,11 @@ def completed(
     out = list(effects)
     for k, effect in enumerate(out):
         if effect.term.over_temperature is not None and len(runs) > 1:
-            out[k] = _over_temperature(runs, effect, [e for e in out if e is not effect], kept)
+            out[k] = _over_temperature(_Loops(runs, [e for e in out if e is not effect], power_on, kept), effect)
     for k, effect in enumerate(out):
         if effect.term.overtone is None:
             continue
-        data = cleaned_samples(_chosen(runs, [e for e in out if e is not effect], kept))
+        data = cleaned_samples(samples_beside(runs, [e for e in out if e is not effect], power_on, kept))
         found = overtones_of(data, effect.term, effect.values)
         room = max(MOST_TERMS - len([e for e in terms_of(out) if e.term.table is not None]), 0)
         out[k] = replace(effect, overtones=tuple(Effect(effect.id, v) for v in found[:room]))
@@ -336,7 +342,7 @@ _ABOUT = np.geomspace(0.6, 1.0 / 0.6, 15)  # widths about that of a loop of one 
 
 
 class _Loops:
-    """Loops beside other effects and any smooth map, as means of samples over 100 s.
+    """Loops beside other effects, any smooth map and any intercepts of power-ons, as means of samples over 100 s.
 
     Attributes:
         y: What the map leaves of the bias, shape (n,).
@@ -344,7 +350,11 @@ class _Loops:
     """
 
     def __init__(
-        self, runs: Sequence[Played], others: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
+        self,
+        runs: Sequence[Played],
+        others: Sequence[Effect],
+        power_on: NDArray[np.int64],
+        kept: Sequence[NDArray[np.bool_]] | None,
     ) -> None:
         data = _chosen(runs, others, kept)
         self._played = [(run, run.in_force[m]) for run, m in zip(runs, _masks(runs, others, kept), strict=True)]
@@ -358,7 +368,10 @@ class _Loops:
         span = (float(t.min()), float(t.max()))
         self.middle_c = 0.5 * sum(span)
         fastest = max(float(np.abs(rate).max()), MIN_HALF_RANGE_C_PER_MIN)
-        self._smooth = smooth_basis(t, rate / fastest, span, self._root)
+        of_map = smooth_basis(t, rate / fastest, span, self._root)
+        of_power_on = power_on[data.run][:, None] == np.unique(power_on[data.run])
+        intercepts = [self._means(own.astype(np.float64)) * self._root for own in of_power_on.T]
+        self._smooth = orthonormal(of_map, *(own[:, None] for own in intercepts))
         self.y = self._rest(data.bias_dph - data.bias_dph.mean())  # see `smooth_basis`
 
     def columns(self, loop: Effect) -> FloatArray:
@@ -375,16 +388,13 @@ class _Loops:
         return np.asarray(column - self._smooth @ (self._smooth.T @ column))
 
 
-def _over_temperature(
-    runs: Sequence[Played], effect: Effect, others: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
-) -> Effect:
+def _over_temperature(loops: _Loops, effect: Effect) -> Effect:
     """The effect with a strength that goes with temperature, where BIC asks for that; else as it is.
 
     The parameter that it is searched over is found anew with it.
     """
     over, over_temperature = searched(effect.id).over, effect.term.over_temperature
     assert over is not None and over_temperature is not None
-    loops = _Loops(runs, others, kept)
     able = [{**effect.values, over: float(value)} for value in effect.values[over] * _ABOUT]
     columns = [loops.columns(Effect(effect.id, dict(over_temperature(own, 1.0, 0.0, 0.0)))) for own in able]
     constant = min(_left(column[:, :1], loops.y) for column in columns)
@@ -435,12 +445,12 @@ def samples_beside(
     power_on: NDArray[np.int64],
     kept: Sequence[NDArray[np.bool_]] | None = None,
 ) -> TrainingData:
-    """Return the samples that a map beside the effects is fitted to: those `kept`, without intercepts of power-ons.
+    """Return samples beside the effects, those `kept`, without the intercepts of power-ons.
 
     Args:
         power_on: Number of the power-on of each run.
     """
-    return without_intercepts(_chosen(runs, effects, kept), power_on)
+    return _without_intercepts(_chosen(runs, effects, kept), power_on)
 
 
 def fit_extended(
@@ -449,42 +459,28 @@ def fit_extended(
     arguments: dict[str, Any],
     kept: Sequence[NDArray[np.bool_]] | None = None,
     *,
-    beside: bool = True,
     rate: bool = True,
 ) -> Fit:
-    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone.
-
-    Where it is not one `beside` effects it is what would be emitted without any.
-    """
-    data = samples_beside(runs, effects, arguments["power_on"], kept) if beside else _chosen(runs, effects, kept)
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
+    data = _chosen(runs, effects, kept)
     return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
 
 
-def without_intercepts(data: TrainingData, power_on: NDArray[np.int64]) -> TrainingData:
-    """Return the samples less the intercept of every power-on, as far as a map beside them tells it from noise.
-
-    The intercepts are draws of one normal distribution, whose variance is what the means of the residuals scatter by
-    beyond their noise: where power-ons do not differ nothing is taken off.
+def _without_intercepts(data: TrainingData, power_on: NDArray[np.int64]) -> TrainingData:
+    """Return the samples less the intercept of every power-on, as training estimates it jointly with a smooth map.
 
     Args:
         power_on: Number of the power-on of each run.
     """
-    _, index = np.unique(power_on[data.run], return_inverse=True)
-    count = np.bincount(index)
-    if count.size < 2:
+    if np.unique(power_on[data.run]).size < 2:
         return data
-    out = data
-    for _ in range(_LEVELLINGS):
-        samples = cleaned_samples(out)
-        process = fit_process(samples, scaling_of(samples))
-        at = scaling_of(samples).normalise(data.temperature_c, data.slope_c_per_min)
-        left = data.bias_dph - process.mean_dph(*at)
-        mean = np.bincount(index, left) / count
-        noise = np.bincount(index, (left - mean[index]) ** 2) / count / count
-        variance = max(float(mean.var(ddof=1)) - float(noise.mean()), 0.0)
-        offset = mean * variance / (variance + noise)
-        out = replace(data, bias_dph=data.bias_dph - (offset - offset.mean())[index])
-    return out
+    samples = cleaned_samples(data)
+    history = TrainingHistory.of(samples, scaling_of(samples), power_on)
+    history, found = history.without_outliers(smooth(history.count))
+    intercept_dph = history.spread * found.own()[:, 0]
+    of_power_on = dict(zip(np.unique(power_on[history.means.run]).tolist(), intercept_dph.tolist(), strict=True))
+    own = np.array([of_power_on.get(number, 0.0) for number in power_on.tolist()])  # a copy of a run has none
+    return replace(data, bias_dph=data.bias_dph - own[data.run])
 
 
 def _re_zeroed(rest: FloatArray, time_s: FloatArray, effects: Sequence[Effect]) -> FloatArray:

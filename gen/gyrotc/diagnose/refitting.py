@@ -112,13 +112,13 @@ class Refitting:
                 return fitted
         arguments = self.arguments if with_map else self.arguments | self.plain
         rate = not (self.single_cycle and with_map)
-        fitted = fit_extended(self.train, effects, arguments, None if whole else kept, beside=with_map, rate=rate)
+        fitted = fit_extended(self.train, effects, arguments, None if whole else kept, rate=rate)
         if whole:
             self._fits.append((list(effects), with_map, fitted))
         return fitted
 
     def samples_beside(self, effects: Sequence[Effect], whole: Sequence[Effect] = ()) -> TrainingData:
-        """Return what the map is fitted to beside effects: samples whose input is known beside the `whole` set too."""
+        """Return samples beside effects, without intercepts, whose input is known beside the `whole` set too."""
         masks = [known(run, whole) for run in self.train]
         return samples_beside(self.train, effects, self.arguments["power_on"], masks)
 
@@ -141,7 +141,7 @@ class Refitting:
         """Residuals of held-out training samples; as many causes are chosen anew on the others."""
         kept = [~m for m in held]
         chosen = filter(is_corrected, self.chosen_without(held, len(causes)))
-        effects = completed(self.train, [Effect.of(c) for c in chosen], kept)
+        effects = completed(self.train, [Effect.of(c) for c in chosen], self.arguments["power_on"], kept)
         stages = (effects[:k] for k in range(sum(map(is_corrected, causes)) + 1))
         scored = [m & known(run, effects) for run, m in zip(self.train, held, strict=True)]
         return [self._residuals(kept, self.train, scored, stage, beside=k > 0) for k, stage in enumerate(stages)]

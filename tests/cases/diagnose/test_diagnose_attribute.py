@@ -382,6 +382,19 @@ def test_a_pair_must_gain_and_need_both() -> None:
     assert clear_pair(weak, _point(800.0, *both), size) is None, "neither says anything alone"
 
 
+def test_a_cause_beside_offsets_of_power_ons_is_not_taken_for_their_imperfection() -> None:
+    """An offset is the same in all rows of a run: what varies within runs cannot be what its form lacks."""
+    size = 400
+    for other, gain, clear in (
+        ("turn_on_offset", 15040.0, True),
+        ("turn_on_offset", 15010.0, False),
+        ("warm_up", 15040.0, False),
+    ):
+        singles = [_point(15000.0, (other, 1.0)), _point(12000.0, ("hysteresis", 1.0))]
+        pair = _point(gain, ("hysteresis", 1.0), (other, 1.0))
+        assert (clear_pair(singles, pair, size) is not None) == clear, (other, gain)
+
+
 def test_rivals_are_near_in_the_criterion() -> None:
     singles = [_point(g, (id, 1.0)) for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))]
     near = remaining(ranked_rivals(singles, singles[0].members, 0, 400))
@@ -1000,7 +1013,7 @@ def wave() -> Effect:
 
 
 def test_a_wave_and_its_overtones_are_taken_off_and_stand_in_the_model(refitting: Refitting) -> None:
-    [whole] = completed(refitting.train, [wave()])
+    [whole] = completed(refitting.train, [wave()], refitting.arguments["power_on"])
     assert len(whole.overtones) == 2
     run = refitting.train[0]
     plain, left = samples(run, []), samples(run, [whole])
@@ -1017,5 +1030,5 @@ def test_a_wave_and_its_overtones_are_taken_off_and_stand_in_the_model(refitting
 
 def test_overtones_take_no_place_in_a_table_from_another_cause(refitting: Refitting) -> None:
     others = [Effect("hysteresis", {"width_c": w, "amplitude_dph_per_c": 1e-9}) for w in (2.0, 6.0)]
-    whole = completed(refitting.train, [wave(), *others])
+    whole = completed(refitting.train, [wave(), *others], refitting.arguments["power_on"])
     assert len(terms_of(whole)) == MOST_TERMS and len(whole[0].overtones) == 1

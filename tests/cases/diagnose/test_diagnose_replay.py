@@ -46,7 +46,7 @@ from gyrotc.quality import Judged, Judgement, judge
 from gyrotc.recordings import Dataset, Rows, Run, joined_runs, load
 from gyrotc.simulate import simulate
 from gyrotc.tables import quantise
-from gyrotc.train import FitOptions, FrontEnd, fit_dataset, front_end, joined
+from gyrotc.train import FitOptions, FrontEnd, fit_dataset, front_end, joined, power_ons
 from gyrotc.verify import replay_case_of
 from numpy.typing import NDArray
 from single_cycles import NOISE, clean_cycle
@@ -302,11 +302,11 @@ amplitude_dph_per_c_per_c = {growth!r}
 """
 
 
-def _loops(folder: Path, strength: float, seed: int) -> tuple[Dataset, Effect]:
+def _loops(folder: Path, strength: float, seed: int, more: str = "") -> tuple[Dataset, Effect]:
     """Recordings of a play whose strength goes from 1 - strength to 1 + strength between -40 and 70 C; and the one of
     one strength that stands for it."""
     growth = strength * 2e-4 / 55.0
-    (folder / "loops.toml").write_text(LOOPS.format(growth=growth), "utf-8")
+    (folder / "loops.toml").write_text(LOOPS.format(growth=growth) + more, "utf-8")
     simulate(folder / "loops.toml", seed=seed, out=folder / "data", row_s=10.0)
     return load(folder / "data"), Effect("hysteresis", {"width_c": 5.4, "amplitude_dph_per_c": 2e-4})
 
@@ -318,7 +318,7 @@ def test_a_play_gets_a_strength_over_temperature_where_recordings_ask_for_it(see
         dataset, one = _loops(folder, strength, seed)
         runs = [run for run in dataset.runs if run.role == "train"]
         played = play_runs(dataset, runs, front_end(runs, 10.0), judge(dataset))
-        (found,) = completed(played, [one])
+        (found,) = completed(played, [one], power_ons(runs))
         if strength == 0.0:
             assert found == one, "nothing asks for it"
             continue
@@ -328,7 +328,16 @@ def test_a_play_gets_a_strength_over_temperature_where_recordings_ask_for_it(see
         assert width == pytest.approx(6.0, rel=0.1)
         assert amplitude + growth * (15.0 - middle) == pytest.approx(2e-4, rel=0.1)
         assert growth == pytest.approx(2e-4 / 55.0, rel=0.2)
-        assert completed(played[:1], [one]) == [one], "a single run does not say it"
+        assert completed(played[:1], [one], power_ons(runs)) == [one], "a single run does not say it"
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_offsets_of_power_ons_do_not_change_the_strength_of_a_play(seed: int, tmp_path: Path) -> None:
+    """Offsets 25 times the play, which runs at different temperatures would give a strength that goes with these."""
+    dataset, one = _loops(tmp_path, 0.0, seed, '[[cause]]\nid = "turn_on_offset"\nstd_dph = 0.03\n')
+    runs = [run for run in dataset.runs if run.role == "train"]
+    played = play_runs(dataset, runs, front_end(runs, 10.0), judge(dataset))
+    assert completed(played, [one], power_ons(runs)) == [one]
 
 
 def test_the_strength_of_a_play_over_temperature_is_shipped_and_gains_on_the_exam(tmp_path: Path) -> None:

@@ -282,10 +282,11 @@ def test_a_play_has_one_strength_whatever_constant_the_rate_has(tmp_path: Path) 
     simulate("hysteresis", seed=1, out=tmp_path)
     dataset = load(tmp_path)
     records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
-    runs = Refitting(dataset, records, FitOptions(), single_cycle=False).train
+    refitting = Refitting(dataset, records, FitOptions(), single_cycle=False)
+    runs, power_on = refitting.train, refitting.arguments["power_on"]
     raised = [replace(run, data=replace(run.data, bias_dph=run.data.bias_dph + 1000.0)) for run in runs]
     play = Effect("hysteresis", {"width_c": 3.05, "amplitude_dph_per_c": 1.8e-4})
-    assert completed(runs, [play]) == completed(raised, [play]) == [play]
+    assert completed(runs, [play], power_on) == completed(raised, [play], power_on) == [play]
 
 
 def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:
