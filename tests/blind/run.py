@@ -125,7 +125,7 @@ def run(plan: Plan, folder: Path) -> list[Row]:
 
     Args:
         plan: What to make.
-        folder: Where rows and cached banks are kept.
+        folder: Where rows are kept.
     """
     path = folder / f"{plan.seed}-{plan.records}.jsonl"
     done = {row["number"]: row for row in rows_of(path)}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import pickle
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -14,15 +13,14 @@ from unittest.mock import patch
 import gyrotc.pages.report as pages
 import numpy as np
 from gyrotc.assess import Earlier, budget_of, changes_since, evaluate, held_against, load_limits
-from gyrotc.common import InputError, average_rows
-from gyrotc.diagnose import build_bank, diagnose, records_of, series_of, signature_bank
+from gyrotc.common import average_rows
+from gyrotc.diagnose import diagnose, records_of, series_of
 from gyrotc.fleet import load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages import write_diagnosis_page
 from gyrotc.quality import check, judge
 from gyrotc.recordings import load
 from gyrotc.results import DeclaredUnits, Evaluation, Manifest, read_result
-from gyrotc.results import cache as kept
 from gyrotc.simulate import read as read_scenario
 from gyrotc.simulate import simulate, simulated_floor
 from gyrotc.tables import RECORD, emit, quantise, read_options
@@ -140,7 +138,7 @@ READERS = (
     "csv", "parquet", "dataset.toml", "model.json", "limits.toml", "fleet.toml", "scenario.toml", "evaluate.json",
     "training.json", "verify.json", "manifest.json", "limits.json", "changes.json", "budget.json",
     "diagnose.json", "series.json",
-    "truth.json", "noise.npy", "trace.csv", "board.log", "bank", "record",
+    "truth.json", "noise.npy", "trace.csv", "board.log", "record",
 )  # fmt: skip
 
 
@@ -166,7 +164,6 @@ def seeds_in(seeds: Path, folder: Path) -> dict[str, Reader]:
         "noise.npy": _truth(seeds, folder, _noise_name(seeds), "bytes"),
         "trace.csv": Reader(_trace(result, folder), "text", [(result / "trace" / "run-01.csv").read_bytes()]),
         "board.log": Reader(_log(folder), "text", [log_text().encode()]),
-        "bank": Reader(_bank(seeds, folder), "bytes", [_bank_bytes(seeds, folder)]),
         "record": Reader(_record(folder), "json", [(result / "c" / RECORD).read_bytes()]),
     }  # fmt: skip
     for name in ("evaluate", "training", "verify", "manifest", "limits", "changes", "budget"):
@@ -370,31 +367,6 @@ def _log(folder: Path) -> Callable[[bytes], None]:
         path.write_bytes(data)
         for part in log_parts(path).parts:
             compared_words(part, np.zeros((300, 2), dtype=np.uint32))
-
-    return read
-
-
-def _bank_bytes(seeds: Path, folder: Path) -> bytes:
-    path = seeds / "bank"
-    if not path.exists():
-        records = records_of(load(seeds / "data"), "train", block_s=600.0, average_s=600.0)
-        bank = build_bank(records, 0)
-        large = {f.name: getattr(bank, f.name) for f in fields(bank)}
-        small = {k: v[:2, ..., :2].copy() for k, v in large.items() if isinstance(v, np.ndarray) and v.ndim > 1}
-        content = pickle.dumps(replace(bank, **small), protocol=5)
-        path.write_bytes(kept.head_of_content("a.bank", content) + content)
-    return path.read_bytes()
-
-
-def _bank(seeds: Path, folder: Path) -> Callable[[bytes], None]:
-    def read(data: bytes) -> None:
-        path = folder / "a.bank"
-        path.write_bytes(data)
-        bank = kept.content_in(path, signature_bank.bank_from_bytes)
-        if data != (seeds / "bank").read_bytes() and bank is not None:
-            raise AssertionError("a damaged bank was taken")
-        if bank is None:
-            raise InputError("bank", "thrown away")
 
     return read
 

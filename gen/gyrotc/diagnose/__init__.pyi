@@ -103,7 +103,6 @@ from .search import view_of_bank as view_of_bank
 from .shipping import PieceGain as PieceGain
 from .shipping import choose_shipped as choose_shipped
 from .signature_bank import SignatureBank as SignatureBank
-from .signature_bank import bank_of as bank_of
 from .signature_bank import build_bank as build_bank
 from .signature_bank import direction_of as direction_of
 from .single_cycle import CycleFits as CycleFits

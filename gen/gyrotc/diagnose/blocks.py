@@ -5,7 +5,6 @@ Every feature is computed on the rows and averaged afterwards; nothing is filter
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -126,16 +125,6 @@ class Records:
         """The runs that have two blocks at least, numbered anew: of fewer a run shows no course of time."""
         left = [r for r, kept in zip(self.runs, self.kept, strict=True) if kept.size > 1]
         return tuple(replace(r, history=replace(r.history, run=k, runs=len(left))) for k, r in enumerate(left))
-
-    def key(self) -> str:
-        """Hash of everything but the rates: what a bank of signatures depends on."""
-        digest = hashlib.sha256(repr(self.block_s).encode())
-        for run, kept in zip(self.runs, self.kept, strict=True):
-            h = run.history
-            for part in (h.time_s, h.temperature_c, h.on_s, kept):
-                digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
-            digest.update(repr((h.run, h.runs, h.day)).encode())
-        return digest.hexdigest()
 
 
 def singled_out(where: NDArray[np.bool_]) -> FloatArray:

@@ -30,7 +30,7 @@ from .posterior import EQUIVALENT
 from .profile_likelihood import Gains, Point
 from .refinement import Refined
 from .search import Search, open_search
-from .signature_bank import bank_of
+from .signature_bank import build_bank
 from .static_map import LEVELS, fits_exactly, led_map
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
@@ -147,7 +147,8 @@ def _with_map(
     y = records.target()
     channels = _channels(records)
     for level in range(len(LEVELS)):
-        bank = bank_of(records, level, say, lead_s)
+        say("computing the signatures of all causes")
+        bank = build_bank(records, level, lead_s)
         if checked.sigma is not None:
             bank = bank.weighted(records, checked.sigma)
         colour = declared.colour(records.block_s) if declared else None

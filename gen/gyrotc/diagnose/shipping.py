@@ -21,7 +21,7 @@ from ..common.arrays import FloatArray
 from ..results.diagnosed import ShippingTrial
 from ..train.candidates import CandidateComparison, compare_candidates
 from ..train.channels import MOST_TERMS
-from ..train.choice import gain_over_pieces
+from ..train.choice import expected_square, gain_over_pieces
 from ..train.data import cleaned_samples, scaling_of
 from ..train.fitting import power_ons
 from .refit import Effect
@@ -162,8 +162,8 @@ def _comparison(refitting: Refitting, effects: Sequence[Effect], every: Sequence
 def _covered_scores(comparison: CandidateComparison, name: str) -> FloatArray:
     """Return the log RMS that a candidate leaves on each piece at temperatures that the rest has covered.
 
-    The noise is added: differences below it decide nothing. Whole runs are judged about their means. A piece of which
-    less than half is covered has none (nan): there the ends of the map would be judged.
+    It is that of training (`train.choice`), of whole runs about their means. A piece of which less than half is covered
+    has none (nan): there the ends of the map would be judged.
     """
     history = comparison.history
     if name not in comparison.maps:
@@ -175,7 +175,7 @@ def _covered_scores(comparison: CandidateComparison, name: str) -> FloatArray:
         left = means.after_dph[covered]
         about = left.mean() if left.size and fold.kind in ("run", "power-on") else 0.0
         enough = np.mean(covered) >= _MIN_COVERED
-        found.append(0.5 * np.log(np.mean((left - about) ** 2) + comparison.noise_dph**2) if enough else np.nan)
+        found.append(0.5 * np.log(expected_square(left - about, comparison.noise_dph)) if enough else np.nan)
     return np.array(found)
 
 

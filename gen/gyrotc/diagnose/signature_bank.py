@@ -1,30 +1,16 @@
-"""Signatures of all candidates as block means, with their inner products, kept on disk between calls.
-
-It depends on the temperature records alone, not on the rates, and is kept on disk by their hash.
-
-Reading makes nothing but the classes of a bank, plain values and arrays.
-"""
+"""Signatures of all candidates as block means, with their inner products: they depend on the temperatures alone."""
 
 from __future__ import annotations
 
-import hashlib
-import importlib
-import inspect
-import io
-import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
-from ..common.progress import Progress, silent
 from ..mirror.recursions import play
-from ..results import cache
 from .blocks import Records
 from .candidates import (
     Candidate,
@@ -250,51 +236,3 @@ def _dictionary(records: Records) -> FloatArray:
 def direction_of(records: Records) -> FloatArray:
     """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N,)."""
     return records.columns(lambda h: play(DIRECTION_C, h.temperature_c) - h.temperature_c)
-
-
-_CLASSES = (SignatureBank, Signature, Alternative, MapBasis, Candidate)
-_OWN = {(kind.__module__, kind.__qualname__): kind for kind in _CLASSES}
-_NUMPY = {
-    ("numpy", "ndarray"),
-    ("numpy", "dtype"),
-    *((f"numpy.{core}.{part}", name) for core in ("core", "_core") for part, name in (
-        ("multiarray", "_reconstruct"), ("multiarray", "scalar"), ("numeric", "_frombuffer"),
-    )),
-}  # fmt: skip
-
-
-def bank_of(records: Records, level: int, say: Progress = silent, lead_s: float = 0.0) -> SignatureBank:
-    """The bank of these temperature records, from disk or made and kept."""
-    digest = hashlib.sha256(f"{level} {lead_s:g} {_code()} {records.key()}".encode()).hexdigest()
-    bank = cache.kept(f"{digest}.bank", bank_from_bytes)
-    if bank is None:
-        say("computing the signatures of all causes")
-        bank = build_bank(records, level, lead_s)
-        cache.keep(f"{digest}.bank", pickle.dumps(bank, protocol=5))
-    return bank
-
-
-def bank_from_bytes(content: bytes) -> SignatureBank | None:
-    """Return the bank that a file holds; None if it holds something else. It may raise anything."""
-    bank = _Reader(io.BytesIO(content)).load()
-    return bank if isinstance(bank, SignatureBank) else None
-
-
-class _Reader(pickle.Unpickler):
-    """Makes the classes of a bank and arrays, and calls nothing else."""
-
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) in _OWN:
-            return _OWN[module, name]
-        if (module, name) == ("builtins", "slice"):
-            return slice
-        if (module, name) in _NUMPY:
-            return getattr(importlib.import_module(module), name)
-        raise pickle.UnpicklingError(f"{module}.{name} has no place in a bank")
-
-
-def _code() -> str:
-    """Return the hash of the program and of causes that are registered from outside it: others make other banks."""
-    features = (cause.features for cause in diagnosable_causes().values())
-    files = sorted({inspect.getfile(one) for one in features if one is not None})
-    return hashlib.sha256(b"".join([cache.program_of().encode(), *(Path(f).read_bytes() for f in files)])).hexdigest()

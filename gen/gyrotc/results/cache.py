@@ -43,8 +43,8 @@ def program_of() -> str:
 
 T = TypeVar("T")
 
-# Some dozens of banks of signatures, beside which compiled objects are small.
-_MAX_BYTES = 2 * 10**9
+# Some thousand compiled objects of the runtime and its tables.
+_MAX_BYTES = 2 * 10**8
 _MAGIC = b"gyrotc kept\n"
 _HEAD_BYTES = len(_MAGIC) + hashlib.sha256().digest_size
 
@@ -74,7 +74,6 @@ def content_in(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
     try:
         data = read_input(path, "recording_mib", "what was kept")
         head, content = data[:_HEAD_BYTES], data[_HEAD_BYTES:]
-        del data  # a bank of signatures has the size of what a search remembers
         if head == head_of_content(path.name, content):
             found = content_of(content)
             if found is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import re
 import subprocess
 import sys
@@ -20,7 +19,6 @@ import pytest
 from conftest import ROOT, Command
 from gyrotc.assess import load_limits
 from gyrotc.common import InputError, inputs, install_command, parse_json, parse_toml
-from gyrotc.diagnose import bank_of, records_of
 from gyrotc.fleet import Cluster, connected, load_manifest
 from gyrotc.model import load_model
 from gyrotc.pages import report
@@ -241,40 +239,23 @@ def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None
     assert out_of_memory.returncode == 2 and out_of_memory.stderr.startswith("gyrotc: not enough memory")
 
 
-class _Runs:
-    """What a pickle of somebody else would do."""
-
-    def __init__(self, trace: Path) -> None:
-        self.trace = trace
-
-    def __reduce__(self) -> tuple[Any, tuple[str]]:
-        return os.system, (f"touch {self.trace}",)
-
-
-def test_a_damaged_or_foreign_bank_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_kept_and_damaged_or_of_another_name_is_thrown_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    for number in range(3):
-        write_csv(tmp_path / "RLG-1" / f"{number}.csv", columns(400))
-    records = records_of(load(tmp_path / "RLG-1"), "train", block_s=600.0, average_s=600.0)
-    said: list[str] = []
-    bank = bank_of(records, 0, said.append)
+    kept.keep("a.object", content := bytes(range(256)))
     assert kept.folder().stat().st_mode & 0o777 == 0o700
-    [path] = kept.folder().glob("*.bank")
+    path = kept.folder() / "a.object"
     whole = path.read_bytes()
-    assert np.array_equal(bank_of(records, 0, said.append).signatures, bank.signatures)
-    assert len(said) == 1, "the second came from disk"
+    assert kept.kept("a.object", bytes) == content
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 1
-    foreign = pickle.dumps(_Runs(tmp_path / "was-here"))
-    kept.keep(path.name, foreign)
-    for number, content in enumerate((path.read_bytes(), bytes(flipped), whole[:1000]), start=2):
-        path.write_bytes(content)
-        assert np.array_equal(bank_of(records, 0, said.append).signatures, bank.signatures)
-        assert len(said) == number
-    assert not (tmp_path / "was-here").exists(), "code of somebody else was run"
+    for name, damaged in (("a.object", bytes(flipped)), ("a.object", whole[:100]), ("b.object", whole)):
+        (kept.folder() / name).write_bytes(damaged)
+        assert kept.kept(name, bytes) is None and not (kept.folder() / name).exists(), name
+    kept.keep("a.object", content)
     kept.folder().chmod(0o777)
-    bank_of(records, 0, said.append)
-    assert len(said) == 5, "others may write there"
+    assert kept.kept("a.object", bytes) is None, "others may write there"
 
 
 def test_a_bank_of_another_version_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

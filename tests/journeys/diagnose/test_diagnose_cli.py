@@ -311,6 +311,7 @@ def test_the_training_runs_alone_say_what_is_shipped(case: Case) -> None:
     assert found.shipped == [GRADIENT_TO_REMOVE]
     assert found.before_dph is not None and found.after_dph is not None
     assert found.after_dph < 0.5 * found.before_dph
+    assert found.after_dph == pytest.approx(LEVEL, rel=0.2), "noise is left, and counted once"
     wrong = replace(GRADIENT_TO_REMOVE, values={"tau_s": TAU_S, "amplitude_dph_per_c": -SIZE_DPH_PER_C})
     assert choose_shipped(blind, [wrong], [0.99]).shipped == []
     both = choose_shipped(blind, [GRADIENT_TO_REMOVE, wrong], [0.99, 0.99])
