@@ -258,17 +258,6 @@ def test_what_is_kept_and_damaged_or_of_another_name_is_thrown_away(
     assert kept.kept("a.object", bytes) is None, "others may write there"
 
 
-def test_a_bank_of_another_version_is_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    write_csv(tmp_path / "RLG-1" / "a.csv", columns(400))
-    records = records_of(load(tmp_path / "RLG-1"), "train", block_s=600.0, average_s=600.0)
-    said: list[str] = []
-    bank_of(records, 0, said.append)
-    monkeypatch.setattr(kept, "program_of", lambda: 64 * "0")
-    bank_of(records, 0, said.append)
-    assert len(said) == 2
-
-
 def test_a_line_without_an_end_does_not_fill_memory(tmp_path: Path) -> None:
     folder = tmp_path / "RLG-1"
     folder.mkdir()
