@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from bench.campaigns import CAMPAIGNS
 from bench.mutation import PARTS
 from bench.oracle.compare import differences
 from bench.oracle.normalise import content_of
-from bench.page import Figure, figures_table
+from bench.page import Figure, figures_table, write
 from bench.records import fill, read_record, rounded, write_record
 from bench.splits import Judged, Split, counts
 
@@ -63,6 +64,17 @@ def test_a_record_is_read_as_it_was_written_and_pages_get_its_figures(tmp_path: 
     (docs / "a.md").write_text("0<!--= one/rows/9/x; d -->\n")
     with pytest.raises(KeyError, match="one/rows/9/x is no value"):
         fill(docs)
+
+
+def test_the_page_of_results_and_every_quoted_figure_are_those_of_the_records(tmp_path: Path) -> None:
+    docs = ROOT / "docs"
+    shutil.copytree(docs / "results", tmp_path / "docs" / "results")
+    for page in [ROOT / "README.md", *docs.glob("*.md")]:
+        shutil.copy(page, tmp_path / page.relative_to(ROOT))
+    write(tmp_path / "docs")
+    fill(tmp_path / "docs")
+    for page in [ROOT / "README.md", *docs.glob("*.md")]:
+        assert (tmp_path / page.relative_to(ROOT)).read_text("utf-8") == page.read_text("utf-8"), page.name
 
 
 def test_numbers_of_a_record_have_as_many_digits_as_pages_print() -> None:
