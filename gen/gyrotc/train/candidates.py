@@ -68,10 +68,9 @@ class CandidateComparison:
     noise_dph: float
 
     @property
-    def process(self) -> Process | None:
-        """The smooth map, if it could be fitted."""
-        found = self.maps.get("mrbf")
-        return Process.of(self.history, found) if found else None
+    def process(self) -> Process:
+        """The smooth map."""
+        return Process.of(self.history, self.maps["mrbf"])
 
     def left_out(self, name: str) -> list[Averages]:
         """Return what a candidate leaves on each piece."""
@@ -119,14 +118,14 @@ def compare_candidates(
         scaling: Their scaling.
         power_on: Number of the power-on of each run, by its index; None: each run is one.
         average_s: Averaging of what is judged, s.
+
+    Raises:
+        TrainingFailed: The smooth map cannot be fitted, so nothing states the noise and what a correction leaves.
     """
     history = TrainingHistory.of(samples, scaling, power_on)
-    maps: dict[str, GaussianMap] = {}
+    history, smooth_map = history.without_outliers(smooth(history.count))
+    maps = {"mrbf": smooth_map}
     failed: dict[str, str] = {}
-    try:
-        history, maps["mrbf"] = history.without_outliers(smooth(history.count))
-    except TrainingFailed as failure:
-        failed["mrbf"] = str(failure)
     for name in CANDIDATES[:2]:
         try:
             maps[name] = history.fit(structure_of(name, history.count))
@@ -135,19 +134,18 @@ def compare_candidates(
     maps = {name: maps[name] for name in CANDIDATES if name in maps}
     unseen = history.unseen(list(maps.values()), average_s)
     squares = np.full((len(unseen), len(CANDIDATES)), np.nan)
-    noise_dph = _noise_of_means(history, maps.get("mrbf"), average_s)
+    noise_dph = _noise_of_means(history, smooth_map, average_s)
     for at, name in enumerate(maps):
         squares[:, CANDIDATES.index(name)] = [expected_square(piece[at].after_dph, noise_dph) for piece in unseen]
     return CandidateComparison(history, maps, failed, unseen, choose(CANDIDATES, squares), average_s, noise_dph)
 
 
-def _noise_of_means(history: TrainingHistory, found: GaussianMap | None, average_s: float) -> float:
+def _noise_of_means(history: TrainingHistory, found: GaussianMap, average_s: float) -> float:
     """Return the noise of a mean from differences of neighbouring residuals of the smooth map, deg/h.
 
     Differences of the bias itself would count the change of the map between two means as noise.
     """
-    residual = history.y if found is None else history.residual(found)
-    return floor_dph(history.means, history.spread * residual, average_s)
+    return floor_dph(history.means, history.spread * history.residual(found), average_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +158,7 @@ class Selected:
         rows: All candidates, as in `training.json`.
         reason: Why this one, in words.
         findings: What a user should know.
-        process: The smooth map of all samples, if it could be fitted.
+        process: The smooth map of all samples.
         folds: Pieces that were left out.
         left_out: What it leaves on each of them without having seen it.
     """
@@ -170,7 +168,7 @@ class Selected:
     rows: list[dict[str, Any]]
     reason: str
     findings: list[dict[str, Any]]
-    process: Process | None
+    process: Process
     folds: tuple[Fold, ...]
     left_out: list[Averages]
 
@@ -186,6 +184,9 @@ def select(
         power_on: Number of the power-on of each run, by its index; None: each run is one.
         seed: Seed of the Kohonen network.
         average_s: Averaging of RMS figures, s.
+
+    Raises:
+        TrainingFailed: The smooth map cannot be fitted.
     """
     comparison = compare_candidates(samples, scaling, power_on, average_s)
     refused = dict(comparison.failed)

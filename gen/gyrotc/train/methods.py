@@ -73,7 +73,7 @@ def fit(
 
     Raises:
         InputError: Bad samples or arguments.
-        TrainingFailed: The equations of a method that was asked for by name cannot be solved.
+        TrainingFailed: The equations of a method that was asked for by name, or of model selection, cannot be solved.
     """
     method = "mrbf" if method == AUTO and (centers is not None or rho is not None) else method
     BuildOptions(method=method, seed=seed, centers=centers, rho=rho, average_s=average_s)
