@@ -22,7 +22,6 @@ from .data import Scaling, TrainingData
 from .folds import Fold
 from .gaussian import COLUMNS, FEW, GaussianMap, Structure, TrainingFailed
 from .mrbf import fit_mrbf
-from .noise import floor_dph
 from .objection import objection_to
 from .process import Process, TrainingHistory, smooth
 from .result import Outcome
@@ -56,7 +55,7 @@ class CandidateComparison:
         unseen: What each of `maps` leaves on each piece without having seen it, in their order.
         choice: The decision.
         average_s: Averaging of what is judged, s.
-        noise_dph: Noise of a mean over `average_s`, from differences of what the smooth map leaves on neighbours.
+        noise_dph: Noise of an average over `average_s`, deg/h.
     """
 
     history: TrainingHistory
@@ -134,18 +133,10 @@ def compare_candidates(
     maps = {name: maps[name] for name in CANDIDATES if name in maps}
     unseen = history.unseen(list(maps.values()), average_s)
     squares = np.full((len(unseen), len(CANDIDATES)), np.nan)
-    noise_dph = _noise_of_means(history, smooth_map, average_s)
+    noise_dph = history.noise_dph(smooth_map, average_s)
     for at, name in enumerate(maps):
         squares[:, CANDIDATES.index(name)] = [expected_square(piece[at].after_dph, noise_dph) for piece in unseen]
     return CandidateComparison(history, maps, failed, unseen, choose(CANDIDATES, squares), average_s, noise_dph)
-
-
-def _noise_of_means(history: TrainingHistory, found: GaussianMap, average_s: float) -> float:
-    """Return the noise of a mean from differences of neighbouring residuals of the smooth map, deg/h.
-
-    Differences of the bias itself would count the change of the map between two means as noise.
-    """
-    return floor_dph(history.means, history.spread * history.residual(found), average_s)
 
 
 @dataclass(frozen=True, slots=True)

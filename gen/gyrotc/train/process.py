@@ -17,12 +17,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import BoolArray, FloatArray
+from ..common.arrays import BoolArray, FloatArray, parts_of
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, Averages, median
 from .data import Bins, Scaling, TrainingData, average_samples, gather, mean_cells, weighted_mean
 from .folds import Fold, edges_of, folds
 from .gaussian import COLUMNS, FEW, Basis, GaussianMap, Structure, Sums, VarianceSearch
-from .noise import difference_sigma
+from .noise import difference_sigma, floor_dph
 
 MEAN_S = 50.0
 """Length of the means of the model: 100 s would smear a ripple of 11 C at 5 C/min."""
@@ -210,6 +210,19 @@ class TrainingHistory:
         x, own = self.columns, found.own()
         of_own = np.sum(x[:, : own.shape[1]] * own[self.power_on], axis=1)
         return np.asarray(self.y - x[:, : found.structure.columns] @ found.coefficients - of_own)
+
+    def noise_dph(self, found: GaussianMap, average_s: float) -> float:
+        """Return the noise of the averages that `unseen` judges, deg/h.
+
+        It is that of differences of what a map leaves on neighbouring averages. Differences of the bias itself would
+        count the change of the map as noise.
+        """
+        if average_s >= MEAN_S:
+            return floor_dph(self.means, self.spread * self.residual(found), average_s)
+        samples, n = self.samples, found.structure.columns
+        t, r = self.scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
+        of_map = [self.basis.columns(t[part], r[part], n) @ found.coefficients for part in parts_of(len(t))]
+        return floor_dph(samples, samples.bias_dph - self.spread * np.concatenate(of_map), average_s)
 
     @cached_property
     def folds(self) -> tuple[Fold, ...]:

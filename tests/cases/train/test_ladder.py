@@ -71,6 +71,15 @@ def test_the_simplest_correction_that_does_is_taken(name: str, bias: Callable[..
     assert not found.findings, "a constant that leaves noise only is no failure"
 
 
+@pytest.mark.parametrize("average_s", [10.0, 20.0, 40.0, 100.0])
+def test_white_noise_is_no_failure_over_any_averaging_time(average_s: float) -> None:
+    """Averages that are shorter than the means of the model have more noise than these."""
+    data = samples(0)
+    found = fit(with_bias(data, np.full(len(data), 5.0)), method="auto", average_s=average_s)
+    assert found.method == "constant"
+    assert not found.findings
+
+
 def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> None:
     """Each run has a slope of its own: within a run a map looks good, on another run it does harm."""
     data = samples(0)
