@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 from gyrotc.simulate import LotOrder, SimulatedGyro, draw_lot, read, with_noise
-from gyrotc.train import Fit, TrainingData, cleaned_samples, fit, predict, scaling_of, uncertainty_of
-from gyrotc.train.prior import EarlierPrior, means_of_unit, posterior_of_means, stated_sigma_dph, widened
+from gyrotc.train import Fit, TrainingData, cleaned_samples, fit, fit_process, predict
+from gyrotc.train.prior import EarlierPrior, posterior_of_process, widened
 from numpy.typing import NDArray
 
 from ..campaigns import say
@@ -122,14 +122,8 @@ def _changed(data: TrainingData, change: Change, replaced: Fit | None) -> Traini
 
 def _prior(early: TrainingData, known: Fit) -> EarlierPrior:
     """As `jobs.recalibration` reads it from a result."""
-    samples = cleaned_samples(early)
-    scaling = scaling_of(samples)
-    means = means_of_unit(samples, scaling, known.outcome.process)[0]
-    stated = uncertainty_of(samples, known)
-    envelope = scaling.temperature_c, scaling.slope_c_per_min
-    between = stated["rules"]["between_dph"]
-    sigma = stated_sigma_dph(np.array(stated["rows"]), envelope, between, means)
-    return widened(posterior_of_means(means, envelope, between, sigma), 0.0, "none", "0" * 64, None)
+    process = known.process or fit_process(cleaned_samples(early), known.scaling)
+    return widened(posterior_of_process(process, known.scaling), 0.0, "none", "0" * 64, None)
 
 
 def _one(number: int) -> dict[float, dict[str, dict[str, Any]]]:

@@ -39,7 +39,7 @@ def prior_from(
         if run.role == "train" and run.sha256 in seen:
             raise InputError(run.file, f"the model in {folder} was made from it", "recordings of its own")
     where = earlier.folder / "training.json"
-    posterior = posterior_of_result(read_result(where, Training), earlier.model, where)
+    posterior = posterior_of_result(read_result(where, Training), where)
     aged, stated = _ageing(earlier, dataset, ageing_dph, limits)
     return widened(posterior, aged, stated, earlier.model.hash, earlier.date)
 

@@ -237,23 +237,29 @@ Figures = tuple[float, ...]
 class LotFunctions(Part):
     """The functions that maps are written in: docs/lot.md."""
 
-    center_c: PlottedCelsius = Field(description="z_T = (T - center)/half range")
-    half_range_c: Positive = Field(description="of T, C")
-    half_range_c_per_min: Positive = Field(description="of dT/dt, C/min")
-    kept: tuple[Annotated[int, Field(ge=0, le=120)], ...] = Field(description="numbers of the functions, of 121")
+    center_c: PlottedCelsius = Field(description="center of T, C: x = (T - center)/half range")
+    half_range_c: Positive = Field(description="half range of T, C")
+    half_range_c_per_min: Positive = Field(description="half range of dT/dt, C/min: y = (dT/dt)/half range")
+    slope_unit: Positive = Field(description="y at which the function of the slope is 1")
+    reach_t: Positive = Field(description="half length of the domain of the sines of x")
+    reach_r: Positive = Field(description="half length of the domain of the sines of y")
+    kept: tuple[Annotated[int, Field(ge=0, le=92)], ...] = Field(
+        description="numbers of the functions in use, of 93, ascending"
+    )
 
 
 class LotProcess(Part):
-    """A smooth process: standard deviations in units of the lot, scales in half ranges."""
+    """A smooth process: standard deviations in units of the coefficients, scales in half ranges."""
 
-    constant: Positive = Field(description="of the constant")
-    short: Positive = Field(description="of the part with a short scale in T")
-    short_scale: Positive = Field(description="its scale")
-    long: Positive = Field(description="of the part with a long scale in T")
-    long_scale: Positive = Field(description="its scale")
-    coupled: Positive = Field(description="of the part that couples T and dT/dt")
-    coupled_scale_t: Positive = Field(description="its scale in T")
-    coupled_scale_r: Positive = Field(description="its scale in dT/dt")
+    constant: Positive = Field(description="standard deviation of the constant")
+    line: Positive = Field(description="standard deviation of the line in T")
+    curve: Positive = Field(description="standard deviation of the quadratic and of the cubic function of T")
+    slope: Positive = Field(description="standard deviation of the slope in dT/dt")
+    smooth: Positive = Field(description="standard deviation of the smooth part over T")
+    smooth_scale: Positive = Field(description="scale in T of the smooth part")
+    coupled: Positive = Field(description="standard deviation of the part that couples T and dT/dt")
+    coupled_scale_t: Positive = Field(description="scale in T of the coupled part")
+    coupled_scale_r: Positive = Field(description="scale in dT/dt of the coupled part")
 
 
 class LotCluster(Part):
@@ -349,7 +355,7 @@ class LotUse(Part):
 
 
 class KnownMap(Part):
-    """What was known of a unit's map when its table was made, where its own recordings do not say it all."""
+    """What was known of a unit's map when its table was made: mean and covariance of its coefficients."""
 
     temperature_c: tuple[PlottedCelsius, PlottedCelsius] = Field(description="envelope, C")
     slope_c_per_min: tuple[Rate, Rate] = Field(description="the same of dT/dt, C/min")
@@ -357,9 +363,14 @@ class KnownMap(Part):
     unit_dph: Positive = Field(description="1 of the coefficients, deg/h")
     functions: LotFunctions = Field(description="what maps are written in: docs/lot.md")
     mean: Figures = Field(description="coefficients of the map")
-    covariance: tuple[Figures, ...] = Field(description="of the coefficients: lower triangle, row by row")
-    rest: LotProcess = Field(description="the smooth process behind it")
+    root: tuple[Figures, ...] = Field(
+        description="square root of the covariance of the coefficients: lower triangle, row by row"
+    )
+    rest: LotProcess = Field(description="smooth process of the map")
     asked_temperature_c: Figures = Field(description="where corrections are asked for, C")
     asked_slope_c_per_min: Figures = Field(description="the same, C/min")
     asked_share: Figures = Field(description="the same, share of time")
-    between_dph: Amount = Field(description="of the constant from power-on to power-on, 1 sigma, deg/h")
+    own: tuple[Amount, ...] = Field(
+        description="1 sigma of the first coefficients from power-on to power-on; empty if it is not known"
+    )
+    own_freedom: Count | None = Field(description="degrees of freedom of `own`; null means infinite")

@@ -197,7 +197,7 @@ class MapMeans(Part):
     temperature_c: tuple[float, ...] = Field(description="temperature of each mean, C")
     slope_c_per_min: tuple[float, ...] = Field(description="dT/dt of each mean, C/min")
     bias_dph: tuple[float, ...] = Field(description="bias of each mean, deg/h")
-    count: tuple[float, ...] = Field(description="number of means over `mean_s` in each mean")
+    count: tuple[float, ...] = Field(description="number of independent means over `mean_s` in each mean")
     sigma_dph: _Length = Field(description="noise of a mean over `mean_s`, 1 sigma, deg/h")
     mean_s: _Length = Field(description="averaging time, s")
 
@@ -253,7 +253,7 @@ class Training(UnitResult):
     lot: LotUse | None = Field(default=None, description="use of the lot; null without `--lot`")
     prior: EarlierUse | None = Field(default=None, description="use of the earlier model; null without `--prior`")
     known: KnownMap | None = Field(
-        default=None, description="prior for the next recalibration; null without a lot or an earlier model"
+        default=None, description="prior for the next recalibration; absent for an extended model"
     )
 
 

@@ -37,9 +37,11 @@ from .methods import fit
 from .networks import snapped
 from .noise import noise_terms, sensitivities, stretches
 from .plausibility import AGREE_S, longest_same_s, stuck_after_s
+from .prior.earlier import posterior_of_process
 from .prior.given import Prior
 from .prior.unit_means import means_of_unit
-from .process import Process, TrainingHistory, smooth
+from .prior.use import known_map
+from .process import Process, TrainingHistory, fit_process, smooth
 from .result import Fit, predict
 from .samples import Blocks, run_blocks
 from .simple import LeastSquares, powers_of_method
@@ -67,6 +69,7 @@ _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse 
 # Gathered means are kept to this share of their noise, and their inputs to a tenth of what sensors resolve.
 _MEANS_SHARE = 0.01
 _MEANS_C_DECIMALS, _MEANS_C_PER_MIN_DECIMALS, _MAX_DECIMALS = 3, 4, 12
+_COUNT_DECIMALS = 3  # of means of which many count as one
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
@@ -210,6 +213,8 @@ def fit_dataset(
     added = choice.added if choice else np.zeros(len(data))
     data = replace(data, bias_dph=data.bias_dph - added)
     fitted = _judged(data, _fit(data, options, power_on=power_on, serial=dataset.serial), options.average_s)
+    process = fitted.process or fit_process(cleaned_samples(data), fitted.scaling, power_on)
+    fitted = replace(fitted, process=process)
     front = replace(front, stuck_s=stuck_after_s(read.longest_same_s))
     model = model_of(dataset, runs, data, fitted, front, options, added)
     training = training_of(dataset, read.runs, data, fitted, front, options)
@@ -219,7 +224,7 @@ def fit_dataset(
     }
     content |= {"lot": fitted.lot} if fitted.lot else {}
     content |= {"prior": fitted.prior} if fitted.prior else {}
-    content |= {"known": fitted.known} if fitted.known else {}
+    content["known"] = fitted.known or known_map(posterior_of_process(process, fitted.scaling))
     if choice:
         content["channels"] = choice.rows
         model = with_channels(model, choice, runs, data, HOLD_S) if choice.trial.chosen else model
@@ -289,7 +294,7 @@ def _means(data: TrainingData, fitted: Fit) -> MapMeans:
         temperature_c=rounded(found.temperature_c, _MEANS_C_DECIMALS),
         slope_c_per_min=rounded(found.slope_c_per_min, _MEANS_C_PER_MIN_DECIMALS),
         bias_dph=rounded(found.bias_dph, decimals),
-        count=rounded(found.count, 1),
+        count=rounded(found.count, _COUNT_DECIMALS),
         sigma_dph=found.sigma_dph,
         mean_s=mean_s,
     )

@@ -36,8 +36,8 @@ _REACH = 1.4
 _MIN_REACH = 1e-3
 _MIN_RATE = 1e-6
 
-# Variance of the constant, in squares of the spread of the bias: as good as free.
-_FREE = 100.0
+FREE = 100.0
+"""Variance of the constant, in squares of the spread of the bias: as good as free."""
 # A column that is not used keeps the equations solvable.
 _MIN_VARIANCE = 1e-10
 
@@ -180,7 +180,7 @@ class Structure:
 
     def variances(self, p: FloatArray, basis: Basis) -> tuple[FloatArray, FloatArray]:
         """Return the variance of each coefficient of the map, and its derivatives by the logarithms."""
-        variance = np.full(self.columns, _FREE)
+        variance = np.full(self.columns, FREE)
         slope = np.zeros((self.columns, self.map_parameters))
         for k, part in enumerate(_PART[: self.columns - 1], 1):
             variance[k] = np.exp(2.0 * p[part])

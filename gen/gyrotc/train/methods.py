@@ -19,7 +19,7 @@ from .networks import network
 from .noise import floor_dph
 from .objection import objection_to
 from .ols import RIDGE, fit_ols
-from .prior.given import Prior
+from .prior.given import Prior, UnitSamples
 from .result import Fit, Outcome, predict
 from .simple import fit_simple
 from .stepwise import fit_mlr
@@ -83,9 +83,8 @@ def fit(
     selected = None
     reason = ""
     like_auto = method in (AUTO, "mrbf") and centers is None
-    given = (
-        prior.with_samples(samples, scaling, serial, seed=seed, average_s=average_s) if like_auto and prior else None
-    )
+    unit = UnitSamples(samples, scaling, power_on, serial)
+    given = prior.with_samples(unit, seed=seed, average_s=average_s) if like_auto and prior else None
     findings += given.findings if given else []
     if given is not None and given.map is not None:
         (outcome, scaling), method, reason = given.map, "mrbf", given.reason

@@ -68,18 +68,20 @@ class LinearMap(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Where corrections will be asked for, as a lot's units show it.
+    """Where corrections will be asked for, as a lot's units or an earlier calibration show it.
 
     Attributes:
         temperature_c, slope_c_per_min: Places, shape (n,).
         share: Of the time, the same shape.
-        between_dph: Standard deviation of the constant from power-on to power-on, by the lot's units, deg/h.
+        between_dph: Standard deviation of the constant from power-on to power-on, deg/h; None: it is not known.
+        freedom: Degrees of freedom of it; None: many.
     """
 
     temperature_c: FloatArray
     slope_c_per_min: FloatArray
     share: FloatArray
-    between_dph: float
+    between_dph: float | None
+    freedom: int | None = None
 
 
 @dataclass(frozen=True)
@@ -288,7 +290,7 @@ class Process:
         center, spread: deg/h.
         seconds: Length of a mean, s.
         colour: So many means count as one, because their noise is correlated.
-        asked: With a lot: where its units were; None: where the samples are.
+        asked: With a prior: where its recordings were; None: where the samples are.
     """
 
     model: MapModel

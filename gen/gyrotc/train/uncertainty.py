@@ -419,7 +419,9 @@ class _Errors:
         process, model = self.process, self.process.model
         mean = float(np.hypot(process.spread * np.linalg.norm(self.root), self.departure_dph))
         if process.asked is not None:
-            return TurnOn(float(np.hypot(process.asked.between_dph, mean)), None, mean)
+            between = process.asked.between_dph
+            known = None if between is None else float(np.hypot(between, mean))
+            return TurnOn(known, process.asked.freedom, mean)
         if isinstance(model, GaussianMap) and model.structure.own:
             scatter = process.spread * float(np.sqrt(model.scatter[0]))
             return TurnOn(float(np.hypot(scatter, mean)), len(model.power_ons) - 1, mean)

@@ -1,5 +1,5 @@
 from .basis import PRIOR_LOG as PRIOR_LOG
-from .basis import LotBasis as LotBasis
+from .basis import PriorBasis as PriorBasis
 from .departures import Departures as Departures
 from .departures import Hypothesis as Hypothesis
 from .departures import revised as revised
@@ -7,8 +7,7 @@ from .departures import updated as updated
 from .departures import within as within
 from .earlier import EarlierPrior as EarlierPrior
 from .earlier import posterior_of_known as posterior_of_known
-from .earlier import posterior_of_means as posterior_of_means
-from .earlier import stated_sigma_dph as stated_sigma_dph
+from .earlier import posterior_of_process as posterior_of_process
 from .earlier import widened as widened
 from .learn import FALSE_ALARM as FALSE_ALARM
 from .learn import Learned as Learned
@@ -21,5 +20,6 @@ from .learn import sums_of as sums_of
 from .unit_means import UnitMeans as UnitMeans
 from .unit_means import means_of_unit as means_of_unit
 from .use import LotPrior as LotPrior
+from .use import MapPosterior as MapPosterior
 from .use import known_map as known_map
 from .use import prior_of as prior_of

@@ -22,7 +22,6 @@ from ...common.errors import InputError
 from ...common.metrics import LEAST_SPAN_C
 from ...results.evaluation import At, MapDifference
 from ...results.training import ChangeKind, CheckedCell, MapChange
-from .basis import PRIOR_LOG
 from .learn import FALSE_ALARM
 from .unit_means import UnitMeans
 from .use import MapPosterior, MapPrior
@@ -57,7 +56,7 @@ def within(prior: MapPrior, run: UnitMeans) -> UnitMeans:
     if not inside.any():
         found = f"is nowhere within {t0:.1f} ... {t1:.1f} C and {r0:.2f} ... {r1:.2f} C/min"
         raise InputError("--prior", f"the check run {found}", "a run where the earlier model holds")
-    return UnitMeans(t[inside], r[inside], run.bias_dph[inside], run.count[inside], run.sigma_dph)
+    return run.select(inside)
 
 
 class Departures:
@@ -73,7 +72,7 @@ class Departures:
         self.run = run
         self.left = run.bias_dph - expected.mean_dph(run.temperature_c, run.slope_c_per_min)
         values = expected.prior.basis.values(run.temperature_c, run.slope_c_per_min) * expected.prior.unit_dph
-        self.covariance = values @ expected.covariance @ values.T + np.diag(run.sigma_dph**2 / run.count)
+        self.covariance = values @ expected.covariance @ values.T + _scatter_of(run, values, expected.prior.own)
 
     def cells(self) -> Iterator[CheckedCell]:
         """The run in parts."""
@@ -188,6 +187,13 @@ def _change(shape: _Shape, size: float, sigma: float, text: str) -> MapChange:
 
 _SIZES = np.logspace(0.0, 5.0, 21)  # of a change, over 1 sigma of the earlier map: five decades, four to each
 _GRID = (61, 25)  # points of T and of dT/dt over the envelope, as for the distance of two maps
+# A new shape of size 1 is the sum of two processes (`basis.PARAMETERS`): one of short scale over T, with a constant and
+# with what couples T and dT/dt, and one of long scale. Line, curve and slope would go on where the run has not been.
+_NONE = 1e-6
+_NEW_SHAPE = (
+    (1.0, _NONE, _NONE, _NONE, 0.3, 0.15, 0.3, 0.8, 0.8),
+    (_NONE, _NONE, _NONE, _NONE, 1.0, 0.7, _NONE, 0.8, 0.8),
+)
 _RIDGE = 1e-9  # of a line written in the functions: their sines nearly repeat one another inside the envelope
 # Strong evidence (Kass and Raftery 1995), which more than an offset needs: where the run has not been, an offset is the
 # same, and any other change a guess
@@ -222,6 +228,20 @@ class Hypothesis:
         return bool(self.moved.significant)
 
 
+def _scatter_of(run: UnitMeans, values: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the covariance of means about the map of all power-ons: noise, and what each power-on has of its own.
+
+    Args:
+        run: The means.
+        values: Columns at the means, deg/h.
+        own: Variances of what a power-on has of its own, of the first columns.
+    """
+    of_own = (values[:, : len(own)] * own) @ values[:, : len(own)].T
+    if run.power_on is not None:
+        of_own = of_own * (run.power_on[:, None] == run.power_on)
+    return np.asarray(of_own + np.diag(run.sigma_dph**2 / run.count))
+
+
 class _Seen:
     """Means of a run against a map that has not seen them, in deg/h.
 
@@ -231,7 +251,7 @@ class _Seen:
     def __init__(self, prior: MapPrior, run: UnitMeans) -> None:
         inputs = run.temperature_c, run.slope_c_per_min
         self.values = prior.unit_dph * prior.basis.values(*inputs)
-        self.noise = np.diag(run.sigma_dph**2 / run.count)
+        self.noise = _scatter_of(run, self.values, prior.own)
         self.left = run.bias_dph - prior.center_dph - self.values @ prior.means[0]
 
     def scatter(self, covariance: FloatArray) -> FloatArray:
@@ -305,12 +325,11 @@ def _changes(prior: MapPrior, run: UnitMeans, where: FloatArray) -> Iterator[tup
         a, b = (2.0 * (float(x) - low) / max(high - low, 1e-9) - 1.0 for x in (seen.min(), seen.max()))
         line = where.T @ np.clip(place, a, b)  # in the functions' own unit
         lines.append(prior.unit_dph * np.linalg.solve(gram + _RIDGE * np.trace(gram) * np.eye(len(gram)), line))
-    process = PRIOR_LOG.copy()
-    process[0] = 0.0
+    shape = np.sum([prior.basis.variance(np.log(process)) for process in _NEW_SHAPE], axis=0)
     yield "unchanged", np.zeros((n, 1))
     yield "offset", offset
     yield "slope", np.column_stack([offset, *lines])
-    yield "full", np.diag(np.sqrt(prior.basis.variance(process)))
+    yield "full", np.diag(np.sqrt(shape))
 
 
 def _places() -> tuple[FloatArray, FloatArray]:

@@ -1,35 +1,34 @@
 """A unit's earlier model as the prior of its recalibration.
 
-The earlier means give the map's posterior in the lot's functions (or it stands in `training.json`, where a lot or a
-still earlier model had a share in it). Since then the bias may have moved: the constant by the stated ageing, what
-depends on temperature smoothly by half of it. What else became of it the check run says (`hypotheses`).
+The earlier result holds the posterior of its map: mean and covariance of the coefficients of the model of training
+(`known` of `training.json`). Since then the bias may have moved: the constant by the stated ageing, line and curve over
+temperature by half of it. What else became of it the check run says (`departures`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...common.arrays import FloatArray
 from ...common.errors import InputError
-from ...model import Model
 from ...results.fleet import KnownMap
 from ...results.training import ChangeKind, EarlierUse, Training, TriedChange
-from ..data import Scaling, TrainingData
-from ..process import Asked
-from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
+from ..data import Scaling
+from ..gaussian import FEW, GaussianMap, sum_of
+from ..process import Asked, Process
+from .basis import CONSTANT, PRIOR_LOG, PriorBasis
 from .departures import Departures, Hypothesis, revised, updated, within
-from .given import Given
-from .learn import Envelope, sums_of, that_count
-from .unit_means import UnitMeans, means_of
+from .given import Given, UnitSamples
+from .learn import LEAST_RATIO
+from .unit_means import UnitMeans
 from .use import (
     MapPosterior,
     MapPrior,
-    check_positive,
     curve_of,
     known_map,
     network_of_posterior,
@@ -38,8 +37,8 @@ from .use import (
     triangle,
 )
 
-_ROUNDS = 20  # of the search for a unit's parameters, as of a lot's
-_SHAPE = 0.5  # of the constant's ageing, what depends on T: less makes a finding of every slow change of shape
+_CELLS = (32, 12)  # of T and dT/dt: where an earlier calibration was, as fine as the coverage of its table
+_SHAPE = 0.5  # of the constant's ageing, line and curve: less makes a finding of every slow change of shape
 _MEANS: dict[ChangeKind, str] = {
     "unchanged": "is confirmed",
     "offset": "has moved by an offset",
@@ -72,21 +71,19 @@ class EarlierPrior(MapPrior):
     def check_axis(self, axis: str | None) -> None:
         """Nothing to refuse: it was read for this axis."""
 
-    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
+    def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
         """Finds what became of the earlier model, and fits it with a check run.
 
         Args:
-            samples: Cleaned samples of the check run.
-            own: Their scaling.
-            serial: The unit's.
+            samples: Of the check run.
             seed: Of the Kohonen network.
             average_s: Averaging of RMS figures, s.
         """
-        alone, unit = seen_alone(samples, own)
+        alone, unit = seen_alone(samples)
         run = within(self, unit)
         found = revised(self, run, self.unaged)
         posterior = updated(found[0].prior, unit)  # what lies beyond the earlier envelope counts, too
-        map_of_both = network_of_posterior(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        map_of_both = network_of_posterior(samples, alone, unit, posterior, seed=seed, average_s=average_s)
         use = _use(self, posterior, found, run, None if isinstance(map_of_both, str) else map_of_both[1])
         if isinstance(map_of_both, str):
             text = f"The earlier model is not used: a map with it is refused: {map_of_both}."
@@ -107,82 +104,74 @@ class EarlierPrior(MapPrior):
         return Given(map_of_both, findings, because, prior=use, known=known_map(posterior))
 
 
-def stated_sigma_dph(rows: FloatArray, envelope: Envelope, between_dph: float, means: UnitMeans) -> float:
-    """1 sigma of a map as its table states it, RMS over the means of its calibration, deg/h.
+def posterior_of_process(process: Process, scaling: Scaling) -> MapPosterior:
+    """Return what the smooth map of a unit's recordings says of it.
 
     Args:
-        rows: 1 sigma in cells of the envelope, a row for each of dT/dt, T ascending, with the scatter of power-ons.
-        envelope: Ranges of T (C) and dT/dt (C/min).
-        between_dph: Standard deviation of the constant from power-on to power-on, deg/h, which is taken off.
-        means: Of its calibration.
+        process: The map, of the samples alone.
+        scaling: Their scaling.
     """
-    inputs = (means.temperature_c, means.slope_c_per_min)
-    i, j = (
-        np.clip(((x - low) / max(high - low, 1e-9) * n).astype(int), 0, n - 1)
-        for x, (low, high), n in zip(inputs, envelope, rows.shape[::-1], strict=True)
+    model = process.model
+    assert isinstance(model, GaussianMap)
+    every = PriorBasis.of(model.basis, scaling)
+    rest = np.append(CONSTANT, model.p[: model.structure.map_parameters])
+    told = np.diagonal(sum_of(model.power_ons).products) / model.sigma**2
+    counts = every.variance(rest) * told > LEAST_RATIO
+    counts[:FEW] = True
+    root = model.factor[counts]
+    prior = MapPrior(
+        basis=every.only(counts),
+        center_dph=process.center,
+        unit_dph=process.spread,
+        temperature_c=scaling.temperature_c,
+        slope_c_per_min=scaling.slope_c_per_min,
+        means=model.coefficients[counts][None],
+        covariances=(root @ root.T)[None],
+        share=np.ones(1),
+        rest=rest,
+        asked=_asked(process, scaling, model),
+        freedom=np.inf,
+        own=model.scatter,
     )
-    variance = float(np.average(rows[j, i] ** 2, weights=means.count)) - between_dph**2
-    return float(np.sqrt(max(variance, 0.0)))
+    return prior.alone()
 
 
-def posterior_of_means(
-    means: UnitMeans, envelope: Envelope, between_dph: float, stated_dph: float = 0.0
-) -> MapPosterior:
-    """What recordings of a unit say of its map, the smoothness of which they tell themselves.
-
-    Args:
-        means: Of its calibration.
-        envelope: Ranges of T (C) and dT/dt (C/min).
-        between_dph: Standard deviation of its constant from power-on to power-on, deg/h.
-        stated_dph: 1 sigma of the map as its table states it (`stated_sigma_dph`), which runs left out have calibrated:
-            a posterior that claims less is widened to it.
-    """
-    center = float(np.average(means.bias_dph, weights=means.count))
-    unit = float(np.sqrt(np.average((means.bias_dph - center) ** 2, weights=means.count))) or 1.0
-    basis = LotBasis.over(*envelope)
-    sums = sums_of([means], basis, center, unit)
-    rest = PRIOR_LOG.copy()
-    rest[0] = CONSTANT
-    for number in range(_ROUNDS + 1):
-        covariance = np.linalg.inv(np.diag(1.0 / basis.variance(rest)) + sums.precision[0])
-        mean = covariance @ sums.moment[0]
-        if number == 0:
-            used = that_count(sums, basis.variance(rest))
-            basis, sums = basis.only(used), sums.only(used)
-        elif number < _ROUNDS:
-            rest = fitted_parameters(basis, mean**2 + np.diag(covariance), 1.0, rest, free=False)
-    asked = Asked(means.temperature_c, means.slope_c_per_min, means.count / means.count.sum(), between_dph)
-    prior = MapPrior(basis, center, unit, *envelope, mean[None], covariance[None], np.ones(1), rest, asked, np.inf)
-    known = prior.alone()
-    wider = max(1.0, (stated_dph / known.rms_sigma_dph()) ** 2)
-    return replace(known, covariance=wider * covariance)
+def _asked(process: Process, scaling: Scaling, model: GaussianMap) -> Asked:
+    """Return where the recordings were, by cells of the envelope."""
+    bins = process.bins
+    number = [np.floor(0.5 * (x + 1.0) * n).astype(np.int64) for x, n in zip((bins.t, bins.r), _CELLS, strict=True)]
+    _, cell = np.unique(np.column_stack(number), axis=0, return_inverse=True)
+    share = np.bincount(cell.ravel(), bins.count)
+    t, r = (np.bincount(cell.ravel(), bins.count * x) / share for x in (bins.t, bins.r))
+    places = scaling.center_c + scaling.half_range_c * t, scaling.half_range_c_per_min * r
+    known = model.structure.own > 0
+    between = process.spread * float(np.sqrt(model.scatter[0])) if known else None
+    return Asked(*places, share / share.sum(), between, len(model.power_ons) - 1 if known else None)
 
 
-def posterior_of_result(training: Training, model: Model, where: Path) -> MapPosterior:
-    """What is known of a unit's map by its result, `training` being read from `where`.
+def posterior_of_result(training: Training, where: Path) -> MapPosterior:
+    """Return what is known of a unit's map by its result, `training` being read from `where`.
 
     Raises:
         InputError: It does not say enough.
     """
-    if training.known is not None:
-        return posterior_of_known(training.known, str(where))
-    means = means_of(training.means, where)
-    envelope = model.envelope.temperature_c, model.envelope.slope_c_per_min
-    between, table = model.between_dph, model.uncertainty_dph
-    stated = stated_sigma_dph(np.array(table.rows), envelope, between, means) if table else 0.0
-    return posterior_of_means(means, envelope, between, stated)
+    if training.known is None:
+        raise InputError(
+            f"{where}, field known",
+            "is missing (an extended model, or an earlier gyrotc)",
+            "a result of `gyrotc build` without added terms: give that command again",
+        )
+    return posterior_of_known(training.known, str(where))
 
 
 def widened(
     posterior: MapPosterior, ageing_dph: float, ageing_from: str, model_hash: str, date: str | None
 ) -> EarlierPrior:
-    """An earlier posterior as the prior of today: ageing is added, and the constant of another power-on."""
-    old = posterior.prior
+    """Return an earlier posterior as the prior of today: ageing is added."""
+    old, unaged = posterior.prior, posterior.covariance
     moved = PRIOR_LOG.copy()
-    sizes = np.array([1.0, _LEAST, _SHAPE, _LEAST]) * ageing_dph / old.unit_dph
-    moved[[0, 1, 3, 5]] = np.log(np.maximum(sizes, _LEAST))
-    unaged = posterior.covariance.copy()
-    unaged[0, 0] += (old.asked.between_dph / old.unit_dph) ** 2
+    sizes = np.array([1.0, _SHAPE, _SHAPE, _LEAST, _LEAST, _LEAST]) * ageing_dph / old.unit_dph
+    moved[[0, 1, 2, 3, 4, 6]] = np.log(np.maximum(sizes, _LEAST))
     covariance = unaged + np.diag(old.basis.variance(moved) if ageing_dph else 0.0 * posterior.mean)
     return EarlierPrior(
         basis=old.basis,
@@ -196,6 +185,7 @@ def widened(
         rest=old.rest,
         asked=old.asked,
         freedom=np.inf,
+        own=old.own,
         model_hash=model_hash,
         date=date,
         ageing_dph=ageing_dph,
@@ -210,15 +200,17 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
     Raises:
         InputError: The file contradicts itself.
     """
-    basis = LotBasis.read(known.functions)
-    lower = triangle(known.covariance, len(basis.kept), f"{where}, known")
-    covariance = lower + np.tril(lower, -1).T
+    basis = PriorBasis.read(known.functions)
+    lower = triangle(known.root, len(basis.kept), f"{where}, known, root")
     asked = [np.array(x) for x in (known.asked_temperature_c, known.asked_slope_c_per_min, known.asked_share)]
     if len({len(x) for x in asked}) != 1 or not (asked[2].size and asked[2].min() >= 0.0 < asked[2].sum()):
         raise InputError(f"{where}, known, asked_share", "lists that do not go together", "a share for each place")
     if len(known.mean) != len(basis.kept):
         raise InputError(f"{where}, known, mean", f"{len(known.mean)} numbers", f"{len(basis.kept)}, one a function")
-    check_positive(covariance, f"{where}, known")
+    own = np.array(known.own, dtype=np.float64)
+    if len(own) > min(len(basis.kept), FEW):
+        raise InputError(f"{where}, known, own", f"{len(own)} numbers", f"{FEW} at most, one a coefficient")
+    between = known.unit_dph * float(own[0]) if len(own) else None
     prior = MapPrior(
         basis=basis,
         center_dph=known.center_dph,
@@ -226,11 +218,12 @@ def posterior_of_known(known: KnownMap, where: str) -> MapPosterior:
         temperature_c=known.temperature_c,
         slope_c_per_min=known.slope_c_per_min,
         means=np.array(known.mean)[None],
-        covariances=covariance[None],
+        covariances=(lower @ lower.T)[None],
         share=np.ones(1),
         rest=processed(known.rest),
-        asked=Asked(asked[0], asked[1], asked[2], known.between_dph),
+        asked=Asked(asked[0], asked[1], asked[2], between, known.own_freedom),
         freedom=np.inf,
+        own=own**2,
     )
     return prior.alone()
 

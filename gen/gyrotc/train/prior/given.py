@@ -5,10 +5,30 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...results.fleet import KnownMap, LotUse
 from ...results.training import EarlierUse
 from ..data import Scaling, TrainingData
 from ..result import Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class UnitSamples:
+    """What was recorded of a unit.
+
+    Attributes:
+        cleaned: Its samples.
+        scaling: Their scaling.
+        power_on: Number of the power-on of each run, by its index; None: each run is one.
+        serial: The unit's, to tell whether a lot has seen it.
+    """
+
+    cleaned: TrainingData
+    scaling: Scaling
+    power_on: NDArray[np.int64] | None
+    serial: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +61,10 @@ class Prior(Protocol):
     def check_axis(self, axis: str | None) -> None:
         """Raises InputError where it is not of this axis."""
 
-    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
-        """Tests whether cleaned samples agree with it, and makes a map of both if they do.
+    def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
+        """Tests whether samples agree with it, and makes a map of both if they do.
 
         Args:
-            own: Scaling of the samples.
-            serial: The unit's.
             seed: Of the Kohonen network.
             average_s: Averaging of RMS figures, s.
         """

@@ -24,7 +24,7 @@ from scipy.special import fdtrc, gammaincc
 from ..._core import posteriors
 from ...common.arrays import FloatArray
 from ...common.progress import Progress, Stages
-from .basis import CONSTANT, PRIOR_LOG, LotBasis, fitted_parameters
+from .basis import CONSTANT, PRIOR_LOG, PriorBasis
 from .unit_means import UnitMeans
 
 FALSE_ALARM = 0.01  # of the test: docs/lot.md
@@ -124,7 +124,7 @@ class LotState:
         evidence: Log evidence of the units, up to a constant of the recordings.
     """
 
-    basis: LotBasis
+    basis: PriorBasis
     directions: FloatArray
     rest: FloatArray
     of_mean: FloatArray
@@ -148,7 +148,12 @@ class LotState:
 
 
 def fitted(
-    units: UnitSums, basis: LotBasis, rank: int, cluster: NDArray[np.int64], rounds: int, start: LotState | None = None
+    units: UnitSums,
+    basis: PriorBasis,
+    rank: int,
+    cluster: NDArray[np.int64],
+    rounds: int,
+    start: LotState | None = None,
 ) -> LotState:
     """Expectation and maximisation over a number of rounds; clusters stay as given."""
     first = PRIOR_LOG.copy()
@@ -182,11 +187,11 @@ def _round(units: UnitSums, state: LotState, rank: int, *, fit: bool) -> LotStat
         cross = second @ back.T
         directions = np.linalg.solve(scores, cross.T).T
         left = (np.diag(second) - np.sum(directions * cross, axis=1)) / n
-    rest = fitted_parameters(basis, left, n, rest)
+    rest = basis.fitted_parameters(left, n, rest)
     of_mean = state.of_mean
     if fit:
         squares = (state.means**2 + np.diagonal(state.covariances, axis1=1, axis2=2)).mean(axis=0)
-        of_mean = fitted_parameters(basis, squares, len(state.means), of_mean, free=False)
+        of_mean = basis.fitted_parameters(squares, len(state.means), of_mean, free=False)
     return replace(state, directions=directions, rest=rest, of_mean=of_mean)
 
 
@@ -254,7 +259,8 @@ _LEAST_IN_CLUSTER = 3  # units: as for a lot
 _ROUNDS = (8, 16, 20)  # with all functions, with those that count, for each model: the evidence changes by < 1 then
 _SAMPLE = 256  # units at most that say which functions count: a variance from so many is known to a tenth
 _AGAIN = 6  # rounds of a model that starts from another of nearly the same units
-_COUNTS = 1e-3  # signal-to-noise ratio below which a function says nothing
+LEAST_RATIO = 1e-3
+"""Variance of a coefficient over that of its noise: with less, recordings say nothing of it."""
 _FOLDS = 5  # each leaves four fifths of the units, enough to stand for the lot
 _STARTS = 8  # of the search for clusters
 _REFINED = 2  # partitions whose units may change clusters: of many units every start gives another one
@@ -303,7 +309,7 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progre
     count = np.concatenate([u.count for u in units])
     center = float(np.average(bias, weights=count))
     unit = float(np.sqrt(np.average((bias - center) ** 2, weights=count))) or 1.0
-    every = LotBasis.over(*envelope)
+    every = PriorBasis.over(*envelope)
     say = Stages(progress, _STAGES)
     say("smoothness of the maps")
     sample = sums_of(units[:: -(-len(units) // _SAMPLE)], every, center, unit)
@@ -325,7 +331,7 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progre
     return Learned(state, center, unit, scale, inside, p, left)
 
 
-def sums_of(units: Sequence[UnitMeans], basis: LotBasis, center: float, unit: float) -> UnitSums:
+def sums_of(units: Sequence[UnitMeans], basis: PriorBasis, center: float, unit: float) -> UnitSums:
     """What recordings say of the coefficients, in units of the lot."""
     n = len(basis.kept)
     precision, moment = np.empty((len(units), n, n)), np.empty((len(units), n))
@@ -340,12 +346,12 @@ def sums_of(units: Sequence[UnitMeans], basis: LotBasis, center: float, unit: fl
 def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:
     """Which functions of a process with these variances recordings say anything of."""
     most = np.diagonal(sums.precision, axis1=1, axis2=2).max(axis=0)
-    used = variance * most > _COUNTS
+    used = variance * most > LEAST_RATIO
     used[0] = True
     return np.asarray(used)
 
 
-def _chosen(sums: UnitSums, basis: LotBasis, say: Progress) -> LotState:
+def _chosen(sums: UnitSums, basis: PriorBasis, say: Progress) -> LotState:
     """The model with the largest evidence, each direction paid for by half the logarithm of the units a number."""
     together = np.zeros(len(sums), dtype=np.int64)
     plain = fitted(sums, basis, 0, together, _ROUNDS[1])

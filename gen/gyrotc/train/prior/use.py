@@ -21,8 +21,8 @@ from ..mrbf import fit_mrbf
 from ..objection import objection_to
 from ..process import MEAN_S, Asked, Process, fit_process
 from ..result import Outcome
-from .basis import PARAMETERS, LotBasis
-from .given import Given
+from .basis import PARAMETERS, PriorBasis
+from .given import Given, UnitSamples
 from .learn import FALSE_ALARM, evidence, freedom_of, p_value, scores, student_variance, sums_of
 from .unit_means import UnitMeans, means_of_unit
 
@@ -42,9 +42,10 @@ class MapPrior:
         rest: Log parameters of the smooth process of what is a unit's own (`basis.PARAMETERS`).
         asked: Where corrections are asked for.
         freedom: Degrees of freedom of the spread.
+        own: Variances of what a power-on has of its own, of the first coefficients; empty: they are not known.
     """
 
-    basis: LotBasis
+    basis: PriorBasis
     center_dph: float
     unit_dph: float
     temperature_c: tuple[float, float]
@@ -55,6 +56,7 @@ class MapPrior:
     rest: FloatArray
     asked: Asked
     freedom: float
+    own: FloatArray
 
     def with_runs(self, unit: UnitMeans) -> MapPosterior:
         """What prior and recordings of a unit say together, and how far the unit is from the prior."""
@@ -137,14 +139,14 @@ def file_numbers(values: FloatArray) -> tuple[float, ...]:
 
 
 def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> FloatArray:
-    """The lower triangle that a file holds row by row, shape (n, n).
+    """The lower triangle that a field of a file holds row by row, shape (n, n).
 
     Raises:
         InputError: A row has another length.
     """
     lower = np.zeros((n, n))
     if [len(row) for row in rows] != list(range(1, n + 1)):
-        raise InputError(f"{where}, covariance", "rows of other lengths", f"a lower triangle of {n} rows")
+        raise InputError(where, "rows of other lengths", f"a lower triangle of {n} rows")
     for k, row in enumerate(rows):
         lower[k, : k + 1] = row
     return lower
@@ -180,7 +182,7 @@ class _PosteriorMap:
     @property
     def scales(self) -> tuple[float, float]:
         """Shortest scales of what a unit differs by, which are those of the lot's rest; normalised."""
-        _, _, short, _, _, _, of_t, of_r = np.exp(self.posterior.prior.rest)
+        _, _, _, _, _, short, _, of_t, of_r = np.exp(self.posterior.prior.rest)
         basis = self.posterior.prior.basis
         by_t = basis.half_range_c / self.scaling.half_range_c
         by_r = basis.half_range_c_per_min / self.scaling.half_range_c_per_min
@@ -192,7 +194,7 @@ class _PosteriorMap:
     def roots(self, t: FloatArray, r: FloatArray) -> FloatArray:
         prior = self.posterior.prior
         values = prior.basis.values(*self._physical(t, r))
-        return np.asarray(prior.unit_dph / self.spread * values @ np.linalg.cholesky(self.posterior.covariance))
+        return np.asarray(prior.unit_dph / self.spread * values @ square_root(self.posterior.covariance))
 
     def _physical(self, t: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         s = self.scaling
@@ -222,17 +224,16 @@ class LotPrior(MapPrior):
         if self.lot.axis != axis:
             raise InputError("--lot", f"of axis {self.lot.axis}", f"a lot of axis {axis}, as the recordings")
 
-    def with_samples(self, samples: TrainingData, own: Scaling, serial: str, *, seed: int, average_s: float) -> Given:
+    def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
         """Tests whether a unit fits its lot, and fits it with the lot if it does.
 
         Args:
-            samples: Cleaned samples of the unit.
-            own: Their scaling.
-            serial: The unit's serial: one of the lot is reported.
+            samples: Of the unit; if its serial is one of the lot, this is reported.
             seed: Of the Kohonen network.
             average_s: Averaging of RMS figures, s.
         """
-        alone, unit = seen_alone(samples, own)
+        own, serial = samples.scaling, samples.serial
+        alone, unit = seen_alone(samples)
         posterior = self.with_runs(unit)
         if posterior.p_value < FALSE_ALARM:
             use = _use(self, posterior, serial, accepted=False, scaling=own)
@@ -243,7 +244,7 @@ class LotPrior(MapPrior):
             )
             evidence = {"p_value": use.p_value, "false_alarm": use.false_alarm, "lot": use.checksum}
             return Given(None, [{"id": "not_of_its_lot", "text": text, "evidence": evidence}], lot=use)
-        found = network_of_posterior(samples, own, alone, unit, posterior, seed=seed, average_s=average_s)
+        found = network_of_posterior(samples, alone, unit, posterior, seed=seed, average_s=average_s)
         if isinstance(found, str):
             use = _use(self, posterior, serial, accepted=False, scaling=own)
             text = f"The lot is not used: a map with it is refused: {found}."
@@ -258,7 +259,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
     Raises:
         InputError: The file contradicts itself: lengths that differ, a covariance that is none.
     """
-    basis = LotBasis.read(lot.functions)
+    basis = PriorBasis.read(lot.functions)
     kept = basis.kept
     directions = np.array(lot.directions, dtype=np.float64).reshape(-1, len(kept)) if kept.size else np.zeros((0, 0))
     rest = np.diag(basis.variance(processed(lot.rest))) + directions.T @ directions
@@ -281,6 +282,7 @@ def prior_of(lot: Lot, where: str = "lot.json") -> LotPrior:
         rest=processed(lot.rest),
         asked=_asked(lot, where),
         freedom=freedom,
+        own=np.array([(lot.between_dph / lot.unit_dph) ** 2]),
         lot=lot,
     )
 
@@ -291,7 +293,7 @@ def _of_clusters(lot: Lot, scale: float, rest: FloatArray, where: str) -> tuple[
     means, covariances = [], []
     for number, cluster in enumerate(lot.clusters):
         at = f"{where}, clusters, {number}"
-        lower = triangle(cluster.covariance, n, at)
+        lower = triangle(cluster.covariance, n, f"{at}, covariance")
         if len(cluster.mean) != n:
             raise InputError(f"{at}, mean", f"{len(cluster.mean)} numbers", f"{n}, one a function")
         covariance = scale * (rest + lower + np.tril(lower, -1).T)
@@ -318,8 +320,7 @@ def _centers(span: tuple[float, float], n: int) -> FloatArray:
 
 
 def network_of_posterior(
-    samples: TrainingData,
-    own: Scaling,
+    samples: UnitSamples,
     alone: Process | None,
     unit: UnitMeans,
     posterior: MapPosterior,
@@ -330,30 +331,31 @@ def network_of_posterior(
     """The network that follows a posterior over the envelopes of prior and unit, or why it must not be used.
 
     Args:
-        samples: Cleaned samples of the unit.
-        own: Their scaling.
+        samples: Of the unit.
         alone: The process of the unit alone, for its outliers.
         unit: The unit's means.
         posterior: What prior and means say together.
         seed, average_s: As for `fit`.
     """
-    scaling = _over_both(own, posterior.prior)
-    process = _process(samples, scaling, alone, unit, posterior)
+    cleaned, scaling = samples.cleaned, _over_both(samples.scaling, posterior.prior)
+    process = _process(cleaned, scaling, alone, unit, posterior)
     try:
-        outcome = fit_mrbf(samples, scaling, seed=seed, centers=None, average_s=average_s, process=process)
-        against = objection_to(outcome, samples, scaling, average_s)
+        outcome = fit_mrbf(cleaned, scaling, seed=seed, centers=None, average_s=average_s, process=process)
+        against = objection_to(outcome, cleaned, scaling, average_s)
     except TrainingFailed as failure:
         return str(failure)
     return against or (outcome, scaling)
 
 
-def seen_alone(samples: TrainingData, own: Scaling) -> tuple[Process | None, UnitMeans]:
-    """The process of a unit alone, None where it cannot be solved, and the unit's means."""
+def seen_alone(samples: UnitSamples) -> tuple[Process | None, UnitMeans]:
+    """The process of a unit alone, None where it cannot be solved, and the unit's means, those of each power-on."""
+    cleaned, scaling, power_on = samples.cleaned, samples.scaling, samples.power_on
+    number = np.arange(int(cleaned.run.max()) + 1) if power_on is None else power_on
     try:
-        alone = fit_process(samples, own)
+        alone = fit_process(cleaned, scaling, number)
     except TrainingFailed:
         alone = None
-    return alone, means_of_unit(samples, own, alone)[0]
+    return alone, means_of_unit(cleaned, scaling, alone, number)[0]
 
 
 def _over_both(own: Scaling, prior: MapPrior) -> Scaling:
@@ -459,10 +461,23 @@ def known_map(posterior: MapPosterior) -> KnownMap:
         unit_dph=prior.unit_dph,
         functions=basis.result(),
         mean=file_numbers(posterior.mean),
-        covariance=tuple(file_numbers(row[: k + 1]) for k, row in enumerate(posterior.covariance)),
+        root=tuple(file_numbers(row[: k + 1]) for k, row in enumerate(_lower_root(posterior.covariance))),
         rest=process_result(prior.rest),
         asked_temperature_c=file_numbers(asked.temperature_c),
         asked_slope_c_per_min=file_numbers(asked.slope_c_per_min),
         asked_share=file_numbers(asked.share),
-        between_dph=asked.between_dph,
+        own=file_numbers(np.sqrt(prior.own)),
+        own_freedom=asked.freedom,
     )
+
+
+def square_root(covariance: FloatArray) -> FloatArray:
+    """Return a square root of a covariance, whose smallest variances may be lost in rounding."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _lower_root(covariance: FloatArray) -> FloatArray:
+    """Return the square root that is a lower triangle."""
+    upper = np.asarray(np.linalg.qr(square_root(covariance).T, mode="r"))
+    return np.asarray(upper.T)
