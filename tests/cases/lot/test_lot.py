@@ -175,7 +175,7 @@ def test_a_stranger_is_reported_and_calibrated_without_the_lot() -> None:
     assert coverage(data, with_lot) == coverage(data, alone)
 
 
-@pytest.mark.parametrize(("distance", "accepted"), [(0.3, True), (0.35, False)])
+@pytest.mark.parametrize(("distance", "accepted"), [(0.25, True), (0.29, False)])
 def test_one_in_a_hundred_of_its_units_is_a_stranger_to_a_lot(distance: float, accepted: bool) -> None:
     _, prior, _ = family(11)
     own = distance * np.array([2e-3, -2e-3, 1e-3, 0.0, 1e-3])
