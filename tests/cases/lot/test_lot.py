@@ -221,7 +221,7 @@ def test_a_unit_that_stands_apart_is_set_aside_and_named() -> None:
     assert lot.units[4].cluster is None and "U4" in lot.text
 
 
-@pytest.mark.parametrize(("distance", "inside"), [(6.0, True), (7.0, False)])
+@pytest.mark.parametrize(("distance", "inside"), [(5.5, True), (6.0, False)])
 def test_of_twenty_units_one_is_set_aside_at_a_twentieth_of_the_level(distance: float, inside: bool) -> None:
     """The level of 1 % is that of a lot, not of each of its units: one of a hundred clean units is below it."""
     rng = np.random.default_rng(41)
