@@ -162,28 +162,20 @@ class _Scale:
             power = float(small @ small)
             alike = min(max(float(small[1:] @ small[:-1]) / power, 0.0), 0.9) if power > 0.0 else 0.0
             share = (1.0 - alike) / (1.0 + alike)
-        found, open_at, carried, peak = list[tuple[int, int]](), -1, 0.0, 0.0
+        regions, carried = list[tuple[int, int, float]](), 0.0
         for start in range(0, len(self._z), _PART):
-            score = self._scores(start, start + _PART, share)
-            total = carried + np.cumsum(score)
+            total = carried + np.cumsum(self._scores(start, start + _PART, share))
             height = total - np.minimum(np.minimum.accumulate(total), 0.0)
-            inside = height > 0.0
-            edges = np.flatnonzero(np.diff(np.r_[open_at >= 0, inside].astype(np.int8)))
-            bounds = np.r_[0, edges, len(score)]
-            for a, b in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
-                if a == b:
-                    continue
-                if not inside[a]:
-                    if open_at >= 0 and peak > of_one:
-                        found.append((open_at, start + a))
-                    open_at, peak = -1, 0.0
-                    continue
-                if open_at < 0:
-                    open_at = start + a
-                peak = max(peak, float(height[a:b].max()))
-            carried = float(height[-1])
-        if open_at >= 0 and peak > of_one:
-            found.append((open_at, len(self._z)))
+            carried, inside = float(height[-1]), height > 0.0
+            first = np.flatnonzero(inside & ~np.r_[False, inside[:-1]])
+            end = np.flatnonzero(inside & ~np.r_[inside[1:], False]) + 1
+            peak = np.maximum.reduceat(height, first) if len(first) else height[:0]
+            for k in np.flatnonzero((peak > of_one) | (first == 0) | (end == len(height))).tolist():
+                one = int(first[k]) + start, int(end[k]) + start, float(peak[k])
+                if regions and regions[-1][1] == one[0]:  # it goes on from the part before
+                    one = regions[-1][0], one[1], max(regions.pop()[2], one[2])
+                regions.append(one)
+        found = [(first, end) for first, end, peak in regions if peak > of_one]
         return [one for first, end in found for one in _cut(self._scores(first, end, share), first, cost, of_one)]
 
     def _scores(self, first: int, end: int, share: float) -> FloatArray:
