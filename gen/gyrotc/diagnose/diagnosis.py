@@ -227,7 +227,7 @@ def _as_emitted(
 ) -> Extension:
     """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
     exam = [run for run in dataset.runs if run.role == "exam"]
-    if extended is None or not refitting.exam:
+    if extended is None or extension.measured_on != "exam":
         return extension
     plain = fit_dataset(dataset, options, read=refitting.read()).model
     before, after = emitted_means((plain, extended), exam, options.average_s)

@@ -1,7 +1,7 @@
 """The compensation model extended with the named causes: the map beside their terms, and what it gains.
 
-Training runs decide what is shipped (`shipping`). Where there are test runs, they measure the gain; where there are
-none, parts of the training runs that are left out in turn.
+Training runs decide what is shipped (`shipping`). Where test runs have a mean, they measure the gain; else parts of the
+training runs that are left out in turn.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Extension:
     Attributes:
         steps: Gain of every cause, taken one after the other; None of one that cannot be corrected.
         total: Gain of all shipped causes together: on an exam that of the emitted tables; None if none is shipped.
-        rate_left_out: Gain with one ramp rate left out of everything, and its environment.
-        forward: Gain on runs later than everything that was learnt from; None without dates.
+        rate_left_out: Gain with one ramp rate left out of everything, and its environment; None without a mean of it.
+        forward: Gain on runs later than everything that was learnt from; None without dates or a mean of these runs.
         extended: Fit with the shipped causes, None if none is shipped.
         shipped: Effects of the extended model.
         crossed: The cross-validation on the training runs that decided so.
@@ -125,7 +125,8 @@ def extend(
     named = [Effect.of(c) for c in itertools.compress(causes, correctable)]
     effects = completed(refitting.train, named, refitting.arguments["power_on"])
     stages = [effects[:k] for k in range(len(effects) + 1)]
-    chain = refitting.on_exam(stages) if refitting.exam else _crossed(refitting, causes)
+    exam = _on_exam(refitting, stages)
+    chain = exam or _crossed(refitting, causes)
     if single_cycle and effects:  # found together: one alone is another model
         chain = [chain[0], *(chain[-1] for _ in effects)]
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
@@ -133,13 +134,13 @@ def extend(
     crossed = choose_shipped(refitting, effects, list(itertools.compress(probabilities, correctable)))
     shipped = crossed.shipped
     last = max((k for k, effect in enumerate(effects) if effect in shipped), default=-1)
-    total = gain_of(chain[0], chain[last + 1], floor, average_s) if shipped and not refitting.exam else None
+    total = gain_of(chain[0], chain[last + 1], floor, average_s) if shipped and not exam else None
     numbers = [k for k, able in enumerate(correctable) if able]
     return Extension(
         steps=tuple(next(steps) if able else None for able in correctable),
         total=total,
         rate_left_out=_rate_left_out(refitting, causes, floor) if effects else None,
-        forward=_forward(refitting, chain, causes, floor) if effects else None,
+        forward=_forward(refitting, exam, causes, floor) if effects else None,
         extended=refitting.fit(shipped) if shipped else None,
         shipped=tuple(shipped),
         crossed=crossed,
@@ -150,7 +151,7 @@ def extend(
         lot=refitting.fit(shipped).lot,
         baseline_rms=_rms(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,
-        measured_on="exam" if refitting.exam else "left out",
+        measured_on="exam" if exam else "left out",
         before=chain[0],
         after=chain[-1],
     )
@@ -165,10 +166,20 @@ def _rms(runs: Sequence[Averages]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([r.after_dph for r in runs]) ** 2)))
 
 
+def _on_exam(refitting: Refitting, stages: Sequence[Sequence[Effect]]) -> Chain | None:
+    """Residuals of the exam runs; None where no mean of them has a known input beside all effects."""
+    chain = refitting.on_exam(stages) if refitting.exam else [[]]
+    return chain if _has_means(chain) else None
+
+
+def _has_means(chain: Chain) -> bool:
+    return any(run.after_dph.size for run in chain[0])
+
+
 def _crossed(refitting: Refitting, causes: Sequence[Refined]) -> Chain:
     """Every training run (or branch of few runs) left out in turn, in a few groups."""
     chains = [refitting.left_out(held, causes) for held in held_out_masks(refitting)]
-    if not any(run.after_dph.size for stages in chains for run in stages[0]):
+    if not any(map(_has_means, chains)):
         return [_score_self(refitting)] * (sum(map(is_corrected, causes)) + 1)
     return [[run for stage in stages for run in stage] for stages in zip(*chains, strict=True)]
 
@@ -189,18 +200,23 @@ def _rate_left_out(refitting: Refitting, causes: Sequence[Refined], floor: float
         return None
     fastest = max(moving, key=lambda e: speeds[e])
     held = [np.full(len(r.data.bias_dph), r.environment == fastest, dtype=bool) for r in refitting.train]
-    return fastest, _gain_without(refitting, held, causes, floor)
+    gain = _gain_without(refitting, held, causes, floor)
+    return (fastest, gain) if gain else None
 
 
-def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floor: float) -> GainOnUnseen | None:
-    """Later runs from earlier ones: the exam where it came last, else the last third of the training runs."""
+def _forward(refitting: Refitting, exam: Chain | None, causes: Sequence[Refined], floor: float) -> GainOnUnseen | None:
+    """Later runs from earlier ones: the exam where it came last, else the last third of the training runs.
+
+    Args:
+        exam: Residuals of the exam runs; None where these have no mean.
+    """
     days = [run.day for run in refitting.train]
-    later = [run.day for run in refitting.exam]
+    later = [run.day for run in refitting.exam] if exam else []
     if any(d is None for d in (*days, *later)) or len(days) < FOLDS:
         return None
     known = [float(d) for d in days if d is not None]
-    if later and min(float(d) for d in later if d is not None) > max(known):
-        return gain_of(chain[0], chain[-1], floor, refitting.average_s)
+    if exam and min(float(d) for d in later if d is not None) > max(known):
+        return gain_of(exam[0], exam[-1], floor, refitting.average_s)
     cut = float(np.quantile(known, _LEARNT))
     held = [np.full(len(r.data.bias_dph), d > cut, dtype=bool) for r, d in zip(refitting.train, known, strict=True)]
     if not any(m.any() for m in held) or sum(not m.any() for m in held) < 2:
@@ -208,7 +224,11 @@ def _forward(refitting: Refitting, chain: Chain, causes: Sequence[Refined], floo
     return _gain_without(refitting, held, causes, floor)
 
 
-def _gain_without(refitting: Refitting, held: list[BoolArray], causes: Sequence[Refined], floor: float) -> GainOnUnseen:
-    """Gain of all causes on held-out training samples."""
+def _gain_without(
+    refitting: Refitting, held: list[BoolArray], causes: Sequence[Refined], floor: float
+) -> GainOnUnseen | None:
+    """Gain of all causes on held-out training samples; None where these have no whole mean."""
     chain = refitting.left_out(held, causes)
+    if not _has_means(chain):
+        return None
     return gain_of(chain[0], chain[-1], floor, refitting.average_s)

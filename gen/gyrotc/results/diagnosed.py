@@ -158,9 +158,11 @@ class ExtendedModel(Part):
     gain: GainOnUnseen = Field(description="gain over the static map")
     rate_left_out: WithoutRate | None = Field(
         description="gain on the environment with the fastest temperature, left out of everything; null if there is "
-        "one environment"
+        "one environment, or no whole mean of it"
     )
-    forward_in_time: GainOnUnseen | None = Field(description="gain on runs later than all training; null without dates")
+    forward_in_time: GainOnUnseen | None = Field(
+        description="gain on runs later than all training; null without dates, or without a whole mean of these runs"
+    )
 
 
 class DetectionLimit(Part):

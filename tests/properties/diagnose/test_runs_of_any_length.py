@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from drawn import examples
 from gyrotc.causes import CATALOGUE, History
 from gyrotc.diagnose import diagnose, records_of
+from gyrotc.mirror import first_order
 from gyrotc.quality import Change, WalkNoise, found_events
 from gyrotc.recordings import load
 from gyrotc.results import Diagnosed
+from gyrotc.train import FitOptions
 from hypothesis import given
 from hypothesis import strategies as st
 from recordings import Columns, changes_in, toml, write_csv
@@ -146,6 +149,44 @@ def test_samples_too_few_for_a_mean_when_left_out_are_scored_themselves(tmp_path
         run["temperature_c"] = 20.0 + 0.05 * run["time_s"]
     found = diagnose(load(written(tmp_path, *runs))).result
     assert found.baseline is None or np.isfinite(found.baseline.exam_rms_dph)
+
+
+SLOW = (((0.0, 20.0), (2.5, 60.0), (5.5, -20.0), (8.0, 20.0)), ((0.0, -20.0), (2.0, 40.0), (4.5, 60.0), (8.0, 0.0)))
+
+FAST = ((0.0, 20.0), (0.15, 60.0), (0.4, 20.0))
+
+
+def ramps(rng: np.random.Generator, corners: Sequence[tuple[float, float]], late_s: float, lag_dph: float) -> Columns:
+    """Temperatures through (h, C), which are stamped late, and a bias that follows them also with a lag of 900 s."""
+    hours, corners_c = zip(*corners, strict=True)
+    time = np.arange(0.0, 3600.0 * hours[-1], 10.0)
+    temperature = np.interp(time / 3600.0, hours, corners_c)
+    seen = np.interp((time + late_s) / 3600.0, hours, corners_c)
+    lag = first_order(900.0, time, temperature) - temperature
+    rate = 0.01 + 2e-3 * seen + lag_dph * lag + 1e-3 * rng.standard_normal(time.size)
+    return {"time_s": time, "temperature_c": temperature, "rate_dph": rate}
+
+
+def test_a_fastest_environment_without_a_whole_mean_gives_no_gain(tmp_path: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    folder = written(tmp_path, *(ramps(rng, one, 0.0, 1e-3) for one in (*SLOW, *SLOW, FAST)))
+    text = (tmp_path / "dataset.toml").read_text("utf-8")
+    (tmp_path / "dataset.toml").write_text(text.replace('"4.csv"', '"4.csv"\nenvironment = "fast"'), "utf-8")
+    found = diagnose(load(folder), options=FitOptions(average_s=3600.0))
+    assert [cause.id for cause in found.result.physical] == ["thermal_gradient"]
+    assert found.extension is not None and found.extension.rate_left_out is None
+
+
+def test_a_test_run_without_a_whole_mean_beside_the_cause_measures_no_gain(tmp_path: Path) -> None:
+    """Temperatures are known 40 s later only: of 320 s too few are left for half of a mean over 600 s."""
+    rng = np.random.default_rng(SEED)
+    short = ((0.0, 20.0), (0.09, 22.0))
+    folder = written(tmp_path, *(ramps(rng, one, 40.0, 0.0) for one in (*SLOW, FAST, short)))
+    text = (tmp_path / "dataset.toml").read_text("utf-8")
+    (tmp_path / "dataset.toml").write_text(text.replace('"3.csv"', '"3.csv"\nrole = "exam"'), "utf-8")
+    found = diagnose(load(folder), options=FitOptions(average_s=600.0)).result
+    assert [cause.id for cause in found.physical] == ["time_misalignment"]
+    assert found.measured_on == "left out"
 
 
 @pytest.mark.parametrize(("clock_s", "since_s"), [(0.0, 0.0), (600.0, 600.0), (1e5, 0.0), (1e9, 0.0), (-1e5, 0.0)])
