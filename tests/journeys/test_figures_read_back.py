@@ -292,6 +292,28 @@ def test_the_bias_over_temperature_shows_each_branch_before_and_after(demo: Path
         assert first.pixels_off(line, line.x, expected) < 2 * NEAR
 
 
+def test_the_band_about_the_map_at_rest_is_u_of_the_cells_at_rest(demo: Path, panels: list[PanelRead]) -> None:
+    """Twice the sigma that the table states for dT/dt = 0, where training was and where it was not."""
+    model = load_model(demo / "result" / "model.json")
+    content = json.loads((demo / "result" / "model.json").read_text())
+    known, seen, spans = content["uncertainty_dph"], content["coverage"], content["envelope"]
+    t = np.linspace(*spans["temperature_c"], 160)
+
+    def cells_at_rest(rows: list[Any], cells: list[int]) -> list[Any]:
+        (t0, t1), (r0, r1) = spans["temperature_c"], spans["slope_c_per_min"]
+        row = int((0.0 - r0) / (r1 - r0) * cells[1])
+        return [rows[row][min(int((x - t0) / (t1 - t0) * cells[0]), cells[0] - 1)] for x in t]
+
+    covered = [cell == "1" for cell in cells_at_rest(seen["rows"], seen["cells"])]
+    trained, untrained = (cells_at_rest(known[name], known["cells"]) for name in ("rows", "uncovered"))
+    u = 2.0 * np.where(covered, trained, untrained)
+    assert max(map(max, known["rows"])) > 1.1 * u.min() / 2.0, "sigma differs between the cells"
+    (panel,) = (p for p in panels if p.title.startswith("before, less a constant"))
+    (band,) = (s for s in panel.series if s.kind == "band")
+    rest = model.map_dph(t, 0.0 * t) - model.fallback_dph
+    assert panel.pixels_off(band, np.r_[t, t[::-1]], np.r_[rest - u, (rest + u)[::-1]]) < 2 * NEAR
+
+
 def test_cuts_through_the_map_are_those_of_the_model(demo: Path, panels: list[PanelRead]) -> None:
     model = load_model(demo / "result" / "model.json")
     (cuts,) = (p for p in panels if p.title == "cuts through the map")

@@ -253,6 +253,20 @@ def test_figures_of_the_judged_runs_do_not_depend_on_their_order(plain: dict[str
     assert all(figures[0]) and figures[0] == pytest.approx(figures[1], rel=1e-9)
 
 
+@pytest.mark.parametrize("own", [True, False])
+def test_figures_of_left_out_runs_count_on_the_recordings_of_training_alone(
+    own: bool, plain: dict[str, Any], tmp_path: Path
+) -> None:
+    """One run of four is another; what training has shown of unseen history is true of the model, wherever it is."""
+    runs = {name: run for name, run in unit().items() if run[0] == "train"}
+    first, (_, rows) = next(iter(runs.items()))
+    if not own:
+        runs[first] = ("train", rows | {"rate_dph": rows["rate_dph"] + 1e-3})
+    found = evaluate(plain["out"], load(written(tmp_path / "RLG-1", runs)), compiled=False)
+    assert len(runs) > 1 and (found.left_out is not None) == own
+    assert plain["training"]["generalises"] is True and found.generalises is True
+
+
 def test_steps_that_differ_are_counted_over_all_runs(plain: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """The first step of each run is taken for one that differs."""
     replay_on = evaluation.replay_on
@@ -358,3 +372,14 @@ def test_what_is_not_stated_of_earths_rate_is_said_once(tmp_path: Path) -> None:
     page = (found["out"] / "report.html").read_text("utf-8")
     assert page.count("the model may take Earth") == 1 == page.count("Earth rate not stated")
     assert "the model may take Earth's rate for bias" in found["model"]["meta"]["warnings"][0]
+
+
+def test_what_no_finding_repeats_is_on_the_page_beside_earths_rate(tmp_path: Path) -> None:
+    runs = unit()
+    role, rows = runs["run-00.csv"]
+    runs["run-00.csv"] = (role, rows | {"supply_v": np.full(ROWS, 5.0)})
+    data = written(tmp_path / "RLG-1", runs)
+    text = (data / "dataset.toml").read_text()
+    (data / "dataset.toml").write_text(text.replace('earth_rate = "none"\n', ""))
+    page = (built(tmp_path, data)["out"] / "report.html").read_text("utf-8")
+    assert "channel supply_v is left out" in page and page.count("the model may take Earth") == 1

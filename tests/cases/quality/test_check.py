@@ -122,6 +122,20 @@ def test_gaps_are_counted_with_their_rows(tmp_path: Path) -> None:
     assert "1 gaps; 20 rows of 10 s are missing" in result.warnings[0].text
 
 
+@pytest.mark.parametrize("row_s", [0.1, 10.0])
+def test_noise_is_stated_of_a_row_and_of_the_root_of_an_hour(row_s: float, tmp_path: Path) -> None:
+    """White noise of so much a row has an angle random walk of as much times the root of the row in hours."""
+    table = columns(2000)
+    table["time_s"] = row_s * np.arange(2000)
+    table["rate_dph"] = 20.0 + np.random.default_rng(4).normal(0.0, 0.36, 2000)
+    write_csv(tmp_path / "R" / "a.csv", table)
+    (found,) = (line for line in check(tmp_path / "R").lines() if "deg/h a row" in line)
+    noise = re.search(r"noise (\S+) deg/h a row \((\S+) deg/sqrt\(h\)\)", found)
+    assert noise is not None, found
+    assert float(noise[1]) == pytest.approx(0.36, rel=0.1)
+    assert float(noise[2]) == pytest.approx(0.36 * np.sqrt(row_s / 3600.0), rel=0.1)
+
+
 @pytest.mark.parametrize("lost", [(), (500, 501, 502), (90, 700, 701, 2500)])
 def test_late_stamps_are_no_gaps(lost: tuple[int, ...], tmp_path: Path) -> None:
     """Rows of 5 ms with stamps that are off by up to 2 ms: the step from an early to a late one is up to 9 ms."""

@@ -66,6 +66,12 @@ def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
     assert lot.at_rest.temperature_c[0] == pytest.approx(lot.temperature_c[0], rel=1e-5)
 
 
+def test_the_scatter_of_power_ons_is_that_of_all_units(world: Path) -> None:
+    between = [load_model(path).between_dph for path in (world / "fleet").glob("LOT-*/model.json")]
+    assert len(between) == 5 and max(between) > 1.1 * min(between)
+    assert load_lot(world / "lot.json").between_dph == pytest.approx(np.sqrt(np.mean(np.square(between))), rel=1e-5)
+
+
 def test_how_many_units_were_left_out_is_said_with_the_reasons(world: Path, tmp_path: Path) -> None:
     fleet = Path(shutil.copytree(world / "fleet", tmp_path / "fleet"))
     shutil.copytree(fleet / "LOT-0005-002", fleet / "under another name")
