@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 import pytest
 from gyrotc.common import Averages
 from gyrotc.fleet import gyro_facts, reasons, step_in, summary_of
@@ -127,6 +128,15 @@ def test_what_fades_after_a_power_on_has_its_amplitude(amplitude: float) -> None
     assert run.warm_up_dph == pytest.approx(expected) == pytest.approx(amplitude, rel=0.2)
     short = Averages(time[:18], after[:18], after[:18], np.zeros(18))
     assert gyro_facts([("a.csv", short)]).runs[0].warm_up_dph == 0.0
+
+
+def test_the_curve_of_a_gyro_goes_over_all_plausible_temperatures() -> None:
+    """From -90 to 200 C in cells of 5 C: the mean bias in each, by pandas."""
+    t = np.linspace(-89.5, 199.5, 5781)
+    before = 1e-3 * t + 1e-5 * t**2
+    a = Averages(100.0 * np.arange(t.size), before, 0.0 * before, t)
+    expected = pd.Series(before).groupby(pd.cut(t, np.arange(-90.0, 201.0, 5.0), right=False), observed=True).mean()
+    assert gyro_facts([("a.csv", a)]).curve == pytest.approx(expected.tolist())
 
 
 def test_a_step_is_found_where_it_is() -> None:
