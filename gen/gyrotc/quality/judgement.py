@@ -122,10 +122,9 @@ class Judged:
         for run in joined_runs(runs):
             rest = run
             for time_s in self.of(run).power_ons_s:
-                if not in_limits(np.asarray(time_s), run.from_s, run.to_s, ()):
-                    continue
-                found.append(replace(rest, to_s=time_s))
-                rest = replace(rest, from_s=time_s, power_on_s=time_s)
+                if (run.from_s is None or run.from_s < time_s) and (run.to_s is None or time_s < run.to_s):
+                    found.append(replace(rest, to_s=time_s))
+                    rest = replace(rest, from_s=time_s, power_on_s=time_s)
             found.append(rest)
         return tuple(found)
 

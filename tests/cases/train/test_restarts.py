@@ -10,7 +10,7 @@ from conftest import Command
 from gyrotc.diagnose import diagnose, series_of
 from gyrotc.jobs import compare
 from gyrotc.model import load_model
-from gyrotc.quality import found_events
+from gyrotc.quality import found_events, judge
 from gyrotc.recordings import load
 from gyrotc.train import FitOptions, fit_dataset
 from recordings import toml, write_csv
@@ -39,6 +39,14 @@ def recorded(folder: Path, files: int, garbage: int = 0) -> Path:
         write_csv(folder / f"{k}.csv", {name: values[kept] for name, values in columns.items()})
     (folder / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(files))), "utf-8")
     return folder
+
+
+def test_each_side_of_a_restart_is_a_run_that_is_not_cut_again(tmp_path: Path) -> None:
+    dataset = load(recorded(tmp_path, 3))
+    judged = judge(dataset)
+    runs = judged.cut(dataset.runs)
+    assert len(runs) == 4
+    assert [judged.cut([run]) for run in runs] == [(run,) for run in runs]
 
 
 @pytest.mark.parametrize("files", [1, 3])
