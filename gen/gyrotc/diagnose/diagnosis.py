@@ -136,8 +136,13 @@ def _diagnosed(dataset: Dataset, judged: Judged, chosen: FitOptions, say: Progre
     long = replace(dataset, runs=tuple(r for r in dataset.runs if r not in short))
     found = _of_long_runs(long, judged, records, chosen, say)
     text = "{} is left out: it has no two blocks of {:g} s"
-    missing = (*found.result.missing, *(text.format(name_of(run), records.block_s) for run in short))
+    missing = (*found.result.missing, *(text.format(_span_of(run), records.block_s) for run in short))
     return replace(found, result=found.result.model_copy(update={"missing": missing}))
+
+
+def _span_of(run: Run) -> str:
+    """Return the name of a run, and where it ends if it is a part of its file."""
+    return name_of(run) if run.to_s is None else f"{name_of(run)} up to {run.to_s:g} s"
 
 
 def _of_long_runs(dataset: Dataset, judged: Judged, records: Records, chosen: FitOptions, say: Progress) -> Diagnosis:

@@ -129,7 +129,7 @@ NOISE_WORDS: dict[str, str] = {
     "noise_level": "The noise has another level than declared",
     "noise_colour": "The noise has another colour than declared",
     "noise_variance": "The noise varies with temperature, ramp rate or time since power-on",
-    "outliers": "Single rows are outliers",
+    "outliers": "Rows are outliers",
     "temperature_quantisation": "The temperature is recorded in coarse steps",
 }
 

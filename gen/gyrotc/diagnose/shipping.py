@@ -2,8 +2,8 @@
 
 Every piece of thermal history is left out in turn, and what the map with the effects leaves of it is compared with what
 would be emitted without them: log RMS at temperatures that the rest has covered, of whole runs about their means, which
-a power-on draws anew. Causes and their parameters are those of all training runs, as the parameters of the evidence
-process are; the map is fitted anew without each piece. Test runs have no part in it.
+a power-on draws anew. Causes and their parameters are those of all training runs, as the parameters of the smooth
+map are; the map is fitted anew without each piece. Test runs have no part in it.
 
 An effect is shipped where the posterior odds of its cause times its mean gain exceed the doubt of that gain: what is
 certain is shipped for any gain, what is as likely as all else only for one that is beyond doubt.
@@ -78,7 +78,8 @@ class Shipping:
         candidate: What model selection would emit without them.
         left_out: What was left out, in words.
         before_dph, after_dph: RMS over these pieces without effects, and with those that are shipped (if none is: with
-            those tried last), all pieces counting alike; None if no piece can be judged, or none was tried.
+            those tried last), all pieces that both know counting alike; None if there is no such piece, the RMS with
+            effects also if none was tried.
         reason: Why nothing is shipped; empty where something is.
     """
 
@@ -141,7 +142,8 @@ def choose_shipped(refitting: Refitting, effects: Sequence[Effect], probabilitie
                 f"with a probability of {probabilities[numbers[0]]:.0%}"
             )
     after = scores if shipped else last
-    rms = _rms_of(without), None if after is None else _rms_of(after)
+    both = np.isfinite(without if after is None else without + after)
+    rms = _rms_of(without[both]), None if after is None else _rms_of(after[both])
     return Shipping(shipped, refuted, candidate, [best.pieces()], *rms, "" if shipped else reason)
 
 

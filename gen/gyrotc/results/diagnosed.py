@@ -224,9 +224,11 @@ class ShippingTrial(Part):
     beside: str = Field(description="correction that would be emitted without it")
     left_out: tuple[str, ...] = Field(description="pieces that were left out, in words")
     rms_before_dph: Figure = Field(
-        description="of what the rest has covered of them without it, deg/h; null: not tried"
+        description="RMS without it on what the rest has covered of these pieces, deg/h; null if no piece can be judged"
     )
-    rms_after_dph: Figure = Field(description="the same with it, deg/h; null: not tried")
+    rms_after_dph: Figure = Field(
+        description="RMS with it on the same, deg/h; null if no piece can be judged, or nothing was tried"
+    )
     reason: str | None = Field(description="reason why nothing is shipped; null if an extension is")
 
 
