@@ -17,7 +17,7 @@ _AROUND_S, _AROUND_ROWS = 300.0, 10  # what is fitted on either side of a gap
 _LEAST_JUMP_C, _JUMP_SIGMAS = 1.0, 20.0  # what the time would have done to the temperature, had it passed
 # Of the change that the gap should have brought: less is none; and of its noise
 _UNMOVED, _UNMOVED_SIGMAS = 0.1, 5.0
-_SLOPE_RATIO = 2.0  # ratio of dT/dt before and after: beyond it the temperature reversed_files within the gap
+_SLOPE_RATIO = 2.0  # ratio of dT/dt before and after: beyond it the temperature turned within the gap
 # Of a run, and rows in each: enough for a median that is sure to a tenth of its scatter
 _PARTS, _LEAST_STEPS = 50, 40
 _DRIFT, _DRIFT_SIGMAS = 0.005, 5.0  # half a per cent of dT/dt

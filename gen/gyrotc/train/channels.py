@@ -259,7 +259,7 @@ def chosen_channels(
     columns: Mapping[str, FloatArray],
     average_s: float,
 ) -> ChannelChoice | None:
-    """Choose channels; None if there is none.
+    """Choose channels; None if there is no candidate.
 
     Args:
         dataset: The recordings.

@@ -307,8 +307,9 @@ class TurnOn:
         return _quantile(self.freedom, _ONE_SIGMA) * self.repeatability_dph
 
 
-def coverage(data: TrainingData, fit: Fit, cells: tuple[int, int] = _COVERAGE_CELLS) -> dict[str, Any]:
+def coverage(data: TrainingData, fit: Fit) -> dict[str, Any]:
     """`coverage` of `model.json`: cells of the envelope (T, dT/dt) that hold training samples, its own or a lot's."""
+    cells = _COVERAGE_CELLS
     t = _index(data.temperature_c, fit.scaling.temperature_c, cells[0])
     r = _index(data.slope_c_per_min, fit.scaling.slope_c_per_min, cells[1])
     seen = np.zeros(cells[::-1], dtype=bool)
