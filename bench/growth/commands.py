@@ -32,10 +32,9 @@ def used():
     return sum(one.ru_utime + one.ru_stime for one in both)
 marks = [("starting", 0.0)]
 from gyrotc.jobs.calibration import build
-from gyrotc.train.fitting import FitOptions
 def note(stage, *_):
     marks.append((stage.split()[0].rstrip(":"), used()))
-build(Path(sys.argv[1]), Path(sys.argv[2]), FitOptions(), progress=note)
+build(Path(sys.argv[1]), Path(sys.argv[2]), progress=note)
 print(json.dumps([*marks, ("", used())]))
 """
 _STARTER = """import os, sys

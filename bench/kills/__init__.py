@@ -25,8 +25,8 @@ _TEXT = """
 {ended:,} jobs are interrupted by a signal (KILL, TERM, INT) or by a disk error (EIO; ENOSPC from then on) at one of
 their calls that change a file; commands also by a signal at a random time, and `fleet` in its worker processes too.
 Each way of writing is interrupted at {calls}, with and without an exchange of names. Wrong is a result that is
-neither the earlier one nor the new one, or anything left after the next job. Without an exchange of names, a disk that
-is full between the two renames leaves the place empty until the next job, which counts as wrong.
+neither the earlier one nor the new one, or anything left after the next job. Without an exchange of names, a disk on
+which every call fails from the second rename on leaves the place empty until the next job, which counts as wrong.
 """
 
 

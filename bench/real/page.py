@@ -63,10 +63,6 @@ class Result:
     def rms(self) -> float:
         return float(self.evaluation["exam"]["after"]["rms_dph"])
 
-    @property
-    def best_trivial(self) -> float:
-        return min(self.others[name] for name in TRIVIAL)
-
 
 def cases(source: Path, work: Path) -> Iterator[Case]:
     """Every set that is there with every run, or span of its only run, left out in turn."""
@@ -265,7 +261,7 @@ def main(source: Path, docs: Path, work: Path) -> None:
     for case in cases(source, work):
         of_case = list(judged(case, work))
         for r in of_case:
-            print(f"{_named(r)}: {r.rms:.4g}, best trivial {r.best_trivial:.4g}", flush=True)
+            print(f"{_named(r)}: {r.rms:.4g}, best trivial {min(r.others[name] for name in TRIVIAL):.4g}", flush=True)
         if case.plotted:
             (docs / "real" / f"{case.name}.png").write_bytes(png(picture(of_case), dpi=125))
         results += of_case

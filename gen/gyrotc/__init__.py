@@ -12,6 +12,7 @@ From Python (`gyrotc.jobs.api`):
 
     data = gyrotc.load("data")              recordings, or gyrotc.Dataset.from_pandas(frame, rate_unit="deg/s")
     result = gyrotc.build(data)             what the command does; result.plot(), result.to_xarray()
+    gyrotc.check("data")                    so do gyrotc.fit and gyrotc.jobs.diagnose
 
 `gyrotc.RBFNetworkRegressor` is the network as an estimator of scikit-learn.
 """
@@ -21,14 +22,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .jobs.api import Dataset, Result, build, load
+    from .jobs.api import Dataset, Result, build, check, fit, load
     from .train.estimator import RBFNetworkRegressor
 
-__all__ = ["Dataset", "RBFNetworkRegressor", "Result", "__version__", "build", "load"]
+__all__ = ["Dataset", "RBFNetworkRegressor", "Result", "__version__", "build", "check", "fit", "load"]
 
 __version__ = "0.1.0"
 
-_API = ("Dataset", "Result", "build", "load")
+_API = ("Dataset", "Result", "build", "check", "fit", "load")
 
 
 def __getattr__(name: str) -> Any:

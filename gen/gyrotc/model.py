@@ -36,6 +36,7 @@ from .causes import CATALOGUE
 from .causes.base import Cause, Tabled
 from .common.errors import InputError, quoted
 from .common.inputs import MOST_CENTERS, MOST_HELD, AverageLength, BlockLength, read_json, refused
+from .results.base import refused_result
 from .results.files import write_atomically
 from .results.json_text import digest_of, json_text
 
@@ -647,12 +648,14 @@ def load_model(path: Path) -> Model:
     raw = read_json(path, "a model.json", ceiling_name="text_mib")
     if not isinstance(raw, dict) or raw.get("schema") != MODEL_SCHEMA:
         found = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
-        raise InputError(f"{path}, field schema", quoted(found), repr(MODEL_SCHEMA))
+        error = InputError(f"{path}, field schema", quoted(found), repr(MODEL_SCHEMA))
+        raise refused_result(path, raw, error)
     checksum = raw.pop(CHECKSUM, None)
     try:
         model = Model.from_dict(raw)
-    except ValidationError as error:
-        raise refused(error, lambda field: f"{path}, field {field or '(whole)'}", Model) from error
+    except ValidationError as wrong:
+        field_error = refused(wrong, lambda field: f"{path}, field {field or '(whole)'}", Model)
+        raise refused_result(path, raw, field_error) from wrong
     if checksum != model.hash:
         raise InputError(
             f"{path}, field {CHECKSUM}",

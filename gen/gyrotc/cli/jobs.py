@@ -99,24 +99,23 @@ def build(
 
     Example: gyrotc build recordings --out result
     """
+    from ..jobs.calibration import BuildRequest
     from ..jobs.calibration import build as run
     from ..train.fitting import FitOptions
 
+    request = BuildRequest(
+        fit=FitOptions(prior=lot_in(lot)),
+        axis=axis,
+        numerics=numerics_of(numeric),
+        targets=target or (),
+        extend=extend,
+        limits=limits,
+        previous=previous,
+        prior=prior,
+        ageing_dph=ageing,
+    )
     with progress() as say:
-        results = run(
-            dataset,
-            out,
-            FitOptions(prior=lot_in(lot)),
-            axis=axis,
-            numerics=numerics_of(numeric),
-            targets=target or (),
-            extend=extend,
-            limits=limits,
-            previous=previous,
-            prior=prior,
-            ageing_dph=ageing,
-            progress=say,
-        )
+        results = run(dataset, out, request, progress=say)
     if len(results) == 1:
         write_json(json_file, results[0].evaluation.content())
     else:
@@ -183,40 +182,15 @@ def diagnose(
 
     Example: gyrotc diagnose recordings --out diagnosis
     """
-    from ..jobs.applied import applied_in
-    from ..jobs.diagnosis import diagnose_dataset
-    from ..recordings.loading import asked_axes, load
-    from ..recordings.records import Dataset
-    from ..results.folder import result_folder
+    from ..jobs.diagnosis import diagnose as run
     from ..train.fitting import FitOptions
 
-    fitting = FitOptions(prior=lot_in(lot))
-    subtracted = applied_in(dataset)
-    axes = asked_axes(dataset, axis)
-    several = len(axes) > 1 or axis == "all"
-    results: dict[str, Diagnosed] = {}
-
-    def one(name: str | None, into: Path | None) -> None:
-        recordings: Dataset = load(dataset, axis=name, applied=subtracted)
-        with progress() as say:
-            results[name or ""] = diagnose_dataset(
-                recordings,
-                into,
-                options=fitting,
-                progress=say,
-            ).result
-
-    if not several or out is None:
-        for name in axes:
-            one(name, out)
-    else:
-        with result_folder(out, "diagnose", inputs=[dataset]) as stage:
-            for name in axes:
-                one(name, stage.folder / str(name))
+    with progress() as say:
+        results = run(dataset, out, FitOptions(prior=lot_in(lot)), axis=axis, progress=say)
     contents = {name: result.content() for name, result in results.items()}
-    write_json(json_file, contents if several else next(iter(contents.values())))
+    write_json(json_file, contents.get("", contents))
     for name, result in results.items():
         for line in diagnosis_lines(result):
             tell(line)
         if out is not None:
-            tell(f"report: {(out / name if several else out) / 'report.html'}")
+            tell(f"report: {out / name / 'report.html'}")

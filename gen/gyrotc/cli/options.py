@@ -144,7 +144,7 @@ def _result_place(folder: Path) -> Path:
 
 
 def _holds_result(folder: Path) -> bool:
-    names = ("model.json", "x/model.json", "y/model.json", "z/model.json", "diagnose.json")
+    names = ("model.json", *(f"{axis.value}/model.json" for axis in GyroAxis), "diagnose.json")
     return any((folder / name).is_file() for name in names)
 
 

@@ -283,18 +283,10 @@ def check(
 
     Example: gyrotc check recordings
     """
-    from ..assess.changes import earlier_models
-    from ..jobs.applied import applied_in
-    from ..quality.inspection import check as run
+    from ..jobs.inspection import check as run
 
     with progress() as say:
-        result = run(
-            dataset,
-            axis=axis,
-            applied=applied_in(dataset),
-            earlier=earlier_models(previous) if previous else None,
-            progress=say,
-        )
+        result = run(dataset, axis=axis, previous=previous, progress=say)
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

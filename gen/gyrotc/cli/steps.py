@@ -97,22 +97,12 @@ def fit(
 
     Example: gyrotc fit recordings --out result
     """
-    from ..jobs.applied import applied_in
-    from ..jobs.recalibration import with_prior
-    from ..recordings.loading import load
-    from ..results.files import write_atomically
-    from ..results.folder import result_folder
-    from ..results.json_text import json_text
-    from ..train.fitting import FitOptions, fit_dataset
+    from ..jobs.fitting import fit as run
+    from ..train.fitting import FitOptions
 
-    fitting = FitOptions(prior=lot_in(lot))
-    with result_folder(out, "fit", inputs=[dataset]) as stage, progress() as say:
-        recordings = load(dataset, axis=axis, applied=applied_in(dataset))
-        stage.of(recordings.serial, recordings.axis)
-        fitting = with_prior(fitting.with_stated(recordings.fit), recordings, prior, ageing)
-        fitted = fit_dataset(recordings, fitting, progress=say)
-        fitted.model.save(stage.folder / "model.json")
-        write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))
+    options = FitOptions(prior=lot_in(lot))
+    with progress() as say:
+        fitted = run(dataset, out, options, axis=axis, prior=prior, ageing_dph=ageing, progress=say)
     write_json(json_file, fitted.training.content())
     training = fitted.training
     for line in training_lines(training):

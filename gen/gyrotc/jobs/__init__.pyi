@@ -2,6 +2,7 @@ from .api import Result as Result
 from .axes import axes_in as axes_in
 from .axes import joint_texts as joint_texts
 from .axes import verify_axes as verify_axes
+from .calibration import BuildRequest as BuildRequest
 from .calibration import Built as Built
 from .calibration import build as build
 from .calibration import build_into as build_into
@@ -12,6 +13,7 @@ from .certification import missing_facts as missing_facts
 from .certification import reason_of_release as reason_of_release
 from .certification import unit_of as unit_of
 from .comparison import compare as compare
+from .diagnosis import diagnose as diagnose
 from .diagnosis import extended_scenario as extended_scenario
 from .lot import calibrated_unit as calibrated_unit
 from .lot import checksum_of as checksum_of

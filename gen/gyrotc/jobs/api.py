@@ -6,6 +6,8 @@
     result.plot()                                                   # bias against temperature, in a notebook
     result.to_xarray()                                              # the map over temperature and its rate
 
+`gyrotc.check`, `gyrotc.fit` and `gyrotc.jobs.diagnose` do what these commands do (`gyrotc.diagnose` is a package).
+
 What the commands check is checked here, too: what is wrong raises `gyrotc.common.errors.InputError` with one message.
 """
 
@@ -31,17 +33,20 @@ from ..model import Model
 from ..pages.display import sci
 from ..pages.report import thermal_picture
 from ..pages.unit import UnitResults, unit_in
+from ..quality.inspection import CheckResult
 from ..recordings import records
 from ..recordings.importers.job import ImportOptions, import_files
 from ..recordings.importers.map_file import Map
 from ..recordings.loading import load as _load
 from ..results.evaluation import Evaluation
 from ..results.folder import scratch_folder
-from ..train.fitting import FitOptions
-from .calibration import Built
+from ..train.fitting import FitOptions, Fitted
+from .calibration import BuildRequest, Built
 from .calibration import build as _build
+from .fitting import fit as _fit
+from .inspection import check as _check
 
-__all__ = ["Dataset", "Picture", "Result", "build", "load"]
+__all__ = ["Dataset", "Picture", "Result", "build", "check", "fit", "load"]
 
 _Place = str | os.PathLike[str]
 _GRID = (121, 41)  # points of a map over temperature and over its rate: a step of about 1 C and 0.25 C/min
@@ -156,20 +161,57 @@ def build(
     data = dataset if isinstance(dataset, records.Dataset) else load(dataset)
     with ExitStack() as stack:
         place = Path(out) if out is not None else stack.enter_context(scratch_folder()) / "result"
-        [built] = _build(
-            data.folder,
-            place,
-            FitOptions(**options),
+        request = BuildRequest(
+            fit=FitOptions(**options),
             axis=data.axis,
             numerics=numerics,
             targets=targets,
             extend=extend,
-            limits=Path(limits) if limits is not None else None,
-            progress=progress,
+            limits=_path(limits),
         )
+        [built] = _build(data.folder, place, request, progress=progress)
         result = Result(place, built)
         weakref.finalize(result, stack.pop_all().close)
     return result
+
+
+def fit(
+    dataset: records.Dataset | _Place, out: _Place | None = None, *, progress: Progress = silent, **options: Any
+) -> Fitted:
+    """Trains a model, as `gyrotc fit` does.
+
+    Args:
+        dataset: What `load` gave, or the folder of recordings of one rate.
+        out: Folder for `model.json` and `training.json`; None: no files.
+        progress: As for `build`.
+        **options: As for `build`.
+
+    Raises:
+        InputError: Bad recordings or arguments; `out` is untouched.
+    """
+    data = dataset if isinstance(dataset, records.Dataset) else load(dataset)
+    return _fit(data.folder, _path(out), FitOptions(**options), axis=data.axis, progress=progress)
+
+
+def check(
+    folder: _Place, *, axis: str | None = None, previous: _Place | None = None, progress: Progress = silent
+) -> CheckResult:
+    """Returns all errors and warnings about a data set, as `gyrotc check` reports them.
+
+    Args:
+        folder: The data set, which may be wrong.
+        axis: Axis of three-axis recordings; None: every one.
+        previous: An earlier result of this gyro: are sign and axes as they were?
+        progress: As for `build`.
+
+    Raises:
+        InputError: The earlier result cannot be read, or is of another gyro.
+    """
+    return _check(Path(folder), axis=axis, previous=_path(previous), progress=progress)
+
+
+def _path(place: _Place | None) -> Path | None:
+    return None if place is None else Path(place)
 
 
 class Picture(str):

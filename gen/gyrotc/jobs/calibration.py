@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
 from ..common.errors import InputError
 from ..common.progress import Progress, Stages, silent
+from ..common.threads import with_one_thread
 from ..model import Model, load_model
 from ..pages.report import write_report
 from ..pages.unit import UnitResults
@@ -96,74 +97,80 @@ class Built:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """Options of a build besides those of the fit."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuildRequest:
+    """What `build` is asked for besides the recordings and the place of the result.
 
-    numerics: Sequence[str] | None
-    extend: bool
-    limits: Limits | None
-    previous: Path | None
+    Attributes:
+        fit: Options of training, and the lot of the unit.
+        axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
+            the runtime once with all tables; "all" the same, but refuses recordings of one rate.
+        numerics: Arithmetics of the tables; None: all.
+        targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
+        extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
+        limits: A limits file that the result is held against.
+        previous: An earlier result of the same gyro, to find what changed.
+        prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
+            check run) do not speak against it; also the `previous` one where none is given.
+        ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
+    """
+
+    fit: FitOptions = field(default_factory=FitOptions)
+    axis: str | None = None
+    numerics: Sequence[str] | None = None
+    targets: Sequence[str] = ()
+    extend: bool = False
+    limits: Path | None = None
+    previous: Path | None = None
     prior: Path | None = None
     ageing_dph: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What is done for an axis: a request whose limits have been read, or a gyro of a fleet."""
+
+    request: BuildRequest
+    limits: Limits | None
     in_fleet: bool = False
     watch: Watch | None = None
-    targets: Sequence[str] = ()
 
 
-def build(
-    source: Path,
-    out: Path,
-    options: FitOptions,
-    *,
-    axis: str | None = None,
-    numerics: Sequence[str] | None = None,
-    targets: Sequence[str] = (),
-    extend: bool = False,
-    limits: Path | None = None,
-    previous: Path | None = None,
-    prior: Path | None = None,
-    ageing_dph: float | None = None,
-    progress: Progress = silent,
-) -> list[Built]:
-    """Build verified C and a report from recordings; one result for each axis.
+@with_one_thread
+def build(source: Path, out: Path, request: BuildRequest | None = None, *, progress: Progress = silent) -> list[Built]:
+    """Recordings in, verified C and a report out; one result for each axis.
 
     `out` is replaced as a whole at the end; until then an older one stays as it was.
 
     Args:
-        axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
-            the runtime once with all tables; "all" the same, but refuses recordings of one rate.
-        targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
-        extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
-        limits: A limits file that the result is held against.
-        previous: An earlier result of the same gyro, to say what changed.
-        prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
-            check run) do not speak against it; also the `previous` one where none is given.
-        ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
+        source: Folder of recordings.
+        out: Folder of the result.
+        request: What is asked for besides; None: all at its default.
         progress: Takes note of every stage.
 
     Raises:
         InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
         CheckFailed: Every arithmetic is refused; `out` is untouched.
     """
-    chosen_targets(targets)
+    request = request or BuildRequest()
+    chosen_targets(request.targets)
     known = applied_in(source)
-    if extend and (options.prior is not None or prior is not None):
+    if request.extend and (request.fit.prior is not None or request.prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
-    refuse_together(options, prior, ageing_dph)
-    held = load_limits(limits) if limits else None
-    order = _Order(numerics, extend, held, previous or prior, prior, ageing_dph)
-    proven = targets or (held.needs.targets if held else ())
-    order = replace(order, targets=proven)
-    axes = asked_axes(source, axis)
-    shares = _STAGES if extend else _STAGES | {"diagnosing": 0.0}
+    refuse_together(request.fit, request.prior, request.ageing_dph)
+    limits = load_limits(request.limits) if request.limits else None
+    if limits and not request.targets:
+        request = replace(request, targets=limits.needs.targets)
+    order = _Order(request, limits)
+    axes = asked_axes(source, request.axis)
+    shares = _STAGES if request.extend else _STAGES | {"diagnosing": 0.0}
     with result_folder(out, "build", inputs=[source]) as stage:
-        if len(axes) == 1 and axis != "all":
+        if len(axes) == 1 and request.axis != "all":
             say = Stages(progress, shares)
             say("reading")
             dataset = load(source, axis=axes[0], applied=known)
             stage.of(dataset.serial, dataset.axis)
-            return [_build_axis(dataset, stage.folder, options, order, say)]
+            return [_build_axis(dataset, stage.folder, order, say)]
         built = []
         names = [str(name) for name in axes]
         of_axes = Stages(progress, dict.fromkeys(names, 1.0))
@@ -174,7 +181,7 @@ def build(
             stage.of(dataset.serial)
             with result_folder(stage.folder / name, "build") as part:
                 part.of(dataset.serial, name)
-                built.append(_build_axis(dataset, part.folder, options, order, say))
+                built.append(_build_axis(dataset, part.folder, order, say))
         join_axes(stage.folder, names)
         return built
 
@@ -199,16 +206,19 @@ def build_into(
     Raises:
         CheckFailed: Every arithmetic is refused.
     """
-    order = _Order(numerics, False, limits, None, in_fleet=True, watch=watch)
-    return _build_axis(dataset, work, options, order, Stages(silent, _STAGES))
+    order = _Order(BuildRequest(fit=options, numerics=numerics), limits, in_fleet=True, watch=watch)
+    return _build_axis(dataset, work, order, Stages(silent, _STAGES))
 
 
-def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order, say: Stages) -> Built:
-    options = with_prior(options.with_stated(dataset.fit), dataset, order.prior, order.ageing_dph, order.limits)
-    earlier = load_earlier(order.previous, dataset.serial, dataset.axis) if order.previous else None
+def _build_axis(dataset: Dataset, work: Path, order: _Order, say: Stages) -> Built:
+    request = order.request
+    options = request.fit.with_stated(dataset.fit)
+    options = with_prior(options, dataset, request.prior, request.ageing_dph, order.limits)
+    previous = request.previous or request.prior
+    earlier = load_earlier(previous, dataset.serial, dataset.axis) if previous else None
     say("judging rows")
     judged = judge(dataset)
-    fitted, diagnosis = _extended(dataset, work, options, judged, say) if order.extend else (None, None)
+    fitted, diagnosis = _extended(dataset, work, options, judged, say) if request.extend else (None, None)
     fitted = fitted or fit_dataset(dataset, options, judged=judged, progress=say.within("training"))
     if order.limits:
         model = guarded(fitted.model, order.limits.guards, order.limits.file, dataset.channels)
@@ -223,12 +233,12 @@ def _build_axis(dataset: Dataset, work: Path, options: FitOptions, order: _Order
     emission = emit(
         fitted.model,
         work,
-        numerics=order.numerics,
+        numerics=request.numerics,
         runtime_apart=order.in_fleet,
         progress=say.within("emitting C", "emitting C: "),
     )
     verification = verify(
-        work, targets=order.targets, compiled=not order.in_fleet, progress=say.within("verifying", "verifying: ")
+        work, targets=request.targets, compiled=not order.in_fleet, progress=say.within("verifying", "verifying: ")
     )
     _write(work / "verify.json", verification.content())
     evaluation = evaluate(

@@ -11,17 +11,57 @@ from typing import Any
 
 from ..common.progress import Progress, Stages, silent
 from ..common.texts import toml_comment, toml_key, toml_value
-from ..diagnose.diagnosis import Diagnosis, diagnose, series_of
+from ..common.threads import with_one_thread
+from ..diagnose.diagnosis import Diagnosis, series_of
+from ..diagnose.diagnosis import diagnose as _diagnose
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
 from ..quality.judgement import Judged
+from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset
 from ..results.diagnosed import Diagnosed, NamedCause
 from ..results.files import write_atomically
 from ..results.folder import result_folder
 from ..results.json_text import json_text
 from ..train.fitting import FitOptions
+from .applied import applied_in
 
 _MODEL, _SCENARIO = "model-extended.json", "scenario-extended.toml"
+
+
+@with_one_thread
+def diagnose(
+    source: Path,
+    out: Path | None = None,
+    options: FitOptions | None = None,
+    *,
+    axis: str | None = None,
+    progress: Progress = silent,
+) -> dict[str, Diagnosed]:
+    """Return the diagnosis of each axis of recordings by its name; "" where they have one rate or one axis is named.
+
+    Args:
+        source: Folder of recordings.
+        out: Folder of the result, of several axes in `out/x`, `out/y`, `out/z`; None: no files.
+        options: As for `fit`, without an earlier model; None: all at their defaults.
+        axis: Axis of three-axis recordings; None or "all": every one.
+        progress: Takes note of every stage.
+
+    Raises:
+        InputError: Bad recordings or arguments, or a file in `out` that gyrotc did not write; `out` is untouched.
+    """
+    applied = applied_in(source)
+    axes = asked_axes(source, axis)
+    several = len(axes) > 1 or axis == "all"
+    of_axes = Stages(progress, dict.fromkeys(map(str, axes), 1.0))
+    results: dict[str, Diagnosed] = {}
+    with result_folder(out, "diagnose", inputs=[source]) if out and several else nullcontext() as stage:
+        for name in axes:
+            dataset = load(source, axis=name, applied=applied)
+            into = stage.folder / str(name) if stage else out
+            say = of_axes.within(str(name), f"{name}: " if several else "")
+            result = diagnose_dataset(dataset, into, options=options, progress=say).result
+            results[str(name) if several else ""] = result
+    return results
 
 
 def diagnose_dataset(
@@ -48,7 +88,7 @@ def diagnose_dataset(
         if stage:
             stage.of(dataset.serial, dataset.axis)
         say = Stages(progress, {"diagnosing": 0.96, "drawing": 0.04})
-        found = diagnose(dataset, options=chosen, progress=say.within("diagnosing"), judged=judged)
+        found = _diagnose(dataset, options=chosen, progress=say.within("diagnosing"), judged=judged)
         if stage is None:
             return found
         say("drawing")

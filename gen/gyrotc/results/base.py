@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..common.errors import InputError, quoted
-from ..common.inputs import checked, parse_json, read_input
+from .. import __version__
+from ..common.errors import InputError, quoted, shortened
+from ..common.inputs import checked, parse_json, read_input, read_json
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -88,7 +90,41 @@ def read_result(path: Path, kind: type[R]) -> R:
     """
     where, expected = str(path), f"what gyrotc wrote as {path.name}"
     data = read_input(path, "result_mib", expected)
-    return checked_result(parse_json(data, where, expected), kind, where, data)
+    content = parse_json(data, where, expected)
+    try:
+        return checked_result(content, kind, where, data)
+    except InputError as error:
+        raise refused_result(path, content, error) from error
+
+
+def refused_result(path: Path, content: Any, error: InputError) -> InputError:
+    """Return the refusal of a result: it names the program that wrote it where that is another one than this.
+
+    Args:
+        path: The file; a manifest beside it names the program.
+        content: Its content, which names the version.
+        error: Refusal of its content.
+    """
+    from .cache import program_of  # it looks at every file of the package
+
+    written = _version_in(content)
+    with suppress(InputError):
+        manifest = read_json(path.parent / "manifest.json", "a manifest")
+        program = manifest.get("program") if isinstance(manifest, dict) else None
+        if isinstance(program, str) and program and program != program_of():
+            written, here = f"{_version_in(manifest)} (program {program[:12]})", f" (program {program_of()[:12]})"
+            return _of_another(path, written, here, error)
+    return error if written in ("", __version__) else _of_another(path, written, "", error)
+
+
+def _version_in(content: Any) -> str:
+    version = content.get("gyrotc_version") if isinstance(content, dict) else None
+    return shortened(version) if isinstance(version, str) else ""
+
+
+def _of_another(path: Path, written: str, here: str, error: InputError) -> InputError:
+    found = f"was written by gyrotc {written}, and this is gyrotc {__version__}{here}, which finds: {error}"
+    return InputError(str(path), found, "a result of this gyrotc: give the command that made it again")
 
 
 def read_optional(path: Path, kind: type[R]) -> R | None:

@@ -212,7 +212,11 @@ class _Job:
         elif not exchange(self.work, self.place):
             aside = part_of(self.place)
             self.place.rename(aside)  # a job that is killed here leaves both: `_recover`
-            self.work.rename(self.place)
+            try:
+                self.work.rename(self.place)
+            except OSError:
+                aside.rename(self.place)
+                raise
             aside.rename(self.work)
         sync_folder(self.place.parent)
 
@@ -265,7 +269,9 @@ def _is_same(path: Path, other: Path) -> bool:
     """Test whether two files are one, or equal; links are neither."""
     if path.is_symlink() or other.is_symlink() or not other.is_file():
         return False
-    return path.samefile(other) or sha256(path) == sha256(other)
+    if path.samefile(other):
+        return True
+    return path.stat().st_size == other.stat().st_size and sha256(path) == sha256(other)
 
 
 def _is_whole(path: Path) -> bool:

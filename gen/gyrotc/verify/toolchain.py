@@ -259,7 +259,6 @@ class Object:
 
 
 _GRAPH = ("-fstack-usage", "-fcallgraph-info=su")
-_made: dict[str, Object] = {}  # by name, of this process
 
 
 def runtime_object(target: Target, c_folder: Path, numeric: str, work: Path, *, fresh: bool = False) -> Object:
@@ -269,11 +268,6 @@ def runtime_object(target: Target, c_folder: Path, numeric: str, work: Path, *, 
     return shared_object(
         target.model_copy(update={"flags": flags}), c_folder / f"gtc_{numeric}.c", work, include=c_folder, fresh=fresh
     )
-
-
-def forget_objects() -> None:
-    """Forget what this process has compiled, as a process does that has just begun."""
-    _made.clear()
 
 
 def shared_object(target: Target, source: Path, work: Path, *, include: Path, fresh: bool = False) -> Object:
@@ -287,7 +281,7 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
         CheckFailed: The compiler refused.
     """
     name = "" if fresh else _name_of(target, source, work, include)
-    found = _made.get(name) or (cache.kept(name, functools.partial(_object, name)) if name else None)
+    found = cache.kept(name, functools.partial(_object, name)) if name else None
     if found is None:
         (path,) = compile_objects(target, [source], work, include=include)
         graph = path.with_suffix(".ci")
@@ -300,8 +294,6 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
         )
         if name:
             cache.keep(name, _content(found))
-    if name:
-        _made[name] = found
     return found
 
 

@@ -364,13 +364,13 @@ def test_nan_cells_are_missing_samples_also_inside_exclude(tmp_path: Path, clean
 
 
 def test_the_report_lists_what_was_left_out_with_the_line_to_paste(tmp_path: Path) -> None:
-    from gyrotc.jobs import build
+    from gyrotc.jobs import BuildRequest, build
 
     table = cycle()
     table["rate_dph"][[5000, 9100]] += 5.0
     write_csv(tmp_path / "R" / "a.csv", table)
     (tmp_path / "R" / "dataset.toml").write_text(toml(RUN), "utf-8")
-    build(tmp_path / "R", tmp_path / "out", FitOptions(), numerics=["f32"], targets=["host-gcc-O2"])
+    build(tmp_path / "R", tmp_path / "out", BuildRequest(numerics=["f32"], targets=["host-gcc-O2"]))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "Rows left out of training" in page
     lines = (

@@ -263,6 +263,27 @@ def test_a_job_that_is_killed_between_two_renames_is_made_up_for(
     assert not result_faults(out) and [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
+def test_an_earlier_result_comes_back_where_the_second_rename_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that refuses one call must not leave the place empty."""
+    out = tmp_path / "out"
+    write(out, "one")
+    monkeypatch.setattr(folders, "exchange", lambda *_: False)
+    rename, calls = Path.rename, iter(range(9))
+
+    def failing(path: Path, target: Path) -> Path:
+        if next(calls) == 1:
+            raise OSError(errno.EIO, "Input/output error", str(target))
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", failing)
+    with pytest.raises(GyrotcError, match="Input/output error"):
+        write(out, "two")
+    assert content(out) == {"c/table.c": "one", "model.json": "one"} and not result_faults(out)
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
 def _forged(folder: Path, *parts: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     head = {"kind": "result", "command": "build", "serial": "A", "axis": None, "parts": parts, "finished": True}

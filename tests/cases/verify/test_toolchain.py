@@ -142,14 +142,10 @@ def compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[_Compi
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(toolchain, "compile_objects", counting)
-    toolchain.forget_objects()
     yield counted
-    toolchain.forget_objects()
 
 
 def _asked(source: Path, work: Path, target: Target = HOST, *, fresh: bool = False) -> Object:
-    """As a process that has just begun."""
-    toolchain.forget_objects()
     return shared_object(target, source, work, include=source.parent, fresh=fresh)
 
 
@@ -240,7 +236,6 @@ def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, co
     job = replace(job_of(emitted(tmp_path / "a")), trusted=False)
     first = [entry.content() for entry in board_entries(job, target)]
     assert all(entry["status"] == "pass" for entry in first)
-    toolchain.forget_objects()
     before = compiled.count
     assert [entry.content() for entry in board_entries(job, target)] == first
     assert compiled.count == before, "the runtime is compiled once"

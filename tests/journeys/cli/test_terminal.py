@@ -28,6 +28,7 @@ from gyrotc.cli.output import folded
 from gyrotc.cli.progress import StageLine
 from gyrotc.cli.recordings import RunFormat
 from gyrotc.common import Progress, Stages
+from gyrotc.jobs import BuildRequest
 from gyrotc.jobs import build as build_result
 from gyrotc.model import load_model
 from gyrotc.quality import check
@@ -72,7 +73,7 @@ def _of_job(job: str, folder: Path, report: Progress) -> None:
     elif job == "check":
         check(folder / "R", progress=report)
     elif job == "build":
-        build_result(folder / "R", folder / "out", FitOptions(), targets=["host-gcc-O2"], progress=report)
+        build_result(folder / "R", folder / "out", BuildRequest(targets=["host-gcc-O2"]), progress=report)
     else:
         emit(load_model(GOLDEN), folder / "out", progress=report)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -18,10 +19,11 @@ import pytest
 from conftest import EXAMPLE, HOST, MEASURED, ROOT, Command, run_gyrotc
 from gyrotc.assess import evaluate
 from gyrotc.common import InputError
+from gyrotc.jobs import diagnose
 from gyrotc.model import load_model
 from gyrotc.pages import write_report
 from gyrotc.recordings import load
-from gyrotc.results import MapError, failed_checks
+from gyrotc.results import MapError, Training, failed_checks, read_result
 from recordings import columns, state, write_csv
 
 
@@ -367,6 +369,70 @@ def test_build_gives_what_the_command_gives(tmp_path: Path) -> None:
     folder = result.folder
     del result
     assert not folder.exists()
+
+
+def test_fit_diagnose_and_check_give_what_the_commands_give(tmp_path: Path) -> None:
+    rows = columns(720)
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
+    for command, file in (("fit", "training.json"), ("diagnose", "diagnose.json"), ("check", "check.json")):
+        out = ("--out", tmp_path / "out") if command == "fit" else ()
+        run_gyrotc(command, tmp_path / "RLG-1", *out, "--json", tmp_path / file)
+    fitted = gyrotc.fit(tmp_path / "RLG-1", tmp_path / "fitted")
+    without_times = {"curves": None}  # they hold the seconds that a search took
+    assert fitted.training.content() | without_times == _json(tmp_path / "training.json") | without_times
+    assert load_model(tmp_path / "fitted") == fitted.model
+    assert diagnose(tmp_path / "RLG-1")[""].content() == _json(tmp_path / "diagnose.json")
+    assert gyrotc.check(tmp_path / "RLG-1").result().content() == _json(tmp_path / "check.json")
+    with pytest.raises(InputError, match="block_s"):
+        gyrotc.fit(tmp_path / "RLG-1", block_s=0.0)
+
+
+_THREADS = """
+import sys
+from pathlib import Path
+import gyrotc, scipy.linalg
+from threadpoolctl import threadpool_info, threadpool_limits
+
+def threads():
+    return {one["num_threads"] for one in threadpool_info()}
+
+threadpool_limits(2)
+seen = set()
+gyrotc.fit(sys.argv[1], progress=lambda *_: seen.update(threads()))
+print(sorted(seen), sorted(threads()))
+"""
+
+
+@pytest.mark.parametrize(("stated", "inside"), [(None, [1]), ("2", [2])])
+def test_a_job_has_one_thread_from_python_too_unless_the_user_says_otherwise(
+    stated: str | None, inside: list[int], tmp_path: Path
+) -> None:
+    """The caller's own number of threads is what it was, once the job is done."""
+    rows = columns(720)
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment |= {} if stated is None else {"OMP_NUM_THREADS": stated}
+    done = subprocess.run(
+        [sys.executable, "-c", _THREADS, str(tmp_path / "RLG-1")],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == f"{inside} [2]\n"
+
+
+def test_a_result_of_another_program_is_refused_by_its_name(tmp_path: Path) -> None:
+    """A field that this program does not find is not called missing where another program wrote the file."""
+    training, manifest = tmp_path / "training.json", tmp_path / "manifest.json"
+    training.write_text(json.dumps({"schema": "gyrotc.fit/1", "gyrotc_version": "0.1.0", "serial": "A"}))
+    manifest.write_text(json.dumps({"gyrotc_version": "0.1.0", "program": "5" * 64}))
+    with pytest.raises(InputError) as refused:
+        read_result(training, Training)
+    told = str(refused.value)
+    assert told.startswith(f"{training}: was written by gyrotc 0.1.0 (program {'5' * 12}), and this is gyrotc")
+    assert told.endswith("; expected a result of this gyrotc: give the command that made it again")
+    manifest.unlink()
+    with pytest.raises(InputError, match="is missing") as refused:
+        read_result(training, Training)
+    assert "was written by" not in str(refused.value)
 
 
 def test_the_names_come_on_first_use_and_a_missing_library_is_named() -> None:

@@ -79,10 +79,13 @@ def test_how_many_units_were_left_out_is_said_with_the_reasons(world: Path, tmp_
     summary = json.loads((fleet / "fleet.json").read_text())
     (barred,) = (one for one in summary["serials"] if one["name"] == "LOT-0005-001")
     barred["findings"] = ["sign_reversed"]
+    # A unit whose recordings have left the fleet is not in fleet.json, though its result is still there.
+    shutil.copytree(fleet / "LOT-0005-003", fleet / "left")
+    summary["serials"] += [barred | {"findings": [], "name": name} for name in ("under another name", "LOT-0005-006")]
     (fleet / "fleet.json").write_text(json.dumps(summary))
     expected = (
-        "left out: 1 barred by a finding of the fleet, 1 calibrated with a lot or an earlier model, "
-        "1 with the serial of another folder"
+        "left out: 1 not in fleet.json, 1 barred by a finding of the fleet, "
+        "1 calibrated with a lot or an earlier model, 1 with the serial of another folder"
     )
     assert expected in run_here("lot", fleet, "--out", tmp_path / "lot.json")
     lot = load_lot(tmp_path / "lot.json")
