@@ -32,12 +32,12 @@ MODELS = {"every position reached": (_wide_envelope, 2**32), "golden": (_golden,
 
 
 @pytest.fixture
-def bar() -> Iterator[Progress | None]:
-    """Shows progress on the terminal, past what captures output; None where there is no terminal."""
+def bar() -> Iterator[Progress]:
+    """Show progress on the terminal, past what captures output; nothing where there is no terminal."""
     try:
         number = os.open("/dev/tty", os.O_WRONLY)
     except OSError:
-        yield None
+        yield lambda stage, done, total: None
         return
     with os.fdopen(number, "w", encoding="utf-8") as terminal:
         yield lambda stage, done, total: print(f"\r{stage}, {done / total:.0%}   ", end="", file=terminal, flush=True)
@@ -45,9 +45,7 @@ def bar() -> Iterator[Progress | None]:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_input_agrees_and_keeps_the_bound(
-    name: str, tmp_path: Path, results: Results, bar: Progress | None
-) -> None:
+def test_every_input_agrees_and_keeps_the_bound(name: str, tmp_path: Path, results: Results, bar: Progress) -> None:
     make, inputs = MODELS[name]
     folder = emitted(tmp_path, make())
     model = load_model(folder / "model.json")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from emitted import GOLDEN, emitted
+from gyrotc.mirror import TableKind
 from gyrotc.model import Model, load_model
 from gyrotc.tables import needs_of, runtime_texts
 from models import bank_with_channels, with_memories
@@ -14,9 +15,7 @@ from models import bank_with_channels, with_memories
 SOURCES = Path(__file__).resolve().parents[1] / "prove" / "eva"
 _OPTIONS = ("-eva", "-warn-signed-overflow", "-warn-signed-downcast", "-warn-special-float", "none")
 #: Options of the runtime that holds the tables of a `shape`.
-_SHAPE_NEEDS = {"GTC_MAX_TERMS": 4, "GTC_WITH_BANK": 1} | {
-    f"GTC_WITH_{kind}": 1 for kind in ("MEMORY", "PLAY", "WARM_UP", "HARMONIC", "AUXILIARY", "CURVE", "PRODUCT")
-}
+_SHAPE_NEEDS = {"GTC_MAX_TERMS": 4, "GTC_WITH_BANK": 1} | {f"GTC_WITH_{kind.name}": 1 for kind in TableKind}
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from .base import (
     Cause,
     CauseValues,

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from .auxiliary import channel_of
 from .base import Cause, CauseValues, History, Needs, Parameter, Scene, Tabled, Telling, Wording, weights_of
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.inputs import PLAUSIBLE_C
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from .auxiliary import channel_of
 from .base import Cause, CauseValues, History, Needs, Parameter, Scene, Tabled, Telling, Wording, weights_of
 

@@ -22,7 +22,8 @@ from typing import Literal
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import FLOAT64, Recursion, TableKind, first_order, recursion_of
+from ..mirror.kinds import TableKind, recursion_of
+from ..mirror.recursions import FLOAT64, Recursion, first_order
 
 
 @dataclass(frozen=True, slots=True)

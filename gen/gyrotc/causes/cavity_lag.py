@@ -6,7 +6,8 @@ tau dz/dt = T − z,    bias = f(z, dz/dt)    instead of f(T, dT/dt)
 from __future__ import annotations
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import TableKind, first_order
+from ..mirror.kinds import TableKind
+from ..mirror.recursions import first_order
 from .base import (
     ADVICE_MORE_RATES,
     Cause,

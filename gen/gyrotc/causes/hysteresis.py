@@ -13,7 +13,8 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.inputs import PLAUSIBLE_C
-from ..mirror.recursions import TableKind, play
+from ..mirror.kinds import TableKind
+from ..mirror.recursions import play
 from .base import (
     Cause,
     CauseValues,

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from .base import (
     OVERTONES,
     Cause,

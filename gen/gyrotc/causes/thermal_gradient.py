@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import TableKind, first_order
+from ..mirror.kinds import TableKind
+from ..mirror.recursions import first_order
 from .base import (
     ADVICE_MORE_RATES,
     Cause,

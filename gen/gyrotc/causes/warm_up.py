@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from .base import (
     COLD_STARTS,
     Cause,

@@ -15,6 +15,9 @@ from .history import fallback_model as fallback_model
 from .history import follow_history as follow_history
 from .history import recursions_of_table as recursions_of_table
 from .history import replay as replay
+from .kinds import KINDS as KINDS
+from .kinds import TableKind as TableKind
+from .kinds import recursion_of as recursion_of
 from .q31 import GAUSS_ERROR as GAUSS_ERROR
 from .q31 import exp2 as exp2
 from .q31 import exp2_table as exp2_table
@@ -29,7 +32,6 @@ from .recursions import TermOutcome as TermOutcome
 from .recursions import delayed as delayed
 from .recursions import first_order as first_order
 from .recursions import play as play
-from .recursions import recursion_of as recursion_of
 from .table import ARRAYS as ARRAYS
 from .table import CHANNEL_LOST as CHANNEL_LOST
 from .table import CLAMPED as CLAMPED

@@ -27,6 +27,7 @@ from .front_end import (
     period_us,
     with_missing,
 )
+from .kinds import TableKind, recursion_of
 from .readings import Guarded
 from .recursions import (
     F32,
@@ -37,9 +38,7 @@ from .recursions import (
     NumberArray,
     Operations,
     Recursion,
-    TableKind,
     TermOutcome,
-    recursion_of,
 )
 from .sigma import evidence_of, sigma_bits
 from .table import CHANNEL_LOST, CLAMPED, E_ARG, HELD, MISSING_Q31, UNCOVERED, Table, Words

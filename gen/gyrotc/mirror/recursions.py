@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any, TypeVar
 
 import numpy as np
@@ -89,23 +88,6 @@ def delayed(shift_s: float, time_s: FloatArray, values: FloatArray) -> FloatArra
     return np.interp(time_s - shift_s, time_s, values)
 
 
-class TableKind(IntEnum):
-    """Kinds of terms that a table can hold, as in gtc_table.h."""
-
-    MEMORY = 1
-    PLAY = 2
-    WARM_UP = 3
-    HARMONIC = 4
-    AUXILIARY = 5
-    CURVE = 6
-    PRODUCT = 7
-
-    @property
-    def reads_channel(self) -> bool:
-        """True if it reads an auxiliary channel."""
-        return self in (TableKind.AUXILIARY, TableKind.CURVE, TableKind.PRODUCT)
-
-
 @dataclass(frozen=True, slots=True)
 class Course:
     """The corrections of a history as terms see them, one entry each, in numbers of one arithmetic.
@@ -171,7 +153,7 @@ class Recursion:
         raise NotImplementedError
 
 
-class _Memory(Recursion):
+class MemoryRecursion(Recursion):
     """z <- z + gain (T - z) once a block, at rest on T where the front end starts; adds amplitude (z - T).
 
     Where rate is not 0 the map sees z and (T - z) rate instead of T and its slope.
@@ -193,7 +175,7 @@ class _Memory(Recursion):
         return self.do.array(states)
 
 
-class _Play(Recursion):
+class PlayRecursion(Recursion):
     """z <- max(T - width, min(T + width, z)) once a block, from T at a start.
 
     Adds (amplitude + growth (T - middle)) (z - T).
@@ -209,14 +191,14 @@ class _Play(Recursion):
         outcome.added = outcome.added + self.do.scaled_difference(z, course.temperature, amplitude)
 
 
-class _WarmUp(Recursion):
+class WarmUpRecursion(Recursion):
     """Adds amplitude exp(-t/tau), t since power-on; gain is log2(e) blocks/tau."""
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
         outcome.added = outcome.added + self.do.fading(np.maximum(course.elapsed, 0), self.p[0], self.p[1])
 
 
-class _Harmonic(Recursion):
+class HarmonicRecursion(Recursion):
     """Adds amplitude cos(2 pi (T frequency + phase)), phase in turns."""
 
     def apply(self, course: Course, channel: CourseChannel | None, outcome: TermOutcome) -> None:
@@ -244,7 +226,7 @@ class _OfChannel(Recursion):
         raise NotImplementedError
 
 
-class _Auxiliary(_OfChannel):
+class AuxiliaryRecursion(_OfChannel):
     """Adds slope (mean - reference)."""
 
     def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
@@ -252,7 +234,7 @@ class _Auxiliary(_OfChannel):
         return self.do.scaled_difference(mean, reference, slope)
 
 
-class _Curve(_OfChannel):
+class CurveRecursion(_OfChannel):
     """Adds slope (mean - reference) and two Gaussians of one gain, the first of them at the reference."""
 
     def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
@@ -262,28 +244,12 @@ class _Curve(_OfChannel):
         return np.asarray(line + self.do.bells(x, gain, ((reference, first), (center, second))))
 
 
-class _Product(_OfChannel):
+class ProductRecursion(_OfChannel):
     """Adds (slope + growth (T - middle)) (mean - reference)."""
 
     def _added(self, mean: NumberArray, temperature: NumberArray) -> NumberArray:
         slope, reference, growth, middle = self.p[:4]
         return self.do.scaled_difference(mean, reference, self.do.over_temperature(slope, growth, temperature, middle))
-
-
-_RECURSIONS: dict[TableKind, type[Recursion]] = {
-    TableKind.MEMORY: _Memory,
-    TableKind.PLAY: _Play,
-    TableKind.WARM_UP: _WarmUp,
-    TableKind.HARMONIC: _Harmonic,
-    TableKind.AUXILIARY: _Auxiliary,
-    TableKind.CURVE: _Curve,
-    TableKind.PRODUCT: _Product,
-}
-
-
-def recursion_of(kind: TableKind, do: Operations, parameters: Sequence[Any]) -> Recursion:
-    """A term of a kind in an arithmetic."""
-    return _RECURSIONS[kind](do, parameters)
 
 
 NumberArray = NDArray[Any]

@@ -18,7 +18,8 @@ from ..common.arrays import IntArray
 from . import f32, q31
 from .front_end import FROM_FALLBACK as FALLEN
 from .front_end import FROM_MAP, Steps
-from .recursions import Course, NumberArray, TableKind, TermOutcome
+from .kinds import Past, TableKind
+from .recursions import Course, NumberArray, TermOutcome
 from .table import FALLBACK, UNCOVERED, WARMING, Table, Words
 
 #: Words of a table's uncertainty behind its grids, without those of the terms.
@@ -322,11 +323,10 @@ def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[NumberArray]:
     """Yield for each term the sigma of the time before it began, or of a channel that is not read."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)
+    past = Past(evidence.since, evidence.low, evidence.high)
     for i, record in enumerate(table.records("terms")):
-        first, word, kind = table.numbers(record[2:])[0], words[i], int(record[0])
-        if TableKind(kind).reads_channel:
+        first, word, kind = table.numbers(record[2:])[0], words[i], TableKind(int(record[0])).description
+        if kind.reads_channel:
             yield np.where(next(away), do.squared(word), np.zeros_like(do.squared(word)))
-        elif kind == TableKind.MEMORY:
-            yield do.squared(do.remaining(word, first, evidence.since))
-        elif kind == TableKind.PLAY:
-            yield do.squared(do.unsettled(first, evidence.low, evidence.high, word))
+        elif kind.past_sigma is not None:
+            yield do.squared(kind.past_sigma(do, word, first, past))

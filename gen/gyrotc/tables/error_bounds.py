@@ -20,7 +20,6 @@ each is concave, and Σ s_k is least at a corner. All in the coordinates in whic
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypedDict
 
@@ -30,12 +29,11 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed
 from ..mirror.history import evaluate_map
-from ..mirror.q31 import GAUSS_ERROR
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import Range, Reach
 from ..mirror.table import Table, f32_words
 from ..model import Envelope, Model, Network, Term
 from ..results.base import Numeric
-from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient, strongest
+from .rounding import LOG2E, exp2_of_minus, guard_of, largest_gradient
 
 #: Share of the range of the map, and of the terms, that is granted beyond it at either end.
 MARGIN = 0.25
@@ -46,8 +44,6 @@ _CROSSING = 64  # lines that are all crossed: 4096 places, as many as the grid h
 _NARROW = 2.0  # cells: half a cell off, a wider Gaussian keeps 94 % of its height
 _STATIONS = np.linspace(0.0, 1.0, 5)
 """Of a narrow region, from edge to edge: alone in the middle, handed over outside."""
-
-Range = tuple[float, float]
 
 
 class Bounds(TypedDict):
@@ -141,34 +137,9 @@ def _effects(model: Model) -> Range:
 
 def _effect(model: Model, term: Term) -> Range:
     """Return the range of a term within the envelope and the guard of its channel, deg/h."""
-    kind, values = term.table.kind, term.table.parameters(term.parameters, model.block_s)
-    low, high = model.envelope.temperature_c
-    if kind.reads_channel:
-        guard = guard_of(model, term.channel)
-        return _of_channel(kind, values, (low, high), (guard.low, guard.high))
-    if kind == TableKind.MEMORY:
-        size = abs(values[1]) * (high - low)
-    elif kind == TableKind.PLAY:
-        size = strongest(values[1:], (low, high)) * values[0]
-    elif kind in (TableKind.WARM_UP, TableKind.HARMONIC):
-        size = abs(values[-1])
-    else:
-        raise NotImplementedError(f"largest effect of a term of kind {kind}")
-    return -size, size
-
-
-def _of_channel(kind: TableKind, values: Sequence[float], temperature_c: Range, readings: Range) -> Range:
-    """Return the range of a term of a channel over temperatures and readings, deg/h; it contains 0."""
-    slopes, reference, bells = [values[0]], values[1], (0.0, 0.0)
-    if kind == TableKind.CURVE:
-        reference, bells = values[2], (values[3], values[5])
-    elif kind == TableKind.PRODUCT:
-        slopes = [values[0] + values[2] * (t - values[3]) for t in temperature_c]
-    elif kind != TableKind.AUXILIARY:
-        raise NotImplementedError(f"largest effect of a term of kind {kind}")
-    ends = [slope * (x - reference) for slope in slopes for x in readings]
-    low, high = (math.fsum(pick(0.0, weight) for weight in bells) for pick in (min, max))
-    return min(0.0, *ends) + low, max(0.0, *ends) + high
+    kind, values = term.table.kind.description, term.table.parameters(term.parameters, model.block_s)
+    guard = guard_of(model, term.channel)
+    return kind.effect(values, model.envelope.temperature_c, (guard.low, guard.high))
 
 
 def _words(bounds: Range, numeric: Numeric, frac_bits: int) -> tuple[int, ...]:
@@ -184,61 +155,24 @@ def _words(bounds: Range, numeric: Numeric, frac_bits: int) -> tuple[int, ...]:
     return low & 0xFFFFFFFF, high & 0xFFFFFFFF
 
 
-_EPS = 2.0**-24  # largest relative error of one float32 rounding
-_F32_GAUSSIAN = 1.9e-7  # of 2^-v in float32, by visiting every argument: docs/numerics.md, section 2
-_STEEP = 0.715  # largest |d/da 2^(-a²)|: sqrt(2 ln2 / e)
-_SCALED = 0.736  # largest |da²/da a 2^(-a²)|: 2/e
-_CUT = 2.0**-32  # what a Gaussian is at 32 octaves, where it ends
-
-
 def channel_error_dph(model: Model, numeric: Numeric, frac_bits: int) -> float:
-    """Sum over the curves and products of a model, deg/h; 0 without any."""
-    of = _f32 if numeric == "f32" else _q31
-    kinds = (TableKind.CURVE, TableKind.PRODUCT)
-    return math.fsum(of(model, term, 2.0**-frac_bits) for term in model.terms if term.table.kind in kinds)
+    """Return the sum over the terms whose rounding is part of the stated error, deg/h; 0 without any."""
+    total = []
+    for term in model.terms:
+        errors = term.table.kind.description.rounding_error
+        if errors is not None:
+            values = term.table.parameters(term.parameters, model.block_s)
+            total.append(errors[numeric](values, _reach(model, term), 2.0**-frac_bits))
+    return math.fsum(total)
 
 
-def _reaches(model: Model, term: Term) -> tuple[float, float]:
-    """Largest distance of a reading from the reference; of T from its own, C."""
+def _reach(model: Model, term: Term) -> Reach:
     guard, p = guard_of(model, term.channel), term.parameters
-    reach = max(abs(x - p["reference"]) for x in (guard.low, guard.high))
-    middle = p.get("reference_c", 0.0)
-    return reach, max(abs(t - middle) for t in model.envelope.temperature_c)
-
-
-def _q31(model: Model, term: Term, unit: float) -> float:
-    values = term.table.parameters(term.parameters, model.block_s)
-    reach, reach_c = _reaches(model, term)
-    if term.table.kind == TableKind.CURVE:
-        slope, gain, _, first, _, second = values
-        argument = gain * 2.0**-17 + 2.0**-28  # a center is rounded, the product cut off
-        bell = GAUSS_ERROR + _CUT + _STEEP * argument + _SCALED * 2.0**-25 / gain
-        line = 0.5 * unit * reach + abs(slope) * 2.0**-17 + unit
-        return line + (abs(first) + abs(second)) * bell + 2.0 * unit
-    slope, _, growth, _ = values
-    here = 0.5 * unit + 0.5 * unit * reach_c + abs(growth) * 2.0**-17 + unit
-    return here * reach + _steepest(values, reach_c) * 2.0**-17 + unit
-
-
-def _f32(model: Model, term: Term, unit: float) -> float:
-    values = term.table.parameters(term.parameters, model.block_s)
-    reach, reach_c = _reaches(model, term)
-    if term.table.kind == TableKind.CURVE:
-        slope, gain, reference, first, center, second = values
-        line = abs(slope) * (3.0 * reach + abs(reference)) * _EPS
-        bells = math.fsum(
-            abs(w) * (_F32_GAUSSIAN + _CUT + _STEEP * gain * abs(c) * _EPS + (4.0 * _SCALED + 2.0) * _EPS)
-            for c, w in ((reference, first), (center, second))
-        )
-        total = abs(slope) * reach + 2.0 * (abs(first) + abs(second))  # of the two sums
-        return 1.01 * (line + bells + total * _EPS)
-    slope, reference, growth, middle = values
-    here = abs(slope) + abs(growth) * (4.0 * reach_c + abs(middle)) + _steepest(values, reach_c)
-    return 1.01 * _EPS * (here * reach + _steepest(values, reach_c) * (2.0 * reach + abs(reference)))
-
-
-def _steepest(values: Sequence[float], reach_c: float) -> float:
-    return abs(values[0]) + abs(values[2]) * reach_c
+    reference_c = p.get("reference_c", 0.0)
+    return Reach(
+        reading=max(abs(x - p["reference"]) for x in (guard.low, guard.high)),
+        temperature_c=max(abs(t - reference_c) for t in model.envelope.temperature_c),
+    )
 
 
 # Of T and of dT/dt: the bound is loose by what a share grows within a cell, the time grows with their number

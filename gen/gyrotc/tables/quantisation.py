@@ -31,7 +31,7 @@ from ..common.inputs import PLAUSIBLE_C, runtime_folders
 from ..mirror.f32 import FUSIBLE
 from ..mirror.front_end import missed_before, samples_per_block
 from ..mirror.history import evaluate_map, replay
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from ..mirror.sigma import RULES
 from ..mirror.table import ARRAYS, Table, Words
 from ..model import Model, load_model

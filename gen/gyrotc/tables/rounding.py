@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed
 from ..common.inputs import MOST_HELD, PLAUSIBLE_C
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind, TermWord
 from ..mirror.table import SERIAL_WORDS, Words, f32_words
 from ..model import Guard, Model, Rules, Term, Uncertainty
 from ..results.base import Numeric
@@ -232,12 +231,6 @@ def largest_gradient(
 
 
 _PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, section 3
-_LIMIT = 2**30  # of parameters in fixed point that are multiplied
-
-_ALONE = {TableKind.WARM_UP: 1, TableKind.HARMONIC: 2}
-"""Which parameter is an amplitude in deg/h."""
-_BY = {(TableKind.WARM_UP, 0): 64.0, (TableKind.CURVE, 1): 8.0}
-"""What a parameter is multiplied by for float32, whose Gaussian counts in 64ths of an octave."""
 
 TermRecord = tuple[TableKind, int, list[float]]
 
@@ -248,30 +241,9 @@ def channel_names(model: Model) -> list[str]:
 
 
 def term_size_dph(model: Model) -> float:
-    """Return the most that the terms can add within the envelope, deg/h."""
-    low, high = model.envelope.temperature_c
-    sizes = []
-    for kind, _, values in (_term_record(model, term) for term in model.terms):
-        if kind == TableKind.MEMORY:
-            sizes.append(abs(values[1]) * (high - low))
-        elif kind == TableKind.PLAY:
-            sizes.append(max(strongest(values[1:], (low, high)) * (high - low), abs(values[2])))
-        elif kind in _ALONE:
-            sizes.append(abs(values[_ALONE[kind]]))
-        elif kind == TableKind.CURVE:  # each weight has half a word; a slope, whatever the unit, one
-            sizes.append(max(2.0 * abs(values[3]), 2.0 * abs(values[5]), abs(values[0])))
-        elif kind == TableKind.PRODUCT:
-            slope, _, growth, middle = values
-            sizes.append(max(abs(slope), abs(growth), strongest((slope, growth, middle), (low, high))))
-        elif kind != TableKind.AUXILIARY:  # the line of a channel has no bound
-            raise NotImplementedError(f"largest words of a term of kind {kind}")
-    return math.fsum(sizes)
-
-
-def strongest(parameter: Sequence[float], temperature_c: tuple[float, float]) -> float:
-    """Largest magnitude over a range of temperature of a parameter that goes with it: value, growth, middle of T."""
-    value, growth, middle = parameter
-    return max(abs(value + growth * (t - middle)) for t in temperature_c)
+    """Return the largest number that the words of the terms must hold within the envelope, deg/h."""
+    records = (_term_record(model, term) for term in model.terms)
+    return math.fsum(kind.description.word_size(values, model.envelope.temperature_c) for kind, _, values in records)
 
 
 def f32_terms(model: Model) -> Words:
@@ -280,7 +252,7 @@ def f32_terms(model: Model) -> Words:
     words = np.zeros((len(records), 2 + _PARAMETERS), dtype=np.uint32)
     heads = _heads(model)
     for row, head, (kind, _, values) in zip(words, heads, records, strict=True):
-        scaled = [_BY.get((kind, k), 1.0) * value for k, value in enumerate(values)]
+        scaled = [word.f32_factor * value for word, value in zip(kind.description.words, values, strict=True)]
         row[:2] = kind, head
         row[2 : 2 + len(values)] = f32_words(scaled)
     return words.reshape(-1)
@@ -292,33 +264,23 @@ def q31_terms(model: Model, frac_bits: int) -> Words:
     Raises:
         CheckFailed: A parameter does not fit its word.
     """
-    unit = 2.0**frac_bits
-    scales = {
-        TableKind.MEMORY: (2.0**31, unit, 2.0**24),
-        TableKind.PLAY: (2.0**16, unit, unit, 2.0**16),
-        TableKind.WARM_UP: (2.0**28, unit),
-        TableKind.HARMONIC: (2.0**32, 2.0**32, unit),
-        TableKind.AUXILIARY: (unit, 2.0**16),
-        TableKind.CURVE: (unit, 2.0**24, 2.0**16, unit, 2.0**16, unit),
-        TableKind.PRODUCT: (unit, 2.0**16, unit, 2.0**16),
-    }
     words = np.zeros((len(model.terms), 2 + _PARAMETERS), dtype=np.uint32)
     for row, head, term in zip(words, _heads(model), model.terms, strict=True):
         kind, _, values = _term_record(model, term)
         row[:2] = kind, head
-        for k, (value, scale) in enumerate(zip(values, scales[kind], strict=True)):
-            row[2 + k] = _whole(kind, k, term.id, value * scale)
+        for k, (word, value) in enumerate(zip(kind.description.words, values, strict=True)):
+            bits = frac_bits if word.q31_bits is None else word.q31_bits
+            row[2 + k] = _whole(word, term.id, value * 2.0**bits)
     return words.reshape(-1)
 
 
-def _whole(kind: TableKind, k: int, id: str, value: float) -> int:
+def _whole(word: TermWord, id: str, value: float) -> int:
     whole = round(value)
-    if (kind, k) == (TableKind.HARMONIC, 1):
+    if word.is_phase:
         return whole & 0xFFFFFFFF
     if whole == 2**31:  # a gain of 1
         whole -= 1
-    half = (kind.reads_channel and (kind, k) != (TableKind.CURVE, 1)) or (kind, k) == (TableKind.PLAY, 2)
-    if abs(whole) >= (_LIMIT if half else 2**31):
+    if abs(whole) >= (2**30 if word.is_multiplied else 2**31):
         raise CheckFailed(f"q31: a parameter of term {id} leaves the range of 32 bits")
     return whole & 0xFFFFFFFF
 

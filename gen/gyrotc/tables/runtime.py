@@ -18,7 +18,7 @@ from pathlib import Path
 
 from ..common.errors import CheckFailed
 from ..common.inputs import runtime_folders
-from ..mirror.recursions import TableKind
+from ..mirror.kinds import TableKind
 from ..mirror.table import PARTS
 from ..model import Model, RuntimePart
 from ..results.base import NUMERICS
@@ -101,7 +101,7 @@ def _derived(options: Options) -> dict[str, int]:
     """Return the settings that gtc_config.h derives from the options."""
     terms = options["GTC_MAX_TERMS"]
     channels = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.reads_channel)
-    retained = max(options["GTC_WITH_MEMORY"], options["GTC_WITH_PLAY"])
+    retained = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.description.has_state)
     derived = {
         "GTC_WITH_TERMS": int(terms > 0),
         "GTC_WITH_CHANNELS": channels,

@@ -31,8 +31,9 @@ from ..causes.base import Cause, History
 from ..common.arrays import FloatArray
 from ..mirror.front_end import with_missing
 from ..mirror.history import channel_at
+from ..mirror.kinds import TableKind
 from ..mirror.readings import Guarded
-from ..mirror.recursions import F32, CourseChannel, TableKind
+from ..mirror.recursions import F32, CourseChannel
 from ..model import Model
 from ..recordings.records import Dataset, Rows, Run
 from ..recordings.units import channel_kind
