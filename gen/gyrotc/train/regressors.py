@@ -12,14 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import BoolArray, FloatArray
-from .choice import CandidateChoice, choose
+from .choice import CandidateChoice, choose, expected_square
 from .data import Scaling, TrainingData, average_samples, mean_cells
 from .gaussian import GaussianMap
+from .noise import floor_dph
 from .process import MEAN_S, TrainingHistory, smooth
 
 # Map and weights are found in turn so many times: a third round moves weights of simulated gyros by less than 1 %.
@@ -46,7 +48,7 @@ class RegressorChoice:
     Attributes:
         chosen: Names in the order in which they were taken.
         weights: Of the columns of each, deg/h per unit.
-        left_out_rms_dph: RMS over the pieces left out, all counting alike, with none, one, two, ... of them.
+        left_out_rms_dph: RMS expected on the pieces left out, all counting alike, with none, one, two, ... of them.
         choice: The decision on their number; candidates are "0", "1", "2", ...
         pieces: Number of pieces.
     """
@@ -213,14 +215,25 @@ class Beside:
         return found
 
     def squares(self, pieces: Sequence[_Piece], chosen: Sequence[str]) -> FloatArray:
-        """Return the mean square on every piece with some regressors, (deg/h)^2."""
-        return np.array([np.mean((piece.left @ self._mix(piece.normal, chosen)) ** 2) for piece in pieces])
+        """Return the mean square that is expected on every piece with some regressors, (deg/h)^2."""
+        left = (piece.left @ self._mix(piece.normal, chosen) for piece in pieces)
+        return np.array([expected_square(residual, self._noise_dph) for residual in left])
 
     def weights(self, chosen: Sequence[str]) -> dict[str, FloatArray]:
         """Return the weights of regressors from the whole history."""
-        precision = self._precision(np.ones(len(self.history.y), dtype=bool))
-        mix = self._mix(self._normal(precision, self._smoothed(precision)), chosen)
+        mix = self._whole_mix(chosen)
         return {name: -mix[self.place[name]] for name in chosen}
+
+    @cached_property
+    def _noise_dph(self) -> float:
+        """Noise of an average on a piece, by what map and all regressors leave, as what these explain is no noise."""
+        left = self.residuals() @ self._whole_mix(list(self.place))
+        return floor_dph(self.history.means, left, max(self.average_s, MEAN_S))
+
+    def _whole_mix(self, chosen: Sequence[str]) -> FloatArray:
+        """Return the mix of the whole history."""
+        precision = self._precision(np.ones(len(self.history.y), dtype=bool))
+        return self._mix(self._normal(precision, self._smoothed(precision)), chosen)
 
     def _precision(self, mask: BoolArray) -> FloatArray:
         """Return products of map columns, bias and regressors, with what power-ons have of their own integrated out."""

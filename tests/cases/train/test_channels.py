@@ -111,6 +111,19 @@ def test_a_channel_that_the_bias_follows_is_taken_with_its_slope(rng: np.random.
     assert row.share_of_variance == pytest.approx(np.var(line) / np.var(made.bias_dph), rel=0.05)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_lucky_fold_of_two_means_does_not_keep_a_channel_out(seed: int) -> None:
+    """In its last run, of 200 s, neither noise nor the channel acts: the map alone leaves hardly anything there."""
+    rng = np.random.default_rng(seed)
+    samples, u = history(rng), wander(rng, 30.0)
+    last = samples.run == _RUNS - 1
+    u[last] = 1.0
+    made = np.where(last, 7e-3 + 1e-3 * np.tanh(samples.temperature_c / 20.0), samples.bias_dph + 3e-4 * u)
+    kept = ~last | (samples.time_s < 200.0)
+    columns = {"supply_v": 28.0 + 0.1 * u[kept]}
+    assert verdicts(replace(samples, bias_dph=made).select(kept), columns)["supply_v"][0] == "taken"
+
+
 def _effect(shape: str, u: Array, t: Array) -> Array:
     """What a channel of mean 0 and variance 1 adds, deg/h."""
     slope = 1.0 + (0.02 * (t - 20.0) if shape == "product" else 0.0)
