@@ -152,12 +152,13 @@ class CandidateModel(Part):
 
     id: str = Field(description="name of the method")
     left_out_rms_dph: Figure = Field(
-        description="RMS on thermal history left out in turn, all pieces counting alike, deg/h; null if not known"
+        description="RMS that is expected of new means on thermal history left out in turn, so never less than the "
+        "noise, all pieces counting alike, deg/h; null if not known"
     )
     loss: float | None = Field(
         default=None,
-        description="mean logarithm of the RMS on pieces of history left out, less that of the best candidate; null if "
-        "not known",
+        description="mean logarithm of the RMS expected on pieces of history left out, less that of the best "
+        "candidate; null if not known",
     )
     doubt: Figure = Field(
         default=None, description="standard error of this difference over the pieces; null of the best candidate"
@@ -183,7 +184,7 @@ class ChannelTried(Part):
         default=None, description="of the straight line through what it adds, deg/h per unit; where taken"
     )
     left_out_rms_before_dph: Figure = Field(
-        default=None, description="RMS on history left out with those taken before it, deg/h; where taken"
+        default=None, description="RMS expected on history left out with those taken before it, deg/h; where taken"
     )
     left_out_rms_after_dph: Figure = Field(default=None, description="the same with it, deg/h; where taken")
     share_of_variance: Figure = Field(

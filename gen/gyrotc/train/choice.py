@@ -1,16 +1,16 @@
 """The one decision of training: is a richer candidate better on history that it has not seen?
 
-A candidate's loss on a piece of history is the logarithm of the RMS that it leaves there without having seen it, so all
-pieces count alike and one gross failure does not outvote the others. A candidate is beaten by a richer one whose mean
-loss is smaller by more than its doubt: the standard error of the mean difference over the pieces. The simplest
-candidate that no richer one beats is taken.
+A candidate's loss on a piece of history is the logarithm of the RMS that is expected there of means that it has not
+seen, so all pieces count alike and one gross failure does not outvote the others. A candidate is beaten by a richer one
+whose mean loss is smaller by more than its doubt: the standard error of the mean difference over the pieces. The
+simplest candidate that no richer one beats is taken.
 
 Two or three pieces may agree by accident, and their scatter then says that there is no doubt. So one more deviation is
 added to theirs: that of a piece on which the candidates are equally good, give or take 1.5 %. It counts much with two
 pieces and hardly at all with ten.
 
-New means on a piece will show the structure that a candidate leaves and their own noise, so a candidate cannot leave
-less than the noise but by accident. The logarithm of such an accident on a few means would outvote the other pieces;
+New means on a piece will show the structure that a candidate leaves and their own noise, so a candidate leaves less
+than the noise only by accident. The logarithm of such an accident on a few means would outvote the other pieces;
 `expected_square` returns what is to be expected of new means instead.
 """
 
@@ -29,6 +29,8 @@ from ..common.arrays import FloatArray
 _PRIOR_DEVIATION = 0.015
 # Standard errors that a gain must exceed. More keep the constant where a map would help; fewer take maps by chance.
 _STANDARD_ERRORS = 1.0
+# A mean square that is more than so many times that of the noise is taken as it is: the tail below 0 is nothing there.
+_FAR = 1e6
 # Least RMS, as a share of the largest: below it lie rates without noise, which differ by rounding.
 _LEAST_RMS = 1e-6
 
@@ -39,7 +41,7 @@ class CandidateChoice:
 
     Attributes:
         candidates: Names, the simplest first.
-        losses: Log RMS on each piece left out, shape (pieces, candidates); nan: it could not be fitted.
+        losses: Log of the RMS expected on each piece left out, shape (pieces, candidates); nan: it could not be fitted.
         chosen: Name of the candidate that is taken.
     """
 
@@ -52,7 +54,7 @@ class CandidateChoice:
         return gain_over_pieces(self._of(other) - self._of(name))
 
     def rms(self, name: str) -> float | None:
-        """Return the RMS over the pieces, all counting alike; None if it is not known."""
+        """Return the RMS expected over the pieces, all counting alike; None if it is not known."""
         rms = float(np.sqrt(np.mean(np.exp(2.0 * self._of(name))))) if len(self.losses) else np.nan
         return rms if np.isfinite(rms) else None
 
@@ -76,9 +78,9 @@ def expected_square(residual: FloatArray, noise: float) -> float:
         noise: Standard deviation of the noise of a mean; 0: not known.
     """
     square = float(np.mean(residual**2))
-    if noise <= 0.0:
-        return square
     scatter = noise**2 * float(np.sqrt(2.0 / len(residual)))
+    if scatter <= 0.0 or square > _FAR * noise**2:
+        return square
     beyond = (square - noise**2) / scatter
     tail = float(np.exp(-0.5 * beyond**2 - log_ndtr(beyond)) / np.sqrt(2.0 * np.pi))
     return noise**2 + scatter * (beyond + tail)
@@ -91,8 +93,8 @@ def choose(candidates: Sequence[str], mean_squares: FloatArray) -> CandidateChoi
 
     Args:
         candidates: Names, the simplest first.
-        mean_squares: What each leaves on each piece without having seen it, shape (pieces, candidates); nan if it
-            could not be fitted.
+        mean_squares: What is expected of each on each piece without having seen it, shape (pieces, candidates); nan if
+            it could not be fitted.
     """
     names = tuple(candidates)
     squares = np.asarray(mean_squares, dtype=np.float64).reshape(-1, len(names))

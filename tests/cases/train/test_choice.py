@@ -72,6 +72,12 @@ def test_less_than_the_noise_is_not_expected_of_new_means(n: int) -> None:
     assert expected[-1] == pytest.approx(25.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-170, 1e-80, 1e-3])
+@pytest.mark.parametrize("left", [0.0, 1.0])
+def test_noise_that_is_nothing_changes_nothing(left: float, noise: float) -> None:
+    assert expected_square(np.full(4, left), noise) == pytest.approx(left**2, abs=2.0 * noise**2)
+
+
 @pytest.mark.parametrize(("lucky", "chosen"), [(0.2, "rich"), (2.5, "simple")])
 def test_one_lucky_fold_does_not_outvote_the_others(lucky: float, chosen: str) -> None:
     """The simple candidate leaves half of what the rich one does on a fold: below the noise, and above it."""
