@@ -257,6 +257,9 @@ REFUSED: dict[str, Refused] = {
     "started no date": Refused(
         description(RUN + '\nstarted = "yesterday"'), ("field started", "'yesterday'", "2026-03-01T08:00:00Z")
     ),
+    "started in the future": Refused(
+        description(RUN + "\nstarted = 2096-03-01T08:00:00Z"), ("field started", "2096", "not after today")
+    ),
     "power-on no time": Refused(
         description(RUN + '\npower_on_s = "often"'), ("field power_on_s", "'often'", 'seconds or "unknown"')
     ),
@@ -307,6 +310,7 @@ EDITS: dict[str, tuple[str, str]] = {
     "span without rows": ("from_s = 5000.0", "from_s = 0.0"),
     "exclusion without end": ("from_s = 9.0}", "from_s = 9.0, to_s = 20.0, reason = 'door'}"),
     "started no date": ("yesterday", "2026-03-01T08:00:00Z"),
+    "started in the future": ("2096", "2026"),
     "power-on no time": ("often", "unknown"),
     "column named wrong": ("omega", "rate_dph"),
     "pulse weight zero": ("pulse_weight_arcsec = 0.0\n", ""),

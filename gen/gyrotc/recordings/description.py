@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date, datetime, time, timezone
+from datetime import date, datetime, time, timedelta, timezone
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -86,6 +86,11 @@ def _plain_name(name: str) -> str:
     return path.as_posix()
 
 
+def not_yet(instant: datetime) -> bool:
+    """Test whether an instant is after today in every zone: a clock that was wrong."""
+    return instant > datetime.now(timezone.utc) + timedelta(days=1)
+
+
 def _instant(value: object) -> object:
     """TOML date-time, TOML date or ISO 8601 text; without an offset it is taken as UTC."""
     expected = PydanticCustomError("started", "a date and time such as 2026-03-01T08:00:00Z")
@@ -98,7 +103,10 @@ def _instant(value: object) -> object:
         value = datetime.combine(value, time())
     if not isinstance(value, datetime):
         raise expected
-    return value if value.tzinfo else value.replace(tzinfo=timezone.utc)
+    value = value if value.tzinfo else value.replace(tzinfo=timezone.utc)
+    if not_yet(value):
+        raise PydanticCustomError("started", "a date and time that is not after today; leave it out if it is unknown")
+    return value
 
 
 def json_value(value: object) -> object:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...common.arrays import FloatArray
 from ...common.errors import InputError, quoted
+from ..description import not_yet
 from ..tables import Chunk, Column, LoggerTable
 from ..units import Conversion, conversion, words_of_name
 from .map_file import TimeMap
@@ -145,7 +146,16 @@ class Clock:
 
     @property
     def started(self) -> datetime | None:
-        """Time of 0 where it is known, in UTC."""
+        """Time of 0 where it is known and not in the future, in UTC."""
+        return None if self.runs_ahead else self._zero
+
+    @property
+    def runs_ahead(self) -> bool:
+        """True if the stamps lie in the future: the clock of the logger was wrong."""
+        return self._zero is not None and not_yet(self._zero)
+
+    @property
+    def _zero(self) -> datetime | None:
         if self._table.started is not None and not (self._columns and self._columns[0].kind == "stamp"):
             return self._table.started if self.origin in (None, 0) else None
         if self._known_zone and self.origin is not None and (self._stamps is None or self._stamps.dated):

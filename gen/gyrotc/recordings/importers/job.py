@@ -201,6 +201,8 @@ def proposal(file: LoggerFile, plan: ImportPlan, rows: ImportedRows) -> Iterator
         yield _line("time", "-", f"{plan.rate_hz:g} rows per second", plan.why_rate)
     for choice in (plan.temperature, *plan.values, *plan.channels):
         yield _line(choice.role, choice.source, _unit_words(choice), _why(choice))
+    if rows.clock.runs_ahead:
+        yield "  the stamps lie in the future: the clock of the logger was wrong, and when the run started is left out"
     if rows.clock.needs_zone:
         yield "  the stamps have no zone: when the run started is left out (--set time.zone=Europe/Berlin would say it)"
     if plan.where:
