@@ -93,8 +93,8 @@ def _end_stop(judgement: Judgement, events: Sequence[Event]) -> Finding:
     values = " and ".join(f"{one.size:.6g}" for one in events)
     text = (
         f"The rates of {run.file} pile up at {values} deg/h: the sensor or its converter was at an end stop, or wrote "
-        f"this value for readings that it did not have. These rows and the few between them, {rows} in all, do not "
-        "reach the fit."
+        f"this value for readings that it did not have. The stretches with such rows, {rows} rows in all, do not reach "
+        "the fit."
     )
     return _found(
         "end_stop",

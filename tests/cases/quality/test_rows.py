@@ -120,6 +120,27 @@ def test_rates_at_an_end_stop_are_left_out(row_s: float) -> None:
     assert [one.size for one in judgement.events if one.kind == "end_stop"] == [stop]
 
 
+@pytest.mark.parametrize("share", [0.02, 0.1])
+@pytest.mark.parametrize("row_s", [1.0, 10.0])
+def test_what_is_kept_between_two_end_stops_has_the_mean_of_the_rate(row_s: float, share: float) -> None:
+    """Noise that both stops cut off would bend the curve: in the mean over all, and more so without the cut rows."""
+    time, temperature, rate = sound(np.random.default_rng(SEED), row_s)
+    smooth = 0.05 * np.tanh(temperature / 30.0)
+    rate += smooth - 0.01 * np.tanh(temperature / 30.0)
+    smooth += 2e-3 * np.exp(-time / 1500.0)
+    clipped = np.clip(rate, *np.quantile(rate, [share, 1.0 - share]))
+    kept = ~left_out(judged(time, temperature, clipped), len(rate))
+    blocks = len(rate) // round(600.0 / row_s)
+    means = [
+        float(np.mean((clipped - smooth)[part][kept[part]]))
+        for part in np.array_split(np.arange(len(rate)), blocks)
+        if kept[part].mean() > 0.5
+    ]
+    assert len(means) > 3
+    noise = 7e-3 / np.sqrt(600.0)
+    assert np.sqrt(np.mean(np.square(means))) < 1.5 * noise
+
+
 def test_the_ends_of_a_coarse_rate_are_no_end_stops() -> None:
     """Sixty levels of which each has as many rows as the next, the highest and the lowest too."""
     time, temperature, _ = sound(np.random.default_rng(SEED), 10.0)
