@@ -484,6 +484,17 @@ def test_a_short_exam_has_an_interval() -> None:
     assert gain.angle_1h_removed_arcsec is None, "no run lasts an hour"
 
 
+def test_figures_before_and_after_are_each_of_their_own_residuals() -> None:
+    """Residuals of 5 and of 2 deg/h, an hour of which is 5 and 2 times 3600 arcsec."""
+    hours = np.ones(36 * HOURS)
+    gain = gain_of([residual(5.0 * hours)], [residual(2.0 * hours)], 1.0, AVERAGE_S)
+    assert (gain.exam_rms_before_dph, gain.exam_rms_after_dph) == pytest.approx((5.0, 2.0))
+    assert (gain.rms_30min_before_dph, gain.rms_30min_after_dph) == pytest.approx((5.0, 2.0))
+    assert (gain.angle_1h_before_arcsec, gain.angle_1h_after_arcsec) == pytest.approx((18000.0, 7200.0))
+    assert gain.rms_removed_dph.value == pytest.approx(3.0)
+    assert gain.angle_1h_removed_arcsec is not None and gain.angle_1h_removed_arcsec.value == pytest.approx(10800.0)
+
+
 def test_no_gain_is_seldom_taken_for_one() -> None:
     """The lower limit is that of 95 %: of 200 pairs of equally large noise 2.5 % are to seem a gain, and chance."""
     found = [

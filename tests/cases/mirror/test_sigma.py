@@ -44,3 +44,22 @@ def test_a_table_without_uncertainties_says_so(build: Runtime, numeric: str) -> 
     table = quantise(random_model(5), numeric)
     status, _ = build.snapshots(table, table.encode_inputs(np.full((20, 1), 20.0)), np.zeros(20), 2)
     assert set(status[:, 1]) == {E_ABSENT}
+
+
+@pytest.mark.parametrize("numeric", NUMERICS)
+def test_where_nothing_is_uncertain_sigma_is_that_of_the_rounding(build: Runtime, numeric: str) -> None:
+    """Also the root of 0 is the same in both."""
+    model, known = random_model(5), random_uncertainty(5)
+    nothing = ((0.0,) * known.cells[0],) * known.cells[1]
+    amounts = {name: 0.0 for name, value in known.rules.model_dump().items() if isinstance(value, float)}
+    rules = known.rules.model_copy(update=amounts | {"correlation_s": 100.0})
+    content = known.model_copy(update={"rows": nothing, "uncovered": nothing, "rules": rules})
+    table = quantise(model.model_copy(update={"uncertainty_dph": content}), numeric)
+    low, high = model.envelope.temperature_c
+    channels = table.encode_inputs(np.linspace(low, high, 400)[:, None])
+    missed = np.zeros(400, dtype=np.int64)
+    expected = replay(table, channels, missed=missed, samples_per_block=2)
+    status, bits = build.snapshots(table, channels, missed, 2)
+    assert expected.sigma is not None
+    np.testing.assert_array_equal(bits[:, 1], expected.sigma)
+    assert table.decode_bias(bits[:, 1]).max() <= table.error_bound_dph

@@ -243,6 +243,24 @@ def test_rules_have_the_unit_of_the_rate_and_no_other_size() -> None:
     assert small["correlation_s"] > 10.0
 
 
+def test_where_the_temperature_stands_still_nothing_is_held_and_every_rule_is_a_number() -> None:
+    """Though terms make the correction change."""
+    data = gyro(3, 6e-4)
+    still = replace(data, slope_c_per_min=np.zeros(len(data)))
+    rules = uncertainty_of(still, fit(still, method="linear"), CELLS, added=1e-3 * np.sin(still.time_s / 600.0))["rules"]
+    assert rules["hold_dph_per_c"] == rules["slope_dph_per_c_per_min"] == 0.0
+    assert all(np.isfinite(value) for name, value in rules.items() if name != "terms" and value is not None)
+
+
+def test_an_error_that_lasts_from_power_on_to_power_on_is_correlated_longer() -> None:
+    """The error of the map is forgotten with the way over temperature; that of the constant is not."""
+    even, scattered = (
+        uncertainty_of(data, fit(data, method="linear"), CELLS)["rules"]["correlation_s"]
+        for data in (gyro(3, 0.0), gyro(3, 6e-4))
+    )
+    assert scattered > 2.0 * even > 0.0
+
+
 @pytest.mark.parametrize("runs", [4, 6])
 def test_what_stands_for_a_lost_channel_states_the_error_of_the_next_run(runs: int, model_dict: dict[str, Any]) -> None:
     """Spread within runs, and of the mean of a run more: Student's t about the mean of few, by pandas and scipy."""
