@@ -59,7 +59,7 @@ def test_where_nothing_is_uncertain_sigma_is_that_of_the_rounding(build: Runtime
     channels = table.encode_inputs(np.linspace(low, high, 400)[:, None])
     missed = np.zeros(400, dtype=np.int64)
     expected = replay(table, channels, missed=missed, samples_per_block=2)
-    status, bits = build.snapshots(table, channels, missed, 2)
+    _, bits = build.snapshots(table, channels, missed, 2)
     assert expected.sigma is not None
     np.testing.assert_array_equal(bits[:, 1], expected.sigma)
     assert table.decode_bias(bits[:, 1]).max() <= table.error_bound_dph

@@ -551,3 +551,17 @@ def test_a_coarse_thermometer_that_holds_is_not_stuck(step: float, tmp_path: Pat
     held = np.where(np.arange(600) < 300, table["temperature_c"], table["temperature_c"][300])
     write_csv(tmp_path / "R" / "a.csv", table | {"temperature_c": np.round(held / step) * step})
     assert "stuck_temperature" not in {d.id for d in check(tmp_path / "R").warnings}
+
+
+@pytest.mark.parametrize(("slope", "testable"), [(2e-3, False), (3e-3, True)])
+def test_gains_are_compared_where_the_bias_swings_by_five_times_the_scatter(
+    slope: float, testable: bool, tmp_path: Path
+) -> None:
+    """Four runs up and down over 80 C; the slope is that of the bias, deg/h/C, beside noise of 0.05 deg/h a row."""
+    time = 10.0 * np.arange(1440)
+    temperature = np.interp(time, [0.0, 7200.0, 14400.0], [-20.0, 60.0, -20.0])
+    for k in range(4):
+        rate = 20.0 + slope * temperature + np.random.default_rng(k).normal(0.0, 0.05, 1440)
+        write_csv(tmp_path / f"{k}.csv", {"time_s": time, "temperature_c": temperature, "rate_dph": rate})
+    (tmp_path / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(4))))
+    assert ("gain_changed" not in {one.id for one in check(tmp_path).not_testable}) == testable

@@ -238,6 +238,15 @@ def test_the_choice_does_not_depend_on(name: str, repeats: bool) -> None:
     same(auto(data), auto(change(data)), shift)
 
 
+def test_what_candidates_leave_does_not_see_a_slope_that_both_can_follow() -> None:
+    """Noise is that of what remains: a slope over temperature moves each mean on a ramp by ten times the noise."""
+    data = samples(0)
+    plain, steep = (auto(replace(data, bias_dph=data.bias_dph + k * data.temperature_c)) for k in (0.0, 1e-3))
+    for a, b in zip(plain.candidates, steep.candidates, strict=True):
+        assert a["id"] == b["id"]
+        assert (b["left_out_rms_dph"] == pytest.approx(a["left_out_rms_dph"], rel=0.1)) == (a["id"] != "constant")
+
+
 def same(one: Fit, two: Fit, shift: float = 0.0, share: float = 1e-3) -> None:
     """The same candidate, the same table, and maps within a share of the noise."""
     assert two.method == one.method

@@ -247,7 +247,9 @@ def test_where_the_temperature_stands_still_nothing_is_held_and_every_rule_is_a_
     """Though terms make the correction change."""
     data = gyro(3, 6e-4)
     still = replace(data, slope_c_per_min=np.zeros(len(data)))
-    rules = uncertainty_of(still, fit(still, method="linear"), CELLS, added=1e-3 * np.sin(still.time_s / 600.0))["rules"]
+    rules = uncertainty_of(still, fit(still, method="linear"), CELLS, added=1e-3 * np.sin(still.time_s / 600.0))[
+        "rules"
+    ]
     assert rules["hold_dph_per_c"] == rules["slope_dph_per_c_per_min"] == 0.0
     assert all(np.isfinite(value) for name, value in rules.items() if name != "terms" and value is not None)
 
