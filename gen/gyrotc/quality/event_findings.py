@@ -131,8 +131,8 @@ def _stuck_temperature(judgement: Judgement, events: Sequence[Event]) -> Finding
     run, longest = judgement.run, _longest(events)
     text = (
         f"The temperature of {run.file} stays at one value for {longest.size:g} s from {longest.time_s[0]:g} s on and "
-        f"then steps as it does nowhere else ({len(events)} places): the temperature sensor was stuck, or its record. "
-        "These rows do not reach the fit."
+        f"then steps as it does nowhere else, or its noise does not come back ({len(events)} places): the temperature "
+        "sensor was stuck, or its record. These rows do not reach the fit."
     )
     return _found(
         "stuck_temperature",

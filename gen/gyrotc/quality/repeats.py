@@ -14,7 +14,7 @@ import numpy as np
 from ..common.arrays import FloatArray, IntArray, parts_of, steps_where
 from ..common.metrics import quantile_of_parts
 from ..common.statistics import noise_of
-from .odds import OCTAVE, cost_of
+from .odds import OCTAVE, WINDOW, cost_of
 
 # Rows to one share of repetitions: a coarse value repeats more at some levels than at others.
 _GROUP = 100
@@ -48,7 +48,8 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
 
     Args:
         values: A column of finite values in order of time.
-        needs_release: A stretch counts only if the next value shows that the quantity went on: a temperature may hold.
+        needs_release: A stretch counts only if the next value shows that the quantity went on, since a temperature may
+            hold; at the end of the column, if its noise showed until then.
     """
     n = len(values)
     if n < 2:
@@ -74,11 +75,23 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
                 yield size[size > 0.0]
 
         release = _RELEASE * quantile_of_parts(moves, _ON_RAMPS)
-        ends = np.minimum(starts + lengths, n - 1)[likely]  # the last stretch has no release
-        likely = likely[np.abs(values[ends] - values[ends - 1]) > release]
+        ends = (starts + lengths)[likely]
+        goes_on = np.abs(values[np.minimum(ends, n - 1)] - values[ends - 1]) > release
+        goes_on[-1] |= ends[-1] == n and _shows_noise(values, int(starts[likely[-1]]))
+        likely = likely[goes_on]
     return [
         Repeats(int(starts[k]), int(starts[k] + lengths[k]), float(values[starts[k]]), float(odds[k])) for k in likely
     ]
+
+
+def _shows_noise(values: FloatArray, first: int) -> bool:
+    """Test whether the noise of a column showed in the rows before one: no hold of a programme ends it.
+
+    The resolution of a ramp without noise makes second differences of one step at most.
+    """
+    before = values[max(first - WINDOW, 0) : first]
+    noise = noise_of(np.diff(before, 2)) / np.sqrt(6.0) if len(before) == WINDOW else 0.0
+    return bool(noise > resolution(values))
 
 
 def resolution(values: FloatArray) -> float:

@@ -120,6 +120,19 @@ def test_rates_at_an_end_stop_are_left_out(row_s: float) -> None:
     assert [one.size for one in judgement.events if one.kind == "end_stop"] == [stop]
 
 
+@pytest.mark.parametrize("row_s", [1.0, 10.0, 60.0])
+def test_a_temperature_that_is_stuck_until_the_end_is_left_out(row_s: float) -> None:
+    """Beside it the same run with a sensor without noise that is still at the end, which may be a hold."""
+    time, temperature, rate = sound(np.random.default_rng(SEED), row_s)
+    first = round(0.8 * len(time))
+    temperature[first:] = temperature[first]
+    judgement = judged(time, np.round(temperature, 3), rate)
+    assert left_out(judgement, len(time))[first:].mean() > 0.99
+    assert left_out(judgement, len(time))[:first].mean() < 0.01
+    ramp = np.round(np.minimum(0.01 * row_s * np.arange(len(time)), 0.01 * row_s * first), 2)
+    assert judged(time, ramp - 30.0, rate).count().get("temperature stuck", 0) == 0
+
+
 @pytest.mark.parametrize("share", [0.02, 0.1])
 @pytest.mark.parametrize("row_s", [1.0, 10.0])
 def test_what_is_kept_between_two_end_stops_has_the_mean_of_the_rate(row_s: float, share: float) -> None:
