@@ -345,7 +345,7 @@ def table(record: Record) -> ResultsTable:
     groups = {f"{len(exact)} equivalent forms (a constant added, another unit, order, seed and others)": exact}
     groups |= {name: [row for row in rows if row["variation"].startswith(own)] for name, own in _OTHERS.items()}
     figures = []
-    for name, group in groups.items():
+    for name, group in ((name, group) for name, group in groups.items() if group):
         of = sum(row["sets"] for row in group)
         for words, key in (("same verdict and causes", "same"), ("within bounds", "late")):
             kept = sum(row[key] for row in group)

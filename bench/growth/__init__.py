@@ -46,6 +46,8 @@ def table(record: Record) -> ResultsTable:
 
 def _of_rows(record: Record) -> Iterator[tuple[str, Figure]]:
     long = [row for row in record["rows"] if row["what"] in ("rows", "gradient")]
+    if not long:  # of a quick run
+        return
     commands = ", ".join(f"`{name}`" for name in dict.fromkeys(row["command"] for row in long))
     rows = max(row["sizes"][-1]["size"] for row in long)
     peak = max(row["sizes"][-1]["peak_mib"] for row in long)
