@@ -13,7 +13,7 @@ import numpy as np
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
-from ..common.statistics import orthonormal
+from ..common.statistics import TOLERANCE, orthonormal
 from ..results.diagnosed import NOTHING, UNNAMED
 from .candidates import Candidate, price_of, searched
 from .detection import Found, detect
@@ -369,6 +369,6 @@ def _fitted(gains: Gains, cause: Refined) -> FloatArray:
     """Map and cause as fitted, without noise, deg/h."""
     bank = gains.search.bank
     if cause.candidate.role == "input":
-        return np.asarray(cause.columns @ np.linalg.lstsq(cause.columns, gains.search.y, rcond=1e-9)[0])
+        return np.asarray(cause.columns @ np.linalg.lstsq(cause.columns, gains.search.y, rcond=TOLERANCE)[0])
     rest = gains.search.y - cause.contribution
     return np.asarray(bank.map @ (bank.map.T @ rest) + cause.contribution)

@@ -13,12 +13,11 @@ from scipy.special import logsumexp
 
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
-from ..common.statistics import CHI2_95_TWO
+from ..common.statistics import CHI2_95_TWO, TOLERANCE
 from .candidates import Candidate, searched, shape_parameter
-from .joined import INDEPENDENT, Held, Projection, ScoredColumns, p_values, score
+from .joined import Held, Projection, ScoredColumns, p_values, score
 from .search import Search, View, residual_log_likelihood
-
-_RANK = 1e-10  # eigenvalues of inner products below this share of the largest are rounding
+from .tolerances import INDEPENDENT
 
 
 def project(search: Search, view: View, held: Held) -> Projection:
@@ -32,7 +31,7 @@ def project(search: Search, view: View, held: Held) -> Projection:
         mix = _without_map(search)
         full, b = mix.T @ full @ mix, mix.T @ b
     size, vectors = np.linalg.eigh(full[np.ix_(out, out)])
-    keep = size > _RANK * size[-1]
+    keep = size > TOLERANCE * size[-1]
     half = vectors[:, keep] / np.sqrt(size[keep])
     cross = half.T @ full[out]
     taken = half.T @ b[out]

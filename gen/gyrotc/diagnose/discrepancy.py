@@ -16,11 +16,11 @@ from scipy.special import chdtr, chdtrc
 
 from ..common.arrays import BoolArray, FloatArray
 from ..common.metrics import HALF_HOUR_S
-from ..common.statistics import orthonormal
+from ..common.statistics import TOLERANCE, orthonormal
 from ..results.diagnosed import ComparedStatistic
 from .blocks import Records, centred_slope
 from .detection import project
-from .joined import ROUNDING, p_values, score
+from .joined import p_values, score
 from .noise import NOISE_COLOURS, Declared, Whitener
 from .search import Search, View
 
@@ -147,7 +147,7 @@ def ensemble_of(
     model = orthonormal(search.bank.map, search.joined.beside, *([] if beside is None else [beside]))
     both -= model @ (model.T @ both)
     measured, simulated = both[:, 0], both[:, 1:]
-    rounding = ROUNDING * float(np.sqrt((both**2).mean()))
+    rounding = TOLERANCE * float(np.sqrt((both**2).mean()))
     found = []
     for name, statistic in _statistics(search).items():
         values = statistic(both)

@@ -20,14 +20,12 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from ..common.arrays import FloatArray, IntArray
+from ..common.statistics import TOLERANCE
 from .candidates import Candidate
 from .signature_bank import SignatureBank
+from .tolerances import INDEPENDENT, MAIN
 
 _DRAWS = 4000  # 40 draws lie beyond the 1 % point: it is known to one sixth of itself
-_WEAK = 1e-3  # directions of the dictionary below this share of the strongest are left out
-ROUNDING = 1e-9  # what is below this share of a norm, of an energy or of a size is made of rounding errors
-INDEPENDENT = 1e-4  # share of a column's energy that must be its own beside the others
-_LEAST_LEFT = 1e-6  # of a column's energy: what survives less has no signature left
 _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units of the noise of its weights
 
 
@@ -72,7 +70,7 @@ class Projection:
     @cached_property
     def alive(self) -> NDArray[np.bool_]:
         """Columns that still have a signature."""
-        return np.asarray(np.diag(self.gram) > _LEAST_LEFT * self.before)
+        return np.asarray(np.diag(self.gram) > INDEPENDENT * self.before)
 
     @cached_property
     def structure(self) -> tuple[FloatArray, FloatArray]:
@@ -83,7 +81,7 @@ class Projection:
         """
         inner = self.common.T @ self.gram @ self.common
         size, vectors = np.linalg.eigh(inner)
-        keep = size > _WEAK * size[-1]
+        keep = size > MAIN**2 * size[-1]
         return np.asarray(self.common @ (vectors[:, keep] / np.sqrt(size[keep])))[:, ::-1], size[keep][::-1]
 
 
@@ -145,7 +143,7 @@ def variance_ratio_of(gram: FloatArray, a: FloatArray, before: float) -> tuple[F
         before: Largest norm² that a column had.
     """
     size, vectors = np.linalg.eigh(gram)
-    keep = size > ROUNDING * max(before, 1e-300)
+    keep = size > TOLERANCE * max(before, 1e-300)
     return ratio_of((a @ vectors[:, keep]) ** 2 / size[keep], size[keep])
 
 
@@ -178,7 +176,7 @@ def draw_null(projection: Projection, columns: ScoredColumns, seed: int, draws: 
     """Largest score in data without effect, shape (draws,)."""
     used = np.flatnonzero(projection.alive)
     gram = projection.gram[np.ix_(used, used)]
-    gram = gram + np.diag(1e-7 * projection.before[used] + 1e-12)
+    gram = gram + np.diag(TOLERANCE * projection.before[used] + 1e-12)
     factor = root_of_gram(gram)
     normal = np.random.default_rng(seed).standard_normal((draws, used.size))
     a = np.zeros((draws, projection.a.size))
@@ -273,7 +271,7 @@ def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: 
     on_map = bank.map.T @ columns
     rest = columns - bank.map @ on_map
     norm = np.linalg.norm(rest, axis=0)
-    norm = np.where(norm > ROUNDING * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
+    norm = np.where(norm > TOLERANCE * np.linalg.norm(columns, axis=0) + 1e-300, norm, np.inf)
     length = np.linalg.norm(held, axis=0)
     layout = JoinedLayout.of(bank.map.shape[1], bank.signatures.shape[1], own.shape[1], len(bank.inputs), held.shape[1])
     added = (*names, *bank.inputs)

@@ -16,14 +16,14 @@ from scipy.special import chdtrc, fdtrc, pdtrc
 from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.progress import Progress, silent
-from ..common.statistics import main_directions, orthonormal
+from ..common.statistics import TOLERANCE, main_directions, orthonormal
 from ..quality.odds import FALSE_ALARMS
 from .attribution import Attribution, attribute, overlap
 from .blocks import Records, centred_slope
 from .candidates import Candidate, columns_of, diagnosable_causes, searched
 from .detection import CauseLimit, detection_limits
 from .discrepancy import Ensemble, NoiseFinding, ensemble_of, noise_findings
-from .joined import ROUNDING, Channels
+from .joined import Channels
 from .marginal_likelihood import MarginalLikelihood
 from .noise import NOISE_WORDS, Colour, Declared
 from .posterior import EQUIVALENT
@@ -32,10 +32,10 @@ from .refinement import Refined
 from .search import Search, open_search
 from .signature_bank import build_bank
 from .static_map import LEVELS, fits_exactly, led_map
+from .tolerances import MAIN
 
 _FINER_P = 1e-3  # one in a thousand campaigns gets a finer map than it needs, which costs little
 _MEMORIES = ("thermal_memory", "hysteresis")  # families of causes that a lag of the sensor may be taken for
-_MAIN = 0.05  # share of the strongest direction (of a function) below which memories (the finer map) say nothing
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def _channels(records: Records) -> Channels | None:
     columns, candidates = [], []
     for name in names:
         column = records.average([r.channels[name] for r in records.runs])
-        if np.ptp(column) > ROUNDING * (1.0 + np.abs(column).max()):
+        if np.ptp(column) > TOLERANCE * (1.0 + np.abs(column).max()):
             for cause in (id for id, term in diagnosable_causes().items() if term.needs.channel):
                 columns.append(column - column.mean())
                 candidates.append(Candidate(cause, {}, "columns", name))
@@ -215,10 +215,10 @@ def needs_finer(search: Search) -> bool:
         + [gains.plain_columns(s) for c, s in gains.random if not _of_map(c)]
         + waves
     )
-    held = orthonormal(gains.map_q, main_directions(memory, _MAIN))
+    held = orthonormal(gains.map_q, main_directions(memory, MAIN))
     rest = finer - held @ (held.T @ finer)
     q, r = np.linalg.qr(rest)
-    own = np.abs(np.diag(r)) > _MAIN * np.linalg.norm(finer, axis=0)
+    own = np.abs(np.diag(r)) > MAIN * np.linalg.norm(finer, axis=0)
     if not own.any():
         return False
     y = gains.whiten(search.y) / gains.scale
@@ -291,7 +291,7 @@ def _variance(records: Records) -> tuple[FloatArray | None, float, float]:
     freedom = logs.size - 1 - q.shape[1]
     f = float((weights**2).sum()) / rank / (left / freedom)
     p = float(fdtrc(rank, freedom, f))
-    beta, *_ = np.linalg.lstsq(x, logs, rcond=1e-8)
+    beta, *_ = np.linalg.lstsq(x, logs, rcond=TOLERANCE)
     sigma = np.exp(np.clip(0.5 * (design @ beta - np.median(design @ beta)), *np.log(_SIGMAS)))
     low, high = np.quantile(sigma, [0.025, 0.975])
     ratio = float(high / low)

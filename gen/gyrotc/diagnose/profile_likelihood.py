@@ -27,9 +27,10 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, columns_of, price_of, searched
-from .joined import INDEPENDENT, variance_ratio_of
+from .joined import variance_ratio_of
 from .noise import Whitener
 from .search import Search
+from .tolerances import INDEPENDENT
 
 _MOST_SPREAD = 2.0  # spread of a cause over that of the rate: the map may take off half of it, and not nearly all
 

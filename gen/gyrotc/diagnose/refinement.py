@@ -12,7 +12,7 @@ from scipy.special import chdtri
 
 from .. import causes as terms
 from ..common.arrays import FloatArray
-from ..common.statistics import CHI2_95_ONE, NORMAL_95, orthonormal
+from ..common.statistics import CHI2_95_ONE, NORMAL_95, TOLERANCE, orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, CandidateKey, columns_of, reach_of, searched, shape_parameter
 from .profile_likelihood import Gains
@@ -174,7 +174,7 @@ class _Fit:
     def energy(self, members: list[Candidate]) -> float:
         """Energy of the data that the members explain beyond the map; 0 where one would be larger than is accepted."""
         white = [self.made(m)[0] for m in members]
-        weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=1e-10)[0]
+        weights = np.linalg.lstsq(np.column_stack(white), self.y, rcond=TOLERANCE)[0]
         parts = np.split(weights, np.cumsum([own.shape[1] for own in white])[:-1])
         for member, part in zip(members, parts, strict=True):
             if sized(member) and np.linalg.norm(self.made(member)[1] * part) > 1.0:
@@ -256,7 +256,7 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
     size = np.linalg.norm(white, axis=0)
     norm = np.where(size > 0.0, size, 1.0)  # what runs show nothing of, as of a local function, gets a weight of 0
     y = fit.gains.whiten(search.y)
-    weights = np.linalg.lstsq(white / norm, y, rcond=1e-10)[0] / norm
+    weights = np.linalg.lstsq(white / norm, y, rcond=TOLERANCE)[0] / norm
     mine = weights[start : start + own.shape[1]]
     tangent = _tangent(search, members[k], mine)
     contribution = own @ mine
@@ -295,9 +295,9 @@ def _spread(fit: _Fit, design: FloatArray, tangents: list[FloatArray], start: in
     """Covariance of the weights `start` ... when everything is free, shape (count, count)."""
     white = fit.gains.whiten(np.column_stack([design, *tangents]))
     norm = np.where(np.linalg.norm(white, axis=0) > 0, np.linalg.norm(white, axis=0), 1.0)
-    inverse = np.linalg.pinv((white / norm).T @ (white / norm), rcond=1e-11, hermitian=True)
-    part = slice(start, start + count)
-    return np.asarray(inverse[part, part] / np.outer(norm[part], norm[part]) * fit.gains.scale**2)
+    inverse = np.linalg.pinv(white / norm, rcond=TOLERANCE)[start : start + count]
+    inverse = inverse / norm[start : start + count, None]
+    return np.asarray(inverse @ inverse.T * fit.gains.scale**2)
 
 
 def _amplitudes(

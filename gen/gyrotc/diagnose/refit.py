@@ -20,7 +20,7 @@ from ..causes import CATALOGUE
 from ..causes.base import MOST_OVERTONES, OVERTONES, Cause, CauseValues, History, Scene
 from ..common.arrays import FloatArray, give_back
 from ..common.metrics import LEAST_SPAN_C, MAD_TO_SIGMA, Averages, average_rows
-from ..common.statistics import orthonormal
+from ..common.statistics import TOLERANCE, orthonormal
 from ..mirror.front_end import blocks_since_power_on
 from ..mirror.recursions import Course, CourseChannel, TermOutcome
 from ..quality.judgement import Judged
@@ -61,7 +61,7 @@ def overtones_of(data: TrainingData, term: Cause, values: CauseValues) -> tuple[
         if _energy(bins, [*columns, more]) - _energy(bins, columns) > bins.bic_penalty(more.shape[1]):
             columns.append(more)
             taken.append(own)
-    weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), bins.residual, rcond=1e-9)[0], dtype=np.float64)
+    weights = np.asarray(np.linalg.lstsq(np.column_stack(columns), bins.residual, rcond=TOLERANCE)[0], dtype=np.float64)
     found, at = [], columns[0].shape[1]
     for own, column in zip(taken, columns[1:], strict=True):
         found.append({**own, **term.amplitudes(weights[at : at + column.shape[1]])})
@@ -402,13 +402,13 @@ def _over_temperature(loops: _Loops, effect: Effect) -> Effect:
     best, n = int(np.argmin(left)), loops.y.size
     if n * np.log(constant / left[best]) <= np.log(n):
         return effect
-    strength, growth = np.linalg.lstsq(columns[best], loops.y, rcond=1e-9)[0].tolist()
+    strength, growth = np.linalg.lstsq(columns[best], loops.y, rcond=TOLERANCE)[0].tolist()
     return replace(effect, values=dict(over_temperature(able[best], strength, growth, loops.middle_c)))
 
 
 def _left(columns: FloatArray, y: FloatArray) -> float:
     """Sum of squares that columns leave of y."""
-    return float(np.square(y - columns @ np.linalg.lstsq(columns, y, rcond=1e-9)[0]).sum())
+    return float(np.square(y - columns @ np.linalg.lstsq(columns, y, rcond=TOLERANCE)[0]).sum())
 
 
 def terms_of(effects: Sequence[Effect]) -> list[Effect]:

@@ -19,9 +19,10 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .candidates import Candidate, price_of
-from .joined import INDEPENDENT, ratio_of
+from .joined import ratio_of
 from .posterior import LOOKED_AT, Rival, odds_of
 from .profile_likelihood import Gains, Point
+from .tolerances import INDEPENDENT
 
 RivalKey = tuple[str, str]  # cause and channel ("" for none)
 Kinds = tuple[RivalKey, ...]  # of a model, sorted

@@ -14,15 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..common.statistics import CHI2_95_TWO
+from ..common.statistics import CHI2_95_TWO, TOLERANCE
 from .blocks import Records
 from .joined import Channels, Joined, join
 from .noise import NOISE_COLOURS, Colour, Whitener
 from .signature_bank import SignatureBank
+from .tolerances import MAIN
 
-_MAIN = 0.1  # share of the strongest direction below which those of other inputs are left to the noise
 _FEW_LEFT = 30  # degrees of freedom that noise needs beside effects: its level is known to 13 % then
-_JITTER = 1e-10  # added to the diagonal of inner products of columns of norm 1: dependent columns do not stop Cholesky
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def possible_effects(bank: SignatureBank, joined: Joined, size: int) -> FloatArr
     layout = joined.layout
     exact = np.eye(layout.total)
     _, strength, right = np.linalg.svd(joined.inputs, full_matrices=False)
-    keep = strength > _MAIN * max(float(strength[0]), 1e-300)
+    keep = strength > MAIN * max(float(strength[0]), 1e-300)
     common = np.zeros((layout.total, bank.common.shape[1]))
     common[layout.signatures] = bank.common
     inputs = np.zeros((layout.total, int(keep.sum())))
@@ -129,7 +128,7 @@ def _with_likelihood(
     inner = to.T @ gram @ to
     length = np.sqrt(np.diag(inner))
     to, inner = to / length, inner / np.outer(length, length)
-    factor = np.linalg.cholesky(inner + _JITTER * np.eye(len(inner)))
+    factor = np.linalg.cholesky(inner + TOLERANCE * np.eye(len(inner)))  # dependent columns do not stop it
     c = np.linalg.solve(factor, to.T @ b)
     freedom = question.y.size - len(inner)
     left = max(yy - float(c @ c), 1e-300)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import FloatArray
+from ..common.statistics import TOLERANCE
 from ..mirror.recursions import play
 from .blocks import Records
 from .candidates import (
@@ -25,13 +26,12 @@ from .candidates import (
 )
 from .noise import NOISE_COLOURS, Whitener
 from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
+from .tolerances import MAIN
 
 # In steps of a factor 2.5, over what a day of recordings shows.
 _DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
 _TEXTURE_C, _MODULATING_S = 8.0, 700.0  # of the texture; of the memory that modulates it
 DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
-_COMMON = 0.05  # directions below this share of the largest singular value are left to the noise
-_SMALL = 1e-5  # a signature of which less than this share survives the map is no signature
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def build_bank(records: Records, level: int, lead_s: float = 0.0) -> SignatureBa
 
 def _scale(rest: FloatArray, raw: FloatArray, groups: Sequence[Signature]) -> FloatArray:
     """Norm of every column beside the map; one for all columns of a group of random amounts."""
-    scale = np.maximum(np.linalg.norm(rest, axis=0), _SMALL * np.linalg.norm(raw, axis=0) + 1e-300)
+    scale = np.maximum(np.linalg.norm(rest, axis=0), TOLERANCE * np.linalg.norm(raw, axis=0) + 1e-300)
     for group in groups:
         if group.candidate.role == "variance":
             scale[group.columns] = scale[group.columns].max()
@@ -142,7 +142,7 @@ def _scale(rest: FloatArray, raw: FloatArray, groups: Sequence[Signature]) -> Fl
 def _common(signatures: FloatArray) -> FloatArray:
     """From signatures to their principal directions, shape (K, p)."""
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
-    return np.asarray(right[size > _COMMON * size[0]].T)
+    return np.asarray(right[size > MAIN * size[0]].T)
 
 
 def _alternatives(records: Records) -> tuple[FloatArray, tuple[Alternative, ...]]:
@@ -180,7 +180,7 @@ def _finer(records: Records, static: FloatArray, level: int, lead_s: float) -> F
         return np.zeros((len(static), 0))
     finer = make_basis(records, level + 1, lead_s)[1]
     left, size, _ = np.linalg.svd(finer - static @ (static.T @ finer), full_matrices=False)
-    return np.asarray(left[:, size > 0.1])
+    return np.asarray(left[:, size > MAIN])
 
 
 def _columns(records: Records) -> tuple[list[Signature], list[FloatArray], dict[str, str]]:

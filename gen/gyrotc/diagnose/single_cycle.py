@@ -35,7 +35,6 @@ from .profile_likelihood import SEPARATION
 from .refinement import Interval, Refined, cancelling
 
 _GAUSSIANS, _WIDTH = 6, 1.5  # of the map of T; width in spacings
-_MOST_ALIKE = 1.0 - 1e-9  # correlation of two states that differ by rounding alone
 _ROUNDS, _AROUND, _FINE = 4, 1.5, 1e-4  # of a walk to the optimum: steps of the grid to either side, end in logarithms
 _POWERS = ((0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (0, 3))  # of (T, dT/dt): of each set the first ones
 POWERS_OF_RATE: tuple[tuple[tuple[int, int], ...], ...] = tuple(_POWERS[:count] for count in (1, 2, 3, 4, 6))
@@ -101,7 +100,7 @@ class CycleFits:
             return np.asarray(a**2)
         b = self.columns[kinds[1]].T @ self.rest
         c = self.columns[kinds[0]].T @ self.columns[kinds[1]]
-        ok = np.abs(c) < _MOST_ALIKE
+        ok = 1.0 - c**2 > TOLERANCE
         if kinds[0] == kinds[1]:
             ok &= self._separate(kinds[0])
         raw = a[:, None] ** 2 + b[None, :] ** 2 - 2.0 * c * a[:, None] * b[None, :]
@@ -384,7 +383,7 @@ def _tried(fits: CycleFits, members: tuple[Candidate, ...], effective: float) ->
     energy = fits.energies(kinds)
     if len(kinds) == 2 and kinds[0] == kinds[1]:
         energy = energy + energy.T
-    least = max(float((fits.left(members) ** 2).sum()), 1e-12 * total)
+    least = max(float((fits.left(members) ** 2).sum()), TOLERANCE**2 * total)
     left = np.maximum(total - energy, least)
     deviance = effective * np.log(left / least)
     intervals, resolved = [], True

@@ -28,6 +28,7 @@ from .refinement import Refined
 from .search import Search, View
 from .signature_bank import DIRECTION_C, Alternative, direction_of
 from .static_map import proportional_map
+from .tolerances import INDEPENDENT, MAIN
 from .wide_memory import WideMemory
 
 _BENT = "memory that does not act in proportion"
@@ -35,8 +36,6 @@ _BEND, _BEND_SHARE = 15.0, 0.1  # energy, and share of the cause's gain, that a 
 _LOOSE = 0.02
 """Share of the causes' gain that a smooth function must be ahead by: no gyro is exactly the catalogue's formula. A
 warm-up of glass at d = 52 was by 1.4 % of its gain a smooth curve rather than an exponential."""
-
-_OWN = 1e-3  # share of a column's energy that must be its own beside the model
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +110,7 @@ class _NestedModels:
         held = self.held(kept)
         rest = columns - held @ (held.T @ columns)
         power = np.einsum("ij,ij->j", rest, rest)
-        own = power > _OWN * np.einsum("ij,ij->j", columns, columns)
+        own = power > INDEPENDENT * np.einsum("ij,ij->j", columns, columns)
         energy = np.where(own, (rest.T @ self.y) ** 2 / np.where(own, power, 1.0), 0.0)
         return self.criterion(kept) + float(energy.max()) - self.price * max(searched(i).price for i in ids)
 
@@ -157,7 +156,7 @@ def _common(held: FloatArray, columns: FloatArray, y: FloatArray) -> float:
     """Likelihood ratio of one variance common to the weights of some columns beside a model."""
     rest = columns - held @ (held.T @ columns)
     left, size, _ = np.linalg.svd(rest, full_matrices=False)
-    keep = size > _OWN * max(float(np.linalg.norm(columns, axis=0).max()), 1e-300)
+    keep = size**2 > INDEPENDENT * max(float((columns**2).sum(axis=0).max()), 1e-300)
     if not keep.any():
         return 0.0
     return float(ratio_of((left[:, keep].T @ y) ** 2, size[keep] ** 2)[0])
@@ -166,14 +165,11 @@ def _common(held: FloatArray, columns: FloatArray, y: FloatArray) -> float:
 def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatArray) -> float:
     """Twice the log-likelihood that one shape adds."""
     size, vectors = np.linalg.eigh(columns.T @ columns)
-    keep = size > _OWN * float(before.max())
+    keep = size > INDEPENDENT * float(before.max())
     if not keep.any() or (not other.common and not keep.all()):
         return 0.0
     energy = (a @ vectors[:, keep]) ** 2 / size[keep]
     return float(ratio_of(energy, size[keep])[0]) if other.common else float(energy.sum())
-
-
-_MAIN = 0.03  # share of the strongest direction of changes below which a direction says nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,8 +280,8 @@ def _changes(current: Search, view: View, held: Held, changed: FloatArray) -> tu
     white = whiten(np.column_stack([changed, current.y]))
     norm = np.linalg.norm(white[:, :-1], axis=0)
     rest = white - q @ (q.T @ white)
-    use = np.linalg.norm(rest[:, :-1], axis=0) > _OWN * norm
-    left = main_directions(rest[:, :-1][:, use] / norm[use], _MAIN)
+    use = np.linalg.norm(rest[:, :-1], axis=0) ** 2 > INDEPENDENT * norm**2
+    left = main_directions(rest[:, :-1][:, use] / norm[use], MAIN)
     if left.shape[1] == 0:
         return 1.0, 0.0
     energy = float(((left.T @ rest[:, -1]) ** 2).sum()) / view.scale**2

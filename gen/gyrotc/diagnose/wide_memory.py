@@ -23,7 +23,7 @@ from scipy.special import ndtr
 
 from ..causes.base import History, Parameter, SearchRule
 from ..common.arrays import FloatArray
-from ..common.statistics import orthonormal
+from ..common.statistics import TOLERANCE, orthonormal
 from ..mirror.recursions import first_order, play
 from .blocks import Records, RunRecord
 from .candidates import diagnosable_causes, reach_of, searched, shape_parameter
@@ -40,7 +40,6 @@ _POINTS = 12  # widths (time constants) that are tried: in steps of a factor 1.4
 _NEAR = (0.3, 0.7, 1.0, 0.7, 0.3)  # weights of the widths about one: a factor of two to either side
 _ROW_S = 10.0  # rows that are nearer than that are thinned: nothing here is as quick
 
-_OWN = 1e-6  # of the strongest direction: what is less is rounding
 _ASKED = 1.0  # variance of a direction over that of the noise from which the data say something of it
 _AHEAD, _SHARE = 10.0, 0.1
 """What the evidence must be ahead of that of lags, and which share of itself: in 34 recordings of relays of k from 1.5
@@ -171,7 +170,7 @@ class _Family:
         """Columns with one common variance, shape (N, k), beside a model."""
         rest = white - held @ (held.T @ white)
         left, size, right = np.linalg.svd(rest, full_matrices=False)
-        own = size > _OWN * size[0]
+        own = size > TOLERANCE * size[0]
         target = self.gains.target - held @ (held.T @ self.gains.target)
         ratio, variance = ratio_of((left[:, own].T @ target) ** 2, size[own] ** 2)
         asked = own & (float(variance) * size**2 > _ASKED)
