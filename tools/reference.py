@@ -29,7 +29,7 @@ REPORTED_BY = {"entry": "fleet", "verify-axes": "verify"}
 #: Modules that may be imported by users' programs; they alone have an `__all__`.
 PYTHON = (
     "model", "recordings.loading", "recordings.records", "train.methods", "train.fitting", "tables.quantisation",
-    "tables.emission", "mirror.history", "verify.job", "assess.evaluation", "diagnose.diagnosis",
+    "tables.emission", "mirror.history", "verify.job", "assess.evaluation", "diagnose.diagnosis", "diagnose.series",
     "simulate.data_set", "common.metrics", "common.errors",
 )  # fmt: skip
 _C_PART = re.compile(

@@ -27,7 +27,7 @@ def _one(low: float, high: float = 1e9, *, offset: bool = False) -> Callable[[Ro
 
 
 RANDOM = ("thermometer_drift", "telegraph", "pulses", "room_cycle")
-# Written after the shapes of `diagnose/candidates.py`, by somebody who had not read them.
+# Written after the shapes of `diagnose/shapes.py`, by somebody who had not read them.
 UNFORESEEN = ("stick_slip", "saturating_memory", "ringing", "dose")
 
 CHECKS: list[Check] = [

@@ -15,7 +15,8 @@ from ..causes import CATALOGUE
 from ..common.arrays import FloatArray
 from ..common.statistics import CHI2_95_TWO, TOLERANCE
 from .candidates import Candidate, searched, shape_parameter
-from .joined import Held, Projection, ScoredColumns, p_values, score
+from .joined import Held
+from .scores import Projection, ScoredColumns, p_values, score
 from .search import Search, View, residual_log_likelihood
 from .tolerances import INDEPENDENT
 

@@ -20,8 +20,8 @@ from ..common.statistics import TOLERANCE, orthonormal
 from ..results.diagnosed import ComparedStatistic
 from .blocks import Records, centred_slope
 from .detection import project
-from .joined import p_values, score
 from .noise import NOISE_COLOURS, Declared, Whitener
+from .scores import p_values, score
 from .search import Search, View
 
 _LEVEL_P = 1e-3  # one in a thousand campaigns with noise as declared is reported to have another level

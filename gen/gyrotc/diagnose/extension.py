@@ -24,9 +24,10 @@ from ..train.channels import FallbackModel, fallback_model_of
 from ..train.data import TrainingData, joined
 from ..train.result import Fit
 from .gain import gain_of
+from .optional_parts import completed
+from .played import Effect, Played, known, samples
 from .refinement import Refined
-from .refit import Effect, Played, completed, known, samples, scored_means
-from .refitting import FOLDS, Chain, Refitting, held_out_masks, is_corrected
+from .refitting import FOLDS, Chain, Refitting, held_out_masks, is_corrected, scored_means
 from .shipping import Shipping, choose_shipped
 
 

@@ -27,8 +27,8 @@ from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .blocks import singled_out
 from .candidates import Candidate, columns_of, price_of, searched
-from .joined import variance_ratio_of
 from .noise import Whitener
+from .scores import variance_ratio_of
 from .search import Search
 from .tolerances import INDEPENDENT
 

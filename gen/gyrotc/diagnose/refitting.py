@@ -1,4 +1,4 @@
-"""Training and test runs as the target sees them, and every fit of the map beside effects that is asked of them.
+"""Fit the map beside effects, with or without some of the samples, and measure what it leaves.
 
 Where there are no test runs, training runs (or branches of few runs) are left out in turn, and causes and parameters
 are chosen anew without them.
@@ -7,49 +7,43 @@ are chosen anew without them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..causes import CATALOGUE
-from ..common.arrays import BoolArray
-from ..common.metrics import Averages
+from ..common.arrays import BoolArray, FloatArray
+from ..common.metrics import Averages, average_rows
 from ..quality.event_findings import rows_used
 from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset
 from ..train.data import TrainingData, joined
 from ..train.fitting import FitOptions, Read, front_end, map_method, power_ons
 from ..train.folds import folds
-from ..train.result import Fit
+from ..train.methods import fit
+from ..train.result import Fit, predict
+from ..train.simple import without_rate
 from .attribution import choose
 from .blocks import Records
-from .pipeline import search_of
+from .map_choice import search_of
+from .optional_parts import completed
+from .played import Effect, Played, chosen_samples, known, play_runs, samples, samples_beside
 from .refinement import Refined
-from .refit import (
-    Effect,
-    Played,
-    completed,
-    fit_extended,
-    known,
-    mean_count,
-    play_runs,
-    samples_beside,
-    scored_means,
-)
 from .single_cycle import cycle_of
 from .static_map import fits_exactly
+
+Chain = list[list[Averages]]
+"""Residuals of the scored runs for every set of causes, from none to all."""
+FOLDS = 3  # two thirds remain to learn from, at the cost of three fits; fewer runs cannot be left out whole
+_ROUNDING_S = 1e-6  # of times that are compared
+_RE_ZERO_S = 600.0  # a gyro is re-zeroed in its first ten minutes at rest
 
 
 def is_corrected(cause: Refined) -> bool:
     """Test whether the effect of a cause can be taken off beside the map: not where it is structure of the map."""
     return CATALOGUE[cause.candidate.id].kind != "static"
-
-
-Chain = list[list[Averages]]
-"""Residuals of the scored runs for every set of causes, from none to all."""
-
-FOLDS = 3  # two thirds remain to learn from, at the cost of three fits; fewer runs cannot be left out whole
-_ROUNDING_S = 1e-6  # of times that are compared
 
 
 class Refitting:
@@ -180,3 +174,82 @@ def held_out_masks(refitting: Refitting) -> list[list[BoolArray]]:
         return [[np.full(n, k % FOLDS == fold, dtype=bool) for k, n in enumerate(sizes)] for fold in range(FOLDS)]
     data = joined([run.data for run in refitting.train])
     return [[fold.held(run.data) for run in refitting.train] for fold in folds(data, power_ons(refitting.runs))]
+
+
+def fit_extended(
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    arguments: dict[str, Any],
+    kept: Sequence[NDArray[np.bool_]] | None = None,
+    *,
+    rate: bool = True,
+) -> Fit:
+    """The map refitted beside the effects, on the samples `kept` (default: all); without `rate` a map of T alone."""
+    data = chosen_samples(runs, effects, kept)
+    return fit(data, **arguments) if rate else _over_any_rate(data, arguments)
+
+
+def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
+    """A map of T alone, valid over the rates of the samples."""
+    slope = data.slope_c_per_min
+    fitted = fit(replace(data, slope_c_per_min=np.zeros_like(slope)), **arguments)
+    flat = [without_rate(one) for one in fitted.networks]
+    scaling = replace(
+        fitted.scaling,
+        half_range_c_per_min=max(float(np.abs(slope).max()), fitted.scaling.half_range_c_per_min),
+        slope_c_per_min=(float(slope.min()), float(slope.max())),
+    )
+    return replace(fitted, outcome=replace(fitted.outcome, networks=flat), scaling=scaling)
+
+
+def mean_count(run: Played, average_s: float) -> int:
+    """How many means over `average_s` the samples of a run have."""
+    nothing = np.zeros(run.data.time_s.size)
+    whole = np.ones(nothing.size, dtype=bool)
+    return _means(run, nothing, whole, average_s).time_s.size
+
+
+def scored_means(
+    fitted: Fit,
+    runs: Sequence[Played],
+    effects: Sequence[Effect],
+    average_s: float,
+    scored: Sequence[NDArray[np.bool_]],
+) -> list[Averages]:
+    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out.
+
+    Samples whose input is not known beside the effects are not scored.
+    """
+    out = []
+    for run, asked in zip(runs, scored, strict=True):
+        seen = known(run, effects)
+        chosen = asked & seen
+        if not chosen.any():
+            continue
+        data, rest = samples(run, effects).select(seen), np.zeros(seen.size)
+        left = data.bias_dph - predict(fitted, data.temperature_c, data.slope_c_per_min)
+        if any(e.term.kind == "random" for e in effects):  # a new draw for every run: re-zeroed
+            left = _re_zeroed(left, data.time_s, effects)
+        rest[seen] = left
+        out.append(_means(run, rest, chosen, average_s))
+    return out
+
+
+def _re_zeroed(rest: FloatArray, time_s: FloatArray, effects: Sequence[Effect]) -> FloatArray:
+    """Residuals after a rest at their start: its mean counts as far as the offsets are larger than its noise."""
+    variance = max(e.values["std_dph"] for e in effects if e.term.kind == "random") ** 2
+    first = rest[time_s < time_s[0] + _RE_ZERO_S]
+    noise = float(np.mean(np.diff(rest) ** 2)) / 2.0 / len(first) if len(rest) > 1 else 0.0
+    return np.asarray(rest - first.mean() * variance / (variance + noise))
+
+
+def _means(run: Played, left_dph: FloatArray, scored: NDArray[np.bool_], average_s: float) -> Averages:
+    return average_rows(
+        run.data.time_s,
+        run.data.temperature_c,
+        run.data.bias_dph,
+        left_dph,
+        scored=scored,
+        average_s=max(average_s, run.block_s),
+        from_s=run.begins_s,
+    )

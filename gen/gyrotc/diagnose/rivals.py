@@ -19,9 +19,9 @@ import numpy as np
 from ..common.arrays import FloatArray
 from ..common.statistics import orthonormal
 from .candidates import Candidate, price_of
-from .joined import ratio_of
 from .posterior import LOOKED_AT, Rival, odds_of
 from .profile_likelihood import Gains, Point
+from .scores import ratio_of
 from .tolerances import INDEPENDENT
 
 RivalKey = tuple[str, str]  # cause and channel ("" for none)

@@ -24,7 +24,7 @@ from ..train.channels import MOST_TERMS
 from ..train.choice import expected_square, gain_over_pieces
 from ..train.data import cleaned_samples, scaling_of
 from ..train.fitting import power_ons
-from .refit import Effect
+from .played import Effect
 from .refitting import Refitting
 
 # Share of a piece that must be at temperatures that the rest has covered.

@@ -13,18 +13,9 @@ from ..common.arrays import FloatArray
 from ..common.statistics import TOLERANCE
 from ..mirror.recursions import play
 from .blocks import Records
-from .candidates import (
-    Candidate,
-    CandidateRole,
-    columns_of,
-    diagnosable_causes,
-    late,
-    reach_of,
-    searched,
-    shapes_of,
-    testable,
-)
+from .candidates import Candidate, CandidateRole, columns_of, diagnosable_causes, reach_of, searched, testable
 from .noise import NOISE_COLOURS, Whitener
+from .shapes import late, shapes_of
 from .static_map import LEVELS, MapBasis, changed_inputs, fine_columns, make_basis
 from .tolerances import MAIN
 
@@ -32,6 +23,9 @@ from .tolerances import MAIN
 _DICTIONARY_LAGS_S = (150.0, 400.0, 1000.0, 2500.0, 6000.0)
 _TEXTURE_C, _MODULATING_S = 8.0, 700.0  # of the texture; of the memory that modulates it
 DIRECTION_C = 3.0  # width of the play whose side tells the direction: above thermometer noise, far below a cycle
+# Norm beside the map from which on a direction of the finer map is one that the map lacks. With weaker ones, what a
+# memory leaves would ask for a finer map.
+_OWN = 0.1
 
 
 @dataclass(frozen=True)
@@ -180,7 +174,7 @@ def _finer(records: Records, static: FloatArray, level: int, lead_s: float) -> F
         return np.zeros((len(static), 0))
     finer = make_basis(records, level + 1, lead_s)[1]
     left, size, _ = np.linalg.svd(finer - static @ (static.T @ finer), full_matrices=False)
-    return np.asarray(left[:, size > MAIN])
+    return np.asarray(left[:, size > _OWN])
 
 
 def _columns(records: Records) -> tuple[list[Signature], list[FloatArray], dict[str, str]]:

@@ -32,8 +32,8 @@ from .discrepancy import NoiseFinding
 from .extension import Extension
 from .noise import NOISE_WORDS
 from .pipeline import Analysis
+from .played import terms_of
 from .refinement import Interval, Refined
-from .refit import terms_of
 from .single_cycle import Cycle, memories
 from .verdict import VERDICTS, deciding_run, looks_like, next_steps, sentence_of, shows_as, verdict_of
 

@@ -21,10 +21,11 @@ from ..common.arrays import FloatArray
 from ..common.statistics import main_directions, orthonormal
 from .candidates import price_of, searched
 from .detection import project
-from .joined import Held, Projection, ratio_of
+from .joined import Held
 from .noise import Whitener
 from .profile_likelihood import Gains
 from .refinement import Refined
+from .scores import Projection, ratio_of
 from .search import Search, View
 from .signature_bank import DIRECTION_C, Alternative, direction_of
 from .static_map import proportional_map

@@ -27,9 +27,9 @@ from ..common.statistics import TOLERANCE, orthonormal
 from ..mirror.recursions import first_order, play
 from .blocks import Records, RunRecord
 from .candidates import diagnosable_causes, reach_of, searched, shape_parameter
-from .joined import ratio_of
 from .posterior import EQUIVALENT
 from .profile_likelihood import Gains
+from .scores import ratio_of
 from .static_map import FINE_C
 
 _STEPS, _SOFT = 7, 0.85

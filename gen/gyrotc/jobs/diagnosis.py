@@ -12,8 +12,9 @@ from typing import Any
 from ..common.progress import Progress, Stages, silent
 from ..common.texts import toml_comment, toml_key, toml_value
 from ..common.threads import with_one_thread
-from ..diagnose.diagnosis import Diagnosis, series_of
+from ..diagnose.diagnosis import Diagnosis
 from ..diagnose.diagnosis import diagnose as _diagnose
+from ..diagnose.series import series_of
 from ..pages.diagnosis import PICTURES, SERIES, diagnosis_pictures, write_diagnosis_page
 from ..quality.judgement import Judged
 from ..recordings.loading import asked_axes, load
