@@ -28,6 +28,7 @@ from gyrotc.train.prior import (
     means_of_unit,
     posterior_of_known,
     posterior_of_process,
+    posterior_of_result,
     revised,
     updated,
     widened,
@@ -219,6 +220,38 @@ def test_a_confirmed_model_and_its_check_run_are_one_table() -> None:
     assert "prior_does_not_hold" in [f["id"] for f in changed.findings]
     truth = bias(t, r) + CHANGES["local"](t, r)
     assert np.sqrt(np.mean((predict(changed, t, r) - truth) ** 2)) < 5e-4
+
+
+def test_power_ons_with_offsets_are_in_the_sigma_of_a_confirmed_model() -> None:
+    """An offset of the check run's power-on is not taken for a change, nor for the constant of the gyro."""
+    t, r = (x.ravel() for x in np.meshgrid(np.linspace(-19, 49, 30), np.linspace(-2.0, 2.0, 9)))
+    squares = []
+    for seed in range(100, 112):
+        rng = np.random.default_rng(seed)
+        calibration, check = (with_offsets(rng, recorded(rng, runs), 3e-4) for runs in (CALIBRATION, CHECK))
+        prior = widened(known_of(calibration), 0.0, "none", "a" * 64, None)
+        both, alone = fit(check, method="auto", prior=prior), fit(check, method="mrbf")
+        assert both.prior is not None and both.prior.chosen == "unchanged"
+        errors = [float(np.mean((predict(f, t, r) - bias(t, r)) ** 2)) for f in (both, alone)]
+        squares.append((*errors, both.prior.sigma_dph**2))
+    of_both, of_alone, stated = np.sqrt(np.mean(squares, axis=0))
+    assert of_both < 0.7 * of_alone
+    assert 0.7 * stated < of_both < 1.3 * stated
+
+
+def with_offsets(rng: np.random.Generator, data: TrainingData, sigma_dph: float) -> TrainingData:
+    """Samples with a power-on before each run."""
+    offsets = sigma_dph * rng.normal(size=int(data.run.max()) + 1)
+    return replace(data, bias_dph=data.bias_dph + offsets[data.run])
+
+
+def test_a_result_that_does_not_hold_its_map_is_no_prior(world: Path) -> None:
+    """As of an extended model, or of an earlier gyrotc."""
+    where = world / "old" / "training.json"
+    training = read_result(where, Training)
+    assert posterior_of_result(training, where).mean.size > 5
+    with pytest.raises(InputError, match=r"training\.json, field known: is missing"):
+        posterior_of_result(training.model_copy(update={"known": None}), where)
 
 
 def test_what_is_known_of_a_map_is_read_back() -> None:

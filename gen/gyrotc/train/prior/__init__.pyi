@@ -8,6 +8,7 @@ from .departures import within as within
 from .earlier import EarlierPrior as EarlierPrior
 from .earlier import posterior_of_known as posterior_of_known
 from .earlier import posterior_of_process as posterior_of_process
+from .earlier import posterior_of_result as posterior_of_result
 from .earlier import widened as widened
 from .learn import FALSE_ALARM as FALSE_ALARM
 from .learn import Learned as Learned
