@@ -409,6 +409,37 @@ slope_dph_per_unit_per_c = 1.2e-4
 """
 
 
+LINES = (
+    BENT.partition("[[cause]]")[0]
+    + """
+[[cause]]
+id = "auxiliary"
+channel = "supply_v"
+reference = 28.0
+slope_dph_per_unit = 0.02
+[[cause]]
+id = "auxiliary"
+channel = "magnetic_ut"
+reference = 40.0
+slope_dph_per_unit = 3e-4
+"""
+)
+
+
+def test_the_sigma_of_each_term_is_that_of_losing_its_own_channel(tmp_path: Path) -> None:
+    """One channel moves the bias seven times as far as the other; a constant takes the place of either."""
+    (tmp_path / "lines.toml").write_text(up_and_down("separating", 6) + LINES, "utf-8")
+    simulate(tmp_path / "lines.toml", seed=3, out=tmp_path / "data")
+    dataset = load(tmp_path / "data")
+    found = fit_dataset(dataset, FitOptions(channels=True)).model
+    assert found.uncertainty_dph is not None and found.uncertainty_dph.rules is not None
+    stated = dict(zip((term.channel for term in found.terms), found.uncertainty_dph.rules.terms, strict=True))
+    train = [run.rows() for run in dataset.runs if run.role == "train"]
+    for name, slope in (("supply_v", 0.02), ("magnetic_ut", 3e-4)):
+        effect = slope * np.concatenate([rows.channels[name] for rows in train])
+        assert stated[name] == pytest.approx(effect.std(), rel=0.4), name
+
+
 @pytest.fixture(scope="module")
 def shaped_recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("shapes")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import Command
 from gyrotc.diagnose import diagnose, series_of
@@ -98,3 +99,12 @@ def test_a_restart_is_one_event_whatever_the_rows_beside_the_gap_are(tmp_path: P
     """Rows beside the gap that are left out leave neither a step nor a gap besides the restart."""
     found = [event.id for event in found_events(load(recorded(tmp_path, 3, garbage)))]
     assert [id for id in found if id != "rate_outliers"] == ["restart"]
+
+
+def test_another_gap_of_a_file_with_a_restart_is_named(tmp_path: Path) -> None:
+    """After the second one the gyro goes on at the level that it had."""
+    rows = pd.read_csv(recorded(tmp_path, 3) / "0.csv")
+    rows[(rows["time_s"] < 20_000.0) | (rows["time_s"] > 20_400.0)].to_csv(tmp_path / "0.csv", index=False)
+    found = [(event.id, event.time_s.value) for event in found_events(load(tmp_path)) if event.time_s is not None]
+    assert [id for id, _ in found] == ["restart", "dropout"]
+    assert [at for _, at in found] == pytest.approx([STOP_S, 20_000.0], abs=500.0)
