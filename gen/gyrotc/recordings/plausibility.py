@@ -127,7 +127,8 @@ _NEARLY = 0.999  # of a bound: a sum of six steps and the difference of the ends
 _FLOWN = 5e-5  # deg/sqrt(h): the quietest gyros flown, hemispherical resonators and long coils of fibre
 _QUIETEST = 0.1 * _FLOWN  # ten times quieter than the quietest gyro is no gyro
 _NOISY = 6.0  # deg/sqrt(h), 0.1 deg/s/sqrt(Hz): the noisiest gyros sold, vibrating structures for cameras and toys
-_NOISIEST = 10.0 * _NOISY  # ten times noisier than the noisiest gyro is no gyro at rest
+_AT_REST = 10.0  # times its noise in a data sheet: what chambers and cables do to a gyro at rest is less
+_NOISIEST = _AT_REST * _NOISY  # beyond it is no gyro at rest
 _QUIET_TAU_S = 100.0  # noise is looked at up to here; drift with temperature begins to count beyond
 _FEWEST_CELLS = 30  # less is not judged
 _HOT_SHARE = 0.02  # of the cells; a few wild readings say nothing of the unit
@@ -299,7 +300,12 @@ def _of_noise(
         return None
     walk, robust = max(one for one, _ in walks), min(one for _, one in walks)
     if robust > _NOISIEST:
-        return _too_noisy(robust, rate, column, unit)
+        return _too_noisy(robust, rate, column, unit, "any gyro", (_FLOWN, _NOISY))
+    if noise and robust > _AT_REST * noise:
+        declared = f"a gyro of {noise:.2g} deg/sqrt(h)"
+        louder = _too_noisy(robust, rate, column, unit, declared, (noise / _AT_REST, _AT_REST * noise))
+        if louder.likely is not None:
+            return louder
     larger = [(likely, factor) for likely, factor in _other_rates(unit) if factor > 1.0]
     for least in (_FLOWN, _QUIETEST):
         for likely, factor in larger:
@@ -314,15 +320,17 @@ def _of_noise(
     return None
 
 
-def _too_noisy(walk: float, rate: FloatArray, column: str, unit: Conversion | None) -> Suspicion:
-    """Noise above that of every gyro, with the unit that makes it that of one."""
+def _too_noisy(
+    walk: float, rate: FloatArray, column: str, unit: Conversion | None, gyro: str, usual: tuple[float, float]
+) -> Suspicion:
+    """Return noise above that of a gyro, with the unit that makes it the usual one; limits in deg/sqrt(h)."""
     middle = median(rate)
     found = (
-        f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of any gyro at rest, and a median of "
+        f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of {gyro} at rest, and a median of "
         f"{middle:.4g} deg/h"
     )
     for likely, factor in _other_rates(unit):
-        if factor < 1.0 and _FLOWN <= walk * factor <= _NOISY:
+        if factor < 1.0 and usual[0] <= walk * factor <= usual[1]:
             found += f"; in {likely} it is {walk * factor:.2g} deg/sqrt(h) and {middle * factor:.4g} deg/h"
             return Suspicion("rate", column, found, likely)
     return Suspicion("rate", column, found, None)

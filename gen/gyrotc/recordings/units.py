@@ -3,6 +3,9 @@
 A unit is a product of powers of the names that stand here. Its size is a fraction of whole numbers times a power of pi,
 so a factor is rounded once. An angle has a dimension of its own: Hz is no rate of rotation.
 A register with an offset is written as in its data sheet: `raw/340 + 36.53 degC`.
+
+No library does this: pint evaluates powers of any size, so that `10**9**9 s` in a heading does not end, and it refuses
+words that loggers write.
 """
 
 from __future__ import annotations

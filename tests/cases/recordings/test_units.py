@@ -267,6 +267,22 @@ def test_noise_above_that_of_any_gyro_is_refused_unless_trusted(
     assert load(state(folder, "trust_units = true")).trusted
 
 
+def test_noise_far_above_the_declared_one_is_refused_where_another_unit_makes_it_that(tmp_path: Path) -> None:
+    """A gyro of 0.01 deg/sqrt(h) whose deg/h stand as deg/s: 36 deg/sqrt(h) is less than some gyro might have."""
+    table = columns(600)
+    period = float(table["time_s"][1] - table["time_s"][0])
+    table["rate_dph"] = 20.0 + np.random.default_rng(7).normal(0.0, 0.01 * np.sqrt(3600.0 / period), 600)
+    folder = made(tmp_path / "R", table, 'rate = "deg/s"')
+    assert load(folder).trusted == ()
+    with (folder / "dataset.toml").open("a") as file:
+        file.write("\n[noise]\narw_deg_per_sqrt_h = 0.01\n")
+    with pytest.raises(InputError, match=r"above that of a gyro of 0\.01 .* in deg/h it is 0\.0"):
+        load(folder)
+    remedy = (folder / "dataset.toml").read_text().replace('rate = "deg/s"', 'rate = "deg/h"')
+    (folder / "dataset.toml").write_text(remedy)
+    assert load(folder).trusted == ()
+
+
 def test_gyros_of_every_class_are_taken_in_the_unit_that_is_declared(tmp_path: Path) -> None:
     """From a hemispherical resonator to the noisiest of vibrating gyros, some of them with a wild row."""
     rng = np.random.default_rng(6)
