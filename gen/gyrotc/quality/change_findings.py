@@ -55,7 +55,7 @@ def _lasting(run: Run, one: Change, first_s: float, end_s: float) -> Finding:
 
 
 def _restart(run: Run, step: Change, first_s: float, end_s: float) -> Finding:
-    """Rows that stop and go on at another level."""
+    """Report rows that stop and go on at another level."""
     time, back = step.time_s[1:]
     out = (first_s, time + run.row_period_s) if back - first_s < end_s - back else (back, end_s)
     text = (

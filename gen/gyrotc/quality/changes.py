@@ -187,7 +187,7 @@ def _undoes(one: Change, back: Change) -> bool:
 
 
 def _within(one: Change, gain: Change) -> bool:
-    """Whether a change is the step that a change of gain makes."""
+    """Test whether a change is the step that a change of gain makes."""
     return one.run == gain.run and one.time_s[1] <= gain.time_s[2] and gain.time_s[1] <= one.time_s[2]
 
 
@@ -204,13 +204,13 @@ def _columns(cells: RunCells, run: int, changes: Sequence[_At], curves: Sequence
 
 
 def _over_s(cells: RunCells) -> float:
-    """What takes no longer is a step: two rows that are means may hold it."""
+    """Return the longest time of a step, s: two rows that are means may hold it."""
     return max(_STEP_S, 2.0 * cells.cell_s)
 
 
 @dataclass(frozen=True, slots=True)
 class _Looked:
-    """What a run shows at the places of the search.
+    """Statistics of a run at the places of the search.
 
     Attributes:
         sizes: Sizes over errors of changes at every cell, shape (n,), by what is tried.
@@ -237,7 +237,7 @@ class _Search:
         self._louder: list[float] = []
 
     def found(self, known: Sequence[_At]) -> list[_At]:
-        """All that is clear, placed and fitted beside one another; it begins with what is known."""
+        """Return all clear changes, placed and fitted together, known ones first."""
         found = list(known)
         for run in sorted({at.run for at in known}):
             self._measure(found)
@@ -273,7 +273,7 @@ class _Search:
         return self._runs.fit([_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)])
 
     def _clearest(self, found: Sequence[_At]) -> Iterator[_At]:
-        """Of every run the clearest change, if it is clear; of a departure that comes back both steps."""
+        """Yield the clearest change of each run if it is clear; both steps of a departure that comes back."""
         for k, looked in enumerate(self._measure(found)):
             if sum(at.run == k for at in found) >= _MOST:
                 continue
@@ -300,7 +300,7 @@ class _Search:
                     yield _At(k, "step", begin, length)
 
     def _differ(self, one: _At, other: _At) -> bool:
-        """Whether two changes of a run are two."""
+        """Test whether two changes of a run are distinct."""
         apart = abs(one.middle_s - other.middle_s) > self._separation_s(one.run)
         return apart or {one.kind, other.kind} == {"gain", "drift"}
 
@@ -364,7 +364,7 @@ class _Search:
         return others + own
 
     def _at_steps(self, fit: RunFit, own: list[_At]) -> list[_At]:
-        """With each gain at the step that it may be the cause of: then one step fewer has to be clear."""
+        """Put each gain at the step that it may cause: then one step fewer has to be clear."""
         for gain in [at for at in own if at.kind == "gain"]:
             for step in [at for at in own if at.kind == "step" and self._shows_gain(at.run, at.middle_s)]:
                 rest = [at for at in own if at not in (gain, step)]

@@ -58,7 +58,7 @@ _LEAST_FREEDOM = 10  # degrees of freedom: with fewer a scatter is known to no b
 def curve_findings(
     dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None = None
 ) -> list[Finding]:
-    """Runs that are not as the others, one finding a run at most; the whole run is to be left out.
+    """Report runs that differ from the others, one finding a run at most; the whole run is to be left out.
 
     Args:
         facts: Of the runs, by which their noise is known.
@@ -82,7 +82,7 @@ def curve_findings(
 def open_questions(
     dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None = None
 ) -> Iterator[Finding]:
-    """What these recordings cannot tell of their curves, each with the reason and what to record.
+    """Report what these recordings cannot tell of their curves, with the reason and what to record.
 
     The id is that of the finding that stays open.
     """
@@ -123,7 +123,7 @@ _OPEN = {
 
 
 def _orientation_shows(dataset: Dataset, curve: Curve, earlier: Mapping[str, Model]) -> bool:
-    """Whether a reversed or exchanged axis of the run would show."""
+    """Test whether a reversed or exchanged axis of the run would show."""
     others = [c for c in dataset.curves if c is not curve and c.axes == curve.axes]
     along = _earth(curve)
     by_earth = len(along) == 3 or (len(along) == 1 and abs(float(along[0])) >= _LEAST_ALONG_DPH)
@@ -136,7 +136,7 @@ def _orientation_shows(dataset: Dataset, curve: Curve, earlier: Mapping[str, Mod
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """Which column holds each axis, and with which sign."""
+    """Assignment of columns with signs to axes."""
 
     column: tuple[int, ...]
     sign: tuple[int, ...]
@@ -147,12 +147,12 @@ class _Way:
 
     @property
     def changed(self) -> list[int]:
-        """Axes whose column or sign is another."""
+        """Axes with another column or sign."""
         return [k for k, (c, sign) in enumerate(zip(self.column, self.sign, strict=True)) if c != k or sign < 0]
 
     @property
     def changes(self) -> int:
-        """Columns that are exchanged, and signs that are reversed."""
+        """Number of exchanged columns and reversed signs."""
         return sum(c != k for k, c in enumerate(self.column)) + sum(s < 0 for s in self.sign)
 
     def of(self, rates: FloatArray) -> FloatArray:
@@ -206,7 +206,7 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
 
 
 def _shared_places(curve: Curve, others: Sequence[Curve]) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Which of the run's temperatures two other runs show, their rates there without Earth's, and which of them do."""
+    """Return numbers of the run's temperatures that two others have, their rates there without Earth's, and a mask."""
     grid, rates, there = _on_grid([(other.temperature_c, other.rates_dph - _earth(other)) for other in others])
     shared = np.flatnonzero(np.count_nonzero(there, axis=0) >= _LEAST_OTHERS)
     _, mine, among = np.intersect1d(curve.temperature_c, grid[shared], return_indices=True)
@@ -366,7 +366,7 @@ def _factor_finding(dataset: Dataset, curve: Curve, facts: Sequence[RunFacts]) -
 
 
 def _gain_throughout(run: Run, others: Sequence[_Series]) -> bool:
-    """Whether a factor on the other runs' curve explains a run better than that curve with any memory."""
+    """Test whether a factor on the other runs' curve explains a run better than that curve with any memory."""
     known, usual, _ = _usual_curve(others)
     rows = run.rows()
     good = run.in_span(rows.time_s) & np.isfinite(rows.rate_dph) & np.isfinite(rows.temperature_c)
@@ -421,7 +421,7 @@ def _shared_swing(own: _Series, others: Sequence[_Series]) -> tuple[FloatArray, 
 
 
 def _usual_curve(others: Sequence[_Series]) -> tuple[FloatArray, FloatArray, float]:
-    """Temperatures that two runs have at least, the mean curve there of each without its own mean, their scatter."""
+    """Return temperatures that at least two runs have, the mean of their centred curves there, and the scatter."""
     grid, rates, there = _on_grid(others)
     shared = np.count_nonzero(there, axis=0) >= _LEAST_OTHERS
     grid, rates, there = grid[shared], rates[:, shared], there[:, shared]

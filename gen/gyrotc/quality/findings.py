@@ -454,7 +454,7 @@ def saturated_rows(rate: FloatArray) -> int:
 
 
 def _held(rate: FloatArray) -> int:
-    """For how many rows each rate is held: a logger that asks oftener than the gyro answers; 1 where none is.
+    """Return for how many rows each rate is held by a logger that asks oftener than the gyro answers; 1 if none is.
 
     A coarse rate repeats, too, but never for one number of rows.
     """

@@ -88,12 +88,12 @@ class WalkNoise:
     cell_s: float
 
     def in_cells(self, cell_s: float) -> WalkNoise:
-        """The same in cells of another length, over the variance that their white part has."""
+        """Return the noise in cells of another length, over the variance of their white part."""
         ratio = cell_s / self.cell_s
         return WalkNoise(self.level * ratio**2, self.slope * ratio**4, cell_s)
 
     def variance(self) -> float:
-        """Of what the filter makes of it."""
+        """Variance of the filtered noise."""
         return _filter(self.level, self.slope)[2]
 
     def log_scale(self, cell_s: float) -> float:
@@ -488,7 +488,7 @@ _RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play 
 def evidence_beside_memories(
     means: tuple[FloatArray, FloatArray, FloatArray], used: NDArray[np.bool_], change: FloatArray, known: FloatArray
 ) -> float:
-    """How much better a change explains a run than any memory, as a difference of Schwarz's criterion (BIC).
+    """Return the advantage of a change over any memory for a run, as a difference of Schwarz's criterion (BIC).
 
     The memories are plays, lags, and both, each beside a level, the temperature's rate and what is `known`, free in all
     their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am. Stat. Assoc. 90
@@ -515,7 +515,7 @@ def evidence_beside_memories(
 
 
 def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
-    """Squares that a fit leaves, its rank, and the correlation of neighbours in what it leaves, 0 at least."""
+    """Return the squares that a fit leaves, its rank, and the correlation of neighbours in the residual, 0 at least."""
     q, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
     q = q[:, size > _RANK * size[0]]
     rest = y - q @ (q.T @ y)

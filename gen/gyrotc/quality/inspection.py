@@ -49,7 +49,7 @@ _PERIODS = 0.01  # relative: clocks of loggers differ by less, another sample ra
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """What `check` found.
+    """Result of `check`.
 
     Attributes:
         serial: The stated one; None if that could not be read.
@@ -72,7 +72,7 @@ class CheckResult:
     marks: Mapping[str, tuple[Mark, ...]]
 
     def lines(self) -> Iterator[str]:
-        """For a person: a line for each problem, warning, open question and run, and one that sums up."""
+        """Yield a line for each problem, warning, open question and run, and one that sums up."""
         for problem in self.problems:
             yield f"problem: {problem}"
         advised = (("warning", "advice", self.warnings), ("not testable", "to test it", self.not_testable))
@@ -89,7 +89,7 @@ class CheckResult:
         yield f"{_counted(self.problems, 'problem')}, {_counted(self.warnings, 'warning')}: {verdict}"
 
     def result(self) -> Checked:
-        """What `gyrotc check --json` writes."""
+        """Return the result of `gyrotc check --json`."""
         return Checked(
             gyrotc_version=__version__,
             serial=self.serial,
@@ -116,7 +116,7 @@ def check(
     earlier: Mapping[str, Model] | None = None,
     progress: Progress = silent,
 ) -> CheckResult:
-    """Checks a data set as `fit` would read it, and looks for what is suspect.
+    """Check a data set as `fit` would read it, and look for what is suspect.
 
     Args:
         folder: The data set.
@@ -175,7 +175,7 @@ def _rows(marks: Sequence[Mark]) -> tuple[MarkedRows, ...]:
 
 
 def _of_axes(warning: Finding, seen: Sequence[str | None], axes: int) -> Finding:
-    """Says for which axes a warning holds, where that is not for all."""
+    """State the axes of a warning if it is not of all."""
     if len(seen) == axes:
         return warning
     named = tuple(map(str, seen))
@@ -211,7 +211,7 @@ def _counted(things: Sequence[object], word: str) -> str:
 
 
 def _refuse_another(models: Mapping[str, Model], dataset: Dataset) -> None:
-    """Refuses models of an earlier calibration that are of another gyro."""
+    """Refuse models of an earlier calibration of another gyro."""
     for model in models.values():
         if model.serial != dataset.serial:
             axis = f", axis {model.axis}" if model.axis else ""
@@ -228,7 +228,7 @@ def findings_of_run(judgement: Judgement, f: RunFacts) -> Iterator[Finding]:
 def findings_of_data_set(
     dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None = None
 ) -> Iterator[Finding]:
-    """What all runs together show.
+    """Report what all runs together show.
 
     Args:
         earlier: Models of an earlier calibration, by axis.
@@ -256,7 +256,7 @@ def _looked_at(run: Run, judgement: Judgement) -> tuple[RunFacts, list[Finding]]
 
 
 def _of_all_runs(dataset: Dataset, facts: Sequence[RunFacts], earlier: Mapping[str, Model] | None) -> Iterator[Finding]:
-    """What all runs together raise."""
+    """Yield findings of all runs together."""
     for warning in dataset.warnings:
         where, _, text = warning.partition(": ")
         yield finding("units_trusted" if text.startswith(TRUSTED) else "left_out", text, where)

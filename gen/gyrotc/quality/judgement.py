@@ -57,7 +57,7 @@ class LeftOut(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is known of the rows of one run.
+    """Judgement of the rows of a run.
 
     Attributes:
         run: The run; spans of one file that touch are one.

@@ -154,7 +154,7 @@ def late_findings(runs: Sequence[tuple[Run, Averages]]) -> Iterator[Finding]:
 
 
 def lag_of(change: FloatArray, left: FloatArray) -> tuple[float, float] | None:
-    """By how much what was left, beside a constant, follows from a change that came late, s, with its 1 sigma.
+    """Return the lag by which a residual follows a change that came late, s, with its 1 sigma.
 
     None where nothing changes. What is left may be correlated, so products of neighbours count (Newey and West 1987).
     """

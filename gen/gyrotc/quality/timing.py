@@ -30,7 +30,7 @@ _HOUR_S = 3600.0  # a change of summer time
 
 
 def time_findings(run: Run, rows: Rows) -> Iterator[Finding]:
-    """What is suspect about the times of a run."""
+    """Yield what is suspect about the times of a run."""
     inside = run.in_span(rows.time_s)
     time, temperature = masked(rows.time_s, inside), masked(rows.temperature_c, inside)
     at: Sequence[int] = range(len(rows))
@@ -89,7 +89,7 @@ def _jumps(run: Run, time: FloatArray, at: Sequence[int], jumps: list[int]) -> F
 
 
 def _clock_was_set(time: FloatArray, temperature: FloatArray, k: int, period_s: float) -> bool:
-    """Whether the temperature, on a ramp before and behind row k, did not move in the time that seems to pass."""
+    """Test whether the temperature, on a ramp before and behind row k, did not move in the time that seems to pass."""
     rows = max(_AROUND_ROWS, min(round(_AROUND_S / period_s), 3000))
     before, after = slice(max(k + 1 - rows, 0), k + 1), slice(k + 1, k + 1 + rows)
     fits = [_line(time[part] - time[k], temperature[part]) for part in (before, after)]
@@ -134,7 +134,7 @@ def _coarse(run: Run, some: FloatArray) -> Finding | None:
 
 
 def _regular(step: FloatArray, unit: float) -> bool:
-    """Whether stamps are those of even rows, cut to a unit: rows that are really missing leave the line by and by."""
+    """Test whether stamps are those of even rows cut to a unit: rows that are really missing leave their line."""
     time = np.cumsum(step)
     size = min(_EVEN_ROWS, len(time))
     parts = time[: len(time) // size * size].reshape(-1, size)

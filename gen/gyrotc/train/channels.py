@@ -77,7 +77,7 @@ class ChannelShape:
 
     @property
     def is_held(self) -> bool:
-        """Whether tables of both arithmetics can hold it."""
+        """True if tables of both arithmetics can hold it."""
         return self.values.get("width", _NARROWEST) >= _NARROWEST
 
     def parameters(self, weights: FloatArray) -> dict[str, float]:
@@ -86,7 +86,7 @@ class ChannelShape:
         return {**self.cause.amplitudes(weights), **self.values}
 
     def slope(self, added: FloatArray) -> float:
-        """Of the straight line through what it adds at every training sample, deg/h per unit."""
+        """Return the slope of the line through what it adds at every training sample, deg/h per unit."""
         line = self.columns[:, 0] - self.columns[:, 0].mean()
         return float(line @ added / (line @ line))
 
@@ -135,7 +135,7 @@ _METHODS = ("mrbf", "linear", "constant")  # the first whose map keeps to the sa
 
 @dataclass(frozen=True, slots=True)
 class FallbackModel:
-    """What stands for a term.
+    """Substitute of a term whose channel is not known.
 
     Attributes:
         network: As `model.json` has it, in the scale of the model.
@@ -198,7 +198,7 @@ _ALIKE = 0.98  # correlation beside the map: weights of both would be a seventh 
 
 @dataclass(frozen=True)
 class ChannelChoice:
-    """What was chosen among the channels.
+    """Choice among the channels.
 
     Attributes:
         trial: What was tried on history left out.
@@ -236,7 +236,7 @@ def channel_shown(blocks: Blocks, column: FloatArray) -> CourseChannel:
 
 
 def readings_alone(rows: Rows) -> Rows:
-    """Rows without times and rates, which channels need not stand beside: in a long recording they fill memory."""
+    """Drop times and rates from rows: channels do not need them, and in a long recording they fill memory."""
     return replace(rows, time_s=np.zeros(0), rate_dph=np.zeros(0))
 
 
@@ -247,7 +247,7 @@ def seen_by_target(dataset: Dataset, rows: Rows, blocks: Blocks) -> dict[str, Fl
 
 
 def _names(dataset: Dataset) -> list[str]:
-    """Candidates by name: "a" or "a - b"."""
+    """List the candidates by name: "a" or "a - b"."""
     warm = [name for name in dataset.channels if channel_kind(name, dataset.units) == "temperature"]
     pairs = [(a, "temperature_c") for a in warm] + list(combinations(warm, 2))
     return [n for n in dataset.channels if n not in warm] + [f"{a} - {b}" for a, b in pairs]
@@ -330,7 +330,7 @@ def _bent(
 
 
 def _objection(dataset: Dataset, name: str, values: FloatArray, samples: TrainingData, scaling: Scaling) -> str:
-    """Why a channel must not be an input; empty if it may."""
+    """Return the reason why a channel must not be an input; empty if it may."""
     if channel_kind(name, dataset.units) == "rate":
         return "it is a rate: it would compensate the gyro with what it measures"
     known = np.isfinite(values)
@@ -360,7 +360,7 @@ def _common_noise(values: FloatArray, samples: TrainingData) -> float:
 
 
 def _less_smooth(values: FloatArray, samples: TrainingData, scaling: Scaling) -> FloatArray:
-    """What no polynomial of temperature and its rate holds of a channel, whatever the noise of the bias is."""
+    """Return the part of a channel that no polynomial of T and dT/dt holds, whatever the noise of the bias is."""
     t, r = scaling.normalise(samples.temperature_c, samples.slope_c_per_min)
     columns = [chebval(t, np.eye(k + 1)[k]) * r**power for k in range(_DEGREE + 1) for power in range(3)]
     design = np.stack(columns, axis=1)

@@ -171,7 +171,7 @@ def average_samples(data: TrainingData, length_s: float) -> TrainingData:
 
 @dataclass(frozen=True, slots=True)
 class MeanCells:
-    """Which samples make a mean: those from an edge to the next; None: each sample is its own.
+    """Samples of each mean: those from an edge to the next; None: each sample is its own.
 
     Attributes:
         edges: First sample of each mean.
@@ -204,7 +204,7 @@ def mean_cells(data: TrainingData, length_s: float) -> MeanCells:
 
 
 def weighted_mean(values: FloatArray, weight: FloatArray) -> float:
-    """That of `np.average`, whose checks cost more than it; the weights add up to more than 0."""
+    """Return what `np.average` gives, without its checks; the weights add up to more than 0."""
     return float((values * weight).sum() / weight.sum())
 
 
@@ -224,7 +224,7 @@ def bin_of(t: FloatArray, r: FloatArray) -> NDArray[np.int64]:
 
 
 def gather(t: FloatArray, r: FloatArray, y: FloatArray, weight: FloatArray) -> Bins:
-    """Gathers samples at normalised inputs into cells of 1/50 of each half range.
+    """Gather samples at normalised inputs into cells of 1/50 of each half range.
 
     `weight` is in units of one sample: the noise variance of a sample of weight w is σ²/w.
     """

@@ -68,7 +68,7 @@ class RBFNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.random_state = random_state
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> RBFNetworkRegressor:
-        """Trains on X of shape (n, n_features) and y of shape (n,); raises ValueError for bad input."""
+        """Train on X of shape (n, n_features) and y of shape (n,); raises ValueError for bad input."""
         checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         inputs: FloatArray = checked[0]
         target: FloatArray = checked[1].astype(np.float64)

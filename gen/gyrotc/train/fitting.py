@@ -1,4 +1,4 @@
-"""From a data set to a model: front end, training, envelope and coverage, and the figures of `training.json`.
+"""Fit a model to a data set: front end, training, envelope and coverage, and the figures of `training.json`.
 
 Joins the stages recordings → mirror → train → model; computes nothing of its own beyond the choice of
 block, window and limits.
@@ -76,7 +76,7 @@ _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitOptions(BuildOptions):
-    """What `[fit]` of a data set states, and what is known of the unit before its runs.
+    """Options of a fit: `[fit]` of a data set, and the prior of the unit.
 
     `prior` is what is known of the unit before its runs: a lot, or an earlier model.
 
@@ -97,7 +97,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True)
 class FrontEnd:
-    """What the front end needs besides the data; becomes part of the model."""
+    """Settings of the front end; they become part of the model."""
 
     block_s: float
     slope_blocks: int
@@ -233,7 +233,7 @@ def fit_dataset(
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """What the front end made of the training runs.
+    """Training runs after the front end.
 
     Attributes:
         runs: The runs that the samples number, as `Judged.cut` gives them.
@@ -251,7 +251,7 @@ class Read:
 
 
 def _read(dataset: Dataset, runs: tuple[Run, ...], options: FitOptions, judged: Judged, say: Progress) -> Read:
-    """Reads the training runs."""
+    """Read the training runs."""
     front = front_end(runs, options.block_s)
     parts, columns = [], []
     longest_s = 0.0
@@ -392,7 +392,7 @@ def model_of(
 
 
 def _earth_rate(dataset: Dataset) -> str:
-    """What was done about Earth's rate, in words; computed terms with their standard uncertainties."""
+    """Return in words what was done about Earth's rate, with the standard uncertainties of computed terms."""
     terms = {f"{run.earth.rate_dph:.4f} +- {run.earth.sigma_dph:.4f}" for run in dataset.runs if run.earth is not None}
     if terms:
         return f"computed and taken off: {', '.join(sorted(terms))} deg/h (1 sigma)"
@@ -450,12 +450,12 @@ def training_of(
 
 
 def units_of(dataset: Dataset) -> DeclaredUnits:
-    """Units as declared, and what the user's word was taken against, for `training.json` and `manifest.json`."""
+    """Return the declared units, and the contradictions that the user overruled."""
     return DeclaredUnits(declared=dict(dataset.units), trusted=tuple(dataset.trusted))
 
 
 def _generalises(fitted: Fit) -> bool | None:
-    """Whether the correction was shown to hold on history that it has not seen; None: a named method, not asked."""
+    """Test whether the correction holds on history that it has not seen; None for a named method."""
     if any(f["id"] in _NOT_GENERAL for f in fitted.findings):
         return False
     return True if fitted.candidates else None

@@ -153,7 +153,7 @@ class Sums:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """What a candidate is made of.
+    """Columns of a candidate.
 
     Attributes:
         columns: Leading columns of the map: 1, `FEW` or `COLUMNS`.
@@ -256,7 +256,7 @@ class GaussianMap:
 
     @property
     def scatter(self) -> FloatArray:
-        """Variances of what a power-on has of its own, shape (own,)."""
+        """Variances of the parts of a power-on, shape (own,)."""
         return self.structure.scatter(self.p)
 
     @property
@@ -332,7 +332,7 @@ def _total(power_ons: Sequence[Sums], n: int) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, slots=True)
 class _Integrated:
-    """What power-ons have of their own, integrated out of the normal equations; stacked over power-ons.
+    """Normal equations with the parts of each power-on integrated out, stacked over power-ons.
 
     Attributes:
         inverse: Inverses of the Cholesky factors of I + root HH root / noise, shape (power-ons, own, own).

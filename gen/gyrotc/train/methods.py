@@ -56,7 +56,7 @@ def fit(
     prior: Prior | None = None,
     serial: str = "",
 ) -> Fit:
-    """Trains a map bias = f(T, dT/dt). The same samples in any order give the same result.
+    """Train a map bias = f(T, dT/dt). The order of the samples does not change the result.
 
     Args:
         data: Samples; exact duplicates by run and time count once.
@@ -133,7 +133,7 @@ def trained(
     ridge: float = RIDGE,
     power_on: NDArray[np.int64] | None = None,
 ) -> Outcome:
-    """What one method makes of cleaned samples, whatever they tell about temperature; arguments as those of `fit`.
+    """Train one method on cleaned samples, whatever they tell about temperature; the arguments are those of `fit`.
 
     Args:
         ridge: For the methods by orthogonal least squares, as `fit_ols` takes it.

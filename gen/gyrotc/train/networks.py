@@ -47,7 +47,7 @@ def _on_grid(z: float) -> float:
 
 
 def rescaled(network: NetworkEntry, old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
-    """The same function of temperature and its rate in another scale: linear part and widths count half ranges."""
+    """Express a function of temperature and its rate in another scale: linear part and widths count half ranges."""
     (c_old, h_old), (c_new, h_new) = old["temperature_c"], new["temperature_c"]
     wider = (h_new / h_old, new["slope_c_per_min"] / old["slope_c_per_min"])
     linear_t, linear_r = network["linear"]

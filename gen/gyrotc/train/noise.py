@@ -92,7 +92,7 @@ def noise_terms(residuals: Sequence[FloatArray], step_s: float) -> NoiseTerms:
 
 
 def _bands(residuals: Sequence[FloatArray], step_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What each term gives, the mean square, and the number, of coefficients of narrow bands of frequency.
+    """Return for narrow bands of frequency the share of each term, the mean square and the number of coefficients.
 
     Coefficients are those of the cosine transform of a stretch, the constant left out. With ω = 2 sin(π f step) their
     variance is, of Q, N, B, K: (Q ω/step)², N²/step, B²/ω, K² step/ω²; of N and K exactly so, and independent.
@@ -232,7 +232,7 @@ def difference_sigma(means: TrainingData, y: FloatArray, weight: FloatArray) -> 
 
 
 def not_white(residual: FloatArray, run: NDArray[np.int64], weight: FloatArray) -> str:
-    """Why a residual in order of time is not white noise with zero mean in every run; empty if it may be.
+    """Return the reason why a residual is not white noise with zero mean in every run; empty if it may be.
 
     Two tests at 0.1 %: run means against the scatter (chi-square), autocorrelation over 10 lags (Ljung-Box). A
     single run passes neither: what another run would bring was never seen.

@@ -18,7 +18,7 @@ _LARGEST_DPH = 7.5e6  # that a table holds
 
 
 def objection_to(outcome: Outcome, samples: TrainingData, scaling: Scaling, average_s: float) -> str:
-    """Why the networks must not be used, in words; empty if they may.
+    """Return the reason why networks must not be used, in words; empty if they may.
 
     They must not leave their process by 4 σ anywhere on the envelope, nor lie beyond the lowest or highest mean of
     the samples by more than these differ, nor hold numbers that no table holds.

@@ -67,13 +67,13 @@ def channel_guard(runs: Sequence[Run], channel: str, missing_s: float) -> dict[s
 
 
 def readings_of(runs: Sequence[Run], channel: str) -> Iterator[FloatArray]:
-    """What a channel showed in runs, part by part."""
+    """Yield the readings of a channel in runs, part by part."""
     for run in runs:
         yield from _readings(run.rows().channel(channel))
 
 
 def _readings(column: FloatArray) -> Iterator[FloatArray]:
-    """Those that are not missing, as copies: nobody holds the rows of a run when those of the next are read."""
+    """Yield readings that are not missing, as copies, so that no rows are held when the next run is read."""
     for part in parts_of(len(column)):
         found = column[part][np.isfinite(column[part])]
         if found.size:

@@ -68,7 +68,7 @@ class LinearMap(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Where corrections will be asked for, as a lot's units or an earlier calibration show it.
+    """Places at which corrections will be asked for, as a lot's units or an earlier calibration show them.
 
     Attributes:
         temperature_c, slope_c_per_min: Places, shape (n,).

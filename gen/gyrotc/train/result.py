@@ -21,7 +21,7 @@ from .process import Process
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a method hands to `fit`.
+    """Result of a method, for `fit`.
 
     Attributes:
         networks: The networks as `model.json` has them (docs/FORMAT.md): w0, linear, centers, widths, weights, region.

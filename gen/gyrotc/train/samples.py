@@ -33,7 +33,7 @@ _PART = 2**18  # rows that are looked at together: bounds memory
 
 @dataclass(frozen=True, slots=True)
 class Blocks:
-    """What the front end makes of one run: one entry per block, from the first row of the file on.
+    """Blocks that the front end forms of one run, from the first row of the file on.
 
     A training sample is a block that is `used`: input (`temperature_c`, `slope_c`), answer
     `rate_dph`, weight `rows`.
@@ -60,7 +60,7 @@ class Blocks:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """Which blocks are training samples."""
+        """Mask of the blocks that are training samples."""
         return self.valid & (self.rows > 0) & np.isfinite(self.temperature_c)
 
 
@@ -78,7 +78,7 @@ def run_blocks(
     hold_blocks: int = 30,
     lead_blocks: int = 0,
 ) -> Blocks:
-    """Runs the float32 front end over a recording.
+    """Run the float32 front end over a recording.
 
     Args:
         rows: All rows of the run's file.

@@ -47,7 +47,7 @@ _MOST = 20000  # samples that are looked at
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyInputs:
-    """What the rules are made from; the samples are in order of run and time."""
+    """Input of the rules; the samples are in order of run and time."""
 
     samples: TrainingData
     fit: Fit
@@ -116,7 +116,7 @@ def start_sigma(
     samples: TrainingData,
     channel: Iterable[FloatArray] = (),
 ) -> float:
-    """What a term does not know of the time before it began, 1 σ: deg/h, for a play deg/h/C.
+    """Return the sigma of a term from the unknown time before it began: deg/h, for a play deg/h/C.
 
     A memory or a play may have been as far from the temperature as it was on average in training; that of a play
     falls with every degree of its width through which the temperature has moved; a channel that is lost may differ
@@ -141,7 +141,7 @@ def start_sigma(
 
 
 def _played(samples: TrainingData, width_c: float) -> float:
-    """The same of a play; its width where training did not move it."""
+    """Return that sigma for a play; its width if training did not move it."""
     squares = [(play(width_c, samples.temperature_c[own]) - samples.temperature_c[own]) ** 2 for own in _runs(samples)]
     found = float(np.sqrt(np.mean(np.concatenate(squares))))
     return found if found > 0.0 else width_c
@@ -378,7 +378,7 @@ def _asked(samples: TrainingData, process: Process) -> tuple[tuple[FloatArray, F
 
 @dataclass(frozen=True, slots=True)
 class _Errors:
-    """What a map may be wrong by.
+    """Errors that a map may have.
 
     Attributes:
         process: The smooth map of the same samples.
@@ -440,7 +440,7 @@ def _points(fit: Fit) -> tuple[FloatArray, FloatArray]:
 
 
 def _covered(data: TrainingData, fit: Fit, t: FloatArray, r: FloatArray) -> NDArray[np.bool_]:
-    """Whether points lie in cells of the coverage that hold training samples."""
+    """Return a mask of the points in cells of the coverage that hold training samples."""
     rows = coverage(data, fit)["rows"]
     seen = np.array([[c == "1" for c in row] for row in rows]).reshape(-1)
     return np.asarray(seen[_cell(fit, (len(rows[0]), len(rows)), t, r)])

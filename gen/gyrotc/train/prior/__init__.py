@@ -1,4 +1,4 @@
-"""What is known of a gyro before its runs: what similar units share, or its own earlier calibration (docs/lot.md)."""
+"""Prior of a gyro's map: from similar units, or from its own earlier calibration (docs/lot.md)."""
 
 import lazy_loader
 

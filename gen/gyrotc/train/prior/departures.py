@@ -1,4 +1,4 @@
-"""Where a check run departs from the earlier map of its unit: in parts of the run, and the shape of a change.
+"""Compare a check run with the earlier map of its unit, in parts of the run, and find the shape of a change.
 
 And what may have become of the unit since its earlier calibration. A laboratory tries the simple answers first: the
 earlier map as it is, moved by an offset, moved by an offset and a slope over T and dT/dt, or changed in its whole
@@ -60,10 +60,10 @@ def within(prior: MapPrior, run: UnitMeans) -> UnitMeans:
 
 
 class Departures:
-    """What the earlier map leaves of a run, with its covariance for a unit that has not changed."""
+    """Residual of the earlier map on a run, with its covariance for an unchanged unit."""
 
     def __init__(self, expected: MapPosterior, run: UnitMeans) -> None:
-        """Takes a map that has not seen the run.
+        """Compare a run with a map that has not seen it.
 
         Args:
             expected: The earlier model with its ageing.
@@ -127,7 +127,7 @@ class Departures:
 
 
 def _lines(run: UnitMeans) -> Iterator[_Shape]:
-    """What is the same everywhere, in proportion to T, and to dT/dt where that varies."""
+    """Yield the shapes of a change: constant, in proportion to T, and to dT/dt if that varies."""
     t, r = run.temperature_c, run.slope_c_per_min
     span, rates = _range(t), _range(r)
     yield _Shape("offset", span, rates, np.ones(len(t)))
@@ -222,7 +222,7 @@ class Hypothesis:
 
     @property
     def consistent(self) -> bool:
-        """Whether the map moves by more than U where it has changed, and by no more than is allowed where not."""
+        """True if the map moves by more than U where it has changed, and by no more than allowed elsewhere."""
         if self.kind == "unchanged":
             return self.moved.rms_dph <= self.allowed_dph
         return bool(self.moved.significant)
@@ -272,12 +272,12 @@ class _Seen:
         return np.asarray(0.5 * np.sum((q.T @ white[:, -1]) ** 2 * more / (1.0 + more) - np.log1p(more), axis=1))
 
     def gain(self, covariance: FloatArray) -> FloatArray:
-        """What the coefficients move by for what is left, shape (coefficients, means)."""
+        """Return the movement of the coefficients per unit of the residual, shape (coefficients, means)."""
         return np.asarray(np.linalg.solve(self.scatter(covariance), self.values @ covariance).T)
 
 
 def updated(prior: MapPrior, run: UnitMeans) -> MapPosterior:
-    """What a map of one cluster and a run say together."""
+    """Update the map of one cluster with a run."""
     seen, covariance = _Seen(prior, run), prior.covariances[0]
     gain = seen.gain(covariance)
     rest = np.eye(len(covariance)) - gain @ seen.values
@@ -339,7 +339,7 @@ def _places() -> tuple[FloatArray, FloatArray]:
 
 
 def _inputs(prior: MapPrior) -> tuple[FloatArray, FloatArray]:
-    """The same in C and C/min."""
+    """Return the places of a grid over the envelope in C and C/min."""
     spans = prior.temperature_c, prior.slope_c_per_min
     t, r = (0.5 * (a + b) + 0.5 * (b - a) * x for (a, b), x in zip(spans, _places(), strict=True))
     return t, r

@@ -50,7 +50,7 @@ _LEAST = 1e-6  # of the unit of coefficients: a process has sizes above 0
 
 @dataclass(frozen=True, slots=True)
 class EarlierPrior(MapPrior):
-    """What a unit's earlier model says of it after ageing.
+    """Prior from a unit's earlier model after ageing.
 
     Attributes:
         model_hash, date: Of the earlier model.
@@ -72,7 +72,7 @@ class EarlierPrior(MapPrior):
         """Nothing to refuse: it was read for this axis."""
 
     def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
-        """Finds what became of the earlier model, and fits it with a check run.
+        """Find the change since the earlier model, and fit it together with a check run.
 
         Args:
             samples: Of the check run.

@@ -16,7 +16,7 @@ from ..result import Outcome
 
 @dataclass(frozen=True, slots=True)
 class UnitSamples:
-    """What was recorded of a unit.
+    """Training samples of a unit.
 
     Attributes:
         cleaned: Its samples.
@@ -33,7 +33,7 @@ class UnitSamples:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a prior made of a unit's samples.
+    """Fit of a unit's samples with a prior.
 
     Attributes:
         map: Networks and scaling over both envelopes; None: the prior was not used.
@@ -59,10 +59,10 @@ class Prior(Protocol):
         """Hash of what it was made from."""
 
     def check_axis(self, axis: str | None) -> None:
-        """Raises InputError where it is not of this axis."""
+        """Raise `InputError` if it is not of this axis."""
 
     def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
-        """Tests whether samples agree with it, and makes a map of both if they do.
+        """Test whether samples agree with it, and fit a map to both if they do.
 
         Args:
             seed: Of the Kohonen network.

@@ -76,7 +76,7 @@ def p_value(ratio: FloatArray, squares: FloatArray, freedom: float = np.inf) -> 
 
 
 def inflation(found: list[tuple[FloatArray, FloatArray]]) -> float:
-    """By what the covariance of a lot is to be multiplied, from units that it was not made of; 1 at least."""
+    """Return the factor of a lot's covariance from units that it was not learnt from; 1 at least."""
     ratio = np.concatenate([r[r > _TELLING] for r, _ in found]) if found else np.zeros(0)
     squares = np.concatenate([s[r > _TELLING] for r, s in found]) if found else np.zeros(0)
     if len(ratio) == 0:
@@ -89,7 +89,7 @@ _EVERY = 4  # rounds between two fits of the processes' parameters: each is a se
 
 @dataclass(frozen=True, slots=True)
 class UnitSums:
-    """What recordings of units say of their coefficients: log likelihood −½ wᵀ G w + bᵀ w.
+    """Log likelihood −½ wᵀ G w + bᵀ w of the coefficients of units, from their recordings.
 
     Attributes:
         precision: G, shape (units, n, n).
@@ -106,13 +106,13 @@ class UnitSums:
         return UnitSums(self.precision[which], self.moment[which])
 
     def only(self, used: NDArray[np.bool_]) -> UnitSums:
-        """The same for some of the functions, the others being 0."""
+        """Return the likelihood for some of the functions, the others being 0."""
         return UnitSums(self.precision[:, used][:, :, used], self.moment[:, used])
 
 
 @dataclass(frozen=True, slots=True)
 class LotState:
-    """What is estimated, and what follows from it.
+    """State of the estimation of a lot.
 
     Attributes:
         basis: The functions.
@@ -298,7 +298,7 @@ _STAGES = {
 
 
 def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progress) -> Learned:
-    """Learns what units share.
+    """Learn what units share.
 
     Args:
         units: At least `LEAST_UNITS`.
@@ -332,7 +332,7 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progre
 
 
 def sums_of(units: Sequence[UnitMeans], basis: PriorBasis, center: float, unit: float) -> UnitSums:
-    """What recordings say of the coefficients, in units of the lot."""
+    """Return the log likelihood of the coefficients, in units of the lot."""
     n = len(basis.kept)
     precision, moment = np.empty((len(units), n, n)), np.empty((len(units), n))
     for k, u in enumerate(units):
@@ -344,7 +344,7 @@ def sums_of(units: Sequence[UnitMeans], basis: PriorBasis, center: float, unit: 
 
 
 def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:
-    """Which functions of a process with these variances recordings say anything of."""
+    """Return a mask of the functions that recordings tell anything of, in a process with these variances."""
     most = np.diagonal(sums.precision, axis1=1, axis2=2).max(axis=0)
     used = variance * most > LEAST_RATIO
     used[0] = True
@@ -372,7 +372,7 @@ def _chosen(sums: UnitSums, basis: PriorBasis, say: Progress) -> LotState:
 def _with_directions(
     sums: UnitSums, state: LotState, value: float, price: float, say: Progress
 ) -> tuple[LotState, float]:
-    """As many shared directions as pay for themselves; clusters are held against one cloud with the same freedom."""
+    """Add as many shared directions as pay for themselves; clusters compete with one cloud of the same freedom."""
     paid = value - state.evidence
     for rank in range(1, min(_MOST_DIRECTIONS, len(sums) // _UNITS_A_DIRECTION) + 1):
         say(f"{rank} directions")
@@ -385,7 +385,7 @@ def _with_directions(
 
 
 def _freedom(sums: UnitSums, state: LotState) -> float:
-    """How many numbers recordings of a unit tell of its deviation."""
+    """Return how many numbers the recordings of a unit tell of its deviation."""
     inverse: FloatArray = np.asarray(np.linalg.inv(state.spread()), dtype=np.float64)
     shrunk = np.sum(inverse * posteriors(inverse, sums.precision)[0].mean(axis=0))
     return len(state.basis.kept) - float(shrunk)
@@ -441,7 +441,7 @@ def _smallest(cluster: NDArray[np.int64], number: int) -> int:
 
 
 def _labels_cost(cluster: NDArray[np.int64]) -> float:
-    """What it costs to say who is in which cluster, nats."""
+    """Return the cost of stating the cluster of each unit, nats."""
     share = np.bincount(cluster) / len(cluster)
     return -float(np.sum(np.log(share[cluster])))
 

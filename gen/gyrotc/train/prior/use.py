@@ -1,4 +1,4 @@
-"""What is known of a unit's map before its runs and with them, and its fit with that.
+"""Prior of a unit's map, its update with the runs, and the fit with it.
 
 The posterior over the lot's envelope takes the place of the process of the unit alone.
 
@@ -31,7 +31,7 @@ _DIGITS = 7  # of coefficients: 1e-7 of the lot's spread is nothing
 
 @dataclass(frozen=True, slots=True)
 class MapPrior:
-    """What is known of a unit's map before its runs: a mixture of normal distributions of its coefficients.
+    """Prior of a unit's map: a mixture of normal distributions of its coefficients.
 
     Attributes:
         basis: Functions of T and dT/dt.
@@ -59,7 +59,7 @@ class MapPrior:
     own: FloatArray
 
     def with_runs(self, unit: UnitMeans) -> MapPosterior:
-        """What prior and recordings of a unit say together, and how far the unit is from the prior."""
+        """Update the prior with recordings of a unit; also returns the distance of the unit from the prior."""
         sums = sums_of([unit], self.basis, self.center_dph, self.unit_dph)
         precision, moment = sums.precision[0], sums.moment[0]
         found, likely, p = [], [], []
@@ -77,7 +77,7 @@ class MapPrior:
         return MapPosterior(self, mean, covariance, int(np.argmax(weight)), max(p))
 
     def alone(self) -> MapPosterior:
-        """What is known before any run."""
+        """Return the map before any run."""
         mean, covariance = _mixed([*zip(self.means, self.covariances, strict=True)], self.share)
         return MapPosterior(self, mean, covariance, 0, 1.0)
 
@@ -129,7 +129,7 @@ def processed(process: LotProcess) -> FloatArray:
 
 
 def process_result(log_parameters: FloatArray) -> LotProcess:
-    """The same the other way round."""
+    """Return the process of these logarithms."""
     return LotProcess(**{n: float(v) for n, v in zip(PARAMETERS, np.exp(log_parameters), strict=True)})
 
 
@@ -153,7 +153,7 @@ def triangle(rows: tuple[tuple[float, ...], ...], n: int, where: str) -> FloatAr
 
 
 def check_positive(covariance: FloatArray, where: str) -> None:
-    """Refuses what is no covariance.
+    """Refuse what is no covariance.
 
     Raises:
         InputError: It is none.
@@ -203,7 +203,7 @@ class _PosteriorMap:
 
 @dataclass(frozen=True, slots=True)
 class LotPrior(MapPrior):
-    """What a lot says of a unit that was not seen.
+    """Prior of an unseen unit from its lot.
 
     Attributes:
         lot: The file.
@@ -216,7 +216,7 @@ class LotPrior(MapPrior):
         return self.lot.checksum
 
     def check_axis(self, axis: str | None) -> None:
-        """Refuses the recordings of another axis.
+        """Refuse the recordings of another axis.
 
         Raises:
             InputError: They are of another.
@@ -225,7 +225,7 @@ class LotPrior(MapPrior):
             raise InputError("--lot", f"of axis {self.lot.axis}", f"a lot of axis {axis}, as the recordings")
 
     def with_samples(self, samples: UnitSamples, *, seed: int, average_s: float) -> Given:
-        """Tests whether a unit fits its lot, and fits it with the lot if it does.
+        """Test whether a unit belongs to its lot, and fit it with the lot if it does.
 
         Args:
             samples: Of the unit; if its serial is one of the lot, this is reported.
