@@ -13,7 +13,6 @@ from ..results.folder import result_folder
 from ..results.json_text import json_text
 from ..train.fitting import FitOptions, Fitted, fit_dataset
 from .applied import applied_in
-from .recalibration import with_prior
 
 
 @with_one_thread
@@ -45,8 +44,12 @@ def fit(
         dataset = load(source, axis=axis, applied=applied_in(source))
         if stage:
             stage.of(dataset.serial, dataset.axis)
-        stated = (options or FitOptions()).with_stated(dataset.fit)
-        fitted = fit_dataset(dataset, with_prior(stated, dataset, prior, ageing_dph), progress=progress)
+        options = (options or FitOptions()).with_stated(dataset.fit)
+        if prior is not None or ageing_dph is not None:
+            from .recalibration import with_prior  # 0.2 s: it reads a judged result, and most gyros have none yet
+
+            options = with_prior(options, dataset, prior, ageing_dph)
+        fitted = fit_dataset(dataset, options, progress=progress)
         if stage:
             fitted.model.save(stage.folder / "model.json")
             write_atomically(stage.folder / "training.json", json_text(fitted.training.content()))

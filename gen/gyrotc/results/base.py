@@ -41,7 +41,13 @@ class Part(BaseModel):
     """An object inside a result. Unknown fields are accepted when it is read, and dropped."""
 
     model_config = ConfigDict(
-        frozen=True, extra="ignore", strict=True, allow_inf_nan=False, populate_by_name=True, protected_namespaces=()
+        frozen=True,
+        extra="ignore",
+        strict=True,
+        allow_inf_nan=False,
+        populate_by_name=True,
+        protected_namespaces=(),
+        defer_build=True,
     )
 
     @classmethod
