@@ -117,7 +117,8 @@ class UnitResults:
             return ""
         left = with_uncertainty(judged.after.rms_dph, self.spread("rms_dph"))
         gain = with_uncertainty(judged.improvement, self.spread("improvement"))
-        return f"On {self.judged_on} the table leaves {left} deg/h RMS; a constant leaves {gain} times as much."
+        comma = "," if "," in self.judged_on else ""
+        return f"On {self.judged_on}{comma} the table leaves {left} deg/h RMS; a constant leaves {gain} times as much."
 
     @property
     def doubt(self) -> str:

@@ -50,7 +50,7 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
     if advised:
         return advised[0]
     if limits is None or limits.verdict is None:
-        return "State the limits of the product in a file, and build again with --limits."
+        return "State the limits of the product in a file (docs/limits.md), and build again with --limits."
     if limits.verdict != "PASS":
         return "Record more or longer test runs: the figures are within the limits, their uncertainty is not."
     return "Build the files in DIR/c/ into the firmware; gyrotc certificate DIR --out CERT writes the certificate."
