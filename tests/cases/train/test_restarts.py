@@ -60,16 +60,6 @@ def test_both_sides_of_a_restart_are_left_out_one_by_one(tmp_path: Path, files: 
     assert before[1] <= BACK_S < after[0]
 
 
-def test_a_restart_in_another_span_of_a_file_moves_no_end_of_a_run(tmp_path: Path) -> None:
-    """The gyro is switched on anew in the part of the file that is kept for the exam."""
-    recorded(tmp_path, 2)
-    runs = ('file = "0.csv"\nto_s = 8000.0', 'file = "0.csv"\nfrom_s = 8000.0\nrole = "exam"', 'file = "1.csv"')
-    (tmp_path / "dataset.toml").write_text(toml(*runs), "utf-8")
-    training = fit_dataset(load(tmp_path), FitOptions()).training
-    assert [span.file for span in training.spans] == ["0.csv", "1.csv"]
-    assert 7000.0 < training.spans[0].to_s < 9000.0
-
-
 def test_a_recording_with_a_restart_is_built(tmp_path: Path, gyrotc: Command) -> None:
     """The repeatability is that of four power-ons in three files."""
     done = gyrotc("build", recorded(tmp_path / "data", 3), "--out", tmp_path / "result")
