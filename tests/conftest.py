@@ -140,6 +140,13 @@ def few_vectors(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no browser be found: a certificate then has no PDF, which takes longest."""
+    which = shutil.which
+    monkeypatch.setattr(shutil, "which", lambda name, *more: None if "chrom" in str(name) else which(name, *more))
+
+
+@pytest.fixture
 def in_this_process() -> Iterator[None]:
     """Do the units of fleets in this process, where processes are not what a test is about."""
     from jobs import units_in_this_process

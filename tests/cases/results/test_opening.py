@@ -128,11 +128,10 @@ def back() -> Iterator[None]:
 
 def test_nothing_foreign_is_changed_at_a_name_that_is_opened(
     command: tuple[str, ...], start: Path, tmp_path: Path, traced: list[str], back: None,
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    no_browser: None, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """Before: a link called `.R.lock` emptied the file that it led to, and the command ended with 0."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("gyrotc.pages.certificate._BROWSERS", ())
     work = _fresh(start, tmp_path / "work")
     there = {path.name for path in work.iterdir()}
     traced.clear()

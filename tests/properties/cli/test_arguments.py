@@ -50,13 +50,12 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def place(start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def place(start: Path, tmp_path: Path, no_browser: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     work = tmp_path / "work"
     shutil.copytree(start, work, symlinks=True)
     os.mkfifo(work / "pipe")
     for name in ("HOME", "XDG_CACHE_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
-    monkeypatch.setattr("gyrotc.pages.certificate._BROWSERS", ())
     before = Path.cwd()
     os.chdir(work)
     yield work
