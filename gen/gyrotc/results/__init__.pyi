@@ -7,6 +7,7 @@ from .base import read_optional as read_optional
 from .base import read_result as read_result
 from .cache import program_of as program_of
 from .decision import failed_checks as failed_checks
+from .decision import next_step as next_step
 from .decision import worst_of as worst_of
 from .diagnosed import NOTHING as NOTHING
 from .diagnosed import UNNAMED as UNNAMED
@@ -63,6 +64,7 @@ from .release import Budget as Budget
 from .release import HeldLimits as HeldLimits
 from .release import Limit as Limit
 from .release import MapError as MapError
+from .release import Verdict as Verdict
 from .release import Verification as Verification
 from .release import VerifiedTarget as VerifiedTarget
 from .release import WorstError as WorstError

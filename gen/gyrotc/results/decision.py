@@ -20,7 +20,10 @@ def decision_of(limits: HeldLimits | None, verification: Verification | None, ev
 
 
 def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool, *, diagnosed: bool) -> str:
-    """Return what to do next with a unit, one step: what stands in the way comes before what would be better.
+    """Return what to do next with a unit, one step.
+
+    What makes the recordings worthless comes first. A diagnosis is made of the recordings that are there, so it comes
+    before any advice to record more.
 
     DATASET stands for the recordings, DIR for the result.
 
@@ -32,11 +35,13 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
         return (
             "Do not use the table: its code is not the model. Build it again, and report it if the check fails again."
         )
-    lacking = [one for one in evaluation.requirements if not one.met]
-    if lacking:
-        return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).next
+    lacking = max(evaluation.requirements, key=lambda one: VERDICTS.index(one.verdict), default=None)
+    if lacking and lacking.verdict == "NOT TESTABLE":
+        return lacking.next
     if evaluation.structure_left and not diagnosed:
         return "gyrotc diagnose DATASET: the residual is more than noise, and it names the cause."
+    if lacking and not lacking.met:
+        return lacking.next
     broken = [one for one in limits.limits if one.verdict == "FAIL"] if limits else []
     if any(one.part for one in broken):
         remains = (

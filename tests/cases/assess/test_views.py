@@ -23,9 +23,12 @@ from gyrotc.results import (
     Finding,
     HeldLimits,
     Pooled,
+    Requirement,
     ResidualTest,
     Statistics,
     Training,
+    Verdict,
+    next_step,
 )
 from test_limits import EVALUATION, VERIFICATION
 
@@ -161,6 +164,24 @@ def test_structure_that_is_left_leads_to_a_diagnosis(
     page = page_environment().get_template("parts.html.j2").module.verdict(shown)
     assert ("what remains is more than noise" in page) == left
     assert ("gyrotc diagnose DATASET" in shown.next_step) == left
+
+
+@pytest.mark.parametrize(
+    ("verdict", "structure", "first"),
+    [
+        ("CONDITIONAL PASS", True, "gyrotc diagnose"),
+        ("CONDITIONAL PASS", False, "Record it again"),
+        ("NOT TESTABLE", True, "Record it again"),
+    ],
+)
+def test_a_diagnosis_comes_before_new_recordings_unless_those_there_are_worthless(
+    verdict: Verdict, structure: bool, first: str
+) -> None:
+    lacking = Requirement(id="rows", verdict=verdict, text="", next="Record it again.")
+    findings = (Finding(id="does_not_generalise", text="", evidence={}),) if structure else ()
+    evaluation = EVALUATION.model_copy(update={"requirements": (lacking,), "findings": findings, "residual": None})
+    assert next_step(evaluation, None, False, diagnosed=False).startswith(first)
+    assert next_step(evaluation, None, False, diagnosed=True) == "Record it again."
 
 
 def test_a_figure_of_training_runs_has_a_conditional_pass_at_most(model_dict: dict[str, Any]) -> None:
