@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..common.metrics import LEAST_SPAN_C
+from ..causes import CATALOGUE
+from ..common.metrics import LEAST_SPAN_C, Averages
 from ..common.progress import Progress, Stages, silent
 from ..model import Model
 from ..quality.events import found_events
@@ -156,7 +157,7 @@ def _of_long_runs(dataset: Dataset, judged: Judged, records: Records, chosen: Fi
         extension = _extension(refitting, analysis, None, say)
     causes = cycle.causes if cycle is not None else _named(analysis)
     extended, training = _extended_model(dataset, refitting, extension, chosen)
-    extension = _as_emitted(dataset, refitting, extension, extended, chosen)
+    extension = _as_emitted(dataset, refitting, extension, extended, chosen, about_means=any(map(_shifts_runs, causes)))
     result = result_of(dataset, analysis, extension, causes, chosen, cycle)
     return Diagnosis(result, analysis, extension, extended, training, cycle)
 
@@ -214,16 +215,36 @@ def _extended_model(
 
 
 def _as_emitted(
-    dataset: Dataset, refitting: Refitting, extension: Extension, extended: Model | None, options: FitOptions
+    dataset: Dataset,
+    refitting: Refitting,
+    extension: Extension,
+    extended: Model | None,
+    options: FitOptions,
+    *,
+    about_means: bool,
 ) -> Extension:
-    """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with."""
+    """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with.
+
+    Args:
+        about_means: The mean of each run is subtracted, because a named cause shifts it.
+    """
     exam = [run for run in dataset.runs if run.role == "exam"]
     if extended is None or extension.measured_on != "exam":
         return extension
     plain = fit_dataset(dataset, options, read=refitting.read()).model
     before, after = emitted_means((plain, extended), exam, options.average_s)
-    total = gain_of(before, after, extension.floor, options.average_s)
+    compared = (_less_means(before), _less_means(after)) if about_means else (before, after)
+    total = gain_of(*compared, extension.floor, options.average_s).model_copy(update={"about_means": about_means})
     return replace(extension, total=total, before=before, after=after)
+
+
+def _shifts_runs(cause: Refined) -> bool:
+    """Test whether a cause shifts whole runs, which no table corrects, so that a test run has its shift in full."""
+    return CATALOGUE[cause.candidate.id].family == "between_runs"
+
+
+def _less_means(runs: Sequence[Averages]) -> list[Averages]:
+    return [replace(run, after_dph=run.after_dph - run.after_dph.mean()) if run.after_dph.size else run for run in runs]
 
 
 def model_entries(shipped: Sequence[Effect], fallback_models: Mapping[str, FallbackModel]) -> list[dict[str, Any]]:

@@ -131,7 +131,7 @@ def extend(
     if single_cycle and effects:  # found together: one alone is another model
         chain = [chain[0], *(chain[-1] for _ in effects)]
     pairs = [(chain[0], chain[-1]) for _ in effects] if single_cycle else itertools.pairwise(chain)
-    steps = iter([gain_of(a, b, floor, average_s, whole_dph=_rms(chain[0])) for a, b in pairs])
+    steps = iter([gain_of(a, b, floor, average_s, whole_dph=rms_of(chain[0])) for a, b in pairs])
     crossed = choose_shipped(refitting, effects, list(itertools.compress(probabilities, correctable)))
     shipped = crossed.shipped
     last = max((k for k, effect in enumerate(effects) if effect in shipped), default=-1)
@@ -150,7 +150,7 @@ def extend(
         added=_seen(refitting, [], shipped).bias_dph - _seen(refitting, shipped, shipped).bias_dph,
         floor=floor,
         lot=refitting.fit(shipped).lot,
-        baseline_rms=_rms(chain[0]),
+        baseline_rms=rms_of(chain[0]),
         baseline_centers=refitting.fit([]).n_centers,
         measured_on="exam" if exam else "left out",
         before=chain[0],
@@ -163,7 +163,8 @@ def _seen(refitting: Refitting, effects: Sequence[Effect], shipped: Sequence[Eff
     return joined([samples(run, list(effects)).select(known(run, shipped)) for run in refitting.train])
 
 
-def _rms(runs: Sequence[Averages]) -> float:
+def rms_of(runs: Sequence[Averages]) -> float:
+    """Return the RMS of the residuals of all runs, deg/h."""
     return float(np.sqrt(np.mean(np.concatenate([r.after_dph for r in runs]) ** 2)))
 
 

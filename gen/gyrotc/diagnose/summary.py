@@ -29,13 +29,13 @@ from ..train.fitting import FitOptions, front_end
 from .candidates import diagnosable_causes
 from .detection import CauseLimit
 from .discrepancy import NoiseFinding
-from .extension import Extension
+from .extension import Extension, rms_of
 from .noise import NOISE_WORDS
 from .pipeline import Analysis
 from .played import terms_of
 from .refinement import Interval, Refined
 from .single_cycle import Cycle, memories
-from .verdict import VERDICTS, deciding_run, looks_like, next_steps, sentence_of, shows_as, verdict_of
+from .verdict import VERDICTS, deciding_run, looks_like, meaning_of, next_steps, sentence_of, shows_as, verdict_of
 
 _MOST_EQUIVALENT = 3  # of what remains possible; the page has the probabilities of all
 
@@ -109,17 +109,28 @@ def result_of(
         measured_on=extension.measured_on,
         single_cycle=None if cycle is None else _single_cycle(cycle, extension),
         shipping=extension.crossed.result(),
-        unexplained=_unexplained(analysis) if verdict in ("unexplained", "partial") else None,
+        unexplained=_unexplained(analysis)
+        if verdict == "unexplained" or (verdict == "partial" and not cycle)
+        else None,
         text=sentence_of(
             verdict,
             listed,
             extended,
             undecided,
             analysis.attribution.wide if causes else None,
+            single_cycle=cycle is not None,
         ),
-        meaning=VERDICTS[verdict],
+        meaning=meaning_of(verdict, single_cycle=cycle is not None),
         lot=_of_lot(extension, options, single_cycle=cycle is not None),
-        next=tuple(next_steps(verdict, listed, list(untestable), gain=None if extended is None else extended.gain)),
+        next=tuple(
+            next_steps(
+                verdict,
+                listed,
+                list(untestable),
+                gain=None if extended is None else extended.gain,
+                single_cycle=cycle is not None,
+            )
+        ),
     )
 
 
@@ -229,7 +240,7 @@ def _extended(extension: Extension) -> ExtendedModel | None:
         return None
     left = extension.rate_left_out
     return ExtendedModel(
-        exam_rms_dph=extension.total.exam_rms_after_dph,
+        exam_rms_dph=rms_of(extension.after) if extension.total.about_means else extension.total.exam_rms_after_dph,
         centers=extension.centers,
         terms=tuple(e.id for e in terms_of(extension.shipped) if CATALOGUE[e.id].table is not None),
         model=None,

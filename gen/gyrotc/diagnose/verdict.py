@@ -87,6 +87,13 @@ def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], cycle: C
     return "noise_differs" if noise else "consistent"
 
 
+def meaning_of(verdict: DiagnosisVerdict, *, single_cycle: bool) -> str:
+    """Return what a verdict means, in a sentence."""
+    if verdict == "partial" and single_cycle:
+        return "A memory of the temperature is named by a single cycle; nothing is shipped of it."
+    return VERDICTS[verdict]
+
+
 def looks_like(attribution: Attribution) -> str | None:
     """Return what structure without a name resembles: another shape, or a cause that cannot be, and why."""
     if attribution.other.lead > 0.0:
@@ -102,6 +109,8 @@ def looks_like(attribution: Attribution) -> str | None:
             return f"{cause.candidate.id.replace('_', ' ')} with {value}, where {known}"
     return None
 
+
+_BY_ONE_CYCLE = "by a single cycle, which does not show whether it holds on the next one"
 
 _WITHOUT_NAME = {UNNAMED: "an effect that is in no catalogue", NOTHING: "no effect, but chance"}
 
@@ -128,6 +137,7 @@ def next_steps(
     untestable: Sequence[str],
     *,
     gain: GainOnUnseen | None,
+    single_cycle: bool = False,
 ) -> list[str]:
     """Return what to do in sentences, the most telling first.
 
@@ -136,6 +146,7 @@ def next_steps(
         causes: Causes and kinds of noise that were found.
         untestable: Ids of the causes that these recordings cannot test.
         gain: Of the extension that is shipped; None: none is.
+        single_cycle: What is named comes from a single chamber cycle.
     """
     steps = [_decided_by(c) for c in causes if c.separate_by]
     if gain is not None and gain.shown == "gain":
@@ -145,6 +156,8 @@ def next_steps(
     if verdict == "explained" and gain is None:
         remedies = dict.fromkeys(c.remedy for c in causes if c.family != "noise")
         steps.append(f"Against it: {'; '.join(remedies)}.")
+    elif verdict == "partial" and single_cycle:
+        steps.append("Record the same cycle at another rate: it shows whether what is named holds there.")
     elif verdict in _STEPS:
         steps.append(_STEPS[verdict])
     steps += [f"Paste {c.repair} into dataset.toml and build again." for c in causes if c.repair]
@@ -170,6 +183,8 @@ def sentence_of(
     extended: ExtendedModel | None,
     undecided: str,
     wide: WideMemory | None = None,
+    *,
+    single_cycle: bool = False,
 ) -> str:
     """Return the finding in one to three sentences.
 
@@ -179,6 +194,7 @@ def sentence_of(
         extended: What is shipped.
         undecided: Why a single cycle cannot tell of memory.
         wide: The form of hysteresis that is among the causes, where it is more than one play.
+        single_cycle: What is named comes from a single chamber cycle.
     """
     why = f" about memory of the temperature: {undecided}" if undecided else ""
     causes = [c for c in found if c.family != "noise"]
@@ -191,7 +207,7 @@ def sentence_of(
         "consistent": "Nothing was found beyond the static map and the declared noise.",
         "explained": f"{names}.",
         "ambiguous": f"{names}; what else remains possible: {'; '.join(dict.fromkeys(_possible(causes)))}.",
-        "partial": f"{names}, and structure remains that no cause explains.",
+        "partial": f"{names}, {_BY_ONE_CYCLE if single_cycle else 'and structure remains that no cause explains'}.",
         "noise_differs": f"{noise}.",
         "unexplained": "There is structure that no cause of the catalogue explains.",
         "not_testable": f"The recordings cannot decide{why}.",

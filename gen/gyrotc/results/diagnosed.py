@@ -36,6 +36,9 @@ class GainOnUnseen(Part):
     angle_1h_after_arcsec: Figure = Field(description="RMS angle error over one hour with the causes, arcsec")
     rms_30min_before_dph: Figure = Field(description="RMS of means over 30 minutes of the static map, deg/h")
     rms_30min_after_dph: Figure = Field(description="RMS of means over 30 minutes with the causes, deg/h")
+    about_means: bool = Field(
+        default=False, description="true if the mean of each run is subtracted, because a named cause shifts runs"
+    )
 
     @property
     def shown(self) -> Literal["gain", "loss", "undecided"]:
@@ -49,14 +52,15 @@ class GainOnUnseen(Part):
     def text(self) -> str:
         """The gain on unseen runs in a sentence."""
         rms = f"RMS {self.exam_rms_before_dph:.4g} -> {self.exam_rms_after_dph:.4g} deg/h"
+        runs = "On unseen runs less their means" if self.about_means else "On unseen runs"
         if self.shown == "loss":
-            return f"On unseen runs the extension does harm: {rms}."
+            return f"{runs} the extension does harm: {rms}."
         if self.shown == "undecided":
-            return f"On unseen runs no gain is shown: {rms}."
+            return f"{runs} no gain is shown: {rms}."
         share = self.share_of_excess_removed
         whole = share is not None and share >= _WHOLE
         amount = "" if share is None else f", {'all' if whole else f'{share:.0%}'} of the removable error"
-        return f"On unseen runs the extension gains: {rms}{amount}."
+        return f"{runs} the extension gains: {rms}{amount}."
 
 
 class WithoutRate(GainOnUnseen):

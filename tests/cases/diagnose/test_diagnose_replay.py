@@ -340,6 +340,17 @@ def test_offsets_of_power_ons_do_not_change_the_strength_of_a_play(seed: int, tm
     assert completed(played, [one], power_ons(runs)) == [one]
 
 
+def test_a_cause_beside_offsets_is_shipped_and_its_gain_is_that_of_runs_less_their_means(tmp_path: Path) -> None:
+    """The offsets of the exam runs, 25 times the play, hid the gain, and building without the extension was advised."""
+    dataset, _ = _loops(tmp_path, 0.0, 1, '[[cause]]\nid = "turn_on_offset"\nstd_dph = 0.03\n')
+    found = diagnose(dataset).result
+    assert {cause.id for cause in found.physical} == {"turn_on_offset", "hysteresis"}
+    assert found.extended is not None and found.extended.terms == ("hysteresis",)
+    gain = found.extended.gain
+    assert gain.shown == "gain" and gain.about_means and "less their means" in found.text
+    assert gain.exam_rms_after_dph < 1.1 * (found.noise_floor_dph or 0.0) < found.extended.exam_rms_dph
+
+
 def test_the_strength_of_a_play_over_temperature_is_shipped_and_gains_on_the_exam(tmp_path: Path) -> None:
     dataset, _ = _loops(tmp_path, 1.0, 1)
     found = diagnose(dataset)
