@@ -290,19 +290,23 @@ def check(
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))
-    tell(f"next: {_after_check(result, shlex.quote(str(dataset)))}")
+    tell(f"next: {_after_check(result, shlex.quote(str(dataset)), previous)}")
     if result.problems:
         raise typer.Exit(2)
 
 
-def _after_check(result: CheckResult, dataset: str) -> str:
+def _after_check(result: CheckResult, dataset: str, previous: Path | None) -> str:
     """Return the one step that comes after a check.
 
     Args:
         dataset: The data set as a shell takes it.
+        previous: The earlier result that it was checked against, which the next build must not replace.
     """
     if result.problems:
         return f"mend the problems above, the first one first, and check again: gyrotc check {dataset}"
+    build = f"gyrotc build {dataset} --out result"
+    if previous is not None:
+        build = f"gyrotc build {dataset} --prior {shlex.quote(str(previous))} --out renewed"
     if result.warnings:
-        return f"look at the warnings above; if they are as they should be: gyrotc build {dataset} --out result"
-    return f"gyrotc build {dataset} --out result"
+        return f"look at the warnings above; if they are as they should be: {build}"
+    return build

@@ -160,3 +160,12 @@ def test_memories_are_no_change_and_a_factor_is_no_memory(seed: int) -> None:
     assert _evidence(curve + 0.6 * loops + noise, curve) < 0.0
     assert _evidence(curve + 0.6 * lag + noise, curve) < 0.0
     assert _evidence(curve * np.where(HALF, 1.5, 1.0) + noise, curve) > 10.0
+
+
+def test_the_step_after_a_check_against_an_earlier_result_keeps_that_result(tmp_path: Path, gyrotc: Command) -> None:
+    write_csv(tmp_path / "RLG-1" / "run-01.csv", columns(720))
+    assert gyrotc("fit", tmp_path / "RLG-1", "--out", tmp_path / "result").returncode == 0
+    alone = gyrotc("check", tmp_path / "RLG-1").stdout.splitlines()[-1]
+    assert alone.endswith(f"gyrotc build {tmp_path / 'RLG-1'} --out result")
+    after = gyrotc("check", tmp_path / "RLG-1", "--previous", tmp_path / "result").stdout.splitlines()[-1]
+    assert after.endswith(f"gyrotc build {tmp_path / 'RLG-1'} --prior {tmp_path / 'result'} --out renewed")
