@@ -453,7 +453,7 @@ def likeliest_noise(
 
     Args:
         changes: As for `WhiteRuns.fit`.
-        start: Noise that an earlier call returned, at which the search begins; None: there was none.
+        start: Noise of this function at which the search begins; it ends at the same place from others.
     """
     known: dict[tuple[int, int], float] = {}
     cell_s = min(one.cell_s for one in regression.cells)
@@ -466,17 +466,14 @@ def likeliest_noise(
             known[at] = regression.white(noise_at(at)).fit(changes).log_likelihood
         return known[at]
 
-    best, move = _START, (-1, -1)
+    best, last = _START, (-1, -1)
     if start is not None:
         best = int(np.searchsorted(_LEVELS, start.level)), int(np.searchsorted(_SLOPES, start.slope))
-    moves = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
-    while True:
-        around = (((best[0] + i, best[1] + j), (i, j)) for i, j in (move, *moves))
-        inside = ((at, by) for at, by in around if 0 <= at[0] < len(_LEVELS) and 0 <= at[1] < len(_SLOPES))
-        better = next(((at, by) for at, by in inside if likelihood(at) > likelihood(best)), None)
-        if better is None:
-            break
-        best, move = better  # on in the direction that has led uphill
+    while best != last:
+        last = best
+        around = [(last[0] + i, last[1] + j) for i in (0, -1, 1) for j in (0, -1, 1)]
+        inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
+        best = max(inside, key=likelihood)
     return noise_at(best), known[best]
 
 
