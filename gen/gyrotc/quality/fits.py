@@ -453,7 +453,7 @@ def likeliest_noise(
 
     Args:
         changes: As for `WhiteRuns.fit`.
-        start: Noise of this function at which the search begins; it ends at the same place from others.
+        start: Noise that an earlier call returned, at which the search begins; None: there was none.
     """
     known: dict[tuple[int, int], float] = {}
     cell_s = min(one.cell_s for one in regression.cells)
