@@ -12,7 +12,7 @@ from ..causes import CATALOGUE
 from ..common.metrics import LEAST_SPAN_C, Averages
 from ..common.progress import Progress, Stages, silent
 from ..model import Model
-from ..quality.events import found_events
+from ..quality.event_findings import found_events
 from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset, Run
 from ..results.base import Finding

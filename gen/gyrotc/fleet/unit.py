@@ -17,7 +17,7 @@ from ..common.inputs import checked, read_json
 from ..common.metrics import Averages
 from ..jobs.applied import applied_in
 from ..jobs.calibration import Built, build_into
-from ..quality.events import found_events
+from ..quality.event_findings import found_events
 from ..recordings.loading import calibration_day, input_hashes, load, stated_identity
 from ..recordings.records import Dataset
 from ..results.cache import program_of

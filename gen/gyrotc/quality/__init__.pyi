@@ -1,6 +1,6 @@
 from .changes import Change as Change
 from .curves import curve_findings as curve_findings
-from .events import found_events as found_events
+from .event_findings import found_events as found_events
 from .findings import finding as finding
 from .findings import run_facts as run_facts
 from .fits import WalkNoise as WalkNoise

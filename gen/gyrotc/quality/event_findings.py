@@ -1,20 +1,63 @@
-"""Say in findings what happened to the rows of a run, with its times and what to do."""
+"""Say in findings what happened to the rows of a run, with its times and what to do.
+
+Each event has its time and size with 95 % limits where they can be known, and the `exclude` line that leaves it out.
+Of a change that lasts the shorter side may be left out. A step or a burst that is left in looks like several causes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..recordings.records import Mark, Run
+from ..recordings.records import Dataset, Mark, Run, joined_runs
 from ..results.base import Finding
 from ..results.rows import STATED, LeftOutRows, RowsCount, RowsUsed
-from .change_findings import change_findings
-from .findings import ValueWithLimits, finding
-from .judgement import Judged, Judgement, LeftOut
+from .changes import Change, paired
+from .curves import curve_findings
+from .findings import ValueWithLimits, finding, run_facts
+from .judgement import Judged, Judgement, LeftOut, judge
 from .odds import Event
 
 # Stretches that a result lists; beyond, they are counted only.
 _LISTED = 200
+
+
+def found_events(dataset: Dataset, judged: Judged | None = None) -> list[Finding]:
+    """Return the events of the training runs, those of whole runs first; of such a run nothing else is said.
+
+    Args:
+        judged: Judgement of the rows of the runs; None: they are judged here.
+    """
+    judged = judged or judge(dataset)
+    runs = [run for run in joined_runs(dataset.runs) if run.role == "train"]
+    facts = [run_facts(run, run.rows()) for run in runs]
+    training = {run.file for run in runs}
+    of_runs = [found for found in curve_findings(dataset, facts) if found.file in training]
+    files = {found.file for found in of_runs}
+    return of_runs + [event for run in runs if run.file not in files for event in _events(judged.of(run))]
+
+
+def _events(judgement: Judgement) -> list[Finding]:
+    """Return the events of a run, in order of time."""
+    return sorted([*row_findings(judgement), *_gaps(judgement)], key=_at)
+
+
+def _at(event: Finding) -> float:
+    """Return when an event happened."""
+    assert event.time_s is not None
+    return event.time_s.value
+
+
+def _gaps(judgement: Judgement) -> Iterator[Finding]:
+    """Yield the times without rows, other than those after which the gyro was restarted."""
+    run = judgement.run
+    restarts = [change for change in judgement.changes if change.restarts]
+    for event in judgement.events:
+        start, length = event.time_s[0], event.size
+        if event.kind == "gap" and not any(change.falls_into(event.time_s) for change in restarts):
+            text = f"{run.file} has no rows for {length:g} s from {start:g} s on."
+            limits = (start, start, start + run.row_period_s)
+            yield finding("dropout", text, run, time_s=limits, size=((length,) * 3, "s"))
 
 
 def row_findings(judgement: Judgement) -> Iterator[Finding]:
@@ -25,7 +68,7 @@ def row_findings(judgement: Judgement) -> Iterator[Finding]:
             of_kind.setdefault((event.kind, event.column), []).append(event)
     for key, events in of_kind.items():
         yield _SAYS[key](judgement, events)
-    yield from change_findings(judgement)
+    yield from _changes(judgement)
 
 
 def _largest(events: Sequence[Event]) -> Event:
@@ -202,7 +245,7 @@ def _noise(judgement: Judgement, events: Sequence[Event]) -> Finding:
     )
 
 
-# Gaps are findings of `timing` and `events`, changes that last are those of `change_findings`.
+# Gaps are findings of `timing` and `found_events`, changes that last those of `_changes`.
 _SAID_ELSEWHERE = ("gap", "step", "transition", "drift", "gain", "restart", "displaced")
 _SAYS = {
     ("outlier", "rate"): _outliers,
@@ -243,3 +286,64 @@ def _stretches(judgement: Judgement) -> Iterator[LeftOutRows]:
             [(from_s, to_s)] = _spans(judgement.run, [one])
             rows = one.end - one.first
             yield LeftOutRows(file=judgement.run.file, from_s=from_s, to_s=to_s, rows=rows, reason=one.reason)
+
+
+def _changes(judgement: Judgement) -> Iterator[Finding]:
+    """Yield a finding for each change; a step that comes back is one."""
+    run, (first_s, last_s) = judgement.run, judgement.span_s
+    end_s = last_s + run.row_period_s
+    for one, back in paired(judgement.changes):
+        if back is not None:
+            out = (one.time_s[1], back.time_s[2] + run.row_period_s)
+            text = (
+                f"The rate of {run.file} steps by {one.size[0]:+.3g} deg/h at {one.time_s[0]:g} s and comes back at "
+                f"{back.time_s[0]:g} s, whatever the temperature is. What lies between ({_hours(*out)}) does not reach "
+                "the fit: find out what happened then."
+            )
+            yield finding("step_and_recover", text, run, time_s=one.time_s, size=(one.size, "deg/h"), leave_out=[out])
+        elif one.restarts:
+            yield _restart(run, one, first_s, end_s)
+        else:
+            yield _lasting(run, one, first_s, end_s)
+
+
+_EVENTS = {
+    "step": ("step", "deg/h"),
+    "transition": ("transition", "deg/h"),
+    "drift": ("ramp", "deg/h/h"),
+    "gain": ("gain_changed", "times"),
+}
+
+
+def _lasting(run: Run, one: Change, first_s: float, end_s: float) -> Finding:
+    before = one.time_s[0] - first_s < end_s - one.time_s[0] and one.kind != "drift"
+    out = (first_s, one.time_s[2]) if before else (one.time_s[1], end_s)
+    at, size, clear = one.time_s[0], one.size[0], f"({one.sigmas:.1f} times what noise makes there)"
+    what = {
+        "step": f"steps by {size:+.3g} deg/h at {at:g} s {clear} and stays",
+        "transition": f"changes by {size:+.3g} deg/h within {one.duration_s:g} s about {at:g} s {clear} and stays",
+        "drift": f"begins to drift by {size:+.3g} deg/h each hour at {at:g} s {clear}",
+        "gain": f"over temperature is from {at:g} s on {size:.3g} times what it was before (95 % {one.size[1]:.3g} ... "
+        f"{one.size[2]:.3g}): its scale changed",
+    }[one.kind]
+    id, unit = _EVENTS[one.kind]
+    text = f"The rate of {run.file} {what}: leave out {_hours(*out)}, or start a new run there."
+    return finding(id, text, run, time_s=one.time_s, size=(one.size, unit), leave_out=[out])
+
+
+def _restart(run: Run, step: Change, first_s: float, end_s: float) -> Finding:
+    """Report rows that stop and go on at another level."""
+    time, back = step.time_s[1:]
+    out = (first_s, time + run.row_period_s) if back - first_s < end_s - back else (back, end_s)
+    text = (
+        f"{run.file} has no rows for {back - time:g} s from {time:g} s on, and goes on {step.size[0]:+.3g} deg/h "
+        f"away ({step.sigmas:.1f} times what noise makes there), as after a power-on: what follows is "
+        f"trained on as a power-on of its own. State it (from_s = {back!r}, with its power_on_s), or leave out "
+        f"{_hours(*out)}."
+    )
+    time_s = (back, time, back)
+    return finding("restart", text, run, time_s=time_s, size=(step.size, "deg/h"), leave_out=[out])
+
+
+def _hours(from_s: float, to_s: float) -> str:
+    return f"{from_s / 3600.0:.2f}-{to_s / 3600.0:.2f} h"
