@@ -1,6 +1,6 @@
 """What the runtime says of itself when something fails: true bias less correction, in units of sigma, and the status.
 
-Each fault begins half an hour into an exam run of simulated gyros with a supply voltage among their inputs; the
+Each fault begins half an hour into a test run of simulated gyros with a supply voltage among their inputs; the
 compiled runtime gets a sample a second, and so did the recordings.
 """
 
@@ -63,7 +63,7 @@ profiles = ["fast full range"]
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A gyro's table and one exam run, a row a second: readings (temperature, supply), true bias and rate, deg/h."""
+    """A gyro's table and one test run, a row a second: readings (temperature, supply), true bias and rate, deg/h."""
 
     model: Model
     table: Table
@@ -95,7 +95,7 @@ def unit(seed: int, numeric: Numeric = "f32") -> Unit:
 
 @dataclass(slots=True)
 class Calls:
-    """Calls of the runtime; `row`: of the exam run at which each is made."""
+    """Calls of the runtime; `row`: of the test run at which each is made."""
 
     kind: NDArray[np.int64]
     number: NDArray[np.int64]

@@ -68,7 +68,7 @@ def gyro(scenario: str, seed: int, *, terms: Sequence[Term] = (), numeric: str =
 
 
 def exam_of(plan: str | Path, seed: int) -> Iterator[Recording]:
-    """The exam runs of a simulated gyro, with their true bias."""
+    """The test runs of a simulated gyro, with their true bias."""
     content = with_noise(read(plan)[1], "paper")
     runs = [(s.role, name) for s in content.set for name in s.profiles]
     n = round(BLOCK_S)

@@ -79,7 +79,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """All cells by method and environment, and the noise that was really added to the exam runs, deg/h."""
+    """All cells by method and environment, and the noise that was really added to the test runs, deg/h."""
 
     cells: Mapping[str, Mapping[str, Cell]]
     floor_dph: float
@@ -121,7 +121,7 @@ def experiment(seed: int, noise: NoiseName, folder: Path) -> Experiment:
 
 
 def groups_of(folder: Path) -> tuple[list[PaperGroup], float]:
-    """The environments of a simulated data set in the order of Table 1, and the noise of its exam runs, deg/h."""
+    """The environments of a simulated data set in the order of Table 1, and the noise of its test runs, deg/h."""
     dataset = load(folder)
     front = front_end(dataset.runs, _BLOCK_S)
     blocks, begins = {}, {}

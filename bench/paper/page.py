@@ -264,7 +264,7 @@ def departures(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[
             there = recorded["gyros"].get(noise, {}).get(seed, {})
             for place, was, found in _pairs(there, figures, f"{noise} noise, gyro {seed}"):
                 allowed = TOLERANCE if same and ", mrbf, " not in place else _TOLERANCE_ELSEWHERE
-                # A mean may be 0: it is measured by the noise of the exam runs.
+                # A mean may be 0: it is measured by the noise of the test runs.
                 size = figures["floor_dph"] if place.endswith(", mean_dph") else abs(found)
                 if was is None or not abs(found - was) <= allowed * size:
                     yield f"{place}: {was} recorded, {found} now; allowed {allowed:g} of it"

@@ -102,7 +102,7 @@ def _limit_ratio(hidden: Hidden, result: dict[str, Any]) -> float | None:
 def _gain(
     hidden: Hidden, campaign: Campaign, result: dict[str, Any], physical: list[dict[str, Any]]
 ) -> dict[str, float] | None:
-    """Squares before and after on the exam runs, and of the noise that was really added.
+    """Squares before and after on the test runs, and of the noise that was really added.
 
     Where nothing that can be corrected is named nothing is gained: what was hidden counts, not what was named.
     """

@@ -232,7 +232,7 @@ def test_candidates_stand_with_what_they_leave_and_the_chosen_one_is_marked(
 def test_the_terminal_says_the_same(demo: Path) -> None:
     text = (demo / "printed.txt").read_text()
     before, after = statistics(pooled(demo, EXAM, "rate_dph")), statistics(pooled(demo, EXAM, "remains_dph"))
-    gain = re.search(r"improvement ([\d.]+) ± [\d.]+ against a constant on exam runs", text)
+    gain = re.search(r"improvement ([\d.]+) ± [\d.]+ against a constant on test runs", text)
     about_zero = re.search(r"about zero ([\d.]+)", text)
     assert gain and about_zero
     assert float(about_zero[1]) == pytest.approx(before["rms_dph"] / after["rms_dph"], rel=6e-3)
@@ -342,7 +342,7 @@ def test_the_allan_picture_shows_the_deviation_of_what_remains(demo: Path, panel
 
 
 def test_a_certificate_says_what_the_recordings_give(demo: Path, tmp_path: Path) -> None:
-    """A build with limits; each figure of the certificate, before its ±, is that of the exam runs."""
+    """A build with limits; each figure of the certificate, before its ±, is that of the test runs."""
     limits = tmp_path / "limits.toml"
     names = ("rms_dph", "std_dph", "max_abs_dph")
     limits.write_text("schema = 1\n[at_most]\n" + "".join(f"{name} = 1.0\n" for name in names))

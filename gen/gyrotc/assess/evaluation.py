@@ -119,7 +119,7 @@ def evaluate(
         trace: Folder for one CSV per run.
         trace_rows: Most rows of it: a longer run's are means of as few rows as that takes; None: every row.
         training: What `training.json` says; default that of `folder`. Its figures of spans left out count only if
-            the model was made from these recordings and there is no exam run.
+            the model was made from these recordings and there is no test run.
         judged: Judgement of the rows of the runs; None: they are judged here.
         compiled: False: what the reference says that the C code does; `mismatches` and sizes are null.
         progress: Takes note of every run.

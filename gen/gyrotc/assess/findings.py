@@ -171,7 +171,7 @@ def _unseen(result: Mapping[str, Any], training: Training | None) -> Iterator[Fi
     seen, floor = _rms(result.get("train")), result.get("noise_floor_dph")
     left_out = training.left_out if training else None
     unseen = (
-        ("exam runs", _rms(result.get("exam"))),
+        ("test runs", _rms(result.get("exam"))),
         ("spans left out in turn", left_out.after.rms_dph if left_out else None),
     )
     for name, rms in unseen:

@@ -44,8 +44,7 @@ from .requirements import LEAST_FREEDOM
 
 _NORMAL = NormalDist()
 _ON_TRAINING = (
-    "judged on the training runs themselves, which a fit follows too well: record a run for the exam and give it "
-    'role = "exam"'
+    'judged on the training runs themselves, which a fit follows too well: record a test run and give it role = "exam"'
 )
 
 
@@ -213,7 +212,7 @@ class _Part(BaseModel):
 
 
 class AtMost(_Part):
-    """Upper limits. RMS and the like of compensated means, on exam runs, else on spans left out, else in training."""
+    """Upper limits. RMS and the like of compensated means, on test runs, else on spans left out, else in training."""
 
     rms_dph: UpperBound = None
     std_dph: UpperBound = None

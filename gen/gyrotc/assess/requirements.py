@@ -62,7 +62,7 @@ def _coverage(model: Model, exam: Sequence[Averages]) -> Requirement:
 
 
 def _visited(model: Model, exam: Sequence[Averages]) -> float:
-    """Return the share of trained cells with a mean of the exam in them or in a neighbour."""
+    """Return the share of trained cells with a mean of a test run in them or in a neighbour."""
     coverage = model.coverage
     cells = coverage.cells if coverage else (32, 12)
     trained = coverage.trained if coverage else np.ones(cells[::-1], bool)

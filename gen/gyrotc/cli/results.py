@@ -279,7 +279,7 @@ def summary_lines(result: Evaluation) -> Iterator[str]:
         yield text
 
 
-_JUDGED_ON = {"exam": "exam runs", "left_out": "spans left out", "train": "the training runs themselves"}
+_JUDGED_ON = {"exam": "test runs", "left_out": "spans left out", "train": "the training runs themselves"}
 
 
 def change_lines(changes: Changes) -> Iterator[str]:

@@ -80,7 +80,7 @@ def diagnose(
     progress: Progress = silent,
     judged: Judged | None = None,
 ) -> Diagnosis:
-    """Run the whole diagnosis on the training runs; exam runs measure the gain only.
+    """Run the whole diagnosis on the training runs; test runs measure the gain only.
 
     Args:
         dataset: Recordings. `truth.json` beside them is never opened.
@@ -223,7 +223,7 @@ def _as_emitted(
     *,
     about_means: bool,
 ) -> Extension:
-    """With the gain that the emitted tables have on the exam: without states as `gyrotc build` makes it, and with.
+    """With the gain that the emitted tables have on test runs: without states as `gyrotc build` makes it, and with.
 
     Args:
         about_means: The mean of each run is subtracted, because a named cause shifts it.

@@ -59,7 +59,7 @@ def fallback_models_of(
 
 
 _MOVING_C_PER_MIN = 0.3  # nine tenths of a run are slower than this where the chamber holds or drifts
-_LEARNT = 0.67  # share of the dates that is learnt from where no exam run is later
+_LEARNT = 0.67  # share of the dates that is learnt from where no test run is later
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def rms_of(runs: Sequence[Averages]) -> float:
 
 
 def _on_exam(refitting: Refitting, stages: Sequence[Sequence[Effect]]) -> Chain | None:
-    """Residuals of the exam runs; None where no mean of them has a known input beside all effects."""
+    """Residuals of the test runs; None where no mean of them has a known input beside all effects."""
     chain = refitting.on_exam(stages) if refitting.exam else [[]]
     return chain if _has_means(chain) else None
 
@@ -210,7 +210,7 @@ def _forward(refitting: Refitting, exam: Chain | None, causes: Sequence[Refined]
     """Later runs from earlier ones: the exam where it came last, else the last third of the training runs.
 
     Args:
-        exam: Residuals of the exam runs; None where these have no mean.
+        exam: Residuals of the test runs; None where these have no mean.
     """
     days = [run.day for run in refitting.train]
     later = [run.day for run in refitting.exam] if exam else []

@@ -126,7 +126,7 @@ class Refitting:
         return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
 
     def on_exam(self, stages: Sequence[Sequence[Effect]]) -> Chain:
-        """Residuals of the exam runs for each set of effects, of samples whose input is known beside all of them."""
+        """Residuals of the test runs for each set of effects, of samples whose input is known beside all of them."""
         all_of_them = [effect for stage in stages for effect in stage]
         whole = [known(run, all_of_them) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]

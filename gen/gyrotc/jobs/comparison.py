@@ -1,6 +1,6 @@
 """Compare training methods on one data set, in the form of the paper's Table 1.
 
-Methods train on the training runs and are judged on the exam runs; without exam runs, on spans (or runs) that were left
+Methods train on the training runs and are judged on the test runs; without test runs, on spans (or runs) that were left
 out in turn. Corrections are the maps in float64, with the input in force.
 """
 

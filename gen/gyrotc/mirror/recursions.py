@@ -1,7 +1,7 @@
 """Arithmetic and terms of the target: operations of front end and terms in float64, float32 and fixed point; the one
 text of each recursion, and the operators with memory that they share.
 
-`diagnose` runs it in float64 on training and exam runs, `mirror.history` in float32 and in fixed point against the
+`diagnose` runs it in float64 on training and test runs, `mirror.history` in float32 and in fixed point against the
 compiled code. libc/gtc_terms.inl is the same in C; docs/numerics.md, section 8, says it in words.
 
 A term sees the corrections of a history (`Course`) and changes what the map gets or adds to it (`Outcome`).

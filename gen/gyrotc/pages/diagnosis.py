@@ -66,7 +66,7 @@ def write_diagnosis_page(folder: Path) -> Path:
 
 def _gains(result: Diagnosed) -> list[tuple[str, GainOnUnseen]]:
     """Gain of the whole extension where it is shipped, else of every cause, by where it was measured."""
-    seen = "exam runs" if result.measured_on == "exam" else "parts left out in turn, causes chosen anew"
+    seen = "test runs" if result.measured_on == "exam" else "parts left out in turn, causes chosen anew"
     extended = result.extended
     if extended is None:
         return [(f"{seen}: {c.name[0].lower()}{c.name[1:]}", c.gain) for c in result.causes if c.gain]

@@ -17,7 +17,7 @@ from ..results.rows import LeftOutRows
 from ..results.training import Manifest, Training
 from .display import failure_words, limit_words, plain, with_uncertainty, words
 
-_JUDGED_ON = PARTS | {"exam": "exam runs, never seen in training"}
+_JUDGED_ON = PARTS | {"exam": "test runs, never seen in training"}
 _RULES = {
     "guard_band": "a guard band of w = U; PASS up to the limit less w, CONDITIONAL PASS from there up to the limit, "
     "else FAIL (ILAC-G8:09/2019, non-binary)",
@@ -189,7 +189,7 @@ class UnitResults:
             ("product", product),
             ("calibrated on", str(date) if date is not None else "not stated"),
             *((words(key), plain(value)) for key, value in meta.items()),
-            ("recordings", f"{train} for training, {len(self.evaluation.runs) - train} for the exam"),
+            ("recordings", f"{train} for training, {len(self.evaluation.runs) - train} for the test"),
             ("correction", f"{self.model.method}, model {self.model.hash[:12]}"),
             ("description", str(self.model.meta.get("description", ""))),
             ("made with", f"gyrotc {self.evaluation.gyrotc_version}"),

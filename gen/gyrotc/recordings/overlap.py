@@ -1,4 +1,4 @@
-"""Runs that hold the same rows: an exam on training data is refused, what two runs of one role share counts once."""
+"""Rows that two runs hold: a test run with training data is refused, rows of two runs of one role count once."""
 
 from __future__ import annotations
 
@@ -73,13 +73,13 @@ def _reversed_roles(shared: SharedRows) -> SharedRows:
 
 
 def _refused(shared: SharedRows) -> InputError:
-    """The exam holds training data."""
+    """Return the refusal of a test run that holds training data."""
     line = exclude_line([shared.span_s], f"also in {shared.other_file}")
     return InputError(
         f"{shared.file}, rows {shared.rows[0]} to {shared.rows[1]}",
-        f"{shared.rows[1] - shared.rows[0] + 1} rows of an exam that are also rows {shared.other_rows[0]} to "
+        f"{shared.rows[1] - shared.rows[0] + 1} rows of a test run that are also rows {shared.other_rows[0]} to "
         f"{shared.other_rows[1]} of {shared.other_file}, which is trained on",
-        f"rows that training has not seen: {line} in the exam's [[run]] of {FILE}, or one role for both",
+        f"rows that training has not seen: {line} in the [[run]] of the test run in {FILE}, or one role for both",
     )
 
 

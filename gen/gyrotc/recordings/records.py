@@ -344,4 +344,4 @@ class Dataset:
         axis = f" axis {self.axis}" if self.axis else ""
         exam = sum(run.role == "exam" for run in self.runs)
         rows = sum(run.n_rows for run in self.runs)
-        return f"Dataset({self.serial}{axis}: {len(self.runs)} runs, {exam} of them exams, {rows} rows)"
+        return f"Dataset({self.serial}{axis}: {len(self.runs)} runs, {exam} of them test runs, {rows} rows)"

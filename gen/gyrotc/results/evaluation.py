@@ -234,7 +234,7 @@ class ResidualTest(Part):
 
 _OF_STRUCTURE = frozenset({"fails_on_unseen_span", "does_not_generalise"})
 
-PARTS = {"exam": "exam runs", "left_out": "spans left out of training in turn", "train": "the training runs themselves"}
+PARTS = {"exam": "test runs", "left_out": "spans left out of training in turn", "train": "the training runs themselves"}
 """Data that a model may be judged by, in words."""
 
 
@@ -257,11 +257,11 @@ class Evaluation(UnitResult):
     requirements: tuple[Requirement, ...] = Field(description="properties of the recordings that a PASS needs")
     runs: tuple[EvaluatedRun, ...] = Field(description="all runs")
     train: Pooled | None = Field(description="figures over all training runs; null if there are none")
-    exam: Pooled | None = Field(description="figures over all exam runs; null if there are none")
+    exam: Pooled | None = Field(description="figures over all test runs; null if there are none")
     findings: tuple[Finding, ...] = Field(description="findings, the gravest first")
     model: ModelSizes = Field(description="method and sizes of the model")
     left_out: Pooled | None = Field(
-        default=None, description="figures over spans left out of training in turn; null if there are exam runs"
+        default=None, description="figures over spans left out of training in turn; null if there are test runs"
     )
 
     generalises: bool | None = Field(
@@ -288,12 +288,12 @@ class Evaluation(UnitResult):
     )
     usable: Statistics | None = Field(
         default=None,
-        description="figures after compensation over the usable rows of all exam runs, else of all training runs; null "
+        description="figures after compensation over the usable rows of all test runs, else of all training runs; null "
         "if no row is left out because of what it shows",
     )
 
     def judged(self) -> tuple[Literal["exam", "left_out", "train"], Pooled] | None:
-        """Return the data that the model is judged by: exam runs, else spans left out, else the training runs."""
+        """Return the data that the model is judged by: test runs, else spans left out, else the training runs."""
         if self.exam:
             return "exam", self.exam
         if self.left_out:

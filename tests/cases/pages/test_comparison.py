@@ -153,14 +153,14 @@ ZERO, GAIN = rms(BEFORE) / rms(AFTER), rms(BEFORE - CONSTANT) / rms(AFTER)
 
 def test_the_headline_is_the_gain_against_a_constant() -> None:
     assert GAIN < 0.2 * ZERO
-    begins = f"improvement {GAIN:.2f} against a constant on exam runs (about zero {ZERO:.1f}; paper: 9.8-10.4)"
+    begins = f"improvement {GAIN:.2f} against a constant on test runs (about zero {ZERO:.1f}; paper: 9.8-10.4)"
     assert next(iter(summary_lines(evaluation()))).startswith(begins)
 
 
 @pytest.mark.parametrize(
     ("changes", "on"),
     [
-        ({"noise_floor_source": "estimated"}, "exam runs"),
+        ({"noise_floor_source": "estimated"}, "test runs"),
         ({"exam": None, "left_out": part(BEFORE, AFTER)}, "spans left out"),
         ({"exam": None, "train": part(BEFORE, AFTER)}, "the training runs themselves"),
     ],

@@ -366,10 +366,10 @@ def test_the_last_file_becomes_the_exam_where_that_is_stated_or_answered(tmp_pat
         file.write_text(lines(OWN, lambda k, t, r, noise=noise: f"{k},{t},{r + noise.gauss(0.0, 1.0)}"))
     status, out, error = run("import", *files, "--out", tmp_path / "R", "--exam")
     assert status == 0, error
-    assert "600 rows of 1 s" in out and "b.parquet is the exam" in out
+    assert "600 rows of 1 s" in out and "b.parquet is the test run" in out
     assert [one.role for one in load(tmp_path / "R").runs] == ["train", "exam"]
     _, hint, _ = run("import", *files, "--out", tmp_path / "S")
-    assert "--exam makes the last run the exam" in hint
+    assert "--exam makes the last run a test run" in hint
     for answer, role in (("y", "exam"), ("", "train")):
         options = ImportOptions(exam=None)
         import_files(files, tmp_path / f"T-{role}", Map(), options, ask=lambda _, said=answer: said)

@@ -289,7 +289,7 @@ MOST = 1.010  # docs/results.md: RMS ÷ floor on smooth maps is 1.0040 in the me
 
 
 def sets(folder: Path) -> tuple[TrainingData, TrainingData, float]:
-    """Blocks of the training runs, blocks of the exam runs, and the noise that was really added to these, deg/h."""
+    """Blocks of the training runs, blocks of the test runs, and the noise that was really added to these, deg/h."""
     dataset = load(folder)
     roles = {role: [run for run in dataset.runs if run.role == role] for role in ("train", "exam")}
     front = front_end(roles["train"], 10.0)

@@ -89,7 +89,7 @@ def test_the_compiled_code_gains_what_the_diagnosis_promises(built: Path) -> Non
     other_rate = promised["rate_left_out"]  # of training runs, not of the exam
     assert other_rate["environment"] in ("loops", "slow", "steps")
     assert 0.0 < other_rate["rms_removed_dph"]["value"] != gain["rms_removed_dph"]["value"]
-    assert promised["forward_in_time"] is not None, "the exam runs are later than all training runs"
+    assert promised["forward_in_time"] is not None, "the test runs are later than all training runs"
 
 
 def test_the_report_tells_what_was_added(built: Path) -> None:
@@ -222,7 +222,7 @@ class Case:
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    """Three training runs and an exam run of an hour each, with a thermal gradient."""
+    """Three training runs and a test run of an hour each, with a thermal gradient."""
     print("seed", SEED)
     folder, rng = tmp_path_factory.mktemp("extend"), np.random.default_rng(SEED)
     time = 10.0 * np.arange(360)

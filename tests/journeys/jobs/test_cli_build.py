@@ -323,7 +323,7 @@ def test_a_frame_gives_the_rows_that_it_holds() -> None:
     assert [(run.file, run.role) for run in data.runs] == [("cold.parquet", "train"), ("warm.parquet", "exam")]
     np.testing.assert_allclose(data.runs[0].rows().rate_dph, runs["cold"]["gyro"] * 3600.0, rtol=1e-12)
     np.testing.assert_allclose(data.runs[0].rows().temperature_c, runs["cold"]["T [K]"] - 273.15, atol=1e-9)
-    assert repr(data) == "Dataset(RLG-1: 2 runs, 1 of them exams, 1440 rows)"
+    assert repr(data) == "Dataset(RLG-1: 2 runs, 1 of them test runs, 1440 rows)"
     assert data._repr_html_().count("<tr>") == 3
     folder = data.folder
     del data

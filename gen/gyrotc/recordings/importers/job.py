@@ -517,7 +517,7 @@ def _refuse_loss(files: Sequence[Path], out: Path) -> None:
 
 
 def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bool:
-    """Decide whether the last run is the exam: as stated, else as a person answers, else not.
+    """Decide whether the last run is a test run: as stated, else as a person answers, else not.
 
     Raises:
         InputError: There is only one run.
@@ -526,15 +526,15 @@ def _last_is_exam(files: Sequence[Path], options: ImportOptions, ask: Ask) -> bo
         raise InputError("--exam", "with one file, which training needs", "two files or more")
     if options.exam is not None or options.dry_run or len(files) < 2:
         return bool(options.exam)
-    answer = ask(f"Is {files[-1].name} the exam, which judges the correction and is not trained on? [y/N]")
+    answer = ask(f"Is {files[-1].name} a test run, which judges the correction and is not trained on? [y/N]")
     return (answer or "").lower() in ("y", "yes")
 
 
 def _judged_by(runs: Sequence[ImportedRun]) -> str:
     """Return a sentence about the runs that will judge a correction."""
     if runs[-1].exam:
-        return f"{runs[-1].file} is the exam; the other runs are trained on"
-    hint = "" if len(runs) < 2 else ": --exam makes the last run the exam"
+        return f"{runs[-1].file} is the test run; the other runs are trained on"
+    hint = "" if len(runs) < 2 else ": --exam makes the last run a test run"
     return f"every run is trained on, so a correction is judged by parts left out in turn{hint}"
 
 
