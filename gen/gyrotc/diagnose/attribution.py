@@ -26,10 +26,14 @@ from .search import Search
 from .unexplained import Contest, Misfit, contest, explained, misfit
 from .wide_memory import WideMemory, outlasts, rate_independent
 
-LEVEL = 0.01  # false alarms over the whole catalogue: one in a hundred campaigns (docs/diagnosis.md)
-_WELL = 0.08  # p-value of what is left that a pair must reach,
-_NEARLY, _MOST = 1e-5, 0.95  # or this one with this share of the structure
-_MISFIT = 0.01  # p-value of what is left below which further causes are looked for: as for the first one
+# Level of the whole search, and of what causes leave: chance alone exceeds it in one of a hundred campaigns
+# (docs/diagnosis.md).
+LEVEL = 0.01
+# A pair or three causes are taken for the whole explanation where what they leave has at least this p-value.
+_WELL = 0.08
+# Where they explain nearly all of the structure, no cause of the catalogue is exact enough for that: this one will do.
+_NEARLY = 1e-5
+_MOST = 0.95
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ class _Stage:
 
     @property
     def remains(self) -> bool:
-        return self.left.p_value < _MISFIT or self.found[0].p_value <= LEVEL
+        return self.left.p_value < LEVEL or self.found[0].p_value <= LEVEL
 
     @property
     def well(self) -> bool:
