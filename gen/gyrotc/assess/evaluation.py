@@ -270,7 +270,7 @@ def _program(c_folder: Path, model: Model, table: Table) -> Iterator[tuple[Targe
 def replay_run(
     rows: Rows, run: Run, model: Model, table: Table, program: tuple[Target, Path] | None
 ) -> Iterator[AnsweredRows]:
-    """Feed all rows of a file, part by part, to the compiled code and to the reference, and compare every step."""
+    """Feed rows of a file, part by part, to the compiled code and to the reference, and compare every step."""
     history = replay_case_of(rows, run, model, table)
     if program is None:
         for part in history.parts():
@@ -305,11 +305,13 @@ def _one_run(
     trace_rows: int | None,
     all_runs: Sequence[Run],
 ) -> _Part:
-    rows = run.rows()
+    whole = run.rows()
+    first = run.first_powered(whole.time_s)
+    rows = whole.from_row(first)
     inside = run.in_span(rows.time_s)
     times = rows.time_s if inside.all() else rows.time_s[inside]
     averager = Averager(times, average_s)
-    judgement, usable = judged.of(run), judged.usable(run, rows)
+    judgement, usable = judged.of(run), judged.usable(run, whole)[first:]
     count = row_count(judgement)
     robust = Averager(times, average_s) if count.bad else averager
     each = -(-int(np.count_nonzero(inside)) // trace_rows) if trace_rows else 1
@@ -331,7 +333,7 @@ def _one_run(
             plain = (status == 0) & scored
             squares.append(squares_of(None if part.sigma_dph is None else part.sigma_dph[span][plain]))
             wrong = None if part.mismatches is None else (wrong or 0) + part.mismatches
-    facts, together = run_facts(run, rows), squares_in_all(squares)
+    facts, together = run_facts(run, whole), squares_in_all(squares)
     found = tuple(findings_of_run(judgement, facts))
     return _Part(run, averager.averages(), wrong, facts, found, together, robust.averages(), count)
 

@@ -80,11 +80,7 @@ def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
 
 def _rows_since_power_on(run: Run) -> Rows:
     rows = run.rows()
-    first = 0 if run.power_on_s is None else int(np.searchsorted(rows.time_s, run.power_on_s))
-    if not 0 < first < len(rows):
-        return rows
-    channels = {name: values[first:] for name, values in rows.channels.items()}
-    return Rows(rows.time_s[first:], rows.temperature_c[first:], rows.rate_dph[first:], channels)
+    return rows.from_row(run.first_powered(rows.time_s))
 
 
 def floor_of(records: Records, left_dph: FloatArray, average_s: float) -> float:

@@ -62,6 +62,13 @@ class Rows:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def from_row(self, first: int) -> Rows:
+        """Return the rows from number `first` on, as views; all of them for 0."""
+        if first == 0:
+            return self
+        channels = {name: values[first:] for name, values in self.channels.items()}
+        return Rows(self.time_s[first:], self.temperature_c[first:], self.rate_dph[first:], channels)
+
     def has_channel(self, name: str) -> bool:
         """Test whether there is a channel of this name."""
         return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
@@ -169,6 +176,14 @@ class Run:
             InputError: The file has been changed since it was first read.
         """
         return self.reader()
+
+    def first_powered(self, time_s: FloatArray) -> int:
+        """Return the number of the first row after a power-on within the file, 0 if power came before.
+
+        A target is switched on with its gyro: replays begin there.
+        """
+        first = 0 if self.power_on_s is None else int(np.searchsorted(time_s, self.power_on_s))
+        return first if first < len(time_s) else 0
 
     def in_span(self, time_s: FloatArray) -> NDArray[np.bool_]:
         """Return a mask of the times (s on the file's clock) of the run: from_s <= t < to_s and not excluded."""

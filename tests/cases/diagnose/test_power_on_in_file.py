@@ -1,4 +1,4 @@
-"""A gyro that was switched on anew within a recording warms up anew, for the diagnosis as on the target."""
+"""A gyro that was switched on anew within a recording warms up anew: in diagnosis and evaluation as on the target."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gyrotc.assess import evaluate
 from gyrotc.diagnose import Effect, emitted_means, play_runs, samples
 from gyrotc.model import Model
 from gyrotc.quality import judge
 from gyrotc.recordings import Dataset, load
+from gyrotc.tables import emit
 from gyrotc.train import front_end
 from numpy.typing import NDArray
 from recordings import toml, write_csv
@@ -52,3 +54,17 @@ def test_emitted_tables_are_switched_on_with_the_gyro(recorded: Dataset, model_d
         assert len(without.time_s) > 60
         assert np.abs(without.after_dph).max() > 0.5 * WARM_UP["amplitude_dph"]
         assert np.abs(corrected.after_dph).max() < 0.02 * WARM_UP["amplitude_dph"]
+
+
+def test_evaluation_switches_the_target_on_with_the_gyro(
+    recorded: Dataset, model_dict: dict[str, Any], tmp_path: Path
+) -> None:
+    plane = {"w0": 0.0, "linear": [0.0, 0.0], "centers": [], "widths": [], "weights": [], "region": None}
+    plain = {**model_dict, "coverage": None, "uncertainty_dph": None, "networks": [plane], "block_s": ROW_S}
+    term = {"id": "warm_up", "parameters": WARM_UP, "channel": None}
+    model = Model.from_dict({**plain, "serial": recorded.serial, "terms": [term]})
+    emit(model, tmp_path / "out")
+    found = evaluate(tmp_path / "out", recorded, average_s=100.0, compiled=False)
+    for run in found.runs:
+        assert run.before.max_abs_dph > 0.5 * WARM_UP["amplitude_dph"]
+        assert run.after.max_abs_dph < 0.02 * WARM_UP["amplitude_dph"]
