@@ -30,6 +30,8 @@ _SAMPLE = 2**14
 _PILE = 2.0
 # Noise reaches a stop that is no farther than so many of its standard deviations.
 _REACH = 4.0
+# Correlation of neighbouring second differences: it is -2/3 for noise, and positive for what is smooth.
+_ALTERNATES = -1.0 / 3.0
 # Rows at a stop that cuts off the noise, of 64 rows, from which on they are left out.
 _CUT_ROWS = 4
 
@@ -87,11 +89,12 @@ def stuck(values: FloatArray, *, needs_release: bool) -> list[Repeats]:
 def _shows_noise(values: FloatArray, first: int) -> bool:
     """Test whether the noise of a column showed in the rows before one: no hold of a programme ends it.
 
-    The resolution of a ramp without noise makes second differences of one step at most.
+    Second differences of noise alternate and are those of several steps. What is smooth bends to one side for several
+    rows, and the resolution of a ramp without noise makes one step at most.
     """
-    before = values[max(first - WINDOW, 0) : first]
-    noise = noise_of(np.diff(before, 2)) / np.sqrt(6.0) if len(before) == WINDOW else 0.0
-    return bool(noise > resolution(values))
+    bends = np.diff(values[max(first - WINDOW, 0) : first], 2)
+    alternate = len(bends) == WINDOW - 2 and bends[1:] @ bends[:-1] < _ALTERNATES * (bends @ bends)
+    return bool(alternate and noise_of(bends) / np.sqrt(6.0) > resolution(values))
 
 
 def resolution(values: FloatArray) -> float:
