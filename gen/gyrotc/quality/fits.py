@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
+from scipy.linalg.lapack import dtbtrs
 
 from ..common.arrays import FloatArray, IntArray
 from ..common.metrics import median_step
@@ -125,9 +126,18 @@ def _filter(level: float, slope: float) -> tuple[FloatArray, FloatArray, float]:
 
 
 def _filtered(numerator: FloatArray, denominator: FloatArray, columns: FloatArray) -> FloatArray:
-    from scipy.signal import lfilter  # 0.4 s: most recordings have nothing to be looked for with it
+    """Filter columns, one for each row, shape (..., n), from rest: a(z) out = b(z) in, with a[0] = 1.
 
-    return np.asarray(lfilter(numerator, denominator, columns))
+    The filter is a banded triangular system. `scipy.signal.lfilter` solves the same, but the import of its package
+    takes a third of a fit.
+    """
+    forced = numerator[0] * columns
+    for k in range(1, min(len(numerator), columns.shape[-1])):
+        forced[..., k:] += numerator[k] * columns[..., :-k]
+    rows = forced.reshape(-1, columns.shape[-1])
+    band = np.repeat(denominator[:, None], columns.shape[-1], axis=1)
+    solved, _ = dtbtrs(band, rows.T, uplo="L", diag="U")
+    return np.asarray(solved.T.reshape(columns.shape))
 
 
 class Regression:
