@@ -38,7 +38,7 @@ _MOST = 0.95
 
 @dataclass(frozen=True)
 class Attribution:
-    """What the search found, and how sure that is.
+    """Result of the search: the named causes with their posterior.
 
     Attributes:
         first: The search before any cause is taken, best first.
@@ -69,7 +69,7 @@ class Attribution:
     refuted: bool = False
 
     def without_causes(self) -> Attribution:
-        """The same with nothing named."""
+        """Return the result with nothing named."""
         return replace(self, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
 
     @property
@@ -95,12 +95,12 @@ class _Stage:
 
     @property
     def well(self) -> bool:
-        """Whether the causes leave so little that a set of them is taken for the whole explanation."""
+        """True if the causes leave so little that a set of them is taken for the whole explanation."""
         return self.left.p_value >= _WELL or (self.left.p_value >= _NEARLY and self.left.share >= _MOST)
 
 
 def attribute(search: Search) -> Attribution:
-    """Runs the search to its end."""
+    """Run the search to its end."""
     first = detect(search, "map and beside")
     nothing = Attribution(first, False, (), (), (), 0.0, Misfit(1.0, 1.0, 1.0), first, Contest("", -np.inf))
     if first[0].p_value > LEVEL:
@@ -236,7 +236,7 @@ def _contest(
 
 
 def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage | None:
-    """None where the causes and the map have a column for every block, so that nothing can be said of either."""
+    """Judge a set of causes; None if causes and map have a column for every block: nothing can be said of them."""
     refined = refine(search, gains, chosen)
     columns = gains.map.shape[1] + gains.beside.shape[1] + model_columns(refined).shape[1]
     if columns >= search.y.size:
@@ -247,7 +247,7 @@ def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stag
 
 
 def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
-    """With what a play leaves judged beside hysteresis of any form, where the recordings speak for such a memory.
+    """Judge what a play leaves beside hysteresis of any form, if the recordings speak for such a memory.
 
     The family is one name for every memory with loops that do not depend on the rate; a table's play is but one.
     """
@@ -269,7 +269,7 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
 
 
 def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:
-    """What a second cause makes of a first; not where that is hysteresis of a form that does as well as both."""
+    """Add a second cause to a first, unless hysteresis of another form does as well as both."""
     widened = _widened(search, gains, one)
     if widened.wide is not None and widened.wide.criterion(gains.size) >= pair.criterion(gains.size):
         return widened
@@ -291,7 +291,7 @@ def _deeper(search: Search, gains: Gains, one: _Stage, pair: tuple[Candidate, ..
 
 
 def _plausible(gains: Gains, causes: tuple[Refined, ...]) -> bool:
-    """Whether no cause is larger than is accepted: the third one comes from the search, which asks for no size."""
+    """Test whether no cause is larger than accepted: the third one comes from the search, which asks for no size."""
     return all(gains.limit.allows(c.contribution) for c in causes if sized(c.candidate)) and not cancelling(causes)
 
 

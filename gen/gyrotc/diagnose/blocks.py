@@ -88,7 +88,7 @@ class Records:
         return sum(k.size for k in self.kept)
 
     def spans(self) -> list[slice]:
-        """Where each run's blocks lie in the joined arrays."""
+        """Slices of each run's blocks in the joined arrays."""
         ends = np.cumsum([k.size for k in self.kept])
         return [slice(int(e - k.size), int(e)) for e, k in zip(ends, self.kept, strict=True)]
 
@@ -117,7 +117,7 @@ class Records:
         return self.average([np.where(run.usable, run.rate_dph, 0.0) for run in self.runs])
 
     def without_rows(self, masks: Sequence[NDArray[np.bool_]]) -> Records:
-        """The same runs with `usable` replaced, the same blocks; runs of which too little is left drop out."""
+        """Return the runs with `usable` replaced and the same blocks; runs of which too little is left drop out."""
         tried = Records(tuple(replace(r, usable=m) for r, m in zip(self.runs, masks, strict=True)), self.block_s)
         return Records(tried.long_enough(), self.block_s)
 
@@ -235,7 +235,7 @@ def name_of(run: Run) -> str:
 
 
 def grouped_rows(rows: Rows, usable: NDArray[np.bool_], group: int) -> tuple[Rows, NDArray[np.bool_]]:
-    """Means over `group` rows; a mean counts when half of its rows do."""
+    """Return means over `group` rows; a mean counts if half of its rows do."""
     n = len(rows.time_s) // group * group
     use = usable[:n].reshape(-1, group)
     count = np.maximum(use.sum(axis=1), 1)

@@ -35,7 +35,7 @@ class Candidate:
 
     @property
     def key(self) -> CandidateKey:
-        """What tells it from all others, for sets and dictionaries."""
+        """Key that tells it from all others, for sets and dictionaries."""
         return self.id, tuple(sorted(self.values.items())), self.channel
 
 
@@ -63,7 +63,7 @@ def shape_parameter(cause: str) -> Parameter | None:
 
 
 def reach_of(records: Records) -> Reach:
-    """What these recordings can show of a cause."""
+    """Return the reach of these recordings."""
     span = float(np.ptp(np.concatenate([r.history.temperature_c for r in records.runs])))
     return Reach(span, max(float(np.ptp(r.history.time_s)) for r in records.runs))
 
@@ -76,7 +76,7 @@ def columns_of(records: Records, cause: str, values: CauseValues) -> FloatArray:
 
 
 def testable(records: Records, cause: str) -> str:
-    """Why a cause cannot be tested on these recordings; empty if it can."""
+    """Return the reason why a cause cannot be tested on these recordings; empty if it can."""
     needs = CATALOGUE[cause].needs
     histories = [run.history for run in records.runs]
     if len(histories) < needs.runs:

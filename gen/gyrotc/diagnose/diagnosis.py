@@ -103,7 +103,7 @@ def diagnose(
 
 
 def _about(events: Sequence[Finding]) -> list[str]:
-    """What to do about events before anything else."""
+    """Return what to do about events before anything else."""
     if not any(event.leave_out_s or event.whole_run for event in events):
         return []
     return [
@@ -178,7 +178,7 @@ def _extension(refitting: Refitting, analysis: Analysis, cycle: Cycle | None, sa
 
 
 def _undecidable(records: Records) -> str:
-    """Why these recordings cannot decide anything; empty where they may."""
+    """Return the reason why these recordings cannot decide anything; empty if they may."""
     if not records.runs:
         return f"No run has two blocks of {records.block_s:g} s: record longer ones."
     temperature = np.concatenate([r.history.temperature_c[r.usable] for r in records.runs])
@@ -223,7 +223,7 @@ def _as_emitted(
     *,
     about_means: bool,
 ) -> Extension:
-    """With the gain that the emitted tables have on test runs: without states as `gyrotc build` makes it, and with.
+    """Measure the gain of the emitted tables on test runs: without states, as `gyrotc build` makes it, and with.
 
     Args:
         about_means: The mean of each run is subtracted, because a named cause shifts it.

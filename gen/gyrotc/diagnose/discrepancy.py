@@ -125,7 +125,7 @@ def ensemble_of(
     beside: FloatArray | None = None,
     estimated: bool = False,
 ) -> Ensemble:
-    """Draws the ensemble and compares.
+    """Draw the ensemble and compare.
 
     Args:
         search: The data.
@@ -208,7 +208,7 @@ def _unknown(e: FloatArray) -> FloatArray:
 
 
 def _autocorrelation(e: FloatArray, spans: Sequence[slice]) -> FloatArray:
-    """Of neighbouring blocks."""
+    """Return the correlation of neighbouring blocks."""
     top = sum((e[s][1:] * e[s][:-1]).sum(axis=0) for s in spans)
     return np.asarray(top / (e**2).sum(axis=0))
 

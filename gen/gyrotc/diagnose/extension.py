@@ -64,7 +64,7 @@ _LEARNT = 0.67  # share of the dates that is learnt from where no test run is la
 
 @dataclass(frozen=True)
 class Extension:
-    """What the extension gains.
+    """An extension with its gain.
 
     Attributes:
         steps: Gain of every cause, taken one after the other; None of one that cannot be corrected.
@@ -169,7 +169,7 @@ def rms_of(runs: Sequence[Averages]) -> float:
 
 
 def _on_exam(refitting: Refitting, stages: Sequence[Sequence[Effect]]) -> Chain | None:
-    """Residuals of the test runs; None where no mean of them has a known input beside all effects."""
+    """Return residuals of the test runs; None if no mean of them has a known input beside all effects."""
     chain = refitting.on_exam(stages) if refitting.exam else [[]]
     return chain if _has_means(chain) else None
 
@@ -187,7 +187,7 @@ def _crossed(refitting: Refitting, causes: Sequence[Refined]) -> Chain:
 
 
 def _score_self(refitting: Refitting) -> list[Averages]:
-    """Where no mean can be left out (very short runs): the training samples themselves, without gain."""
+    """Score the training samples themselves, without gain, if no mean can be left out (very short runs)."""
     return scored_means(refitting.fit([]), refitting.train, [], refitting.average_s, refitting.everything())
 
 

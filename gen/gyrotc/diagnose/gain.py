@@ -33,7 +33,7 @@ _FAR = 4.0  # robust standard deviations: a difference beyond says no more of th
 
 
 def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
-    """What the emitted tables of each model leave on runs, bit for bit, on the rows that all of them correct.
+    """Return the residuals of the emitted tables of each model, bit for bit, on the rows that all of them correct.
 
     A target is switched on with its gyro: where the file goes on from before the power-on of a run, the replay begins
     at the power-on.

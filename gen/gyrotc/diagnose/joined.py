@@ -26,7 +26,7 @@ Held = Literal["map", "map and beside", "beside"]
 
 @dataclass(frozen=True, slots=True)
 class JoinedLayout:
-    """Where each kind of column stands among the joined columns."""
+    """Places of each kind of column among the joined columns."""
 
     static: slice
     signatures: slice
@@ -36,7 +36,7 @@ class JoinedLayout:
 
     @classmethod
     def of(cls, static: int, signatures: int, channels: int, inputs: int, beside: int) -> JoinedLayout:
-        """From how many columns of each kind there are."""
+        """Make the layout from the number of columns of each kind."""
         ends = accumulate((0, static, signatures, channels, inputs, beside))
         return cls(*(slice(a, b) for a, b in pairwise(ends)))
 
@@ -87,7 +87,7 @@ class Joined:
 
 
 def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: FloatArray | None) -> Joined:
-    """Joins the bank, shape (N, ...), with channels, changed inputs and what stands beside the map."""
+    """Join the bank, shape (N, ...), with channels, changed inputs and the columns beside the map."""
     none = np.zeros((y.size, 0))
     own, names = channels if channels is not None else (none, [])
     held = beside if beside is not None else none
@@ -114,7 +114,7 @@ def join(bank: SignatureBank, y: FloatArray, channels: Channels | None, beside: 
 
 
 def _changes(bank: SignatureBank, y: FloatArray) -> list[FloatArray]:
-    """What every changed input changes of the fitted map, 0 where it is not known."""
+    """Return the change of the fitted map by every changed input, 0 where it is not known."""
     weights = bank.map.T @ y
     moved = [replaced @ weights - bank.map @ weights for replaced in bank.replaced]
     return [np.where(known, change, 0.0) for known, change in zip(bank.known, moved, strict=True)]
@@ -123,7 +123,7 @@ def _changes(bank: SignatureBank, y: FloatArray) -> list[FloatArray]:
 def _candidates(
     bank: SignatureBank, layout: JoinedLayout, added: tuple[Candidate, ...]
 ) -> tuple[ScoredColumns, tuple[Candidate, ...]]:
-    """Where single columns, pairs and groups of one variance stand, and whose they are."""
+    """Return the places of single columns, pairs and groups of one variance, and their candidates."""
     single: list[tuple[int, Candidate]] = []
     pairs: list[tuple[IntArray, Candidate]] = []
     variance: list[tuple[IntArray, Candidate]] = []

@@ -101,7 +101,7 @@ def _rest(gains: Gains, functions: FloatArray) -> float:
 
 
 def needs_finer(search: Search) -> bool:
-    """Whether the next finer map explains what neither this one nor any memory does."""
+    """Test whether the next finer map explains what neither this one nor any memory does."""
     gains = Gains(search)
     finer = gains.whiten(search.bank.finer)
     added = [p for p in gains.added() if p.members[0].role == "columns"]
@@ -127,5 +127,5 @@ def needs_finer(search: Search) -> bool:
 
 
 def _of_map(candidate: Candidate) -> bool:
-    """Whether a cause is a shape of the static map, and no memory."""
+    """Test whether a cause is a shape of the static map, and no memory."""
     return CATALOGUE[candidate.id].family == "static_map"

@@ -1,4 +1,4 @@
-"""Which of near explanations is likelier when the map has to pay for what it bends: marginal likelihoods.
+"""Marginal likelihoods of near explanations, in which the map has to pay for what it bends.
 
 With dT/dt as an input of the map, memories contain each other. A gradient is z − T = −τ dz/dt: the map of a lagged
 temperature, free in dz/dt, takes it for nothing. And a lag is f(z) = f(T) + f'(T) (z − T) + ..., of which a gradient
@@ -42,7 +42,7 @@ _START = 8.0
 
 
 class MarginalLikelihood:
-    """Of models of one search, as criteria: twice the logarithm, less log N for every parameter.
+    """Marginal likelihoods of the models of a search, as criteria: twice the logarithm, less log N for every parameter.
 
     Args:
         gains: Of the measured recordings.
@@ -68,7 +68,7 @@ class MarginalLikelihood:
         return self._weighed(near)[own][1]
 
     def judged(self, points: Sequence[Point], chosen: CauseSet, k: int, ranked: Sequence[Rival]) -> tuple[Rival, ...]:
-        """Rivals of the k-th cause with distances and odds by the evidence, where that has chosen it; nearest first.
+        """Return rivals of the k-th cause, nearest first, with distances and odds by the evidence if it has chosen them.
 
         Rivals that are too far behind to be asked keep their distance to the best of all.
         """
@@ -92,7 +92,7 @@ class MarginalLikelihood:
         return tuple(sorted(reported, key=lambda r: r.distance))
 
     def criterion(self, members: CauseSet, left_out: NDArray[np.bool_]) -> float:
-        """Of a model: over that of the map alone.
+        """Return the criterion of a model over that of the map alone.
 
         Args:
             members: Its causes; at most one changes the map's input.
@@ -144,7 +144,7 @@ class MarginalLikelihood:
         return {key: _few(ranked[key], size) for key in dict.fromkeys([*keys, *behind])}
 
     def _weighed(self, near: _Near) -> dict[Kinds, tuple[Point, float]]:
-        """Of each kind its best point and criterion, all on the blocks that each of them knows."""
+        """Return the best point and criterion of each kind, all on the blocks that each of them knows."""
         left_out = self._unknown(near)
         tried = {key: [(p, self.criterion(p.members, left_out)) for p in points] for key, points in near.items()}
         return {key: max(found, key=lambda one: one[1]) for key, found in tried.items()}
@@ -169,7 +169,7 @@ class MarginalLikelihood:
 
     @cached_property
     def _back(self) -> FloatArray:
-        """From the map's basis to the functions that it is made of, shape (m, 3 + a + b)."""
+        """Return the matrix from the map's basis to the functions that it is made of, shape (m, 3 + a + b)."""
         return np.asarray(np.linalg.pinv(self.bank.basis.mix))
 
 
@@ -203,7 +203,7 @@ def _swaps(near: _Near) -> bool:
 
 
 def _price(candidate: Candidate) -> int:
-    """Parameters that are free: of a cause that changes the input its own alone, for what the map bends is paid for."""
+    """Return the number of free parameters; of a cause that changes the input its own alone: bending is paid for."""
     return 1 if candidate.role == "input" else price_of(candidate)
 
 
@@ -222,7 +222,7 @@ def _few(points: Sequence[Point], size: int) -> list[Point]:
 
 
 def _end(point: Point) -> list[float]:
-    """Of each cause that hides blocks, the sign of its shift."""
+    """Return the sign of the shift of each cause that hides blocks."""
     return [float(np.sign(value)) for m in point.members if _hides(m.id) for value in m.values.values()]
 
 

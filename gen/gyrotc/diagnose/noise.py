@@ -63,7 +63,7 @@ def markov_row(lags: NDArray[np.int64], block_s: float, tau_s: float) -> FloatAr
 
 
 def flicker_row(lags: NDArray[np.int64], block_s: float) -> FloatArray:
-    """The same for flicker noise: equal Markov processes, correlation times in steps of a factor 4."""
+    """Return the covariances of flicker noise: equal Markov processes, correlation times in steps of a factor 4."""
     return np.asarray(sum(markov_row(lags, block_s, tau) for tau in _FLICKER_S))
 
 

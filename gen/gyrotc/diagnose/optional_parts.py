@@ -131,7 +131,7 @@ class _Loops:
         self.y = self._rest(data.bias_dph - data.bias_dph.mean())  # see `smooth_basis`
 
     def columns(self, loop: Effect) -> FloatArray:
-        """What the map leaves of the loop, and of the loop times the temperature from the middle on, shape (n, 2)."""
+        """Return the loop less the map, and the loop times the temperature from the middle on, shape (n, 2)."""
         added = np.concatenate([run.outcome(loop).added[at] for run, at in self._played])
         away = np.concatenate([run.course.temperature[at] - self.middle_c for run, at in self._played])
         return np.column_stack([self._rest(added), self._rest(added * away)])

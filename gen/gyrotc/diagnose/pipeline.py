@@ -54,7 +54,7 @@ class Analysis:
     extended: Ensemble | None
 
     def left_dph(self, *, named: bool) -> FloatArray:
-        """What the map leaves, and with the causes beside it if they are `named`, deg/h, shape (N,).
+        """Return the residual of the map, or of map and causes if `named`, deg/h, shape (N,).
 
         As large as the noise is of which they have taken a part. Causes without a name are no finding: another length
         of a block finds others, which take a quarter more or less.
@@ -102,7 +102,7 @@ def _extended(
 
 
 def _separations(search: Search, causes: Sequence[Refined]) -> tuple[dict[str, float], ...]:
-    """For every cause, d from which it can be distinguished from each that imitates it."""
+    """Return for every cause the d from which it can be distinguished from each that imitates it."""
     if not causes:
         return ()
     gains, imitators = Gains(search), [id for id in diagnosable_causes() if searched(id).imitates]

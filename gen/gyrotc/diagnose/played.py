@@ -49,7 +49,7 @@ class Effect:
 
     @property
     def term(self) -> Cause:
-        """What the catalogue knows of the cause."""
+        """Cause of the catalogue."""
         return CATALOGUE[self.id]
 
 
@@ -89,7 +89,7 @@ class Played:
     _outcomes: list[tuple[Effect, TermOutcome]] = field(default_factory=list)
 
     def outcome(self, effect: Effect) -> TermOutcome:
-        """What a term makes of every correction; the last few are cached."""
+        """Apply a term to every correction; the last few are cached."""
         for known, outcome in self._outcomes:
             if known == effect:
                 return outcome
@@ -238,7 +238,7 @@ def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
 def sample_masks(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
 ) -> list[NDArray[np.bool_]]:
-    """Of the samples of each run: those `kept` (default: all) whose input is known beside the effects."""
+    """Return masks of the samples of each run: those `kept` (default: all) whose input is known beside the effects."""
     masks = [known(run, effects) for run in runs]
     return masks if kept is None else [mask & k for mask, k in zip(masks, kept, strict=True)]
 
@@ -246,7 +246,7 @@ def sample_masks(
 def chosen_samples(
     runs: Sequence[Played], effects: Sequence[Effect], kept: Sequence[NDArray[np.bool_]] | None
 ) -> TrainingData:
-    """Samples of all runs beside the effects, as `sample_masks`."""
+    """Return samples of all runs beside the effects, as in `sample_masks`."""
     masks = sample_masks(runs, effects, kept)
     return joined([samples(run, effects).select(m) for run, m in zip(runs, masks, strict=True) if m.any()])
 
@@ -303,7 +303,7 @@ def added_range(runs: Sequence[Played], effects: Sequence[Effect], beside: Float
 
 
 def _simulated(run: Played, effect: Effect) -> FloatArray:
-    """What a cause that no table holds adds, as the simulation has it, deg/h."""
+    """Return what a cause that no table holds adds in the simulation, deg/h."""
     seen = run.data.temperature_c
     scene = Scene(run.data.time_s, run.on_s, seen, seen, seen, None, run.day or 0.0)
     assert effect.term.bias is not None

@@ -31,7 +31,7 @@ _SURELY = 300.0  # logarithm of odds beyond which more is no surer
 
 @dataclass(frozen=True)
 class Rival:
-    """What stands in the place of a named cause: another cause, another channel, `UNNAMED` or `NOTHING`.
+    """An alternative to a named cause: another cause, another channel, `UNNAMED` or `NOTHING`.
 
     Attributes:
         id: Cause, `UNNAMED` or `NOTHING`.

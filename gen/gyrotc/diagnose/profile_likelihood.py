@@ -1,4 +1,4 @@
-"""How much better each cause, and each pair of causes, explains the data: profile likelihoods on the grid.
+"""Profile likelihoods of each cause, and of each pair of causes, on the grid.
 
 Of a signature that the static map imitates all but a trace of, the trace decides the size: texture that is none of
 the cause's makes a wave of half a turn over the envelope as large as one likes, and the map takes off again what the
@@ -58,7 +58,7 @@ class SizeLimit:
         return np.asarray(columns.std(axis=0) * self.noise / max(self.spread_dph, 1e-300))
 
     def allows(self, contribution: FloatArray) -> bool:
-        """Whether a fitted effect, deg/h, shape (N,), is accepted."""
+        """Test whether a fitted effect, deg/h, shape (N,), is accepted."""
         return bool(contribution.std() <= self.spread_dph)
 
 
@@ -79,7 +79,7 @@ CauseSet = tuple[Candidate, ...]
 
 @dataclass(frozen=True)
 class _Base:
-    """What is left when a map (plain or of another input) is projected out.
+    """Data and columns with a map (plain or of another input) projected out.
 
     `columns`: all bank columns and channel columns, whitened and projected, over the noise scale.
     """
@@ -106,7 +106,7 @@ class _Taken:
     shares: FloatArray
 
     def allows(self, at: slice, weights: FloatArray) -> bool:
-        """Whether they are still accepted beside other columns with these weights."""
+        """Test whether they are still accepted beside other columns with these weights."""
         left = self.weights - self.less[:, at] @ weights
         return float(((self.shares * left) ** 2).sum()) <= 1.0
 
@@ -225,11 +225,11 @@ class Gains:
             yield Point((base.candidate,), base.gain)
 
     def added(self) -> Iterator[Point]:
-        """Those models of one candidate that leave the map's input as it is."""
+        """Yield the models of one candidate that leave the map's input as it is."""
         yield from self._on(self.base, ())
 
     def waves(self) -> Iterator[Point]:
-        """Models of one wave that is no sine: its columns with the first overtones.
+        """Yield models of one wave that is no sine: its columns with the first overtones.
 
         Fundamentals lie so near one another that the highest overtone, which turns faster, has the grid's distances.
         """
@@ -267,7 +267,7 @@ class Gains:
             yield from self._on(base, (base.candidate,))
 
     def _gain(self, base: _Base, at: slice, before: FloatArray) -> float:
-        """What one column or two add; 0 where they have nothing of their own, or no size that is accepted."""
+        """Return the gain of one column or two; 0 if they have nothing of their own, or no size that is accepted."""
         own, a = base.gram[at, at], base.a[at]
         if a.size == 1:
             if own[0, 0] <= INDEPENDENT * before[0]:
@@ -319,7 +319,7 @@ state with another parameter."""
 
 
 def makes_sense(point: Point) -> bool:
-    """Pairs that make sense: one shape of the map; two of a kind only where that may be, and far from one another."""
+    """Test whether a pair makes sense: one shape of the map; two of a kind only if allowed, and far apart."""
     a, b = point.members
     if a.id != b.id:
         return not all(CATALOGUE[m.id].family == "static_map" for m in point.members)

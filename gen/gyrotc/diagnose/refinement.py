@@ -106,7 +106,7 @@ class Refined:
 
     @property
     def plausible(self) -> bool:
-        """Whether its nonlinear parameter may lie in the catalogue's range, or not far beyond."""
+        """True if its nonlinear parameter may lie in the catalogue's range, or not far beyond."""
         parameter = shape_parameter(self.candidate.id)
         interval = self.parameters.get(parameter.name) if parameter is not None else None
         if parameter is None or interval is None:
@@ -144,7 +144,7 @@ def _moved(candidate: Candidate, value: float) -> Candidate:
 
 
 def sized(candidate: Candidate) -> bool:
-    """Whether a cause has amplitudes, which are accepted up to a size."""
+    """Test whether a cause has amplitudes, which are accepted up to a size."""
     return candidate.role == "columns" and terms.CATALOGUE[candidate.id].kind != "static"
 
 
@@ -183,7 +183,7 @@ class _Fit:
 
 
 def _unseen_s(candidate: Candidate) -> float:
-    """How much of either end of a run a candidate puts out of sight, s."""
+    """Return the time at either end of a run that a candidate hides, s."""
     rule = terms.CATALOGUE[candidate.id].unseen_s
     return 0.0 if rule is None else rule(candidate.values)
 
@@ -197,7 +197,7 @@ def _inside(search: Search, k: int, margin_s: float) -> NDArray[np.bool_]:
 
 
 def refine(search: Search, gains: Gains, members: tuple[Candidate, ...]) -> tuple[Refined, ...]:
-    """Moves the nonlinear parameters of all members to their optimum, one after the other, in two rounds."""
+    """Move the nonlinear parameters of all members to their optimum, one after the other, in two rounds."""
     fit = _Fit(search, gains, members)
     current = list(members)
     profiles: list[FloatArray | None] = [None] * len(current)

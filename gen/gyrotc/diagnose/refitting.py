@@ -117,7 +117,7 @@ class Refitting:
         return samples_beside(self.train, effects, self.arguments["power_on"], masks)
 
     def takes(self, causes: Sequence[Refined]) -> bool:
-        """Whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
+        """Test whether every cause leaves samples whose input is known: a late record of short spans may leave none."""
         effects = [effect for effect in map(Effect.of, causes) if effect.term.mended]
         return all(any(known(run, [effect]).any() for run in self.train) for effect in effects)
 
@@ -126,13 +126,13 @@ class Refitting:
         return [np.ones(len(run.data.bias_dph), dtype=bool) for run in self.train]
 
     def on_exam(self, stages: Sequence[Sequence[Effect]]) -> Chain:
-        """Residuals of the test runs for each set of effects, of samples whose input is known beside all of them."""
+        """Return residuals of the test runs for each set of effects, on samples whose input is known beside all."""
         all_of_them = [effect for stage in stages for effect in stage]
         whole = [known(run, all_of_them) for run in self.exam]
         return [self._residuals(self.everything(), self.exam, whole, e) for e in stages]
 
     def left_out(self, held: list[BoolArray], causes: Sequence[Refined]) -> Chain:
-        """Residuals of held-out training samples; as many causes are chosen anew on the others."""
+        """Return residuals of held-out training samples; as many causes are chosen anew on the others."""
         kept = [~m for m in held]
         chosen = filter(is_corrected, self.chosen_without(held, len(causes)))
         effects = completed(self.train, [Effect.of(c) for c in chosen], self.arguments["power_on"], kept)
@@ -203,7 +203,7 @@ def _over_any_rate(data: TrainingData, arguments: dict[str, Any]) -> Fit:
 
 
 def mean_count(run: Played, average_s: float) -> int:
-    """How many means over `average_s` the samples of a run have."""
+    """Return the number of means over `average_s` that the samples of a run have."""
     nothing = np.zeros(run.data.time_s.size)
     whole = np.ones(nothing.size, dtype=bool)
     return _means(run, nothing, whole, average_s).time_s.size
@@ -216,7 +216,7 @@ def scored_means(
     average_s: float,
     scored: Sequence[NDArray[np.bool_]],
 ) -> list[Averages]:
-    """Residuals of the scored samples of every run as means over `average_s`; runs without any drop out.
+    """Return residuals of the scored samples of every run as means over `average_s`; runs without any drop out.
 
     Samples whose input is not known beside the effects are not scored.
     """
@@ -236,7 +236,7 @@ def scored_means(
 
 
 def _re_zeroed(rest: FloatArray, time_s: FloatArray, effects: Sequence[Effect]) -> FloatArray:
-    """Residuals after a rest at their start: its mean counts as far as the offsets are larger than its noise."""
+    """Return residuals after a rest at their start: its mean counts as far as the offsets exceed its noise."""
     variance = max(e.values["std_dph"] for e in effects if e.term.kind == "random") ** 2
     first = rest[time_s < time_s[0] + _RE_ZERO_S]
     noise = float(np.mean(np.diff(rest) ** 2)) / 2.0 / len(first) if len(rest) > 1 else 0.0

@@ -52,7 +52,7 @@ def rival_key(candidate: Candidate) -> RivalKey:
 
 
 def kinds_of(members: Sequence[Candidate]) -> Kinds:
-    """Of a model, sorted."""
+    """Return the kinds of a model, sorted."""
     return tuple(sorted(map(rival_key, members)))
 
 
@@ -139,7 +139,7 @@ class RivalModel:
         return np.asarray((plus**2).sum(axis=0) - (minus**2).sum(axis=0))
 
     def drawn(self, target: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray | None]:
-        """What the cause does at its fitted size, shape (N,); and weights of `plus` that are drawn anew, (r, S)."""
+        """Return the effect of the cause at its fitted size, shape (N,), and weights of `plus` drawn anew, (r, S)."""
         held = self.held @ (self.held.T @ target)
         along = self.plus.T @ target
         if self.size is None:
@@ -193,7 +193,7 @@ class SimulatedRivals:
         self.drawn = {kind: self._criteria(self._of(found[0])) for kind, found in models.items()}
 
     def odds(self, named: RivalKey, rival: RivalKey) -> float:
-        """How much likelier a lead like the measured one is where the rival acts than where the named cause does.
+        """Return how much likelier a lead like the measured one is if the rival acts than if the named cause does.
 
         At most 1: the rival has the worse criterion. Densities are of normal kernels (Silverman 1986, eq. 3.28) at the
         measured lead, as wide as leads of the named cause, about which it lies, ask for: those of offsets drawn anew

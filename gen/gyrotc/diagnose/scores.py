@@ -23,7 +23,7 @@ _LAMBDA = np.geomspace(1e-3, 1e5, 33)  # variances of a random effect, in units 
 
 @dataclass(frozen=True)
 class ScoredColumns:
-    """Which columns belong together: index sets into the joined columns of a view.
+    """Columns that belong together: index sets into the joined columns of a view.
 
     Attributes:
         single: Columns that are candidates alone, shape (s,).
@@ -61,7 +61,7 @@ class Projection:
 
     @cached_property
     def alive(self) -> NDArray[np.bool_]:
-        """Columns that still have a signature."""
+        """Mask of the columns that still have a signature."""
         return np.asarray(np.diag(self.gram) > INDEPENDENT * self.before)
 
     @cached_property
@@ -140,7 +140,7 @@ def variance_ratio_of(gram: FloatArray, a: FloatArray, before: float) -> tuple[F
 
 
 def ratio_of(energy: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same from energies of independent directions, shape (..., r), and their sizes, shape (r,); 0 of none."""
+    """Return the ratio from energies of independent directions, shape (..., r), and sizes, shape (r,)."""
     if s.size == 0:
         none = np.zeros(energy.shape[:-1])
         return none, none
@@ -159,7 +159,7 @@ def _structure(projection: Projection, a: FloatArray) -> FloatArray:
 
 
 def p_values(scores: FloatArray, projection: Projection, columns: ScoredColumns, seed: int) -> FloatArray:
-    """How often the largest score in data without effect is above each of some scores; shape as theirs."""
+    """Return how often the largest score in data without effect is above each of some scores; shape as theirs."""
     null = np.sort(draw_null(projection, columns, seed))
     return np.asarray((null.size - np.searchsorted(null, scores) + 1.0) / (null.size + 1.0))
 

@@ -28,7 +28,7 @@ _KNOTS = 4  # hats over the temperature: the variance is a slow function of it
 
 @dataclass(frozen=True)
 class Screened:
-    """What the screens found and what is done about it.
+    """Findings of the screens, and what is done about them.
 
     Attributes:
         sigma: Factor of the noise of every block, median 1, shape (N,); None: even.
@@ -40,7 +40,7 @@ class Screened:
 
 
 def screen(records: Records) -> Screened:
-    """Runs all screens."""
+    """Run all screens."""
     found = [rows for run in records.runs for rows in run.outliers]
     findings: list[tuple[str, float, dict[str, float]]] = []
     if len(found) >= _MANY:
@@ -57,7 +57,7 @@ def screen(records: Records) -> Screened:
 
 
 def _variance(records: Records) -> tuple[FloatArray | None, float, float]:
-    """Does the quick part of the noise depend on |dT/dt|, T or the time since power-on?
+    """Test whether the quick part of the noise depends on |dT/dt|, T or the time since power-on.
 
     The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a
     block is one row) is regressed on smooth functions of the three (Breusch and Pagan's idea, robust).

@@ -49,7 +49,7 @@ class View:
 
 @dataclass(frozen=True)
 class Question:
-    """What views need: the data, all columns, and what may be an effect.
+    """Input of views: the data, all columns, and what may be an effect.
 
     Attributes:
         records, bank: The runs and the signatures on their temperatures.
@@ -103,7 +103,7 @@ def view_of(question: Question, colour: Colour) -> View:
 
 
 def _view(question: Question, colour: Colour, gram: FloatArray, log_det: float) -> View:
-    """Completes the inner products of the bank with those of the other columns and of the data."""
+    """Complete the inner products of the bank with those of the other columns and of the data."""
     whiten = Whitener(colour, question.records.kept, question.records.block_s, question.sigma)
     outside = question.joined.outside
     white = whiten(np.column_stack([outside, question.y]))
@@ -123,7 +123,7 @@ def _view(question: Question, colour: Colour, gram: FloatArray, log_det: float) 
 def _with_likelihood(
     question: Question, colour: Colour, gram: FloatArray, b: FloatArray, yy: float, log_det: float
 ) -> View:
-    """Projects out what may be an effect; what is left tells level and likelihood of the noise."""
+    """Project out what may be an effect; the rest tells level and likelihood of the noise."""
     to = question.effects
     inner = to.T @ gram @ to
     length = np.sqrt(np.diag(inner))
@@ -188,11 +188,11 @@ class Search(Question):
         return view_of(self, colour)
 
     def contradicts(self, view: View) -> bool:
-        """Whether the data are so much likelier under another colour that that of the view cannot be theirs."""
+        """Test whether the data are so much likelier under another colour that the view's cannot be theirs."""
         return 2.0 * (self.likeliest.log_likelihood - view.log_likelihood) > _COLOUR_RATIO
 
     def extended(self, columns: FloatArray) -> Search:
-        """The same search with further columns, shape (N, k), in every model; columns of zeros have no part in any.
+        """Return the search with further columns, shape (N, k), in every model; columns of zeros have no part in any.
 
         Only the colours that the data allow are looked at again.
         """
@@ -222,7 +222,7 @@ def open_search(
     declared: Colour | None = None,
     colours: Sequence[int] | None = None,
 ) -> Search:
-    """Binds a bank to one record of rates.
+    """Bind a bank to one record of rates.
 
     Args:
         records: The runs.

@@ -36,7 +36,7 @@ _FAR_BELOW = -1e6  # of a parameter that cannot be; JSON has no infinity
 
 
 def series_of(found: Diagnosis) -> DiagnosisSeries | None:
-    """What the pictures of a diagnosis show, as numbers of six digits; None where nothing could be decided."""
+    """Return the data of the pictures of a diagnosis, in six digits; None if nothing could be decided."""
     analysis, extension = found.analysis, found.extension
     if analysis is None or extension is None:
         return None
@@ -107,7 +107,7 @@ def _band(records: Records, simulated: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def _beyond_the_map(static: FloatArray, causes: Sequence[Refined]) -> FloatArray:
-    """What the causes add that no map holds: what a residual of the map shows of them, deg/h, shape (N,)."""
+    """Return the part of the causes that no map holds, as the map's residual shows it, deg/h, shape (N,)."""
     total = np.sum([c.contribution for c in causes], axis=0)
     return np.asarray(total - static @ (static.T @ total))
 

@@ -74,7 +74,7 @@ def shapes_of(records: Records) -> Iterator[Shape]:
 
 
 def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
-    """What temperatures so far may have left, by row of each run; of each any smooth function, at every T another."""
+    """Yield states that temperatures so far may have left, by row of each run; each acts by a smooth function."""
     runs = [run.history for run in records.runs]
     rates = [centred_slope(h) for h in runs]
     low = min(float(h.temperature_c.min()) for h in runs)
@@ -94,12 +94,12 @@ def _states(records: Records) -> Iterator[tuple[str, list[FloatArray]]]:
 
 
 def late(history: History, tau: float) -> FloatArray:
-    """How much a first-order memory of the temperature differs from it, C, shape (n,)."""
+    """Return by how much a first-order memory of the temperature differs from it, C, shape (n,)."""
     return np.asarray(first_order(tau, history.time_s, history.temperature_c) - history.temperature_c)
 
 
 def _gathered(history: History, x: FloatArray, tau: float) -> FloatArray:
-    """What came in since the start, of which a memory loses some."""
+    """Gather what came in since the start, of which a memory loses some."""
     since = history.time_s - history.time_s[0]
     return np.asarray(first_order(tau, history.time_s, x) - x[0] * np.exp(-since / tau))
 

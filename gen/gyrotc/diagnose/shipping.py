@@ -70,7 +70,7 @@ class PieceGain:
 
 @dataclass(frozen=True)
 class Shipping:
-    """What was tried.
+    """Trial of an extension.
 
     Attributes:
         shipped: Effects of the extended model.

@@ -87,7 +87,7 @@ class SignatureBank:
     alternative_groups: tuple[Alternative, ...]
 
     def weighted(self, records: Records, sigma: FloatArray) -> SignatureBank:
-        """The same signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
+        """Return the signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
         grams, log_dets = _grams(records, self.map, self.signatures, sigma)
         return replace(self, grams=grams, log_dets=log_dets)
 
@@ -134,7 +134,7 @@ def _scale(rest: FloatArray, raw: FloatArray, groups: Sequence[Signature]) -> Fl
 
 
 def _common(signatures: FloatArray) -> FloatArray:
-    """From signatures to their principal directions, shape (K, p)."""
+    """Return the principal directions of signatures, shape (K, p)."""
     _, size, right = np.linalg.svd(signatures, full_matrices=False)
     return np.asarray(right[size > MAIN * size[0]].T)
 
@@ -228,5 +228,5 @@ def _dictionary(records: Records) -> FloatArray:
 
 
 def direction_of(records: Records) -> FloatArray:
-    """How much a play of the temperature differs from it, C: its sign is that of the last change, shape (N,)."""
+    """Return by how much a play of the temperature differs from it, C, shape (N,): the sign of the last change."""
     return records.columns(lambda h: play(DIRECTION_C, h.temperature_c) - h.temperature_c)

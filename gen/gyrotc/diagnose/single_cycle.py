@@ -94,7 +94,7 @@ class CycleFits:
         return out
 
     def energies(self, kinds: tuple[str, ...]) -> FloatArray:
-        """What every combination of one or two states explains, (deg/h)², shape (count, ...)."""
+        """Return what every combination of one or two states explains, (deg/h)², shape (count, ...)."""
         a = self.columns[kinds[0]].T @ self.rest
         if len(kinds) == 1:
             return np.asarray(a**2)
@@ -108,7 +108,7 @@ class CycleFits:
         return np.asarray(np.triu(out, 1) if kinds[0] == kinds[1] else out)
 
     def _separate(self, kind: str) -> NDArray[np.bool_]:
-        """Which two states of a kind are different enough to be two, as in `profile_likelihood`."""
+        """Return a mask of the pairs of states of a kind that are different enough to be two."""
         logs = np.log([next(iter(c.values.values())) for c in self.grid[kind]])
         return np.asarray(np.abs(logs[:, None] - logs[None, :]) > SEPARATION)
 
@@ -178,7 +178,7 @@ class CycleFits:
 
 
 def _shared(here: list[float], low: float, high: float, grid: FloatArray) -> tuple[float, float]:
-    """Limits of the first of two parameters that move together, so that both stay on the grid's range."""
+    """Return limits of the first of two parameters that move together, so that both stay on the grid's range."""
     gap = here[1] - here[0]
     return max(low, float(grid[0]) - min(gap, 0.0)), min(high, float(grid[-1]) - max(gap, 0.0))
 
@@ -227,7 +227,7 @@ class Static:
 
 @dataclass(frozen=True)
 class Cycle:
-    """What a cycle tells.
+    """Conclusions from a cycle.
 
     Attributes:
         tried: Every kind of one and of two states at its best, best first.
@@ -268,13 +268,13 @@ class Cycle:
 
     @property
     def lead(self) -> float:
-        """By how much the criterion of the chosen states is better than that of the best without memory."""
+        """Advantage of the criterion of the chosen states over that of the best without memory."""
         assert self.chosen is not None
         return min(0.0, self.static[0].criterion) - self.chosen.criterion
 
     @property
     def not_testable(self) -> str:
-        """Why memory can be neither named nor ruled out here; empty where it can."""
+        """Reason why memory can be neither named nor ruled out here; empty if it can."""
         if self.turns == 0:
             return (
                 "the temperature never turns, so that a memory of it cannot be distinguished from a map of T: "
@@ -309,7 +309,7 @@ class Cycle:
 
 
 def is_single_cycle(records: Records) -> bool:
-    """Whether no temperature is passed more than three times: memory and dT/dt are then one in a map of both."""
+    """Test whether no temperature is passed more than three times: a map of both then cannot tell memory from dT/dt."""
     temperatures = [r.history.temperature_c[r.usable] for r in records.runs]
     levels = np.quantile(np.concatenate(temperatures), [0.2, 0.35, 0.5, 0.65, 0.8])
     passes = [sum(np.count_nonzero(np.diff(t > level)) for t in temperatures) for level in levels]
@@ -317,7 +317,7 @@ def is_single_cycle(records: Records) -> bool:
 
 
 def cycle_of(records: Records) -> Cycle:
-    """Looks for one or two states in a single cycle, and for a static dT/dt in their place."""
+    """Look for one or two states in a single cycle, and for a static dT/dt in their place."""
     fits = CycleFits(records)
     states = memories()
     kinds = [(k,) for k in states] + list(itertools.combinations_with_replacement(states, 2))

@@ -109,7 +109,7 @@ def make_basis(records: Records, level: int, lead_s: float = 0.0) -> tuple[MapBa
 
 
 def fits_exactly(records: Records, level: int = 0) -> bool:
-    """Whether the map of a level has a function for every block: nothing is left that could tell of noise or a cause.
+    """Test whether the map of a level has a function for every block, so that nothing tells of noise or a cause.
 
     Args:
         level: Of `LEVELS`; 0 is the coarsest.

@@ -135,7 +135,7 @@ def result_of(
 
 
 def _of_lot(extension: Extension, options: FitOptions, *, single_cycle: bool) -> str | None:
-    """What became of the lot, in words."""
+    """Return the use of the lot, in words."""
     if options.prior is None:
         return None
     if single_cycle or extension.lot is None:
@@ -296,7 +296,7 @@ def _limit(limit: CauseLimit) -> DetectionLimit:
 
 
 def _unexplained(analysis: Analysis) -> Unexplained:
-    """What is left: how much of the structure the best cause holds, and where the rest lies."""
+    """Return the unexplained structure: the share of the best cause, and the place of the rest."""
     attribution = analysis.attribution
     return Unexplained(
         share_explained=attribution.left.share,

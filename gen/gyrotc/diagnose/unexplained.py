@@ -95,7 +95,7 @@ class _NestedModels:
         return orthonormal(*self.always, *static, *(self.white[k] for k in kept))
 
     def criterion(self, kept: Sequence[int]) -> float:
-        """Of a set of causes; one with a common variance of many weights is weighed as such."""
+        """Return the criterion of a set of causes; one with a common variance of many weights is weighed as such."""
         random = [k for k in kept if self.causes[k].candidate.role == "variance"][-1:]
         held = self.held([k for k in kept if k not in random])
         total = _energy(held, self.y) - self.price * sum(price_of(self.causes[k].candidate) for k in kept)
@@ -130,7 +130,7 @@ class _NestedModels:
         return best
 
     def bent(self, k: int) -> Contest:
-        """Whether a map of moved inputs needs more of the rate than a factor, more than that of plain inputs does.
+        """Test whether a map of moved inputs needs more of the rate than a factor, more than that of plain inputs does.
 
         A late map imitates memories that act other than in proportion by bending over dT/dt. The map of a true
         lag is less bent there than the one that stands in for it.
@@ -175,7 +175,7 @@ def _gain(other: Alternative, columns: FloatArray, a: FloatArray, before: FloatA
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """What causes leave.
+    """Structure that causes leave.
 
     Attributes:
         p_value: p-value of what is left, under the noise that the data allow and that which is declared, unless the
@@ -190,7 +190,7 @@ class Misfit:
 
 
 def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int = 0) -> Misfit:
-    """Whether anything is left.
+    """Test whether anything is left.
 
     Args:
         current: The search with the causes taken.
@@ -216,7 +216,7 @@ def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int =
 def _reported(
     current: Search, views: Sequence[View], weight: FloatArray, held: Held, changed: FloatArray, chance: int
 ) -> tuple[float, float]:
-    """The same where the noise has one of some colours, each as likely as its weight says."""
+    """Return the result if the noise has one of some colours, each as likely as its weight says."""
     tests = np.array(
         [[*_dictionary(project(current, v, held)), _changes(current, v, held, changed)] for v in views]
     )  # p-value and energy left of each, shape (views, tests, 2)

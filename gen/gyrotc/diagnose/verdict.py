@@ -217,7 +217,7 @@ def sentence_of(
 
 
 def shows_as(cause: str, wide: WideMemory | None) -> str:
-    """How a cause shows; of hysteresis (`wide`: of a form that is more than one play) also how it differs from that."""
+    """Return how a cause shows; for hysteresis of a form beyond one play (`wide`) also the difference."""
     words = CATALOGUE[cause].words
     if wide is None or not searched(cause).loops:
         return words.signature

@@ -1,4 +1,4 @@
-"""Is it memory that does not depend on the rate, whatever its form? A hypothesis as wide as the physics.
+"""Evidence of memory that does not depend on the rate, of whatever form: a hypothesis as wide as the physics.
 
 What is called hysteresis is seldom one play of constant strength: domains, joints and contacts have widths and places
 of their own. Any memory of relays of all half-widths h and places c (Preisach) is a sum of functions of plays,
@@ -52,7 +52,7 @@ no lag of the whole map is, has 1.4 to 1.7; of relays, lags and effects that are
 
 @dataclass(frozen=True)
 class WideMemory:
-    """What a family of memories explains beside a model.
+    """Evidence of a family of memories beside a model.
 
     Attributes:
         evidence: Twice the log of the marginal likelihood over that of the model alone.
@@ -72,12 +72,12 @@ class WideMemory:
 
     @property
     def varies(self) -> bool:
-        """Whether its strength goes with temperature."""
+        """True if its strength goes with temperature."""
         return self.evidence > self.constant + EQUIVALENT
 
     @property
     def text(self) -> str:
-        """How it differs from one play of one strength, in words."""
+        """Difference from one play of one strength, in words."""
         if self.varies:
             return "the strength of its loops goes with temperature, of which a table's play holds a straight line"
         return "its loops are more than a single play, such as a table has, holds"
@@ -97,7 +97,7 @@ def rate_independent(gains: Gains, beside: Sequence[FloatArray]) -> WideMemory |
 
 
 def outlasts(gains: Gains, behind: float, rival: float) -> bool:
-    """Whether memory that does not depend on the rate is likelier than one that fades and was preferred.
+    """Test whether memory that does not depend on the rate is likelier than one that fades and was preferred.
 
     Where one play does as well, the greater evidence decides; where it does not, that has to be clear.
 
@@ -157,7 +157,7 @@ class _Family:
         return replace(found[self._at], constant=constant)
 
     def finer(self, found: WideMemory) -> WideMemory:
-        """What was found with functions of the states as fine as the nodes, where the data ask for them."""
+        """Return the evidence with functions of the states as fine as the nodes, if the data ask for them."""
         held = orthonormal(self.held, self.gains.whiten(found.columns))
         fine = _about(self.states, self._at)
         more = self._weighed(held, fine, self.gains.whiten(fine))
@@ -178,7 +178,7 @@ class _Family:
 
 
 def _about(parts: Sequence[FloatArray], k: int) -> FloatArray:
-    """Those about the k-th, side by side, each with its weight."""
+    """Return the columns about the k-th, side by side, each with its weight."""
     first = k - len(_NEAR) // 2
     return np.column_stack([q * parts[first + j] for j, q in enumerate(_NEAR) if 0 <= first + j < len(parts)])
 
