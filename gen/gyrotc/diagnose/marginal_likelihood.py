@@ -68,7 +68,7 @@ class MarginalLikelihood:
         return self._weighed(near)[own][1]
 
     def judged(self, points: Sequence[Point], chosen: CauseSet, k: int, ranked: Sequence[Rival]) -> tuple[Rival, ...]:
-        """Return rivals of the k-th cause, nearest first, with distances and odds by the evidence if it has chosen them.
+        """Return rivals of the k-th cause, nearest first, with odds by the evidence if that chose the same causes.
 
         Rivals that are too far behind to be asked keep their distance to the best of all.
         """
