@@ -142,10 +142,10 @@ def cells_of(data: TrainingData, found: object, cells: tuple[int, int]) -> tuple
 def test_coverage_marks_the_cells_that_hold_samples() -> None:
     data = samples(0)
     found = fit(data)
-    mapped = coverage(data, found, (16, 6))
-    assert mapped["cells"] == [16, 6]
-    t, r = cells_of(data, found, (16, 6))
-    seen = np.zeros((6, 16), dtype=bool)
+    mapped = coverage(data, found)
+    assert mapped["cells"] == [32, 12]
+    t, r = cells_of(data, found, (32, 12))
+    seen = np.zeros((12, 32), dtype=bool)
     seen[r, t] = True
     assert [[c == "1" for c in row] for row in mapped["rows"]] == seen.tolist()
     assert not seen.all()
@@ -157,8 +157,8 @@ def test_coverage_has_cells_however_narrow_the_envelope_is() -> None:
     narrow = replace(data, temperature_c=20.0 + 0.005 * data.temperature_c, slope_c_per_min=0.05 * data.slope_c_per_min)
     found = fit(narrow, method="linear")
     spans = (found.scaling.slope_c_per_min, found.scaling.temperature_c)
-    seen, *_ = np.histogram2d(narrow.slope_c_per_min, narrow.temperature_c, bins=(6, 16), range=spans)
-    rows = coverage(narrow, found, (16, 6))["rows"]
+    seen, *_ = np.histogram2d(narrow.slope_c_per_min, narrow.temperature_c, bins=(12, 32), range=spans)
+    rows = coverage(narrow, found)["rows"]
     assert [[cell == "1" for cell in row] for row in rows] == (seen > 0).tolist()
     assert all(high - low < 1.0 for low, high in spans)
 
