@@ -20,14 +20,14 @@ def certificate(
     facts: Annotated[
         Path | None,
         typer.Option(
-            "--facts", help="What the laboratory states (TOML, docs/delivery.md); default: [meta] of the data set."
+            "--facts", help="Facts of the laboratory (TOML, docs/delivery.md); default: [meta] of the data set."
         ),
     ] = None,
     number: Annotated[
         str | None, typer.Option("--number", help="Number of the certificate; default: that of the facts.")
     ] = None,
     draft: Annotated[
-        bool, typer.Option("--draft", help="Without what is missing: marked as a draft, and no DCC.")
+        bool, typer.Option("--draft", help="Write a draft without the missing facts and without a DCC.")
     ] = False,
     accept_fail: AcceptOption = None,
 ) -> None:

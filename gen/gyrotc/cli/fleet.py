@@ -33,7 +33,7 @@ def fleet(
     ] = None,
     wait: Annotated[
         int,
-        typer.Option("--wait", metavar="S", min=1, help="How long a fleet waits for a worker of --scheduler, s."),
+        typer.Option("--wait", metavar="S", min=1, help="Longest wait for a worker of --scheduler, s."),
     ] = 60,
     json_file: JsonOption = None,
 ) -> None:

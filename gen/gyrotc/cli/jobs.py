@@ -91,7 +91,7 @@ def build(
     ageing: AgeingOption = None,
     previous: Annotated[
         Path | None,
-        typer.Option("--previous", help="An earlier result of this gyro: say what changed; default: that of --prior."),
+        typer.Option("--previous", help="An earlier result of this gyro to compare with; default: that of --prior."),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:

@@ -67,7 +67,7 @@ AxisOption = Annotated[
     str | None,
     typer.Option(
         "--axis",
-        help="x, y, z or all of a three-axis recording; default: all in build, check and diagnose, else none.",
+        help="Axis of a three-axis recording: x, y, z or all; build, check and diagnose take all by default.",
         autocompletion=completing((*(axis.value for axis in GyroAxis), "all")),
     ),
 ]
@@ -107,21 +107,17 @@ TargetOption = Annotated[
 ]
 LotOption = Annotated[
     Path | None,
-    typer.Option(
-        "--lot", help="What units of this type share (gyrotc lot): a unit then needs fewer runs; default: none."
-    ),
+    typer.Option("--lot", help="A lot (gyrotc lot) as prior of the gyro, which then needs fewer runs; default: none."),
 ]
 PriorOption = Annotated[
     Path | None,
-    typer.Option(
-        "--prior", help="An earlier result of this gyro: a check run confirms it, or says where not; default: none."
-    ),
+    typer.Option("--prior", help="An earlier result of this gyro as prior, tested by the new runs; default: none."),
 ]
 AgeingOption = Annotated[
     float | None,
     typer.Option(
         "--ageing",
-        help="How far the bias may have moved since --prior, 1 sigma, deg/h; default: by drift and dates, else 0.",
+        help="Standard deviation of the drift since --prior, deg/h; default: by drift and dates, else 0.",
     ),
 ]
 AcceptOption = Annotated[

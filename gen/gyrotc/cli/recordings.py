@@ -66,7 +66,7 @@ def import_(
         typer.Option(
             "--column",
             metavar="ROLE=NAME",
-            help="What a column is, e.g. rate=G1, time=t, device=SN; may be repeated.",
+            help="Meaning of a column, e.g. rate=G1, time=t, device=SN; may be repeated.",
         ),
     ] = None,
     stated: Annotated[
@@ -83,7 +83,7 @@ def import_(
     tolerance_s: Annotated[
         float | None,
         typer.Option(
-            "--tolerance-s", min=1e-6, help="For how long a reading of a joined file holds, s; needed with --join."
+            "--tolerance-s", min=1e-6, help="Longest time that a reading of a joined file holds, s; needed with --join."
         ),
     ] = None,
     exam: Annotated[
@@ -272,7 +272,7 @@ def check(
     previous: Annotated[
         Path | None,
         typer.Option(
-            "--previous", help="An earlier result of this gyro: are sign and axes as they were? default: not asked."
+            "--previous", help="An earlier result of this gyro, to compare sign and axes with; default: none."
         ),
     ] = None,
     json_file: JsonOption = None,

@@ -212,7 +212,7 @@ def verify(
     target: TargetOption = None,
     log: Annotated[
         Path | None,
-        typer.Option("--log", help="What board_test.c printed on hardware: checked and entered; default: none."),
+        typer.Option("--log", help="Output of board_test.c on hardware: checked and entered; default: none."),
     ] = None,
     exhaustive: Annotated[
         bool,
