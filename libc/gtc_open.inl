@@ -64,13 +64,13 @@ static int sigma_fits(const TABLE *table)
 {
     const uint_least32_t cells = table->sigma_cells[0] * table->sigma_cells[1];
     const uint_least32_t whole = (sigma_grids(table) * cells) + GTC_SIGMA_RULES + table->n_terms;
-    int fit = ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole))) ? 1 : 0;
+    int fit = 1;
     uint_least32_t i;
 
     for (i = 0U; i < table->n_sigma; i++) {
         fit &= numbers_fit(&table->sigma[i], sigma_limits, 1U);
     }
-    return fit;
+    return ((fit != 0) && ((table->n_sigma == 0U) || ((cells != 0U) && (table->n_sigma == whole)))) ? 1 : 0;
 }
 #endif
 

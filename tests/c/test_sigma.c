@@ -94,6 +94,28 @@ TEST(sigma_grows_with_the_age_of_a_held_correction)
     }
 }
 
+#if GTC_WITH_TERMS
+/* Whatever a state says: a table that does not know its covered cells has one grid, and words behind it are no sigma. */
+TEST(a_table_without_coverage_has_one_sigma_for_a_cell)
+{
+    state_t state;
+    num_t channels[3] = {0, 0, 0};
+    num_t trained;
+    int i;
+
+    CHECK_INT(GTC_OK, init(&state, &CURVED, PERIOD));
+    for (i = 0; i < 100; i++) {
+        channels[0] = (num_t)(C(15) + (((i % 2) == 0) ? (C(1) / 64) : -(C(1) / 64)));
+        channels[1] = (num_t)(C(12) + ((C(1) / 128) * (num_t)((i * 5) % 9)));
+        CHECK(feed_one(&state, channels) >= 0);
+    }
+    CHECK_INT(0, status_of(&state));
+    trained = snapshot_of(&state).sigma;
+    state.status |= GTC_UNCOVERED;
+    CHECK(same(trained, snapshot_of(&state).sigma));
+}
+#endif
+
 TEST(sigma_grows_beyond_the_envelope)
 {
     state_t state = started();
@@ -655,6 +677,9 @@ int main(void)
     RUN(bad_arguments_are_refused_and_nothing_is_written);
     RUN(sigma_falls_while_the_front_end_learns);
     RUN(sigma_grows_with_the_age_of_a_held_correction);
+#if GTC_WITH_TERMS
+    RUN(a_table_without_coverage_has_one_sigma_for_a_cell);
+#endif
     RUN(sigma_grows_beyond_the_envelope);
     RUN(a_rest_moves_the_constant_and_one_call_takes_it_back);
     RUN(the_bound_holds_for_any_rate_and_any_number_of_calls);
