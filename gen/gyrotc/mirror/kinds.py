@@ -76,8 +76,8 @@ class TermWord:
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
-    """How far the inputs of a term go from what its parameters refer to.
+class InputDistances:
+    """Largest distances of the inputs of a term from the references of its parameters.
 
     Attributes:
         reading: Largest distance of a reading from the reference.
@@ -133,7 +133,7 @@ class KindOfTerm:
     recursion: type[Recursion]
     effect: Callable[[Values, Range, Range], Range]
     word_size: Callable[[Values, Range], float]
-    rounding_error: Mapping[str, Callable[[Values, Reach, float], float]] | None = None
+    rounding_error: Mapping[str, Callable[[Values, InputDistances, float], float]] | None = None
     past_sigma: Callable[[PastOperations, Any, Any, Past], NumberArray] | None = None
     reads_channel: bool = False
 
@@ -235,7 +235,7 @@ _SCALED = 0.736  # largest |da²/da a 2^(-a²)|: 2/e
 _CUT = 2.0**-32  # what a Gaussian is at 32 octaves, where it ends
 
 
-def _curve_error_q31(values: Values, reach: Reach, unit: float) -> float:
+def _curve_error_q31(values: Values, reach: InputDistances, unit: float) -> float:
     slope, gain, _, first, _, second = values
     argument = gain * 2.0**-17 + 2.0**-28  # a center is rounded, the product cut off
     gaussian = GAUSS_ERROR + _CUT + _STEEP * argument + _SCALED * 2.0**-25 / gain
@@ -243,7 +243,7 @@ def _curve_error_q31(values: Values, reach: Reach, unit: float) -> float:
     return line + (abs(first) + abs(second)) * gaussian + 2.0 * unit
 
 
-def _curve_error_f32(values: Values, reach: Reach, _unit: float) -> float:
+def _curve_error_f32(values: Values, reach: InputDistances, _unit: float) -> float:
     slope, gain, reference, first, center, second = values
     line = abs(slope) * (3.0 * reach.reading + abs(reference)) * _EPS
     gaussians = math.fsum(
@@ -254,19 +254,19 @@ def _curve_error_f32(values: Values, reach: Reach, _unit: float) -> float:
     return 1.01 * (line + gaussians + total * _EPS)
 
 
-def _product_error_q31(values: Values, reach: Reach, unit: float) -> float:
+def _product_error_q31(values: Values, reach: InputDistances, unit: float) -> float:
     growth = values[2]
     here = 0.5 * unit + 0.5 * unit * reach.temperature_c + abs(growth) * 2.0**-17 + unit
     return here * reach.reading + _steepest(values, reach) * 2.0**-17 + unit
 
 
-def _product_error_f32(values: Values, reach: Reach, _unit: float) -> float:
+def _product_error_f32(values: Values, reach: InputDistances, _unit: float) -> float:
     slope, reference, growth, reference_c = values
     here = abs(slope) + abs(growth) * (4.0 * reach.temperature_c + abs(reference_c)) + _steepest(values, reach)
     return 1.01 * _EPS * (here * reach.reading + _steepest(values, reach) * (2.0 * reach.reading + abs(reference)))
 
 
-def _steepest(values: Values, reach: Reach) -> float:
+def _steepest(values: Values, reach: InputDistances) -> float:
     return abs(values[0]) + abs(values[2]) * reach.temperature_c
 
 

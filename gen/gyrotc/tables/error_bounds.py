@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ..common.arrays import FloatArray
 from ..common.errors import CheckFailed
 from ..mirror.history import evaluate_map
-from ..mirror.kinds import Range, Reach
+from ..mirror.kinds import InputDistances, Range
 from ..mirror.table import Table, f32_words
 from ..model import Envelope, Model, Network, Term
 from ..results.base import Numeric
@@ -166,10 +166,10 @@ def channel_error_dph(model: Model, numeric: Numeric, frac_bits: int) -> float:
     return math.fsum(total)
 
 
-def _reach(model: Model, term: Term) -> Reach:
+def _reach(model: Model, term: Term) -> InputDistances:
     guard, p = guard_of(model, term.channel), term.parameters
     reference_c = p.get("reference_c", 0.0)
-    return Reach(
+    return InputDistances(
         reading=max(abs(x - p["reference"]) for x in (guard.low, guard.high)),
         temperature_c=max(abs(t - reference_c) for t in model.envelope.temperature_c),
     )
