@@ -1,15 +1,14 @@
 from .basis import PRIOR_LOG as PRIOR_LOG
 from .basis import PriorBasis as PriorBasis
 from .departures import Departures as Departures
-from .departures import Hypothesis as Hypothesis
-from .departures import revised as revised
-from .departures import updated as updated
-from .departures import within as within
 from .earlier import EarlierPrior as EarlierPrior
 from .earlier import posterior_of_known as posterior_of_known
 from .earlier import posterior_of_process as posterior_of_process
 from .earlier import posterior_of_result as posterior_of_result
 from .earlier import widened as widened
+from .hypotheses import Hypothesis as Hypothesis
+from .hypotheses import revised as revised
+from .hypotheses import updated as updated
 from .learn import FALSE_ALARM as FALSE_ALARM
 from .learn import Learned as Learned
 from .learn import evidence as evidence
@@ -18,6 +17,7 @@ from .learn import learn_prior as learn_prior
 from .learn import p_value as p_value
 from .learn import scores as scores
 from .learn import sums_of as sums_of
+from .run_residual import within as within
 from .unit_means import UnitMeans as UnitMeans
 from .unit_means import means_of_unit as means_of_unit
 from .use import LotPrior as LotPrior

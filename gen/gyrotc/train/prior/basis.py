@@ -33,7 +33,8 @@ _MAP = Structure(COLUMNS, 0)
 _OF_MAP = _MAP.map_parameters
 PRIOR_LOG: FloatArray = np.append(0.0, _MAP.prior(1.0)[0][:_OF_MAP])
 _PRIOR_SD: FloatArray = np.append(3.0, _MAP.prior(1.0)[1][:_OF_MAP])
-CONSTANT = 0.5 * float(np.log(FREE))  # of the mean of a lot: nothing is known of it
+CONSTANT = 0.5 * float(np.log(FREE))
+"""Log standard deviation of a constant of which nothing is known."""
 _STEPS = 15  # of a search that goes on in the next round
 _BOUND = 5.0  # prior standard deviations: no parameter of use lies beyond
 # Beyond its domain a sine comes back: from this share of it on, the value there stands.

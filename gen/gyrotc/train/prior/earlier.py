@@ -2,7 +2,7 @@
 
 The earlier result holds the posterior of its map: mean and covariance of the coefficients of the model of training
 (`known` of `training.json`). Since then the bias may have moved: the constant by the stated ageing, line and curve over
-temperature by half of it. What else became of it the check run says (`departures`).
+temperature by half of it. What else became of it the check run says (`hypotheses`).
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ from ..data import Scaling
 from ..gaussian import FEW, GaussianMap, sum_of
 from ..process import Asked, Process
 from .basis import CONSTANT, PRIOR_LOG, PriorBasis
-from .departures import Departures, Hypothesis, revised, updated, within
+from .departures import Departures
 from .given import Given, UnitSamples
+from .hypotheses import Hypothesis, revised, updated
 from .learn import LEAST_RATIO
+from .run_residual import within
 from .unit_means import UnitMeans
 from .use import (
     MapPosterior,
