@@ -461,7 +461,7 @@ def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]], constant_dph: fl
 def _of_windows(
     judged: Sequence[Averages], runs: Sequence[EvaluatedRun], average_s: float
 ) -> Iterable[tuple[str, FigureUncertainty]]:
-    """Return the uncertainty of the worst run's figure: that of an RMS of m normal numbers is sqrt(1/2m) of it."""
+    """Yield the uncertainty of each figure of the worst run: that of an RMS of m normal numbers is sqrt(1/2m) of it."""
     names: tuple[tuple[Literal["rms_30min_dph", "angle_1h_arcsec", "first_10min_rms_dph"], float], ...] = (
         ("rms_30min_dph", HALF_HOUR_S),
         ("angle_1h_arcsec", HOUR_S),

@@ -105,7 +105,7 @@ def _same(stated: float | None, found: float | None, where: str, scale: float = 
 
 
 def _check_same(stated: HeldLimits | Budget, again: HeldLimits | Budget, where: str) -> None:
-    """A result says what is computed again from the other results, whatever version of gyrotc wrote it.
+    """Check that a result says what is computed again from the other results, whatever version of gyrotc wrote it.
 
     Raises:
         InputError: It does not.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def diagnosis_lines(result: Diagnosed) -> Iterator[str]:
-    """Return what the simulation gets wrong, the verdict, events with the lines that leave them out, and what is next.
+    """Yield what the simulation gets wrong, the verdict, events with the lines that leave them out, and what is next.
 
     The page and the JSON have the rest: where nothing was found also the largest discrepancy, which is chance.
     """

@@ -48,7 +48,7 @@ def written_place(path: Path | None) -> Path | None:
 
 
 def _json_place(path: Path | None) -> Path | None:
-    """Check the place of JSON output; with `-` the JSON alone has standard output, and text goes to the other."""
+    """Check the place of JSON; with `-`, text goes to standard error, so that standard output holds the JSON alone."""
     if path != STANDARD_OUTPUT:
         return written_place(path)
     OUT.stderr = True

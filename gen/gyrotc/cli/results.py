@@ -55,7 +55,7 @@ def _figures(part: EvaluatedRun | Pooled) -> tuple[str, str, str]:
 
 
 def training_lines(training: Training) -> Iterator[str]:
-    """Return which correction was chosen and why, which channels it uses, and what came from a lot or earlier model."""
+    """Yield which correction was chosen and why, which channels it uses, and what came from a lot or earlier model."""
     if training.candidates:
         yield f"correction {training.method}: {training.reason}"
     for tried in training.channels or ():
@@ -64,7 +64,7 @@ def training_lines(training: Training) -> Iterator[str]:
 
 
 def prior_lines(training: Training) -> Iterator[str]:
-    """Return what a lot or an earlier model says of the unit, and what became of it; a line each."""
+    """Yield what a lot or an earlier model says of the unit, and what became of it; a line each."""
     if training.lot is not None:
         yield f"lot: {training.lot.text}"
     if training.prior is not None:
@@ -196,7 +196,7 @@ def _difference_text(file: VerifiedFile) -> str:
 
 
 def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
-    """Return the verdict, the gain, what remains, what is known from elsewhere, sizes, proof, findings, the next step.
+    """Yield the verdict, the gain, what remains, what is known from elsewhere, sizes, proof, findings, the next step.
 
     Args:
         dataset, folder: The data set and the result as a shell takes them.
@@ -249,7 +249,7 @@ def size_line(sizes: ModelSizes) -> str:
 
 
 def summary_lines(result: Evaluation) -> Iterator[str]:
-    """Return what was gained against a constant, and what remains against the noise floor.
+    """Yield what was gained against a constant, and what remains against the noise floor.
 
     The improvement about zero stands behind it, and the paper's own figure beside that for the paper's scenario.
     """

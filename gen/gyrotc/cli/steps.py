@@ -112,8 +112,8 @@ def fit(
     tell(prediction_line(training))
     tell(f"{out / 'model.json'}: {fitted.model.n_centers} centers, method {fitted.model.method}")
     advised = [finding.next for finding in training.findings if finding.next]
-    quoted = shlex.quote(str(out))
-    tell(f"next: {advised[0] if advised else f'gyrotc emit {quoted}/model.json --out {quoted}'}")
+    place = shlex.quote(str(out))
+    tell(f"next: {advised[0] if advised else f'gyrotc emit {place}/model.json --out {place}'}")
 
 
 def _map_place(path: Path | None) -> Path | None:

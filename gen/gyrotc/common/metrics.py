@@ -168,7 +168,7 @@ def middle_of_five(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, e
 def cell_length_s(length_s: float, period_s: float) -> float:
     """Return the length of the cells of means over `length_s`, of rows or samples that last `period_s`.
 
-    Of rows longer than 2/3 of `length_s` each is a mean, as one row in a mean is nearer to it than two.
+    If rows are longer than 2/3 of `length_s`, each is a mean: one row is then nearer to that length than two.
     """
     return period_s if period_s > length_s / 1.5 else length_s
 

@@ -145,7 +145,7 @@ def build(
     progress: Progress = silent,
     **options: Any,
 ) -> Result:
-    """Fits, emits C, proves it on targets, judges it and writes the report, as `gyrotc build` does.
+    """Fit, emit C, prove it on targets, judge it and write the report, as `gyrotc build` does.
 
     Args:
         dataset: What `load` gave, or the folder of recordings of one rate.
@@ -178,7 +178,7 @@ def build(
 def fit(
     dataset: records.Dataset | _Place, out: _Place | None = None, *, progress: Progress = silent, **options: Any
 ) -> Fitted:
-    """Trains a model, as `gyrotc fit` does.
+    """Train a model, as `gyrotc fit` does.
 
     Args:
         dataset: What `load` gave, or the folder of recordings of one rate.
@@ -196,7 +196,7 @@ def fit(
 def check(
     folder: _Place, *, axis: str | None = None, previous: _Place | None = None, progress: Progress = silent
 ) -> CheckResult:
-    """Returns all errors and warnings about a data set, as `gyrotc check` reports them.
+    """Return all errors and warnings about a data set, as `gyrotc check` reports them.
 
     Args:
         folder: The data set, which may be wrong.

@@ -99,7 +99,7 @@ class Built:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BuildRequest:
-    """What `build` is asked for besides the recordings and the place of the result.
+    """Options of `build` besides the recordings and the place of the result.
 
     Attributes:
         fit: Options of training, and the lot of the unit.
@@ -128,7 +128,7 @@ class BuildRequest:
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """What is done for an axis: a request whose limits have been read, or a gyro of a fleet."""
+    """Order for the result of one axis: a request with its limits read, or that of a gyro of a fleet."""
 
     request: BuildRequest
     limits: Limits | None
@@ -138,14 +138,14 @@ class _Order:
 
 @with_one_thread
 def build(source: Path, out: Path, request: BuildRequest | None = None, *, progress: Progress = silent) -> list[Built]:
-    """Recordings in, verified C and a report out; one result for each axis.
+    """Make verified C and a report of recordings; return one result for each axis.
 
     `out` is replaced as a whole at the end; until then an older one stays as it was.
 
     Args:
         source: Folder of recordings.
         out: Folder of the result.
-        request: What is asked for besides; None: all at its default.
+        request: Options; None: all at their defaults.
         progress: Takes note of every stage.
 
     Raises:

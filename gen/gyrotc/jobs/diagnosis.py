@@ -82,7 +82,7 @@ def diagnose_dataset(
         judged: Judgement of the rows of the runs; None: they are judged here.
 
     Raises:
-        InputError: As `diagnose` and `result_folder`.
+        InputError: As `gyrotc.diagnose.diagnose` and `result_folder`.
     """
     chosen = (options or FitOptions()).with_stated(dataset.fit)
     with result_folder(out, "diagnose", inputs=[dataset.folder]) if out else nullcontext() as stage:

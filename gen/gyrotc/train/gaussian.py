@@ -256,7 +256,7 @@ class GaussianMap:
 
     @property
     def scatter(self) -> FloatArray:
-        """Variances of the parts of a power-on, shape (own,)."""
+        """Variances of the coefficients that a power-on has of its own, shape (own,)."""
         return self.structure.scatter(self.p)
 
     @property
@@ -332,7 +332,7 @@ def _total(power_ons: Sequence[Sums], n: int) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, slots=True)
 class _Integrated:
-    """Normal equations with the parts of each power-on integrated out, stacked over power-ons.
+    """Normal equations with each power-on's own coefficients integrated out, stacked over power-ons.
 
     Attributes:
         inverse: Inverses of the Cholesky factors of I + root HH root / noise, shape (power-ons, own, own).
