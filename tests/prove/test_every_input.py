@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from emitted import GOLDEN, emitted
 from gyrotc.common import Progress
+from gyrotc.common.progress import silent
 from gyrotc.model import Model, load_model
 from gyrotc.tables import emitted_tables
 from gyrotc.verify import visit_all
@@ -33,11 +34,11 @@ MODELS = {"every position reached": (_wide_envelope, 2**32), "golden": (_golden,
 
 @pytest.fixture
 def bar() -> Iterator[Progress]:
-    """Show progress on the terminal, past what captures output; nothing where there is no terminal."""
+    """Yield what shows progress on the terminal, past what captures output; nothing is shown without a terminal."""
     try:
         number = os.open("/dev/tty", os.O_WRONLY)
     except OSError:
-        yield lambda stage, done, total: None
+        yield silent
         return
     with os.fdopen(number, "w", encoding="utf-8") as terminal:
         yield lambda stage, done, total: print(f"\r{stage}, {done / total:.0%}   ", end="", file=terminal, flush=True)

@@ -1,8 +1,9 @@
 """Describe each kind of term of a table: its words, its state, its channel, its recursion and its bounds.
 
-The mirror, the tables and their bounds take from here what they need to know of a kind, and fail on one that is not
-described. In C the same is in gtc_terms.inl, gtc_private.h and gtc_limits.inl, which tests/cases/tables/test_kinds.py
-holds against this. A new kind needs its row here, its recursion in both languages, and its test.
+The mirror, the tables and their bounds read the properties of a kind here, and fail on one that is not described. In C
+the words, the kinds with a channel and those with a state are in gtc_private.h, gtc_limits.inl and gtc_config.h, which
+tests/cases/tables/test_kinds.py compares with this. A new kind needs its row here, its recursion in both languages, and
+its test.
 """
 
 from __future__ import annotations
@@ -47,13 +48,8 @@ class TableKind(IntEnum):
 
     @property
     def description(self) -> KindOfTerm:
-        """What is known of it."""
+        """Description of the kind."""
         return KINDS[self]
-
-    @property
-    def reads_channel(self) -> bool:
-        """True if it reads an auxiliary channel."""
-        return KINDS[self].reads_channel
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +86,11 @@ class InputDistances:
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """What is known of the time since the terms began, one entry for each correction.
+    """Time since the terms began, one entry for each correction.
 
     Attributes:
         since: Blocks since then.
-        low, high: Of the temperatures that they saw.
+        low, high: Lowest and highest temperature since then.
     """
 
     since: NDArray[np.int64]
@@ -114,16 +110,16 @@ class PastOperations(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class KindOfTerm:
-    """What is known of a kind of term.
+    """Description of a kind of term.
 
     Attributes:
         words: Its parameters, in the order of the record.
-        recursion: What it computes.
+        recursion: Recursion that computes it.
         effect: Range of what it adds, deg/h, from parameters, range of T (C), and range of the readings of its channel.
-        word_size: Largest number in deg/h (of C, or of a unit of the channel) that its words or products must hold in
-            fixed point, from parameters and range of T.
-        rounding_error: By arithmetic, largest error of what it adds against float64, deg/h, from parameters, reach and
-            unit of the bias; None: it is not part of the stated error.
+        word_size: Largest number that its words or products must hold in fixed point, deg/h (or deg/h per C or per unit
+            of the channel), from parameters and range of T (C).
+        rounding_error: By arithmetic, largest error of what it adds against float64, deg/h, from parameters, distances
+            of the inputs and unit of the bias; None: it is not part of the stated error.
         past_sigma: Sigma of what it does not know of the time before it began, from operations, its word of sigma, its
             first parameter and the time since then; None: it has no state.
         reads_channel: It reads an auxiliary channel, and is unsure while that is not read.
@@ -139,7 +135,7 @@ class KindOfTerm:
 
     @property
     def has_state(self) -> bool:
-        """True if it has a state that a saved one keeps over a time without power."""
+        """True if it has a state that is saved and goes on after a time without power."""
         return self.past_sigma is not None
 
 
@@ -161,7 +157,7 @@ def _either_way(size: float) -> Range:
 
 
 def _memory_effect(values: Values, temperature_c: Range, _readings: Range) -> Range:
-    return _either_way(abs(values[1]) * (temperature_c[1] - temperature_c[0]))
+    return _either_way(_memory_size(values, temperature_c))
 
 
 def _play_effect(values: Values, temperature_c: Range, _readings: Range) -> Range:
@@ -169,8 +165,8 @@ def _play_effect(values: Values, temperature_c: Range, _readings: Range) -> Rang
     return _either_way(width * _largest_over(amplitude, growth, reference_c, temperature_c))
 
 
-def _amplitude_effect(values: Values, _temperature_c: Range, _readings: Range) -> Range:
-    return _either_way(abs(values[-1]))
+def _amplitude_effect(values: Values, temperature_c: Range, _readings: Range) -> Range:
+    return _either_way(_amplitude_size(values, temperature_c))
 
 
 def _line_effect(slopes: Values, reference: float, readings: Range) -> Range:

@@ -70,11 +70,11 @@ class Squares:
         return np.asarray(np.where(there, y, np.float32(0.0)))
 
     def remaining(self, word: Any, gain: Any, blocks: NDArray[np.int64]) -> NumberArray:
-        left = np.array([self._left(gain, int(n)) for n in np.asarray(blocks).reshape(-1)], dtype=np.float32)
-        return np.asarray(word * (_ONE - left))
+        taken = np.array([self._taken(gain, int(n)) for n in np.asarray(blocks).reshape(-1)], dtype=np.float32)
+        return np.asarray(word * (_ONE - taken))
 
-    def _left(self, gain: Any, blocks: int) -> Any:
-        """Return the share of a difference that a memory has taken after some blocks."""
+    def _taken(self, gain: Any, blocks: int) -> Any:
+        """Return the share of a difference that a memory has followed after some blocks."""
         factor, left = _ONE - gain, _ONE
         while blocks:
             if blocks & 1:
@@ -131,6 +131,7 @@ class _Q31(Squares):
         return np.asarray((int(word) * np.array(left, dtype=np.int64)) >> 31)
 
     def _left(self, gain: int, blocks: int) -> int:
+        """Return the share of a difference that a memory has not followed after some blocks, in 2^-31."""
         factor, left = _LARGEST - gain, _LARGEST
         while blocks:
             if blocks & 1:
@@ -320,7 +321,7 @@ def _beyond(table: Table, evidence: SigmaEvidence, k: int) -> NumberArray:
 
 
 def _of_terms(table: Table, evidence: SigmaEvidence) -> Iterator[NumberArray]:
-    """Yield for each term the sigma of the time before it began, or of a channel that is not read."""
+    """Yield the variances of terms: that of the time before one began, or of a channel that is not read."""
     do = SQUARES[table.numeric]
     words, away = _rules(table)[RULES:], iter(evidence.away)
     past = Past(evidence.since, evidence.low, evidence.high)

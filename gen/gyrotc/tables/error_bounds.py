@@ -100,7 +100,7 @@ def _granted(model: Model, table: Table) -> Range:
 
 
 def _ridges(model: Model, axis: int, cell: float) -> NDArray[np.float64]:
-    """Return places along an axis (0: C, 1: C/min) of Gaussians and regions narrower than a cell of the grid."""
+    """Return places along an axis (0: C, 1: C/min) of Gaussians and regions narrower than two cells of the grid."""
     unit = (model.scale.temperature_c[1], model.scale.slope_c_per_min)[axis]
     places: list[float] = []
     for network in model.networks:
@@ -156,17 +156,17 @@ def _words(bounds: Range, numeric: Numeric, frac_bits: int) -> tuple[int, ...]:
 
 
 def channel_error_dph(model: Model, numeric: Numeric, frac_bits: int) -> float:
-    """Return the sum over the terms whose rounding is part of the stated error, deg/h; 0 without any."""
-    total = []
+    """Return the largest error by rounding of the terms for which it is stated, added up, deg/h; 0 without any."""
+    errors = []
     for term in model.terms:
-        errors = term.table.kind.description.rounding_error
-        if errors is not None:
+        error_of = term.table.kind.description.rounding_error
+        if error_of is not None:
             values = term.table.parameters(term.parameters, model.block_s)
-            total.append(errors[numeric](values, _reach(model, term), 2.0**-frac_bits))
-    return math.fsum(total)
+            errors.append(error_of[numeric](values, _distances(model, term), 2.0**-frac_bits))
+    return math.fsum(errors)
 
 
-def _reach(model: Model, term: Term) -> InputDistances:
+def _distances(model: Model, term: Term) -> InputDistances:
     guard, p = guard_of(model, term.channel), term.parameters
     reference_c = p.get("reference_c", 0.0)
     return InputDistances(

@@ -135,7 +135,7 @@ def _terms(table: Table, limits: WordLimits) -> Iterator[str]:
             yield f"fallback model of a term is network {fallback_model}"
         if not 1 <= kind <= len(limits) // width:
             yield f"kind of a term is {kind}"
-        elif channel >= table.n_channels or (channel != 0) != TableKind(kind).reads_channel:
+        elif channel >= table.n_channels or (channel != 0) != TableKind(kind).description.reads_channel:
             yield f"channel of a term is {channel}"
         else:
             yield from _beyond(table.numbers(record[2:]), limits[(kind - 1) * width : kind * width])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed
 from ..common.inputs import MOST_HELD, PLAUSIBLE_C
 from ..mirror.kinds import TableKind, TermWord
-from ..mirror.table import SERIAL_WORDS, Words, f32_words
+from ..mirror.table import ARRAYS, SERIAL_WORDS, Words, f32_words
 from ..model import Guard, Model, Rules, Term, Uncertainty
 from ..results.base import Numeric
 
@@ -230,8 +230,6 @@ def largest_gradient(
     return bounds
 
 
-_PARAMETERS = 6  # words of a term's record beside its head: docs/FORMAT.md, section 3
-
 TermRecord = tuple[TableKind, int, list[float]]
 
 
@@ -241,7 +239,7 @@ def channel_names(model: Model) -> list[str]:
 
 
 def term_size_dph(model: Model) -> float:
-    """Return the largest number that the words of the terms must hold within the envelope, deg/h."""
+    """Return the sum over the terms of the largest number that the words of each must hold in the envelope, deg/h."""
     records = (_term_record(model, term) for term in model.terms)
     return math.fsum(kind.description.word_size(values, model.envelope.temperature_c) for kind, _, values in records)
 
@@ -249,7 +247,7 @@ def term_size_dph(model: Model) -> float:
 def f32_terms(model: Model) -> Words:
     """Records in float32."""
     records = [_term_record(model, term) for term in model.terms]
-    words = np.zeros((len(records), 2 + _PARAMETERS), dtype=np.uint32)
+    words = np.zeros((len(records), ARRAYS["terms"]), dtype=np.uint32)
     heads = _heads(model)
     for row, head, (kind, _, values) in zip(words, heads, records, strict=True):
         scaled = [word.f32_factor * value for word, value in zip(kind.description.words, values, strict=True)]
@@ -264,7 +262,7 @@ def q31_terms(model: Model, frac_bits: int) -> Words:
     Raises:
         CheckFailed: A parameter does not fit its word.
     """
-    words = np.zeros((len(model.terms), 2 + _PARAMETERS), dtype=np.uint32)
+    words = np.zeros((len(model.terms), ARRAYS["terms"]), dtype=np.uint32)
     for row, head, term in zip(words, _heads(model), model.terms, strict=True):
         kind, _, values = _term_record(model, term)
         row[:2] = kind, head

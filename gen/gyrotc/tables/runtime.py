@@ -100,7 +100,7 @@ def stated_needs(header: str) -> dict[str, int]:
 def _derived(options: Options) -> dict[str, int]:
     """Return the settings that gtc_config.h derives from the options."""
     terms = options["GTC_MAX_TERMS"]
-    channels = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.reads_channel)
+    channels = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.description.reads_channel)
     retained = max(options[f"GTC_WITH_{kind.name}"] for kind in TableKind if kind.description.has_state)
     derived = {
         "GTC_WITH_TERMS": int(terms > 0),

@@ -47,7 +47,7 @@ from .toolchain import Target, all_targets, end_all
 
 __all__ = ["chosen_targets", "verify"]
 
-# Times as `gyrotc verify -v` measures them
+# Shares of the time, as `gyrotc verify -v` measures it.
 _STAGES = {"comparing files": 0.05, "testing": 0.75, "replaying": 0.1, "visiting every input": 0.1}
 
 # Between two looks at threads that are to end: a delay that nobody notices, and next to no work.

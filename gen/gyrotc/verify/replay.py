@@ -213,7 +213,7 @@ def replay_dataset(
     dataset: Dataset,
     progress: Progress,
 ) -> list[VerifiedTarget]:
-    """Replay every run on every target whose board test ran, and add `replayed` to its entries."""
+    """Replay every run on every target whose board test ran; return the entries, theirs with `replayed`."""
     with ExitStack() as stack, ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         lanes = {}
         for number, entry in enumerate(entries):

@@ -36,7 +36,7 @@ class Footprint:
 
 
 def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
-    """Link self-test, init, sample and bias of a table for a Cortex-M4F, or for the host without its compiler.
+    """Link self-test, init, sample and bias of a table for a Cortex-M4F, or for the host if that has no compiler here.
 
     Returns:
         The sizes; None where nothing can be compiled.

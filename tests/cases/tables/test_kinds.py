@@ -23,7 +23,7 @@ N_PARAMETERS = 6
 
 
 def _rows_of_limits() -> list[list[tuple[str, list[float]]]]:
-    """Rows of the ranges of each kind: the comment, and least and most in float32 and in fixed point."""
+    """Return the ranges of each kind, row by row: the comment, and least and most in float32 and in fixed point."""
     text = LIMITS.split("term_limits[GTC_N_KINDS]")[1].split("};\n#endif")[0]
     kinds = re.findall(r"^    \{\n(.*?)^    \},$", text, re.DOTALL | re.MULTILINE)
     rows = [re.findall(r"RANGE\(([^)]*)\),(?: +/\* (.*?) \*/)?$", kind, re.MULTILINE) for kind in kinds]
@@ -54,7 +54,7 @@ def test_the_kinds_with_a_channel_are_those_of_the_sources() -> None:
     options = re.search(r"#if (.*)\n#define GTC_WITH_CHANNELS 1", CONFIG)
     assert options is not None
     assert of_sources == {TableKind[name] for name in re.findall(r"GTC_WITH_([A-Z_]+)", options[1])}
-    assert of_sources == {kind for kind in TableKind if kind.reads_channel}
+    assert of_sources == {kind for kind in TableKind if kind.description.reads_channel}
 
 
 def test_the_kinds_with_a_state_are_those_of_the_sources() -> None:
