@@ -154,23 +154,26 @@ class Rules(_Frozen):
     """Growth of the uncertainty of a correction unlike those trained on, 1 σ; docs/design.md gives the reasons."""
 
     hold_dph_per_c: BiasAmount = Field(
-        description="for each C by which a held temperature may have continued at its slope, deg/h/C"
+        description="growth for each C by which a held temperature may have continued at its slope, deg/h/C"
     )
-    rest_dph_per_min: BiasAmount = Field(description="for each minute for which a correction is held, deg/h/min")
+    rest_dph_per_min: BiasAmount = Field(description="growth for each minute for which a correction is held, deg/h/min")
     slope_dph_per_c_per_min: BiasAmount = Field(
-        description="for a slope that is known and not yet in the correction, deg/h per C/min"
+        description="growth for a slope that is known and not yet in the correction, deg/h per C/min"
     )
-    start_dph: BiasAmount = Field(description="while no slope is known, deg/h")
+    start_dph: BiasAmount = Field(description="growth while no slope is known, deg/h")
     turn_dph: BiasAmount | None = Field(
         default=None,
-        description="for a held temperature that may have turned to any trained slope, deg/h; absent: `start_dph`",
+        description="growth for a held temperature that may have turned to any trained slope, deg/h; absent:"
+        " `start_dph`",
     )
-    beyond_dph_per_c: BiasAmount = Field(description="for each C beyond the envelope, deg/h/C")
-    beyond_dph_per_c_per_min: BiasAmount = Field(description="for each C/min beyond the envelope, deg/h per C/min")
-    fallback_dph: BiasAmount = Field(description="of the constant correction, deg/h")
-    none_dph: BiasAmount = Field(description="of the bias before the first accepted reading, deg/h")
+    beyond_dph_per_c: BiasAmount = Field(description="growth for each C beyond the envelope, deg/h/C")
+    beyond_dph_per_c_per_min: BiasAmount = Field(
+        description="growth for each C/min beyond the envelope, deg/h per C/min"
+    )
+    fallback_dph: BiasAmount = Field(description="1 σ of the constant correction `fallback_dph`, deg/h")
+    none_dph: BiasAmount = Field(description="1 σ of the bias before the first accepted reading, deg/h")
     between_dph: BiasAmount = Field(
-        description="of the constant of the next power-on, by Student's t, deg/h; included in every cell"
+        description="1 σ of the constant of the next power-on, by Student's t, deg/h; included in every cell"
     )
     turn_on_dph: BiasAmount | None = Field(
         default=None, description="standard deviation that `between_dph` follows from, deg/h; absent: not known"
@@ -202,11 +205,11 @@ class Uncertainty(_Frozen):
     """
 
     cells: CellCounts = Field(description="numbers of cells of T and of dT/dt over the envelope")
-    rows: tuple[tuple[BiasAmount, ...], ...] = Field(description="with training data, deg/h")
+    rows: tuple[tuple[BiasAmount, ...], ...] = Field(description="1 σ of a cell with training data, deg/h")
     uncovered: tuple[tuple[BiasAmount, ...], ...] | None = Field(
-        default=None, description="the same without training data"
+        default=None, description="1 σ of a cell without training data, deg/h; null: as `rows`"
     )
-    rules: Rules | None = Field(default=None, description="growth that is added to that of a cell")
+    rules: Rules | None = Field(default=None, description="growth that is added to the 1 σ of a cell; null: not known")
 
     @model_validator(mode="after")
     def _shape(self) -> Uncertainty:
@@ -297,7 +300,9 @@ class Guard(_Frozen):
     low: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         description="smallest reading; an auxiliary channel is limited to it, a temperature below it is rejected"
     )
-    high: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(description="largest reading, in the same way")
+    high: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+        description="largest reading; an auxiliary channel is limited to it, a temperature above it is rejected"
+    )
     max_step: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         description="largest plausible change between two readings"
     )
@@ -324,7 +329,7 @@ class Guard(_Frozen):
 
 
 class DataFile(_Frozen):
-    """One recording, or a span of one, that the model was fitted to (or that was left for the exam)."""
+    """One recording, or a span of one, that the model was fitted to or that is a test run."""
 
     file: str = Field(description="name in the data set")
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] = Field(description="SHA-256 of the file")
@@ -359,10 +364,12 @@ class Model(_Frozen):
     scale: Scale = Field(description="normalisation of T and dT/dt")
     envelope: Envelope = Field(description="calibrated range; inputs outside are limited to it")
     coverage: Coverage | None = Field(description="cells of the envelope with training data; null: not known")
-    networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=16)] = Field(
-        description="the map; several networks are a bank"
+    networks: Annotated[tuple[Network, ...], Field(min_length=1, max_length=_MAX_NETWORKS)] = Field(
+        description="networks of the map; several are a bank"
     )
-    terms: Annotated[tuple[Term, ...], Field(max_length=4)] = Field(default=(), description="what is added to the map")
+    terms: Annotated[tuple[Term, ...], Field(max_length=4)] = Field(
+        default=(), description="terms that are added to the map"
+    )
     fallback_dph: Dph = Field(
         description="constant correction after the temperature was lost for `hold_blocks`, deg/h: the mean bias of the"
         " training samples"
@@ -409,7 +416,9 @@ class Model(_Frozen):
     uncertainty_dph: Uncertainty | None = Field(
         default=None, description="standard uncertainty of the compensated bias; null: not known"
     )
-    data: tuple[DataFile, ...] = Field(description="recordings")
+    data: tuple[DataFile, ...] = Field(
+        description="recordings that the model was fitted to, and those of its test runs"
+    )
     seed: int = Field(description="seed of the fit")
     meta: dict[str, Any] = Field(
         default={},
