@@ -22,6 +22,7 @@ from gyrotc.model import Model, RuntimePart, load_model
 from gyrotc.tables import NUMERICS, SWITCHES, emit_texts, needs_of, quantise_all, runtime_texts
 from gyrotc.verify import all_targets, compile_objects, link, run_program
 
+from ..campaigns import say
 from ..records import ROOT
 
 MODEL = ROOT / "examples" / "nav_loop" / "filter_model.json"  # of a simulated gyro, with uncertainties
@@ -287,7 +288,7 @@ def _is_measurable(program: Program) -> bool:
 
 
 def _of_emlearn(program: Program) -> tuple[list[str], list[str]]:
-    """Flags for the compiler and for the linker that the network needs."""
+    """Return the flags for the compiler and for the linker that the network needs."""
     if program.name != EMLEARN:
         return [], []
     import emlearn
@@ -296,7 +297,7 @@ def _of_emlearn(program: Program) -> tuple[list[str], list[str]]:
 
 
 def _mlp(model: Model) -> str:
-    """The C text of a network of 16 neurons that was trained on the map of the model."""
+    """Train a network of 16 neurons on the map of the model, and return its C text."""
     from emlearn.net import c_generate_net_loadable
     from sklearn.neural_network import MLPRegressor
 
@@ -319,6 +320,7 @@ def sizes() -> dict[str, Any]:
     rows = []
     for program in PROGRAMS:
         if not _is_measurable(program):
+            say(f"{program.name}: not measured, emlearn or newlib is not installed")
             continue
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
