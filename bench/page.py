@@ -16,7 +16,8 @@ This page answers how accurate gyrotc is, what its code costs on the target, how
 was verified. A figure that misses its aim is marked **(missed)**.
 
 Each record is of the sources of its commit and date, not of later ones; `git diff --stat COMMIT -- gen libc include`
-shows what has changed since. The command measures it again, and the record has all that was measured.
+shows what has changed since. A `+` marks changes to that commit that were not committed. The command measures it again,
+and the record has all that was measured.
 
 RMS is that of compensated means over 100 s, and the noise floor is the RMS of the noise alone. No recording of a laser
 gyro is public: the measured gyros are small MEMS gyros ([real.md](real.md)), and all others are simulated.
