@@ -40,7 +40,7 @@ GRADIENT = '[[cause]]\nid = "thermal_gradient"\ntau_s = 900.0\namplitude_dph_per
 
 
 def up_and_down(base: str, runs: int) -> str:
-    """A campaign of a known scenario's gyro in runs of 2.5 h, one more of them a week later as the exam."""
+    """A campaign of a known scenario's gyro in runs of 2.5 h, one more of them a week later as the test run."""
     return f"""
 extends = "{base}"
 [profile."up and down"]

@@ -68,7 +68,7 @@ def test_trace_has_the_promised_columns_and_a_row_for_every_input_row(demo: Path
 
 
 def test_figures_follow_from_the_trace(demo: Path) -> None:
-    """The exam RMS of a run, computed here from its trace alone."""
+    """The RMS that a correction leaves on a run, computed here from its trace alone."""
     evaluation = _json(demo / "result" / "evaluate.json")
     trace = np.genfromtxt(demo / "result" / "trace" / "run-09.csv", delimiter=",", names=True)
     believed = np.where(trace["status"] == 8, np.nan, trace["compensated_dph"])  # nothing is corrected before
@@ -389,7 +389,6 @@ def test_fit_diagnose_and_check_give_what_the_commands_give(tmp_path: Path) -> N
 
 _THREADS = """
 import sys
-from pathlib import Path
 import gyrotc, scipy.linalg
 from threadpoolctl import threadpool_info, threadpool_limits
 

@@ -68,7 +68,7 @@ def test_the_default_is_nearest_to_the_noise_and_its_row_is_the_model_that_fit_m
     assert row["exam_rms_dph"] < 1.02 * floor
 
 
-def test_without_an_exam_every_run_is_judged_by_a_fit_that_has_not_seen_it(folder: Path, tmp_path: Path) -> None:
+def test_without_test_runs_every_run_is_judged_by_a_fit_that_has_not_seen_it(folder: Path, tmp_path: Path) -> None:
     for path in folder.glob("run-0[1-6].csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     dataset = load(tmp_path)
