@@ -4,7 +4,6 @@ from .event_findings import found_events as found_events
 from .findings import finding as finding
 from .findings import run_facts as run_facts
 from .fits import WalkNoise as WalkNoise
-from .fits import evidence_beside_memories as evidence_beside_memories
 from .inspection import CheckResult as CheckResult
 from .inspection import check as check
 from .inspection import findings_of_run as findings_of_run
@@ -13,6 +12,7 @@ from .judgement import Judgement as Judgement
 from .judgement import judge as judge
 from .judgement import judge_runs as judge_runs
 from .jumps import jumps as jumps
+from .memories import evidence_beside_memories as evidence_beside_memories
 from .odds import Event as Event
 from .repeats import stuck as stuck
 from .thermometers import late_findings as late_findings

@@ -23,7 +23,7 @@ from ..model import Model
 from ..recordings.records import Curve, Dataset, Mark, Run
 from ..results.base import Finding
 from .findings import RunFacts, ValueWithLimits, finding
-from .fits import evidence_beside_memories
+from .memories import evidence_beside_memories
 
 _NEXT = (
     "Look at mounting and wiring; where only the columns are exchanged or mirrored, write them right or name them "

@@ -15,14 +15,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.linalg.lapack import dtbtrs
 
 from ..common.arrays import FloatArray, IntArray
 from ..common.metrics import median_step
 from ..common.statistics import cell_means, running_mean
-from ..mirror.recursions import first_order, play
 
 RowArrays = tuple[FloatArray, FloatArray, FloatArray]
 """Time in s, temperature in C, rate in deg/h of a run, shape (n,) each."""
@@ -32,6 +30,7 @@ _LEAST_SPAN_C = 1.0  # the temperature moves less: a level and a trend say all o
 _SLOPE_S = 300.0  # over which dT/dt is taken: a resolution of 0.1 C makes 0.01 C/min of it
 _WARM_UP_S = (300.0, 1000.0, 3000.0)  # time constants of a level that settles after power-on
 _GAP_CELLS = 3.0  # without rows: the next cell comes behind a gap
+LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
 _LEVELS = 10.0 ** np.arange(-7.0, 0.5)  # variance of the level's walk over the white one, in a coarse cell
 _SLOPES = 10.0 ** np.arange(-13.0, -2.0, 1.5)  # of the slope's walk; at the lowest it moves nothing in a day
 _START = (4, 2)  # where the search over both begins
@@ -39,6 +38,8 @@ _LEAST_SLOPE = 1e-14  # below it the equation of the filter has no solution in f
 # Share of a column's energy that must be its own: far above the rounding of sums of products (1e-15), also divided by
 # the root of this share.
 _RIDGE = 1e-9
+# Share of a change's energy that must be its own: below it, what is fitted beside it explains the change.
+LEAST_ENERGY = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,21 +149,22 @@ class Regression:
 
     Attributes:
         cells: Of the runs.
+        own: Number of columns that each run has of its own.
     """
 
     def __init__(self, cells: Sequence[RunCells], maps: Sequence[FloatArray]) -> None:
         """Join runs with the columns of the map at their cells (`maps_of`)."""
         self.cells = tuple(cells)
         own = [_own_columns(one) for one in cells]
-        self._own = max(len(of_run) for of_run in own)
+        self.own = max(len(of_run) for of_run in own)
         self._rows = [
-            np.concatenate([of_run, np.zeros((self._own - len(of_run), len(one))), of_map, one.rate_dph[None, :]])
+            np.concatenate([of_run, np.zeros((self.own - len(of_run), len(one))), of_map, one.rate_dph[None, :]])
             for one, of_run, of_map in zip(cells, own, maps, strict=True)
         ]
         for rows, one in zip(self._rows, cells, strict=True):
             rows[-1] -= one.rate_dph.mean()
         # What plain least squares say is taken off first, so that sums of squares keep their digits
-        plain = _Solution(np.stack([rows @ rows.T for rows in self._rows]), self._own)
+        plain = _Solution(np.stack([rows @ rows.T for rows in self._rows]), self.own)
         for k, rows in enumerate(self._rows):
             rows[-1] -= plain.amplitudes(k) @ rows[:-1]
         self._taken = plain.of_map()
@@ -170,11 +172,11 @@ class Regression:
     def white(self, noise: WalkNoise) -> WhiteRuns:
         """Return the runs through the filter of a noise."""
         rows = [noise.white(rows, one.cell_s) for rows, one in zip(self._rows, self.cells, strict=True)]
-        return WhiteRuns(self, noise, rows, self._own)
+        return WhiteRuns(self, noise, rows)
 
     def curve(self, run: int, amplitudes: FloatArray) -> FloatArray:
         """Return the map along a run, deg/h; `amplitudes`: of its columns, in what plain least squares have left."""
-        return np.asarray((self._taken + amplitudes) @ self._rows[run][self._own : -1])
+        return np.asarray((self._taken + amplitudes) @ self._rows[run][self.own : -1])
 
 
 def _own_columns(cells: RunCells) -> FloatArray:
@@ -189,8 +191,8 @@ def _own_columns(cells: RunCells) -> FloatArray:
 class WhiteRuns:
     """A regression through the filter of one noise; its sums of products are those of every fit with this noise."""
 
-    def __init__(self, regression: Regression, noise: WalkNoise, rows: Sequence[FloatArray], own: int) -> None:
-        self.regression, self.noise, self._rows, self._own = regression, noise, rows, own
+    def __init__(self, regression: Regression, noise: WalkNoise, rows: Sequence[FloatArray]) -> None:
+        self.regression, self.noise, self._rows = regression, noise, rows
         self._products = np.stack([of_run @ of_run.T for of_run in rows])
 
     def fit(self, changes: Sequence[FloatArray | None]) -> SmoothFit:
@@ -199,14 +201,14 @@ class WhiteRuns:
         Args:
             changes: Columns of what changes in each run, not yet white, shape (k, n) each; None: nothing.
         """
-        cells = self.regression.cells
+        cells, own = self.regression.cells, self.regression.own
         more = [
             None if columns is None else self.noise.white(columns, one.cell_s)
             for columns, one in zip(changes, cells, strict=True)
         ]
         extra = max(0 if columns is None else len(columns) for columns in more)
         if extra == 0:
-            return SmoothFit(self, self._rows, _Solution(self._products, self._own))
+            return SmoothFit(self, self._rows, _Solution(self._products, own))
         rows, products = list[FloatArray](), np.zeros((len(cells), *(extra + np.array(self._products.shape[1:]))))
         products[:, extra:, extra:] = self._products
         for k, (columns, of_run) in enumerate(zip(more, self._rows, strict=True)):
@@ -217,7 +219,7 @@ class WhiteRuns:
                 products[k, :extra, extra:] = found @ of_run.T
                 products[k, extra:, :extra] = products[k, :extra, extra:].T
             rows.append(np.concatenate([found, of_run]))
-        return SmoothFit(self, rows, _Solution(products, extra + self._own))
+        return SmoothFit(self, rows, _Solution(products, extra + own))
 
 
 class _Solution:
@@ -255,6 +257,7 @@ class _Solution:
 
 
 def _inverse_root(energy: FloatArray) -> FloatArray:
+    """Return 1 / sqrt(energy), 0 where there is none."""
     return np.asarray(np.where(energy > 0.0, 1.0 / np.sqrt(np.where(energy > 0.0, energy, 1.0)), 0.0))
 
 
@@ -263,7 +266,7 @@ class SmoothFit:
 
     Attributes:
         sigma: Standard deviation of the white part of a cell, deg/h.
-        log_likelihood: Its logarithm, but for what all noises and changes have in common.
+        log_likelihood: Logarithm of the likelihood, but for what all noises and changes have in common.
     """
 
     def __init__(self, runs: WhiteRuns, rows: Sequence[FloatArray], solution: _Solution) -> None:
@@ -343,7 +346,7 @@ class RunFit:
         return self.white(np.concatenate([self.fitted, self.rest[None, :]])[:, ::-1])
 
     def gain_products(self, curve: FloatArray, cells: IntArray) -> GainProducts:
-        """Return the products of steps at some cells, not the first, and of a curve from there on, white.
+        """Return the products of white steps at some cells, not the first, and of the white curve that begins there.
 
         The filter makes of a curve that begins at a cell the white curve, without what the curve before the cell leaves
         in the two states of the filter: a step, and an impulse through its denominator.
@@ -351,10 +354,10 @@ class RunFit:
         n = len(self.cells)
         _, a, _ = self.noise.filter_of(self.cells.cell_s)
         step, white = self.white(np.ones(n)), self.white(curve)
-        given = curve * step[0]  # as large as the filter makes them
+        scaled = curve * step[0]  # a value as large as the filter makes it in its own cell
         impulse = _filtered(np.array([0.0, 1.0]), a, np.r_[1.0, np.zeros(n - 1)])
-        of_step = (white[cells] - given[cells]) / step[0]
-        of_impulse = white[cells] - given[cells] + given[cells - 1] - a[2] * white[cells - 1]
+        of_step = (white[cells] - scaled[cells]) / step[0]
+        of_impulse = white[cells] - scaled[cells] + scaled[cells - 1] - a[2] * white[cells - 1]
 
         def until_end(one: FloatArray, other: FloatArray) -> FloatArray:
             return np.asarray(np.cumsum(one * other)[n - 1 - cells])
@@ -405,10 +408,6 @@ def gains_of_pairs(step: FloatArray, gain: FloatArray, products: GainProducts) -
 def own_energy(raw: FloatArray, held: FloatArray) -> FloatArray:
     """Return the energies of columns beside what holds parts of them; `held`: these parts, shape (k, columns)."""
     return np.asarray(np.maximum(raw - np.einsum("ij,ij->j", held, held), LEAST_ENERGY * raw))
-
-
-LONGEST_GAP_S = 3000.0  # beyond it a gyro may drift by more than its noise says
-LEAST_ENERGY = 1e-3  # of a change's own, below which what is fitted beside it holds it
 
 
 def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
@@ -485,46 +484,3 @@ def likeliest_noise(
         inside = [(i, j) for i, j in around if 0 <= i < len(_LEVELS) and 0 <= j < len(_SLOPES)]
         best = max(inside, key=likelihood)
     return noise_at(best), known[best]
-
-
-_WIDTHS_C = (0.7, 1.5, 3.0, 6.0, 12.0, 24.0)  # of plays: octaves over what `causes.hysteresis` looks through
-_LAGS_S = (200.0, 600.0, 1800.0, 5400.0)  # over what its lags look through, by factors of three
-_RANK = 1e-3  # of the strongest direction: weaker ones are rounding, or a play that is never pushed
-
-
-def evidence_beside_memories(
-    means: tuple[FloatArray, FloatArray, FloatArray], used: NDArray[np.bool_], change: FloatArray, known: FloatArray
-) -> float:
-    """Return the advantage of a change over any memory for a run, as a difference of Schwarz's criterion (BIC).
-
-    The memories are plays, lags, and both, each beside a level, the temperature's rate and what is `known`, free in all
-    their amplitudes. Twice the logarithm of the odds; 10 is very strong (Kass and Raftery, J. Am. Stat. Assoc. 90
-    (1995) 773). Means that resemble their neighbours count for less, as of a first-order process.
-
-    Args:
-        means: Time (s), temperature (C) and rate of the run, shape (n,) each, with what came before the means used.
-        used: Means that count, shape (n,).
-        change: Columns that explain the run by a change, shape (n, k); its place counts as one more.
-        known: Columns that the memories stand beside, shape (n, k).
-    """
-    t, x, y = means
-    left, rank, alike = _left(change[used], y[used])
-    independent = float(used.sum()) * (1.0 - alike) / (1.0 + alike)
-    plain = [np.ones_like(t), np.gradient(x, t), *known.T]
-    plays = [play(width, x) - x for width in _WIDTHS_C]
-    lags = [first_order(tau, t, x) - x for tau in _LAGS_S]
-    found = []
-    for memories in (plays, lags, plays + lags):
-        remains, columns, _ = _left(np.column_stack(plain + memories)[used], y[used])
-        better = independent * float(np.log(max(remains, 1e-300) / max(left, 1e-300)))
-        found.append(better - (rank + 1 - columns) * float(np.log(max(independent, 1.0))))
-    return min(found)
-
-
-def _left(columns: FloatArray, y: FloatArray) -> tuple[float, int, float]:
-    """Return the squares that a fit leaves, its rank, and the correlation of neighbours in the residual, 0 at least."""
-    q, size, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    q = q[:, size > _RANK * size[0]]
-    rest = y - q @ (q.T @ y)
-    left = float(rest @ rest)
-    return left, q.shape[1], min(max(float(rest[1:] @ rest[:-1]) / max(left, 1e-300), 0.0), 0.95)
