@@ -37,6 +37,10 @@ from .fits import (
 )
 
 RateChangeKind = Literal["step", "transition", "drift", "gain"]
+_Tried = tuple[str, float]
+"""Shape that the search tries: kind, and how long it lasts, s."""
+
+_STEP: _Tried = ("step", 0.0)
 
 FALSE_ALARMS = 0.005  # sets of which one has a change by chance
 _CELL_S, _COARSE_S = 10.0, 60.0  # of the search, and of the noise's estimate
@@ -214,7 +218,7 @@ class _Looked:
 
     Attributes:
         sizes: Sizes over errors of changes at every cell, shape (n,), by what is tried.
-        gains: Changes of gain that are tried.
+        gains: Changes of gain that are tried, those at known steps last.
         with_step, alone: Squares of their sizes over errors, each with its step and beside it.
     """
 
@@ -240,7 +244,10 @@ class _Search:
         """Return all clear changes, placed and fitted together, known ones first."""
         found = list(known)
         for run in sorted({at.run for at in known}):
-            self._measure(found)
+            if self._scale:
+                self._fit_curves(found)
+            else:
+                self._measure(found)
             found = self._placed_anew(run, found)
         for _ in range(_MOST):
             new = list(self._clearest(found))
@@ -255,8 +262,7 @@ class _Search:
 
     def _measure(self, found: Sequence[_At]) -> list[_Looked]:
         """Return what the runs show beside what was found; the first time also what noise makes of each shape."""
-        fit, looked, rests = self._fit(found), list[_Looked](), list[FloatArray]()
-        self._curves[:] = [np.stack([one.time_s, fit.curve(k)]) for k, one in enumerate(self._cells)]
+        fit, looked, rests = self._fit_curves(found), list[_Looked](), list[FloatArray]()
         for k in range(len(self._cells)):
             of_run = fit.of_run(k)
             rests.append(of_run.rest)
@@ -268,6 +274,12 @@ class _Search:
             white = noise_of(np.concatenate(rests))
             self._louder = [max(noise_of(rest) / max(white, 1e-300), 1.0) for rest in rests]
         return looked
+
+    def _fit_curves(self, found: Sequence[_At]) -> SmoothFit:
+        """Fit all runs beside what was found, and keep the map along each run."""
+        fit = self._fit(found)
+        self._curves[:] = [np.stack([one.time_s, fit.curve(k)]) for k, one in enumerate(self._cells)]
+        return fit
 
     def _fit(self, changes: Sequence[_At]) -> SmoothFit:
         return self._runs.fit([_columns(one, k, changes, self._curves) for k, one in enumerate(self._cells)])
@@ -312,6 +324,11 @@ class _Search:
         t = self._cells[run].time_s
         return bool(t[0] + _GAIN_S <= time_s <= t[-1] - _GAIN_S)
 
+    def _gains_at_steps(self, run: int, found: Sequence[_At]) -> list[_At]:
+        """Return changes of gain at the known steps of a run."""
+        steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
+        return [_At(run, "gain", s) for s in steps if self._shows_gain(run, s)]
+
     def _gains_to_try(self, run: int, found: Sequence[_At]) -> list[_At]:
         """Return changes of gain at places in all of a run and, last, at the steps that are known.
 
@@ -324,17 +341,14 @@ class _Search:
         known = any(at.run == run and at.kind == "gain" for at in found)
         if len(self._cells) <= _LEAST_OTHERS or known or not places:
             return []
-        steps = [at.middle_s for at in found if at.run == run and at.kind == "step"]
-        return [_At(run, "gain", s) for s in (*places, *(s for s in steps if self._shows_gain(run, s)))]
+        return [*(_At(run, "gain", s) for s in places), *self._gains_at_steps(run, found)]
 
     def _clearest_gain(self, looked: _Looked, run: int, found: Sequence[_At]) -> tuple[float, _At] | None:
         """Return the likeliest change of gain of a run and what it gains with its step, if one is clear."""
         if not looked.gains:
             return None
         noise = self._white(run) ** 2
-        # Those at steps that are known come last
-        at_steps = sum(at.run == run and at.kind == "step" and self._shows_gain(run, at.middle_s) for at in found)
-        places = len(looked.gains) - at_steps
+        places = len(looked.gains) - len(self._gains_at_steps(run, found))
         least = np.full(len(looked.gains), self._limit)
         least[places:] = _AT_STEP
         clear = np.where(looked.alone / noise > least**2, looked.with_step / noise, 0.0)
@@ -375,7 +389,7 @@ class _Search:
         return own
 
     def _best(self, at: _At, fit: RunFit) -> _At:
-        """The likeliest place and duration; `fit`: beside the other changes of the run.
+        """Return the likeliest place and duration of a change; `fit`: beside the other changes of the run.
 
         Of steps and transitions it is what is more likely, each of both kinds being as likely beforehand and all
         durations of a kind alike; a drift where it is nearly as likely as they are.
@@ -386,11 +400,9 @@ class _Search:
         near = near[:: max(len(near) // _PLACES, 1)] - 0.5 * cells.cell_s
         if at.kind == "gain":
             every = max(len(near) // _GAIN_PLACES, 1)
-            tried = [at] + [replace(at, begin_s=float(t)) for t in near[::every] if self._shows_gain(at.run, t)]
-            place = tried[int(np.argmax(self._gains(fit, tried)))]
+            place = self._best_gain(at, near[::every], fit)
             near = cells.time_s[np.abs(cells.time_s - place.begin_s) <= every * cells.cell_s]
-            tried = [place] + [replace(at, begin_s=float(t)) for t in near if self._shows_gain(at.run, t)]
-            return tried[int(np.argmax(self._gains(fit, tried)))]
+            return self._best_gain(place, near, fit)
         durations = [d for d in _DURATIONS_S if d == 0.0 or d > cells.cell_s]
         shapes = [replace(at, kind="drift", duration_s=0.0)] if at.kind == "drift" else []
         shapes += [replace(at, kind="step", duration_s=d) for d in durations]
@@ -419,6 +431,11 @@ class _Search:
         mean = [np.mean([np.exp(0.5 * (gain - most)) for gain, _ in kind]) for kind in (over, lasting) if kind]
         steps = len(mean) == 1 or mean[0] >= mean[1]
         return max(over if steps else lasting, key=lambda pair: pair[0])[1]
+
+    def _best_gain(self, at: _At, places_s: FloatArray, fit: RunFit) -> _At:
+        """Return the likeliest of a change of gain and the same at other places."""
+        tried = [at] + [replace(at, begin_s=float(t)) for t in places_s if self._shows_gain(at.run, t)]
+        return tried[int(np.argmax(self._gains(fit, tried)))]
 
     def _gains(self, fit: RunFit, tried: Sequence[_At]) -> FloatArray:
         """Return twice the gain of log-likelihood of each of some changes of one kind and run; of a gain with its step.
@@ -534,10 +551,6 @@ def _placed(at: _At, rate: FloatArray, time: FloatArray, around_s: float) -> Val
     k = int(inside[best])
     # One row more on either side: a row that is a mean may hold the step, and bear the time of its end or its start
     return float(t[k]), float(t[max(likely[0] - 2, 0)]), float(t[min(likely[-1] + 1, n - 1)])
-
-
-_Tried = tuple[str, float]  # kind, and how long it lasts, s
-_STEP: _Tried = ("step", 0.0)
 
 
 def _looked(fit: RunFit, curve: FloatArray, gains: list[_At]) -> _Looked:
