@@ -1,7 +1,7 @@
 """Say in findings what happened to the rows of a run, with its times and what to do.
 
 Each event has its time and size with 95 % limits where they can be known, and the `exclude` line that leaves it out.
-Of a change that lasts the shorter side may be left out. A step or a burst that is left in looks like several causes.
+If a change lasts, its shorter side may be left out. A step or a burst that is left in looks like several causes.
 """
 
 from __future__ import annotations

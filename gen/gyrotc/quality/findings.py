@@ -161,7 +161,7 @@ def earth_rate_findings(dataset: Dataset, facts: Sequence[RunFacts]) -> Iterator
 
 
 def shared_rows_findings(dataset: Dataset) -> Iterator[Finding]:
-    """Rows that several training runs, or several test runs, hold, or one run twice: they count twice."""
+    """Yield rows that several training runs, or several test runs, hold, or one run twice: they count twice."""
     for shared in dataset.shared:
         rows = shared.rows[1] - shared.rows[0] + 1
         other = "the same file" if shared.other_file == shared.file else shared.other_file

@@ -515,7 +515,7 @@ def column_faults(columns: Mapping[str, FloatArray], layout: Layout) -> Iterator
 
 
 def rate_faults(name: str, rate: FloatArray) -> Iterator[Fault]:
-    """Yield rates that no gyro has, deg/h; NaN passes."""
+    """Yield the faults of rates that no gyro has, deg/h; NaN passes."""
     yield from _within(name, rate, _RATE_DPH, "deg/h")
 
 

@@ -171,7 +171,7 @@ def suspicions(
     earth_stated: bool,
     noise: float | None = None,
 ) -> Iterator[Suspicion]:
-    """List what contradicts the units of a file.
+    """Yield what contradicts the units of a file.
 
     Args:
         evidence: Of its rows, in gyrotc's units.
@@ -323,7 +323,12 @@ def _of_noise(
 def _too_noisy(
     walk: float, rate: FloatArray, column: str, unit: Conversion | None, gyro: str, usual: tuple[float, float]
 ) -> Suspicion:
-    """Return noise above that of a gyro, with the unit that makes it the usual one; limits in deg/sqrt(h)."""
+    """Return the suspicion of noise above that of a gyro, with the unit in which it is as usual, if there is one.
+
+    Args:
+        gyro: The gyro in words.
+        usual: Least and largest usual noise, deg/sqrt(h).
+    """
     middle = median(rate)
     found = (
         f"white noise of {walk:.2g} deg/sqrt(h){_as(unit)}, above that of {gyro} at rest, and a median of "

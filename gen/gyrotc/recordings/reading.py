@@ -67,12 +67,12 @@ class Evidence:
 
     @property
     def cells(self) -> FloatArray:
-        """Return the means of the cells, shape (n, 2 + rates): time, temperature, rates."""
+        """Means of the cells, shape (n, 2 + rates): time, temperature, rates."""
         return self._cells[: self._count]
 
     @property
     def stuck(self) -> bool:
-        """Test whether most rates repeat the one before, so that their scatter is that of the resolution."""
+        """True if most rates repeat the one before, so that their scatter is that of the resolution."""
         return 2 * self.same > self.rows * (self._cells.shape[1] - 2)
 
     def _filled(self, block: FloatArray) -> FloatArray:

@@ -70,7 +70,7 @@ class Rows:
         return Rows(self.time_s[first:], self.temperature_c[first:], self.rate_dph[first:], channels)
 
     def has_channel(self, name: str) -> bool:
-        """Test whether there is a channel of this name."""
+        """Test whether there is a channel of this name, or a difference of two columns."""
         return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
 
     def channel(self, name: str) -> FloatArray:

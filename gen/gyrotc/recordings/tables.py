@@ -207,7 +207,7 @@ class ArrayTable(LoggerTable):
     parts: Mapping[str, ReadPart] = field(default_factory=dict)
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """Yield rows in order; see `Table.chunks`."""
+        """Yield rows in order; see `LoggerTable.chunks`."""
         for first in range(0, self.rows, CHUNK_ROWS):
             last = min(first + CHUNK_ROWS, self.rows)
             values = {name: np.asarray(self.parts[name](first, last)) for name in names}
@@ -215,7 +215,7 @@ class ArrayTable(LoggerTable):
 
 
 def part_of(values: Any) -> ReadPart:
-    """Read an array that is in memory."""
+    """Return the reader of an array in memory."""
     return lambda first, last: values[first:last]
 
 

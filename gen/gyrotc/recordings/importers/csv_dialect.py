@@ -102,8 +102,10 @@ def _padded(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _is_units(cells: Sequence[str]) -> bool:
-    """Test whether a line holds units: at least half of its words are units, or two fifths and two of them,
-    and one of them is of time, temperature or rate.
+    """Test whether a line holds units.
+
+    At least one of its words is a unit of time, temperature or rate, and half of them are units; two fifths are
+    enough if two are units of these.
     """
     words = [cell.strip("[](){} ") for cell in cells if cell.strip("[](){} -1")]
     known = sum(

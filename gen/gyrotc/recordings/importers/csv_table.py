@@ -90,7 +90,7 @@ class CsvTable(LoggerTable):
     size: int = 0
 
     def chunks(self, names: Sequence[str]) -> Iterator[Chunk]:
-        """Yield rows in order, a chunk for each block of lines; see `Table.chunks`."""
+        """Yield rows in order, a chunk for each block of lines; see `LoggerTable.chunks`."""
         first = 0
         left = Counter({"above the stated line of names": self.dialect.ignored})
         for lines, number, done in self._blocks():

@@ -136,7 +136,7 @@ class ImportedRun:
     exam: bool = False
 
     def result(self) -> ImportedFile:
-        """Return the result of `gyrotc import`."""
+        """Return what the result of `gyrotc import` states of the run."""
         source = self.sources[0].model_dump()
         return ImportedFile(
             file=self.file,
@@ -325,7 +325,7 @@ class Imported:
         )
 
     def findings(self) -> tuple[Finding, ...]:
-        """Findings about rows that were left out and units that contradict their values, as `check` has them."""
+        """Return findings about rows that were left out and units that contradict their values, as `check` has them."""
         said = [
             (id, run.file, text)
             for run in self.runs

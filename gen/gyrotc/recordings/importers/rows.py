@@ -378,7 +378,7 @@ def _unit_of_time(column: Column, table: LoggerTable) -> str | None:
 
 
 RowsChunk = tuple[dict[str, FloatArray], float]
-"""Yield rows by column name, with the share of the file that was read."""
+"""Rows by column name, and the share of the file that was read."""
 FileFormat = Literal["csv", "parquet"]
 _GROUP_ROWS = 2**20  # of a row group: Arrow's own default
 

@@ -154,7 +154,7 @@ def _part_of_field(node: Any, field: str) -> ReadPart:
 
 
 def _part_of(node: Any, index: int | None, tall: bool) -> ReadPart:
-    """Read a vector, a column of a matrix, or a row of a transposed one (as MATLAB stores it)."""
+    """Return the reader of a vector, of a column of a matrix, or of a row of a transposed one (as MATLAB stores it)."""
     if index is None:
         return lambda a, b: numbers(node[a:b])
     return lambda a, b: numbers(node[a:b, index] if tall else node[index, a:b])
