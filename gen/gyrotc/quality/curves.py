@@ -206,7 +206,10 @@ def _against_others(curve: Curve, others: Sequence[Curve]) -> tuple[_Way, str] |
 
 
 def _shared_places(curve: Curve, others: Sequence[Curve]) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Return numbers of the run's temperatures that two others have, their rates there without Earth's, and a mask."""
+    """Return indices of the run's temperatures that two others have, and the others' rates there without Earth's.
+
+    The last array is true where another run has a rate.
+    """
     grid, rates, there = _on_grid([(other.temperature_c, other.rates_dph - _earth(other)) for other in others])
     shared = np.flatnonzero(np.count_nonzero(there, axis=0) >= _LEAST_OTHERS)
     _, mine, among = np.intersect1d(curve.temperature_c, grid[shared], return_indices=True)

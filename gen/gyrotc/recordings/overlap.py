@@ -34,7 +34,7 @@ class _Span:
 def shared_rows(runs: Sequence[Run], recordings: Mapping[str, Recording], problems: Problems) -> tuple[SharedRows, ...]:
     """Return rows that runs of one role have in common, or that a run has twice.
 
-    Rows that a training run and an exam have in common are a problem, with the exclusion that mends it.
+    Rows that a training run and a test run have in common are a problem, with the exclusion that solves it.
     """
     found: list[SharedRows] = []
     prints = [recordings[run.file].fingerprints.within(run) for run in runs]
@@ -49,7 +49,7 @@ def shared_rows(runs: Sequence[Run], recordings: Mapping[str, Recording], proble
 
 
 def counted_once(runs: Mapping[int, Run], shared: Sequence[SharedRows]) -> dict[int, Run]:
-    """Return the runs without the rows that another run has; a run of which too little would remain stays whole."""
+    """Return the runs without the rows that another run has; a run of which too little would remain is left out."""
     kept = {}
     for number, run in runs.items():
         twice = [one for one in shared if one.file == run.file]

@@ -264,7 +264,7 @@ def _check_commas(name: str, header: int, above: Sequence[tuple[int, list[str]]]
 
 
 def _digits(cells: Sequence[str], decimal: str, given: CsvMap) -> dict[str, Any]:
-    """Find the form of numbers besides their decimal mark."""
+    """Return the fields of a dialect that state the form of numbers besides their decimal mark."""
     spaced_sign = any(cell[:2] in ("+ ", "- ") for cell in cells)
     return {"thousands": given.thousands or thousands_of(cells, decimal), "spaced_sign": spaced_sign}
 
@@ -345,7 +345,7 @@ def _separators(name: str, lines: Sequence[str], given: CsvMap) -> tuple[str, st
 
 
 def _holds_number(cells: Sequence[str], decimal: str) -> bool:
-    """Test whether a line holds a number, and is no repeated line of names."""
+    """Test whether a line holds a number; a line of names does not."""
     return any(is_number(cell, decimal) for cell in cells)
 
 

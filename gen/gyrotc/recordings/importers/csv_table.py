@@ -315,7 +315,7 @@ def _unique(names: Sequence[str]) -> list[str]:
 
 
 def _stated_rate(dialect: Dialect) -> dict[str, Any]:
-    """Return the rows per second that a line above the header states, as in `Sample rate: 100 Hz`."""
+    """Return the fields of a table for the rows per second of a line above the header: `Sample rate: 100 Hz`."""
     for key, value in dialect.facts.items():
         found = re.match(r"([\d.,]+)\s*(k?hz|/s|sps|samples/s)?", value.lower())
         number = number_in(found[1].replace(",", ".")) if found else None

@@ -286,7 +286,11 @@ def _check_weight(file: LoggerFile, value: tuple[str, LoggerTable, Column, str],
 
 
 def _rates(table: LoggerTable, file: Path) -> tuple[list[tuple[str, Column, str]], int]:
-    """List the rate columns of a table with role and reason, and their score; none if it is unclear."""
+    """List the rate columns of a table with role and reason, and their score.
+
+    Raises:
+        InputError: Several columns could be the rate.
+    """
     pulses = [c for c in table.columns if words_of_name(c.name)[:1] == ["pulses"]]
     if pulses:
         return [("pulses", pulses[0], "its name")], 5
