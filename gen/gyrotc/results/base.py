@@ -1,4 +1,4 @@
-"""Parts that JSON results share: types of fields, the form on disk, findings, and the way a result is read back."""
+"""Parts that all JSON results share: types of fields, findings, the form on disk and its reading."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def read_result(path: Path, kind: type[R]) -> R:
 
 
 def refused_result(path: Path, content: Any, error: InputError) -> InputError:
-    """Return the refusal of a result: it names the program that wrote it where that is another one than this.
+    """Return the refusal of a result; it names the program that wrote the result if that was not this one.
 
     Args:
         path: The file; a manifest beside it names the program.
@@ -203,7 +203,7 @@ class MarkedRows(Part):
 class Estimate(Part):
     """A figure with its 95 % interval."""
 
-    value: float = Field(description="likeliest value")
+    value: float = Field(description="estimated value")
     low: Figure = Field(description="lower end of the 95 % interval; null if there is none")
     high: Figure = Field(description="upper end of the 95 % interval; null if there is none")
 

@@ -19,10 +19,8 @@ _WHOLE = 0.995  # a share of the removable error that shows as 100 %
 class GainOnUnseen(Part):
     """Gain of causes on runs that they were not fitted to."""
 
-    exam_rms_before_dph: float = Field(
-        description="RMS of the correction that would be emitted without the causes, deg/h"
-    )
-    exam_rms_after_dph: float = Field(description="RMS with the causes, deg/h")
+    exam_rms_before_dph: float = Field(description="RMS of the correction without the causes, deg/h")
+    exam_rms_after_dph: float = Field(description="RMS of the correction with the causes, deg/h")
     share_of_excess_removed: Figure = Field(
         description="share of the removable error that is removed; null if next to nothing is removable"
     )
@@ -32,9 +30,9 @@ class GainOnUnseen(Part):
     angle_1h_removed_arcsec: Estimate | None = Field(
         description="decrease of the RMS angle error over one hour, arcsec; null if no run lasts an hour"
     )
-    angle_1h_before_arcsec: Figure = Field(description="RMS angle error over one hour of the static map, arcsec")
+    angle_1h_before_arcsec: Figure = Field(description="RMS angle error over one hour without the causes, arcsec")
     angle_1h_after_arcsec: Figure = Field(description="RMS angle error over one hour with the causes, arcsec")
-    rms_30min_before_dph: Figure = Field(description="RMS of means over 30 minutes of the static map, deg/h")
+    rms_30min_before_dph: Figure = Field(description="RMS of means over 30 minutes without the causes, deg/h")
     rms_30min_after_dph: Figure = Field(description="RMS of means over 30 minutes with the causes, deg/h")
     about_means: bool = Field(
         default=False, description="true if the mean of each run is subtracted, because a named cause shifts runs"
@@ -77,7 +75,7 @@ class ComparedStatistic(Part):
     simulated_mean: float = Field(description="mean of the simulated campaigns")
     simulated_low: float = Field(description="lower end of the middle 95 % of the simulated campaigns")
     simulated_high: float = Field(description="upper end of the middle 95 % of the simulated campaigns")
-    p_value: float = Field(description="probability of a departure at least as large by chance")
+    p_value: float = Field(description="probability of a deviation at least as large by chance")
 
 
 class Statistic(ComparedStatistic):
@@ -119,7 +117,8 @@ class NamedCause(Part):
         description="posterior probabilities by id: this cause, others in its place, `unnamed` and `nothing`",
     )
     gain: GainOnUnseen | None = Field(
-        description="gain of its term; null for noise and for structure of the map, which no term corrects"
+        description="gain of its term beyond those of the causes before it, of all terms together for a single cycle; "
+        "null for noise and for causes that no term corrects"
     )
     signature: str = Field(description="signature of the cause in the recordings, in words")
     remedy: str = Field(description="remedy in hardware or programme, in words")
@@ -175,7 +174,10 @@ class DetectionLimit(Part):
     value: Figure = Field(description="smallest size that is found; null if no size is")
     unit: str = Field(description="unit of `value`")
     parameter: str | None = Field(description="parameter that the limit depends on; null if none")
-    over: tuple[tuple[float, Figure], ...] = Field(description="pairs of a value of the parameter and the limit there")
+    over: tuple[tuple[float, Figure], ...] = Field(
+        description="pairs of a value of the parameter and the limit there; if the limit is itself a value of the "
+        "parameter, the size there in standard deviations"
+    )
 
 
 class ConsideredCause(Part):
@@ -250,7 +252,7 @@ class Diagnosed(UnitResult):
 
     schema_: Annotated[Literal["gyrotc.diagnose/1"], Field(alias="schema")] = "gyrotc.diagnose/1"
     discrepancies: tuple[Statistic, ...] = Field(
-        description="statistics that the simulation gets wrong, the rarest first"
+        description="statistics of the residual compared with the simulation, the rarest first"
     )
     verdict: DiagnosisVerdict = Field(description="verdict (docs/diagnosis.md)")
     block_s: float = Field(description="length of a block, s")
@@ -287,8 +289,7 @@ class Diagnosed(UnitResult):
 
     @property
     def discrepancy(self) -> str:
-        """The clearest discrepancy of the simulation: statistic, simulated band, probability; empty if there is "
-        "none."""
+        """The clearest discrepancy of the simulation, with its band and probability; empty if there is none."""
         if not self.discrepancies:
             return ""
         first = min(self.discrepancies, key=lambda d: d.p_value)

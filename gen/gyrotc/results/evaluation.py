@@ -52,7 +52,7 @@ class Method(Part):
     improvement_about_zero: Figure = Field(description="RMS before over RMS after compensation")
     centers: Count = Field(description="number of centers of all networks")
     parameter_bytes: Count = Field(description="parameters of the map as 32-bit words, bytes")
-    sum_abs_weights_dph: float = Field(description="sum of the absolute weights, deg/h")
+    sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
     noise_floor_dph: Figure = Field(description="noise floor that the method estimates, deg/h")
     train_s: float = Field(description="processor time of training, s")
     published_train_s: tuple[float, float] | None = Field(
@@ -101,7 +101,10 @@ class Pooled(Part):
     """Figures over several runs, every sample with the same weight."""
 
     before: Statistics = Field(description="before compensation")
-    constant: Statistics = Field(description="after subtraction of `constant_dph` of the result")
+    constant: Statistics = Field(
+        description="after subtraction of a constant: of that which the table falls back to, in `training.json` of the "
+        "mean of these samples"
+    )
     after: Statistics = Field(description="after compensation")
     improvement: Figure = Field(
         description="RMS with a constant over RMS after compensation: the gain of the map, whatever constant is in the "
@@ -261,7 +264,9 @@ class Evaluation(UnitResult):
     findings: tuple[Finding, ...] = Field(description="findings, the gravest first")
     model: ModelSizes = Field(description="method and sizes of the model")
     left_out: Pooled | None = Field(
-        default=None, description="figures over spans left out of training in turn; null if there are test runs"
+        default=None,
+        description="figures over spans left out of training in turn; null if there are test runs, if the method was "
+        "named, or if the model was not made from these recordings",
     )
 
     generalises: bool | None = Field(
@@ -273,8 +278,8 @@ class Evaluation(UnitResult):
     )
     sigma_rms_dph: Amount | None = Field(
         default=None,
-        description="RMS of the 1 sigma that the table states, over the rows that the model is judged by and where the "
-        "correction is neither held nor clamped, deg/h; null if the table states none",
+        description="RMS of the 1 sigma that the table states, over the rows of the test runs, else of the training "
+        "runs, that are corrected without a status bit, deg/h; null if the table states none",
     )
     uncertainty: dict[str, FigureUncertainty] | None = Field(
         default=None,

@@ -77,7 +77,7 @@ class ImportedFile(Part):
     trusted: tuple[str, ...] = Field(
         description="columns whose values look like another unit, accepted by `trust_units`"
     )
-    source: OriginalFile = Field(description="logger's file that the run was made of")
+    source: OriginalFile = Field(description="logger's file that the run was made of, without files joined to it")
 
 
 class ImportedFiles(Result):
@@ -121,13 +121,13 @@ class SimulatedTruth(Numbered):
     """The truth of a simulated data set; only `evaluate` and tests open it."""
 
     schema_: Annotated[Literal["gyrotc.truth/1"], Field(alias="schema")] = "gyrotc.truth/1"
-    scenario: str = Field(description="name or file of the scenario")
+    scenario: str = Field(description="name of the scenario: that of its file, without suffix")
     seed: int = Field(description="seed from which everything was drawn")
     noise: dict[str, Any] = Field(description="levels of the noise, as in the scenario")
     map: dict[str, Any] = Field(description="the bias of the gyro over temperature and its rate, as it was drawn")
     causes: tuple[dict[str, Any], ...] = Field(description="`id`, `channel` and parameters of each cause")
     plan: dict[str, Any] = Field(
-        description="gyro, chamber, sensor and what is recorded of the scenario: thermometers, laser, channels"
+        description="tables of the scenario: gyro, chamber, sensor, thermometers, differences of nodes, laser, channels"
     )
     runs: tuple[TrueRun, ...] = Field(description="all runs")
     lot: TrueLot | None = Field(default=None, description="place in the lot; null if the gyro is of none")

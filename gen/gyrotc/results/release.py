@@ -299,7 +299,9 @@ class VerifiedFile(Part):
         description="`foreign`: gyrotc does not make it; `edited`: the example differs, as its user may edit it"
     )
     status: PassOrFail = Field(description="`pass` if the file may be used")
-    mismatches: Count = Field(description="number of lines or words that differ; 1 for a file without lines or words")
+    mismatches: Count = Field(
+        description="number of lines or words that differ; 1 for a file that is missing, foreign or no regular file"
+    )
     line: Count | None = Field(default=None, description="first line that differs, counted from 1")
     word: Count | None = Field(default=None, description="first word of an image that differs, counted from 1")
     found: str | None = Field(default=None, description="content of that line or word in the file")

@@ -64,20 +64,21 @@ class EarlierUse(Part):
     ageing_dph: Amount = Field(description="standard deviation of the drift of the bias since then, deg/h")
     ageing_from: str = Field(description="source of that figure")
     chosen: ChangeKind = Field(
-        description="what became of the map: the best supported of `tried` of those by which it moves by more than U "
-        "where it has changed, and by no more than U and ageing give where not"
+        description="change of the map: the kind with the largest odds among the consistent ones of `tried`, or "
+        "among all if none is. An unchanged map is consistent if it moves by no more than U with ageing, a changed one "
+        "if it moves by more than U"
     )
     tried: tuple[TriedChange, ...] = Field(description="all hypotheses, the chosen one first")
     moved: MapDifference = Field(
-        description="how far the map has moved over the earlier envelope; U holds the noise of the run and the earlier "
-        "model's sigma, not the ageing"
+        description="movement of the map over the earlier envelope; its U contains the noise of the run and the sigma "
+        "of the earlier model, not the ageing"
     )
     accepted: bool = Field(description="true if the table is made from both, false if from the new recordings alone")
     change: MapChange | None = Field(description="change of the map; null if there is none")
     cells: tuple[CheckedCell, ...] = Field(description="parts of the check run, by ascending temperature")
     own_share: Figure = Field(
-        description="of the variance that the earlier model leaves after ageing, mean over where corrections are asked "
-        "for: what the check run has removed"
+        description="share of the variance of the earlier map after ageing that the check run has removed, mean over "
+        "the region where corrections are needed; null if the earlier model was not used"
     )
     prior_sigma_dph: Amount = Field(description="RMS of 1 sigma of the earlier model after ageing, deg/h")
     sigma_dph: Amount = Field(description="RMS of 1 sigma of both together, deg/h")
@@ -106,7 +107,7 @@ class SpanLeftOut(Part):
     kind: Literal["branch", "part", "run", "power-on"] = Field(
         description="kind of span: a branch of a cycle, a part of a run without branches, a run, or a whole power-on"
     )
-    guard_s: Amount = Field(description="time on either side that was not trained on either, s")
+    guard_s: Amount = Field(description="time before and after the span that was kept out of training, too, s")
 
 
 class AllanPoint(Part):
@@ -181,12 +182,15 @@ class ChannelTried(Part):
         "Gaussians; where taken",
     )
     slope_dph_per_unit: float | None = Field(
-        default=None, description="of the straight line through what it adds, deg/h per unit; where taken"
+        default=None, description="slope of the straight line through what it adds, deg/h per unit; where taken"
     )
     left_out_rms_before_dph: Figure = Field(
-        default=None, description="RMS expected on history left out with those taken before it, deg/h; where taken"
+        default=None,
+        description="RMS expected on history left out with the channels taken before it, deg/h; where taken",
     )
-    left_out_rms_after_dph: Figure = Field(default=None, description="the same with it, deg/h; where taken")
+    left_out_rms_after_dph: Figure = Field(
+        default=None, description="RMS expected on history left out with this channel added, deg/h; where taken"
+    )
     share_of_variance: Figure = Field(
         default=None, description="variance of what it adds over that of the measured bias; where taken"
     )
