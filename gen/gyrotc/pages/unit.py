@@ -131,8 +131,8 @@ class UnitResults:
     @property
     def lacking(self) -> str:
         """The gravest lack of the recordings for a PASS; empty if they lack nothing."""
-        lacking = [one for one in self.evaluation.requirements if not one.met]
-        return max(lacking, key=lambda one: VERDICTS.index(one.verdict)).text if lacking else ""
+        lacking = self.evaluation.gravest_lack
+        return lacking.text if lacking else ""
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -28,19 +28,19 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
     DATASET stands for the recordings, DIR for the result.
 
     Args:
-        failures: Whether a check of its code failed.
-        diagnosed: Whether it was diagnosed already.
+        failures: True if a check of its code failed.
+        diagnosed: True if it was diagnosed already.
     """
     if failures:
         return (
             "Do not use the table: its code is not the model. Build it again, and report it if the check fails again."
         )
-    lacking = max(evaluation.requirements, key=lambda one: VERDICTS.index(one.verdict), default=None)
+    lacking = evaluation.gravest_lack
     if lacking and lacking.verdict == "NOT TESTABLE":
         return lacking.next
     if evaluation.structure_left and not diagnosed:
         return "gyrotc diagnose DATASET: the residual is more than noise, and it names the cause."
-    if lacking and not lacking.met:
+    if lacking:
         return lacking.next
     broken = [one for one in limits.limits if one.verdict == "FAIL"] if limits else []
     if any(one.part for one in broken):

@@ -12,7 +12,7 @@ from ..common.inputs import AverageLength
 from ..common.metrics import Averages, statistics_of
 from ..common.statistics import coverage_factor
 from .base import TABLE_BYTES, Amount, Count, Figure, Finding, Numeric, Part, UnitResult
-from .release import HeldLimits, Verdict
+from .release import VERDICTS, HeldLimits, Verdict
 from .rows import RowsCount
 
 
@@ -304,6 +304,12 @@ class Evaluation(UnitResult):
         if self.left_out:
             return "left_out", self.left_out
         return ("train", self.train) if self.train else None
+
+    @property
+    def gravest_lack(self) -> Requirement | None:
+        """Requirement that the recordings miss by the worst verdict; None if they meet all."""
+        lacking = [one for one in self.requirements if not one.met]
+        return max(lacking, key=lambda one: VERDICTS.index(one.verdict), default=None)
 
     @property
     def structure_left(self) -> bool:
