@@ -313,7 +313,7 @@ def with_reasons(entries: Sequence[FleetEntry], named: Sequence[Reason]) -> list
 
 
 def _exchanged(kinds: dict[str | None, _Kind]) -> Iterator[Reason]:
-    """Two axes of a unit that show each what the other's kind shows."""
+    """Yield a reason for each of two axes of a unit that show what the other's kind shows."""
     units: dict[str, dict[str, tuple[FleetEntry, FloatArray]]] = defaultdict(dict)
     for axis, kind in kinds.items():
         for entry, curve in zip(kind.entries, kind.curves, strict=True):
@@ -363,7 +363,10 @@ def _late(kind: _Kind) -> Iterator[Reason]:
 
 
 def _lateness(facts: Sequence[Facts]) -> FloatArray:
-    """Return the delay of each gyro's temperatures behind the median of all, s; NaN if nothing changes."""
+    """Return the delay of each gyro's temperatures behind the median of all, s; NaN if nothing changes.
+
+    It is the median over the runs of the gyro.
+    """
     late: list[list[float]] = [[] for _ in facts]
     for k in range(max(len(f.runs) for f in facts)):
         profiles = [(n, f.runs[k].profile_c) for n, f in enumerate(facts) if k < len(f.runs)]
@@ -445,7 +448,7 @@ def _noise(kind: _Kind) -> Iterator[Reason]:
 
 
 def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
-    """Yield curves that a change of sign or a factor brings back to those of their kind."""
+    """Yield a reason for each curve that a change of sign or a factor brings back to those of its kind."""
     factors = kind.factors()
     logs = np.log(np.maximum(factors, 1e-9))
     usual, scatter = _usual(logs)
@@ -460,7 +463,7 @@ def _mirrored_or_scaled(kind: _Kind) -> Iterator[Reason]:
 
 
 def _bias_outlier(kind: _Kind) -> Iterator[Reason]:
-    """Yield curves that nothing known brings back."""
+    """Yield a reason for each curve that is far from those of its kind."""
     for entry, curve in zip(kind.entries, kind.curves, strict=True):
         if _FAR < (far := kind.distance(curve)) < np.inf:
             text = f"bias over temperature differs from that of {_kin(entry)} ({far:.0f} robust standard deviations)"
