@@ -164,52 +164,52 @@ class Panel:
         self, x: ArrayLike, y: ArrayLike, color: str, label: str = "", *,
         width: float = 1.2, dash: str = "", title: str = "",
     ) -> None:  # fmt: skip
-        """A line through points, broken where one is not finite."""
+        """Add a line through points, broken where one is not finite."""
         self._add("line", x, y, color, label, width=width, dash=dash, title=title)
 
     def dots(
         self, x: ArrayLike, y: ArrayLike, color: str, label: str = "", *, size: float = 4.0, hollow: bool = False
     ) -> None:
-        """Points, `size` across."""
+        """Add points, `size` across."""
         self._add("rings" if hollow else "dots", x, y, color, label, width=size)
 
     def band(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, color: str, label: str = "") -> None:
-        """The area between two lines."""
+        """Add the area between two lines."""
         self._add("band", x, low, color, label, far=np.asarray(high, dtype=np.float64))
 
     def errors(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, color: str) -> None:
-        """Draw bars of uncertainty from `low` to `high`."""
+        """Add bars of uncertainty from `low` to `high`."""
         self._add("errors", x, low, color, far=np.asarray(high, dtype=np.float64))
 
     def vertical(self, x: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8) -> None:
-        """A line from bottom to top."""
+        """Add a line from bottom to top."""
         self._add("vertical", [x], [np.nan], color, label, dash=dash, width=width)
 
     def horizontal(self, y: float, color: str = ACCENT, label: str = "", *, dash: str = "", width: float = 0.8) -> None:
-        """A line from left to right."""
+        """Add a line from left to right."""
         self._add("horizontal", [np.nan], [y], color, label, dash=dash, width=width)
 
     def span(self, low: float, high: float, color: str, label: str = "") -> None:
-        """A shaded part of the x axis."""
+        """Add a shaded part of the x axis."""
         self._add("span", [low, high], [np.nan, np.nan], color, label)
 
     def bars(self, values: ArrayLike, places: ArrayLike, color: str, label: str = "", *, height: float = 0.6) -> None:
-        """Draw bars from zero to the right; `height` is in units of the y axis."""
+        """Add bars from zero to the right; `height` is in units of the y axis."""
         self._add("bars", values, places, color, label, width=height)
 
     def tops(self, x: ArrayLike) -> None:
-        """Draw triangles at the upper edge."""
+        """Add triangles at the upper edge."""
         self._add("tops", x, np.full(np.size(x), np.nan), ACCENT)
 
     def words(self, x: ArrayLike, y: ArrayLike, texts: Sequence[str]) -> None:
-        """Text to the right of places."""
+        """Add text to the right of places."""
         self._add("words", x, y, ACCENT, texts=tuple(texts))
 
     def image(
         self, values: FloatArray, x: tuple[float, float], y: tuple[float, float], bar: str,
         hidden: NDArray[np.bool_] | None = None,
     ) -> None:  # fmt: skip
-        """Values, shape (rows from below, columns), as colours between the axes; `hidden` cells are hatched."""
+        """Show values, shape (rows from below, columns), as colours between the axes; `hidden` cells are hatched."""
         self.background = Image(values, x, y, hidden, bar)
 
     def _add(self, kind: str, x: ArrayLike, y: ArrayLike, color: str, label: str = "", **more: object) -> None:
