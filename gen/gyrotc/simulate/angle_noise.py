@@ -78,7 +78,7 @@ def _flicker_dph(rng: np.random.Generator, cells: int, bias_instability_dph: flo
 
 
 def bridge_arcsec(rng: np.random.Generator, parts: int, white_arcsec: FloatArray) -> FloatArray:
-    """Draw how the white angle departs from even growth at the inner edges of cells, shape (cells, parts − 1).
+    """Draw the deviation of the white angle from even growth at the inner edges of cells, shape (cells, parts − 1).
 
     It is a Brownian bridge: with the even growth added it is a random walk with `white_arcsec` for a whole cell.
     """

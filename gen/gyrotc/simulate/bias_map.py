@@ -20,6 +20,7 @@ from scipy.interpolate import CubicSpline
 from ..common.arrays import FloatArray
 
 T_RANGE_C = (-36.0, 71.0)  # of the cavity in a chamber at −40 ... 60 C, self-heating included
+KNOTS = 7  # of the spline, evenly over T_RANGE_C
 R_LIMIT_C_PER_MIN = 2.5  # of the cavity: half of the fastest ramp of a chamber, which it follows slowly
 
 
@@ -44,7 +45,7 @@ class BiasMap:
 
 def draw_map(rng: np.random.Generator, range_dph: tuple[float, float]) -> BiasMap:
     """Draw a map whose values over the operating range reach from end to end of `range_dph`, deg/h."""
-    knots_c = np.linspace(*T_RANGE_C, 7)
+    knots_c = np.linspace(*T_RANGE_C, KNOTS)
     values = rng.normal(0.0, 0.3, len(knots_c))
     sign = rng.choice([-1.0, 1.0])
     parameters: dict[str, Any] = {

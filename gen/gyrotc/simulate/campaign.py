@@ -75,7 +75,7 @@ def gyro_map(plan: Scenario, seed: int) -> BiasMap:
 
 
 def noise_seeds(seed: int) -> np.random.SeedSequence:
-    """Return what the noise of all runs of a gyro is drawn from."""
+    """Return the seeds of the noise of all runs of a gyro."""
     return _seeds(seed)[1]
 
 

@@ -28,6 +28,7 @@ from .run_file import SimulatedRunFile
 from .scenario import Scenario, read
 from .truth import TRUTH_FILE
 
+# The names that tools/reference.py documents.
 __all__ = ["FileFormat", "NoiseName", "RowForm", "RowLength", "SimulatedGyro", "simulate", "write_gyro"]
 
 # Levels that `dataset.toml` states, as a data sheet would.
@@ -149,7 +150,7 @@ def _write_run(
 
 
 def _truth_of_run(folder: Path, file: str, made: SimulatedRecord, length: RowLength, weight: float | None) -> TrueRun:
-    """Write the noise and the states of a run: means of each row, or of each second if rows are shorter."""
+    """Write noise and states of a run, as means of rows or, if these are shorter, of seconds; return its entry."""
     step_s = length.cells * CELL_S
     edges = made.angle_arcsec[:: length.cells]
     if weight is not None:

@@ -1,4 +1,4 @@
-"""What differences of nodes and the laser do inside the instrument in one run."""
+"""Effects of temperature differences and of the laser inside the instrument: bias, true states, readings."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .scenario import Channel, Scenario
 
 @dataclass(frozen=True, slots=True)
 class InternalEffects:
-    """What happens inside the instrument in one run, from the start of the chamber programme, shape (n,) each.
+    """Effects inside the instrument in one run, from the start of the chamber programme, shape (n,) each.
 
     Attributes:
-        bias_dph: What differences of nodes and the laser add to the bias, deg/h.
+        bias_dph: Part of the bias that comes from differences of nodes and from the laser, deg/h.
         nodes_c: True temperatures by node, C.
         laser: States of the laser; None: the scenario has none.
         states: States that the truth keeps; empty if the scenario has no thermometers, differences or laser.
@@ -35,7 +35,7 @@ class InternalEffects:
 def internal_effects(
     scenario: Scenario, nodes_c: Mapping[str, FloatArray], scene: Scene, rng: np.random.Generator
 ) -> InternalEffects:
-    """Compute what differences and laser do in a run; `rng` draws the losses that no temperature moves."""
+    """Compute the effects of node differences and laser; `rng` draws the losses that no temperature moves."""
     bias = np.zeros(len(scene.time_s))
     for one in scenario.difference:
         x = nodes_c[one.node] - nodes_c[one.against]

@@ -18,16 +18,15 @@ from ..common.errors import InputError
 from ..common.progress import Progress, Stages, silent
 from ..results.folder import result_folder
 from ..results.recordings import TrueLot
-from .bias_map import R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, map_of, shape_over_range
+from .bias_map import KNOTS, R_LIMIT_C_PER_MIN, T_RANGE_C, BiasMap, map_of, shape_over_range
 from .campaign import NoiseName, with_noise
 from .data_set import RowForm, SimulatedGyro, write_gyro
 from .scenario import Gyro, Scenario, read
 
 SharedScores = dict[str, float]
 
-_KNOTS = 7  # as in `draw_map`
 _EXPANSION = ("expansion", "expansion_slope", "expansion_curvature")
-_MOUNT = tuple(f"mount_{k}" for k in range(_KNOTS))
+_MOUNT = tuple(f"mount_{k}" for k in range(KNOTS))
 _OTHERS = (
     "loss", "loss_c", "loss_width", "alignment", "alignment_c", "alignment_width",
     "flow", "flow_saturation", "flow_turn", "flow_turn_c", "flow_width", "even", "even_saturation",
@@ -167,7 +166,11 @@ def _mixing() -> FloatArray:
 
 
 def _map(gyro: Gyro, scores: SharedScores, center: FloatArray, family: float) -> BiasMap:
-    """Return the static map of a unit; it is as sensitive as its lot to the extent to which the lot is a family."""
+    """Return the static map of a unit.
+
+    The shape is scaled to the range of the bias. The range of the shape is that of the lot's if `family` is 1, the
+    unit's own if it is 0, and in between a geometric mean of both.
+    """
     parameters = _shape_of(scores)
     low, high = gyro.bias_dph
     shape = shape_over_range(parameters)
@@ -180,8 +183,8 @@ def _map(gyro: Gyro, scores: SharedScores, center: FloatArray, family: float) ->
 
 def _shape_of(s: SharedScores) -> dict[str, object]:
     """Return parameters of the shape (`bias_map.py`); their moments are those of the gyros that `draw_map` draws."""
-    knots_c = np.linspace(*T_RANGE_C, _KNOTS)
-    x = np.linspace(-1.0, 1.0, _KNOTS)
+    knots_c = np.linspace(*T_RANGE_C, KNOTS)
+    x = np.linspace(-1.0, 1.0, KNOTS)
     expansion = 0.4 * s["expansion"] * x + 0.35 * s["expansion_slope"] * (x**2 - 1.0 / 3.0)
     expansion = expansion + 0.3 * s["expansion_curvature"] * (x**3 - 0.6 * x)
     knots = expansion + 0.12 * np.array([s[name] for name in _MOUNT])

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from ..common.arrays import FloatArray
 from ..mirror.recursions import first_order
+from .grid import REFERENCE_C
 from .scenario import Channel, Sensor, Thermometer
 
 
@@ -38,7 +39,7 @@ def thermometer_readings(
 def channel_values(channel: Channel, air_c: FloatArray, dt_s: float, rng: np.random.Generator) -> FloatArray:
     """Draw the true quantity behind a channel: level, a part that goes with the air, a wandering part, steps."""
     points = len(air_c)
-    value = channel.level + channel.per_air_c * (air_c - 20.0)
+    value = channel.level + channel.per_air_c * (air_c - REFERENCE_C)
     if channel.wander_sigma:
         decay = float(np.exp(-dt_s / channel.wander_tau_s))
         start = rng.normal(0.0, channel.wander_sigma)

@@ -145,7 +145,7 @@ def _bias(
     bias_map: BiasMap,
     seeds: np.random.SeedSequence,
 ) -> tuple[Scene, FloatArray]:
-    """Apply the causes: the scene as they change it, and the bias in deg/h."""
+    """Apply the causes, and return the scene as they change it and the bias in deg/h."""
     causes = [(CATALOGUE[cause.id], cause) for cause in scenario.cause]
     for term, cause in causes:
         if term.cavity is not None:

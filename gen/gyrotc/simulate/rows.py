@@ -14,7 +14,7 @@ from .grid import CELL_S
 from .record import SimulatedRecord
 
 _CHUNK_ROWS = 200_000  # rows at once: 1.6 MB a column
-_MOST = 10_000  # rows a second or seconds a row: faster than any gyro is read, slower than any is logged
+_MAX_RATIO = 10_000  # rows a second or seconds a row: faster than any gyro is read, slower than any is logged
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +42,9 @@ class RowLength:
         if per_cell > 0.0:
             long, short = cls(round(1.0 / per_cell), 1), cls(1, round(per_cell))
             for ratio, made in ((1.0 / per_cell, long), (per_cell, short)):
-                if 1 <= round(ratio) <= _MOST and abs(ratio - round(ratio)) < 1e-9 * ratio:
+                if 1 <= round(ratio) <= _MAX_RATIO and abs(ratio - round(ratio)) < 1e-9 * ratio:
                     return made
-        raise InputError("row length", given, f"1 ... {_MOST} whole seconds a row, or whole rows a second")
+        raise InputError("row length", given, f"1 ... {_MAX_RATIO} whole seconds a row, or whole rows a second")
 
 
 @dataclass(frozen=True, slots=True)

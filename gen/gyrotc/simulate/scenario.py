@@ -20,6 +20,10 @@ from .profile import AboveZero, Step
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 NonNegative = Annotated[float, Field(ge=0.0)]
+Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
+
+_FOLDER = Path(__file__).parent / "scenarios"
+_OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}  # of every recording, so no channel has such a name
 
 
 class _Strict(BaseModel):
@@ -92,12 +96,6 @@ class Laser(_Strict):
     null_dph_per_ppm: float = 1e-4
     null_growth_per_c: float = 0.0
     stroke_dph: float = 5e-4
-
-
-Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
-
-_FOLDER = Path(__file__).parent / "scenarios"
-_OWN_COLUMNS = {"time_s", "temperature_c", "rate_dph", "pulses"}
 
 
 class Chamber(_Strict):
