@@ -20,7 +20,7 @@ def say(text: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a user may set for a campaign.
+    """Settings of a campaign that a user may choose.
 
     Attributes:
         quick: Run a first small part of each kind of case, to see that the campaign works; no record is kept.

@@ -1,4 +1,4 @@
-"""What the runtime says of itself when something fails: true bias less correction, in units of sigma, and the status.
+"""Measure the runtime when something fails: true bias less correction, in units of its sigma, and its status.
 
 Each fault begins half an hour into a test run of simulated gyros with a supply voltage among their inputs; the
 compiled runtime gets a sample a second, and so did the recordings.

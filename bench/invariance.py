@@ -1,4 +1,4 @@
-"""What must not change a diagnosis, and whether it does.
+"""Diagnose recordings in equivalent forms, which must not change the result.
 
 Every set (packaged scenarios, axes of measured recordings) is diagnosed as it is, then with a constant added to the
 rate, another clock, seed or order of runs, each run twice, spans cut in two, rates that were written in deg/s, other
@@ -76,7 +76,7 @@ def shifted(constant_dph: float) -> Change:
 
 
 def in_degrees_per_second(rows: Rows) -> Rows:
-    """As they come back from a file with nine digits."""
+    """Return rows as they come back from a file in deg/s with nine digits."""
     return replace(rows, rate_dph=np.array([float(f"{v / 3600.0:.9g}") * 3600.0 for v in rows.rate_dph]))
 
 
@@ -160,7 +160,7 @@ VARIATIONS = {
 
 @dataclass(frozen=True)
 class Answer:
-    """What is compared of a diagnosis."""
+    """Parts of a diagnosis that are compared."""
 
     verdict: str
     causes: tuple[str, ...]

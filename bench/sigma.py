@@ -84,7 +84,7 @@ def exam_of(plan: str | Path, seed: int) -> Iterator[Recording]:
 
 
 def _model(folder: Path, terms: Sequence[Term]) -> Model:
-    """As `gyrotc fit` makes it, without the refits that only say how it was chosen."""
+    """Return the model that `gyrotc fit` makes, without the refits that only say how it was chosen."""
     dataset = load(folder)
     runs = [run for run in dataset.runs if run.role == "train"]
     options = FitOptions()

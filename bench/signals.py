@@ -1,4 +1,4 @@
-"""What channels gain on simulated gyros that nothing was tuned on.
+"""Measure what channels gain on simulated gyros that nothing was tuned on.
 
 Every world draws its own gyro: conductances, thermometers, differences of nodes, losses and expansion. Set 1 of the
 scenario `signals` trains, set 2, two weeks later, judges. The oracle knows the true bias: what it leaves is noise.

@@ -1,4 +1,4 @@
-"""What is emitted for measured gyros, judged on parts of their history that training has not seen.
+"""Judge what is emitted for measured gyros on parts of their history that training has not seen.
 
 Every axis of every set in a folder, with each of its parts left out in turn: a run of several; of a single chamber
 cycle its branches, its hot and its cold end; of a single ramp its ends and its middle. The ratio is the RMS over means
@@ -70,7 +70,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Judged:
-    """What was emitted for an axis of a split, and what it leaves.
+    """Result for an axis of a split: what was emitted, and what it leaves.
 
     Attributes:
         split: Which.
@@ -223,7 +223,7 @@ def _rms(exam: TrainingData, correction: NDArray[np.float64]) -> float:
 
 
 def counts(rows: Sequence[Judged]) -> dict[str, Any]:
-    """How often what is emitted is about as good as the best trivial correction, and how often it harms."""
+    """Count how often what is emitted is about as good as the best trivial correction, and how often it harms."""
     ratio = np.array([row.ratio for row in rows])
     of_constant = np.array([row.of_constant for row in rows])
     constant = np.array([row.method == "constant" for row in rows])

@@ -102,7 +102,7 @@ class Model:
         return self.known_biases
 
     def share(self, n: dict[str, Any], t: float, r: float) -> float:
-        """What a network of a bank counts for, before it is divided by the sum of all."""
+        """Return the weight of a network of a bank, before it is divided by the sum of all."""
         if n["region"] is None or len(self.raw["networks"]) == 1:
             return 1.0
         edges = (
@@ -399,7 +399,7 @@ def check_members(model: Model, image: Image, name: str) -> Iterator[str]:
 
 
 def sigma_of(model: Model) -> tuple[list[float], int]:
-    """What the uncertainty's words stand for, deg/h but for one that is a time in s, and the place of that one."""
+    """Return the numbers of the uncertainty, deg/h but for one that is a time in s, and the place of that one."""
     known = model.raw["uncertainty_dph"]
     if known is None or known.get("rules") is None:
         return [], -1

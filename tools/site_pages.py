@@ -1,4 +1,4 @@
-"""What the pages need to become a site (`make site`): MkDocs calls `on_files` and `on_page_markdown` (docs/mkdocs.yml).
+"""Turn the pages into a site (`make site`): MkDocs calls `on_files` and `on_page_markdown` (docs/mkdocs.yml).
 
 Pages that stand beside `docs/` come along below `sources/`, as do files that a page links to, so that no link is dead;
 words behind the language of a block, which say how a test runs it, go; pages that are made from the code

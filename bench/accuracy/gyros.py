@@ -1,4 +1,4 @@
-"""What the default training reaches on simulated gyros, and how it behaves when asked for more or given less.
+"""Measure what the default training reaches on simulated gyros, and how it behaves when asked for more or given less.
 
 Besides: the same samples in other units, in another order, and every one twice.
 """

@@ -1,4 +1,4 @@
-"""How the cost of whole commands grows with rows, runs, centers and units, and what the stages of a build cost."""
+"""Measure how the cost of commands grows with rows, runs, centers and units, and what the stages of a build cost."""
 
 from __future__ import annotations
 

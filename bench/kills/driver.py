@@ -41,7 +41,7 @@ def compiled_shim(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class Blow:
-    """What happens to a job.
+    """Interruption of a job.
 
     Attributes:
         action: One of `ACTIONS`; "" lets the job run undisturbed.
@@ -62,7 +62,7 @@ class Blow:
 
 @dataclass(frozen=True)
 class End:
-    """How a job ended: its exit status (-n: by signal n), its calls that change files, what it reported."""
+    """End of a job: its exit status (-n: by signal n), its calls that change files, what it reported."""
 
     status: int
     calls: int
@@ -154,7 +154,7 @@ def _child(job: Job, below: Path, blow: Blow, errors: int, counter: int) -> None
 
 
 def seconds(job: Job, below: Path) -> float:
-    """How long a job takes."""
+    """Return the time that a job takes, s."""
     begun = time.monotonic()
     end = run(job, below)
     if end.status != 0:

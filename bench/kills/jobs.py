@@ -27,7 +27,7 @@ def _nothing(_version: int) -> None:
 
 @dataclass(frozen=True)
 class Case:
-    """What is killed, and what it writes.
+    """Job that is killed, and what it writes.
 
     Attributes:
         write: The job; it is killed.
@@ -49,7 +49,7 @@ class Case:
         return lambda: self.write(version)
 
     def contents(self) -> tuple[Content, ...]:
-        """What its results hold now."""
+        """Return the present contents of its results."""
         return tuple(content(result) for result in self.results)
 
 
@@ -65,7 +65,7 @@ def content(result: Path) -> Content:
 
 
 def wrong(result: Path) -> list[str]:
-    """What keeps a result that is there from being complete."""
+    """Return the reasons why a result that exists is not complete."""
     if result.is_dir():
         return result_faults(result)
     try:

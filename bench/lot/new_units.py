@@ -1,4 +1,4 @@
-"""What a lot is worth for units that it has not seen, beside simple ways.
+"""Measure what a lot is worth for units that it has not seen, beside simple ways.
 
 Lots are simulated from physics (`gyrotc.simulate.lot`); 60 fully calibrated units teach, 40 others are calibrated from
 a single run of 2.5 h (0 C → 60 C, two hours there, → −40 C at 5 C/min), the first of them from longer programmes, too.
@@ -181,7 +181,7 @@ def _exam(data: TrainingData, noise: Floats) -> Exam:
 
 
 def programmes(data: TrainingData) -> list[tuple[str, TrainingData]]:
-    """What is recorded of a new unit."""
+    """Return what is recorded of a new unit, by the name of the programme."""
     last = data.run == _LAST_RUN
     first = float(data.time_s[last].min())
     return [

@@ -39,7 +39,7 @@ WAYS = ("as found", "offset only", "full", "chosen")
 
 
 def _changes(other: Fit) -> dict[str, Change]:
-    """What is added to the bias; the last makes a unit another one."""
+    """Return the changes of the bias by name; the last one makes a unit another one."""
     return {
         "none": lambda t, _: np.zeros(len(t)),
         "offset": lambda t, _: np.full(len(t), _SIZE_DPH),
@@ -121,7 +121,7 @@ def _changed(data: TrainingData, change: Change, replaced: Fit | None) -> Traini
 
 
 def _prior(early: TrainingData, known: Fit) -> EarlierPrior:
-    """As `jobs.recalibration` reads it from a result."""
+    """Return the prior that `jobs.recalibration` reads from a result."""
     process = known.process or fit_process(cleaned_samples(early), known.scaling)
     return widened(posterior_of_process(process, known.scaling), 0.0, "none", "0" * 64, None)
 

@@ -1,4 +1,4 @@
-"""What of a file is compared: its content without what may differ between two runs of the same program."""
+"""Reduce files to what is compared: their content without what may differ between two runs of the same program."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def digest_of(data: bytes) -> str:
 
 
 def content_of(path: Path) -> Any:
-    """What is compared of a file, as JSON: a document, columns of a table, lines of a text, or a hash."""
+    """Return what is compared of a file, as JSON: a document, columns of a table, lines of a text, or a hash."""
     if path.suffix in UNREAD:
         return "not read"
     data = path.read_bytes()

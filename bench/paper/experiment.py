@@ -58,7 +58,7 @@ class PaperGroup:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one method makes of one environment: exam means over 100 s, deg/h, and how many centers it took.
+    """Result of a method in an environment: means of a test run over 100 s, deg/h, and the number of centers.
 
     Attributes:
         before, after: Measured and compensated bias, shape (n,).
@@ -85,7 +85,7 @@ class Experiment:
     floor_dph: float
 
     def figures(self, *, whole: bool) -> dict[str, Any]:
-        """What docs/paper.md is made of, in deg/h: mean, σ and RMS before and after, and centers; else RMS after."""
+        """Return the figures of docs/paper.md, deg/h: mean, σ and RMS before and after, and centers; else RMS after."""
         before = {name: _figures(cell.before) for name, cell in self.cells["constant"].items()}
         after = {
             method: {name: _after(cell, whole) for name, cell in cells.items()} for method, cells in self.cells.items()

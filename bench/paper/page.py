@@ -138,7 +138,7 @@ def _gyros_table(gyros: Gyros) -> str:
 
 
 def _scatter_table(figures: Figures, samples: int) -> str:
-    """How much σ after compensation differs between the environments: ours, the paper's, and by chance."""
+    """Return a table of how much σ after compensation differs between the environments: paper, here, and by chance."""
     chance = f"{100.0 / np.sqrt(2.0 * samples):.1f} %"
     rows = []
     for method, published in AFTER_DPH.items():
@@ -298,7 +298,7 @@ def page_of(docs: Path, record: Mapping[str, Any]) -> str:
 
 
 def stale(docs: Path) -> Iterator[str]:
-    """What of the page and its figures is not made from the record beside them."""
+    """Yield what of the page and its figures is not made from the record beside them."""
     record = record_of(docs)
     there, made = (docs / "paper.md").read_text("utf-8"), page_of(docs, record)
     for old, new in zip(there.splitlines(), made.splitlines(), strict=False):

@@ -70,7 +70,7 @@ def _rms(exam: Sequence[ExamRows], peer: Correction) -> float:
 
 
 def _means(part: ExamRows, correction: np.ndarray) -> np.ndarray:
-    """What a correction of each block leaves, means of the scored rows."""
+    """Return what a correction of each block leaves, means of the scored rows."""
     after = part.rate_dph - np.nan_to_num(correction)[part.block]
     return average_rows(
         part.time_s,

@@ -47,7 +47,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Planted:
-    """What was planted: the run, when (s; None: in all of it), and under which names it is right."""
+    """Planted event: the run, when (s; None: in all of it), and under which names it is right."""
 
     run: int
     at_s: float | None

@@ -33,12 +33,12 @@ class Deviation:
     lines: range
 
     def covers(self, rule: str, path: Path, line: int) -> bool:
-        """Whether it permits what was found."""
+        """Test whether it permits what was found."""
         return rule == self.rule and (not self.lines or (path == self.path and line in self.lines))
 
 
 def deviations(root: Path) -> list[Deviation]:
-    """All that the sources declare."""
+    """Return all deviations that the sources declare."""
     found = []
     for path in files(root):
         text = path.read_text(encoding="ascii")

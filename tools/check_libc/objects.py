@@ -1,4 +1,4 @@
-"""What compilers make of libc/ and include/: warnings, symbols, data, fused operations."""
+"""Check what compilers make of libc/ and include/: warnings, symbols, data, fused operations."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def run(command: Sequence[str | Path], cwd: Path) -> subprocess.CompletedProcess
 
 
 def present(tool: str) -> Iterator[str]:
-    """What is broken if a tool is not there: a promise that was not checked is not kept."""
+    """Yield a fault if a tool is not there: a promise that was not checked is not kept."""
     if shutil.which(tool) is None:
         yield f"{tool} is not installed (tools/setup.sh check)"
 
