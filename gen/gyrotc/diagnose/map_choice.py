@@ -46,12 +46,10 @@ def _with_map(
 ) -> Search:
     y = records.target()
     channels = _channels(records)
+    colour = declared.colour(records.block_s) if declared else None
     for level in range(len(LEVELS)):
         say("computing the signatures of all causes")
-        bank = build_bank(records, level, lead_s)
-        if checked.sigma is not None:
-            bank = bank.weighted(records, checked.sigma)
-        colour = declared.colour(records.block_s) if declared else None
+        bank = build_bank(records, level, lead_s, checked.sigma)
         search = open_search(records, bank, y, channels=channels, sigma=checked.sigma, declared=colour)
         if level + 1 == len(LEVELS) or fits_exactly(records, level + 1) or not needs_finer(search):
             break

@@ -1,9 +1,9 @@
-"""Signatures of all candidates as block means, with their inner products: they depend on the temperatures alone."""
+"""Signatures of all candidates on the recorded temperatures, as block means, with their inner products in noise."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -38,7 +38,7 @@ class Signature:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A shape that no cause has (`candidates.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
+    """A shape that no cause has (`shapes.Shape`) and where its columns lie in `SignatureBank.alternatives`."""
 
     name: str
     parameters: int
@@ -49,7 +49,7 @@ class Alternative:
 
 @dataclass(frozen=True)
 class SignatureBank:
-    """Everything of the search that does not depend on the rates.
+    """Everything of the search that does not depend on the block means of the rate.
 
     Attributes:
         basis, map: The static map and its block means, shape (N, m), orthonormal.
@@ -61,8 +61,8 @@ class SignatureBank:
         replaced: Map of the changed inputs, shape (len(inputs), N, m).
         known: Blocks where the changed inputs are known, shape (len(inputs), N).
         common: From signatures to their principal directions, weighted by how much they share, shape (K, p).
-        grams: Inner products of (map, signatures) under each colour, shape (len(COLOURS), m + K, m + K).
-        log_dets: log det of each colour's covariance.
+        grams: Inner products of (map, signatures) under each colour, shape (len(NOISE_COLOURS), m + K, m + K).
+        log_dets: log det of each colour's covariance, shape (len(NOISE_COLOURS),).
         untestable: Why a cause cannot be tested, by id.
         finer: Functions of the next finer map that this one lacks, shape (N, q).
         alternatives, alternative_groups: Shapes that no cause has, shape (N, Q), columns of norm 1 or groups of
@@ -86,14 +86,16 @@ class SignatureBank:
     alternatives: FloatArray
     alternative_groups: tuple[Alternative, ...]
 
-    def weighted(self, records: Records, sigma: FloatArray) -> SignatureBank:
-        """Return the signatures under noise that varies from block to block, by a factor `sigma`, shape (N,)."""
-        grams, log_dets = _grams(records, self.map, self.signatures, sigma)
-        return replace(self, grams=grams, log_dets=log_dets)
 
+def build_bank(records: Records, level: int, lead_s: float = 0.0, sigma: FloatArray | None = None) -> SignatureBank:
+    """Compute the bank of a map.
 
-def build_bank(records: Records, level: int, lead_s: float = 0.0) -> SignatureBank:
-    """Compute the bank of the map of a level (`static_map.LEVELS`) and of a lead (`static_map.MapBasis`)."""
+    Args:
+        records: The runs.
+        level: Of `static_map.LEVELS`.
+        lead_s: Of the map, as in `static_map.MapBasis`.
+        sigma: Factor of the noise of every block, shape (N,); None: even.
+    """
     basis, static = make_basis(records, level, lead_s)
     groups, columns, untestable = _columns(records)
     raw = np.column_stack(columns)
@@ -102,7 +104,7 @@ def build_bank(records: Records, level: int, lead_s: float = 0.0) -> SignatureBa
     scale = _scale(rest, raw, groups)
     signatures = rest / scale
     inputs, replaced, known = changed_inputs(records, basis)
-    grams, log_dets = _grams(records, static, signatures, None)
+    grams, log_dets = _grams(records, static, signatures, sigma)
     alternatives, alternative_groups = _alternatives(records)
     return SignatureBank(
         basis=basis,
@@ -228,5 +230,5 @@ def _dictionary(records: Records) -> FloatArray:
 
 
 def direction_of(records: Records) -> FloatArray:
-    """Return by how much a play of the temperature differs from it, C, shape (N,): the sign of the last change."""
+    """Return a play of the temperature less the temperature, C, shape (N,): negative after warming."""
     return records.columns(lambda h: play(DIRECTION_C, h.temperature_c) - h.temperature_c)

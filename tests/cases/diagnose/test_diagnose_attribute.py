@@ -37,6 +37,7 @@ from gyrotc.diagnose import (
     Whitener,
     attribute,
     best_of,
+    build_bank,
     cancelling,
     centred_slope,
     choose,
@@ -633,7 +634,7 @@ def test_the_banks_inner_products_are_those_of_whitened_columns(campaign: Campai
     white = whiten(np.column_stack([bank.map, bank.signatures]))
     assert np.allclose(bank.grams[number], white.T @ white, rtol=1e-9, atol=1e-12)
     sigma = np.linspace(0.5, 2.0, records.size)
-    uneven = bank.weighted(records, sigma)
+    uneven = build_bank(records, 0, sigma=sigma)
     even = uneven.log_dets[number] - 2.0 * np.log(sigma).sum()
     assert even == pytest.approx(bank.log_dets[number])
 
