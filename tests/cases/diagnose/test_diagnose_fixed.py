@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from named_causes import named_causes
 
 from tests.blind.fixed import recordings
@@ -12,8 +11,7 @@ from tests.blind.fixed import recordings
 BLOCK_S = 250.0  # longer than by default: fewer blocks take less time
 
 
-def test_each_hidden_cause_is_named_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def test_each_hidden_cause_is_named_and_no_other(tmp_path: Path) -> None:
     answers = {}
     for folder, hidden in recordings(tmp_path):
         answers[folder.name, hidden] = named_causes(folder, BLOCK_S, BLOCK_S)

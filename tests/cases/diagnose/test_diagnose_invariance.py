@@ -89,8 +89,6 @@ def drawing() -> Drawing:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory, drawing: Drawing) -> Callable[[str], Case]:
     """A recording with one cause hidden at k = 3.5 ("" for none)."""
-    patch = pytest.MonkeyPatch()
-    patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
     known: dict[str, Case] = {}
 
     def make(cause: str) -> Case:
@@ -104,8 +102,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, drawing: Drawing) -> Callable
             known[cause] = Case(records, declared, folder, answer(records, declared))
         return known[cause]
 
-    yield make
-    patch.undo()
+    return make
 
 
 def changed(records: Records, change: Callable[[RunRecord], RunRecord]) -> Records:

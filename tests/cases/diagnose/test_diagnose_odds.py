@@ -361,10 +361,7 @@ def test_a_memory_shows_in_half_hours_and_goes_when_the_simulation_has_it(campai
     assert extended["half_hour_means_rms_dph"] > 0.01
 
 
-def test_a_ripple_over_temperature_needs_a_finer_map_and_a_memory_does_not(
-    campaign: Campaign, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("banks")))
+def test_a_ripple_over_temperature_needs_a_finer_map_and_a_memory_does_not(campaign: Campaign) -> None:
     finer = campaign.bank.finer @ np.random.default_rng(SEED_OF_DISCREPANCY).standard_normal(
         campaign.bank.finer.shape[1]
     )

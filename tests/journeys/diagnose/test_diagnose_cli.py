@@ -1,4 +1,4 @@
-"""A diagnosis through the installed command: named, extended, emitted, verified, shown, reported in words, cached."""
+"""A diagnosis through the installed command: named, extended, emitted, verified, shown, reported in words."""
 
 from __future__ import annotations
 
