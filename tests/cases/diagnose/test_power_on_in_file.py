@@ -19,11 +19,19 @@ from recordings import toml, write_csv
 
 ROW_S, BACK_S = 10.0, 7800.0
 WARM_UP = {"tau_s": 1000.0, "amplitude_dph": 0.05}
+TERM = {"id": "warm_up", "parameters": WARM_UP, "channel": None}
 
 
 def warm_up(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     on_s = np.where(time_s < BACK_S, time_s, time_s - BACK_S)
     return np.asarray(WARM_UP["amplitude_dph"] * np.exp(-on_s / WARM_UP["tau_s"]))
+
+
+def model_of(model_dict: dict[str, Any], dataset: Dataset, *terms: dict[str, Any]) -> Model:
+    """A map that is 0 everywhere, with terms."""
+    plane = {"w0": 0.0, "linear": [0.0, 0.0], "centers": [], "widths": [], "weights": [], "region": None}
+    plain = {"coverage": None, "uncertainty_dph": None, "networks": [plane], "block_s": ROW_S}
+    return Model.from_dict({**model_dict, **plain, "serial": dataset.serial, "terms": list(terms)})
 
 
 @pytest.fixture(params=[60.0, 600.0])
@@ -46,10 +54,7 @@ def test_the_diagnosis_takes_the_warm_up_off_both_runs(recorded: Dataset, *, bri
 
 
 def test_emitted_tables_are_switched_on_with_the_gyro(recorded: Dataset, model_dict: dict[str, Any]) -> None:
-    plane = {"w0": 0.0, "linear": [0.0, 0.0], "centers": [], "widths": [], "weights": [], "region": None}
-    plain = {**model_dict, "coverage": None, "uncertainty_dph": None, "networks": [plane], "block_s": ROW_S}
-    term = {"id": "warm_up", "parameters": WARM_UP, "channel": None}
-    models = [Model.from_dict({**plain, "terms": terms}) for terms in ([], [term])]
+    models = [model_of(model_dict, recorded), model_of(model_dict, recorded, TERM)]
     for without, corrected in zip(*emitted_means(models, recorded.runs, 100.0), strict=True):
         assert len(without.time_s) > 60
         assert np.abs(without.after_dph).max() > 0.5 * WARM_UP["amplitude_dph"]
@@ -59,11 +64,7 @@ def test_emitted_tables_are_switched_on_with_the_gyro(recorded: Dataset, model_d
 def test_evaluation_switches_the_target_on_with_the_gyro(
     recorded: Dataset, model_dict: dict[str, Any], tmp_path: Path
 ) -> None:
-    plane = {"w0": 0.0, "linear": [0.0, 0.0], "centers": [], "widths": [], "weights": [], "region": None}
-    plain = {**model_dict, "coverage": None, "uncertainty_dph": None, "networks": [plane], "block_s": ROW_S}
-    term = {"id": "warm_up", "parameters": WARM_UP, "channel": None}
-    model = Model.from_dict({**plain, "serial": recorded.serial, "terms": [term]})
-    emit(model, tmp_path / "out")
+    emit(model_of(model_dict, recorded, TERM), tmp_path / "out")
     found = evaluate(tmp_path / "out", recorded, average_s=100.0, compiled=False)
     for run in found.runs:
         assert run.before.max_abs_dph > 0.5 * WARM_UP["amplitude_dph"]
