@@ -29,11 +29,11 @@ from .wide_memory import WideMemory, outlasts, rate_independent
 # Level of the whole search, and of what causes leave: chance alone exceeds it in one of a hundred campaigns
 # (docs/diagnosis.md).
 LEVEL = 0.01
-# A pair or three causes are taken for the whole explanation where what they leave has at least this p-value.
+# A pair or three causes are taken for the whole explanation if what they leave has at least this p-value.
 _WELL = 0.08
-# Where they explain nearly all of the structure, no cause of the catalogue is exact enough for that: this one will do.
-_NEARLY = 1e-5
+# If they explain at least this share of the structure, the lower p-value is enough, as no formula is exact.
 _MOST = 0.95
+_NEARLY = 1e-5
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def project(search: Search, view: View, held: Held) -> Projection:
 
 
 def _without_map(search: Search) -> FloatArray:
-    """Return the projection of the joined columns for a model without the map, shape (P, P)."""
+    """Return the matrix from the joined columns to those of a model without the map, shape (P, P)."""
     joined = search.joined
     layout = joined.layout
     mix = np.eye(layout.total)

@@ -16,9 +16,7 @@ from ..quality.event_findings import found_events
 from ..quality.judgement import Judged, judge
 from ..recordings.records import Dataset, Run
 from ..results.base import Finding
-from ..results.diagnosed import (
-    Diagnosed,
-)
+from ..results.diagnosed import Diagnosed
 from ..results.training import Training
 from ..train.channels import FallbackModel
 from ..train.data import TrainingData
@@ -37,8 +35,6 @@ from .single_cycle import Cycle, cycle_of, is_single_cycle
 from .static_map import fits_exactly
 from .summary import not_testable, result_of
 from .verdict import holds
-
-__all__ = ["Diagnosis", "diagnose"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,7 @@ class Diagnosis:
     cycle: Cycle | None = None
 
 
-# As `gyrotc diagnose -v` measures them on data of `gyrotc simulate paper`.
+# Share of the time of each stage, as `gyrotc diagnose -v` measures it on data of `gyrotc simulate paper`.
 _STAGES = {
     "reading": 0.3,
     "screening": 0.01,

@@ -116,7 +116,7 @@ class MarginalLikelihood:
         return own, own - best
 
     def _unknown(self, near: _Near) -> NDArray[np.bool_]:
-        """Test which blocks one of the models does not know, shape (N,)."""
+        """Return a mask of the blocks that at least one of the models does not know, shape (N,)."""
         left_out = np.zeros(self.gains.size, dtype=bool)
         for member in (m for points in near.values() for p in points for m in p.members if m.role == "input"):
             left_out |= ~self.bank.known[self.bank.inputs.index(member)]

@@ -1,9 +1,7 @@
 """Noise of block means: covariance models, the grid of colours, the declared noise, whitening.
 
 A colour is white noise of standard deviation 1 (of block means) plus a slow part; the scale is estimated
-for each colour. Estimation is by residual likelihood (Patterson and Thompson 1971): the part of the data
-that the map and every signature of the catalogue span is projected out first, so that no effect is taken
-for noise.
+for each colour (`search`).
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ class Colour:
     Attributes:
         white: Variance of the white part, of block means.
         slow: Variance of the Markov part before averaging.
-        tau_s: Correlation time of the Markov part, s; 0: flicker (six decades of Markov processes).
+        tau_s: Correlation time of the Markov part, s; 0: flicker (`flicker_row`).
         walk: Variance that a rate random walk gathers in an hour.
         quantum: Variance of the angle at each edge of a block, over block_s².
     """

@@ -21,6 +21,9 @@ from ..train.detrending import INDEPENDENT_S, DetrendedBins, detrend, smooth_bas
 from .candidates import searched
 from .played import Effect, Played, chosen_samples, sample_masks, samples_beside, terms_of
 
+# Widths that are tried, over that of the loop of one strength: in steps of 8 %.
+_WIDTH_FACTORS = np.geomspace(0.6, 1.0 / 0.6, 15)
+
 
 def completed(
     runs: Sequence[Played],
@@ -94,9 +97,6 @@ def _energy(bins: DetrendedBins, columns: list[FloatArray]) -> float:
     return float(((q.T @ bins.residual) ** 2).sum())
 
 
-_ABOUT = np.geomspace(0.6, 1.0 / 0.6, 15)  # widths about that of a loop of one strength, each 7 % from the next
-
-
 class _Loops:
     """Loops beside other effects, any smooth map and any intercepts of power-ons, as means of samples over 100 s.
 
@@ -151,7 +151,7 @@ def _over_temperature(loops: _Loops, effect: Effect) -> Effect:
     """
     over, over_temperature = searched(effect.id).over, effect.term.over_temperature
     assert over is not None and over_temperature is not None
-    able = [{**effect.values, over: float(value)} for value in effect.values[over] * _ABOUT]
+    able = [{**effect.values, over: float(value)} for value in effect.values[over] * _WIDTH_FACTORS]
     columns = [loops.columns(Effect(effect.id, dict(over_temperature(own, 1.0, 0.0, 0.0)))) for own in able]
     constant = min(_left(column[:, :1], loops.y) for column in columns)
     left = [_left(column, loops.y) for column in columns]

@@ -25,7 +25,10 @@ from .search import Search
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything that is known before an extension is made: beside the search's inner products, rows need not fit.
+    """Everything that is known before an extension is made.
+
+    The search is not part of it: its inner products, and the rows that an extension reads, need not fit into memory
+    together.
 
     Attributes:
         records: Training runs.
@@ -56,15 +59,15 @@ class Analysis:
     def left_dph(self, *, named: bool) -> FloatArray:
         """Return the residual of the map, or of map and causes if `named`, deg/h, shape (N,).
 
-        As large as the noise is of which they have taken a part. Causes without a name are no finding: another length
-        of a block finds others, which take a quarter more or less.
+        It is scaled up to the size of the noise, of which map and causes have taken a part. Causes without a name are
+        no finding: another length of a block finds others, which take a quarter more or less.
         """
         fitted = self.extended if named and self.extended is not None else self.ensemble
         return np.asarray(fitted.residual * np.sqrt(fitted.residual.size / max(fitted.freedom, 1)))
 
 
 def analyse(records: Records, declared: Declared | None, say: Progress = silent) -> Analysis:
-    """Everything from rows to named causes."""
+    """Run all stages from the records to the named causes."""
     say("screening")
     screened = screen(records)
     search = search_of(records, declared, screened, say)

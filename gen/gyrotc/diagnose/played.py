@@ -42,7 +42,7 @@ class Effect:
 
     @staticmethod
     def of(cause: Refined) -> Effect:
-        """The effect with the middle of every interval."""
+        """The effect with the estimate of every parameter."""
         values = {name: interval.value for name, interval in cause.parameters.items()}
         own = {name: v for name, v in (cause.candidate.values | values).items() if name != OVERTONES}
         return Effect(cause.candidate.id, own, cause.candidate.channel)
@@ -63,7 +63,7 @@ class Played:
         course: Every correction of the run as terms see it.
         slope: C per block, of every correction.
         begins_s: Where means of the run begin, s.
-        on_s: Time since power-on at the start of every training sample, s; since the first row where it is not known.
+        on_s: Time since power-on at the start of every training sample, s; on the file's clock where it is not known.
         day: Days since the first run, or None.
         channels: The channels at every correction.
         block_s: Length of a block, s.
@@ -222,7 +222,7 @@ def samples(run: Played, effects: Sequence[Effect]) -> TrainingData:
 
 
 def known(run: Played, effects: Sequence[Effect]) -> NDArray[np.bool_]:
-    """Test which samples say something beside the effects, shape (n,).
+    """Return a mask of the samples that say something beside the effects, shape (n,).
 
     Those do not whose input is not known, as at the end of a run that was recorded late, and in training those whose
     states are not, as behind a gap.

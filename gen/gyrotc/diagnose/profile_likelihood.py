@@ -79,9 +79,14 @@ CauseSet = tuple[Candidate, ...]
 
 @dataclass(frozen=True)
 class _Base:
-    """Data and columns with a map (plain or of another input) projected out.
+    """Inner products of columns and data, whitened, with a map (plain or of another input) projected out.
 
-    `columns`: all bank columns and channel columns, whitened and projected, over the noise scale.
+    Attributes:
+        candidate: Cause that changes the map's input; None: the plain map.
+        gain: Gain of what is projected out over the plain map.
+        gram: Inner products of all bank and channel columns, shape (K, K).
+        a: Inner products of these columns with the data over the noise scale, shape (K,).
+        taken: Columns that are projected out in addition to the map; None: there are none.
     """
 
     candidate: Candidate | None

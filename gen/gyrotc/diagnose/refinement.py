@@ -269,7 +269,7 @@ def _result(search: Search, fit: _Fit, members: list[Candidate], k: int, profile
         parameters[parameter.name] = Interval(members[k].values[parameter.name], low, high)
     tangents = [_tangent(search, m, None) if m is not members[k] else tangent for m in members]
     spread = _spread(fit, design, [t for t in tangents if t is not None], start, own.shape[1])
-    parameters |= _amplitudes(members[k], mine, spread, fit, own)
+    parameters |= _amplitudes(members[k], mine, spread, own)
     edges = fit.edges if _unseen_s(members[k]) else None
     return Refined(members[k], own, tangent, parameters, np.asarray(contribution), edges, profile)
 
@@ -301,7 +301,7 @@ def _spread(fit: _Fit, design: FloatArray, tangents: list[FloatArray], start: in
 
 
 def _amplitudes(
-    candidate: Candidate, weights: FloatArray, spread: FloatArray, fit: _Fit, columns: FloatArray
+    candidate: Candidate, weights: FloatArray, spread: FloatArray, columns: FloatArray
 ) -> dict[str, Interval]:
     """Linear parameters by the term's own rule, with intervals."""
     term = terms.CATALOGUE[candidate.id]

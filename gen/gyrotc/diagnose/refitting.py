@@ -50,7 +50,7 @@ class Refitting:
     """Training runs after the front end, and the options of every fit.
 
     The runs of the data set are those that `Judged.cut` returns. For a single cycle the map that is fitted with any
-    effect depends on T alone (see `cycle`).
+    effect depends on T alone (see `single_cycle`).
     """
 
     def __init__(

@@ -29,7 +29,6 @@ class ScoredColumns:
         single: Columns that are candidates alone, shape (s,).
         pairs: Candidates of two columns, shape (q, 2).
         variance: Candidates whose weights have one common variance.
-        structure: Columns (of `Projection.common`) for the omnibus test.
     """
 
     single: IntArray

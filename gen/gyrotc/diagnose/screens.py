@@ -57,13 +57,14 @@ def screen(records: Records) -> Screened:
 
 
 def _variance(records: Records) -> tuple[FloatArray | None, float, float]:
-    """Test whether the quick part of the noise depends on |dT/dt|, T or the time since power-on.
+    """Estimate how the quick part of the noise depends on |dT/dt|, T and the time since power-on.
 
     The log of the mean squared difference of neighbouring rows in a block (of neighbouring blocks where a
     block is one row) is regressed on smooth functions of the three (Breusch and Pagan's idea, robust).
 
     Returns:
-        Factor of every block's standard deviation or None, p-value, ratio of largest to smallest (95 % range).
+        Factor of every block's standard deviation (None if it is even), p-value, and ratio of the largest to the
+        smallest factor (95 % range).
     """
     value, at = _quick_power(records)
     design = _variance_design(records)

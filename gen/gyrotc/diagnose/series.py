@@ -28,8 +28,6 @@ from .detection import Found
 from .diagnosis import Diagnosis
 from .refinement import Refined
 
-__all__ = ["series_of"]
-
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _FAR_BELOW = -1e6  # of a parameter that cannot be; JSON has no infinity

@@ -296,7 +296,7 @@ def _limit(limit: CauseLimit) -> DetectionLimit:
 
 
 def _unexplained(analysis: Analysis) -> Unexplained:
-    """Return the unexplained structure: the share of the best cause, and the place of the rest."""
+    """Return the share of the structure that the best causes explain, and what the rest looks like."""
     attribution = analysis.attribution
     return Unexplained(
         share_explained=attribution.left.share,

@@ -1,4 +1,4 @@
-"""Shares below which a column or a direction says nothing beside others; of rounding errors `statistics.TOLERANCE`."""
+"""Shares below which a column or a direction says nothing beside others; `statistics.TOLERANCE` is for rounding."""
 
 from __future__ import annotations
 

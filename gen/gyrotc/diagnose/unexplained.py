@@ -130,7 +130,7 @@ class _NestedModels:
         return best
 
     def bent(self, k: int) -> Contest:
-        """Test whether a map of moved inputs needs more of the rate than a factor, more than that of plain inputs does.
+        """Return by how much a map of moved inputs bends over dT/dt more than one of plain inputs, less a tolerance.
 
         A late map imitates memories that act other than in proportion by bending over dT/dt. The map of a true
         lag is less bent there than the one that stands in for it.
@@ -190,7 +190,7 @@ class Misfit:
 
 
 def misfit(current: Search, held: Held, causes: Sequence[Refined], chance: int = 0) -> Misfit:
-    """Test whether anything is left.
+    """Return how significant and how large the structure is that causes leave.
 
     Args:
         current: The search with the causes taken.

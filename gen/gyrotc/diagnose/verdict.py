@@ -225,7 +225,7 @@ def shows_as(cause: str, wide: WideMemory | None) -> str:
 
 
 def _possible(causes: Sequence[NamedCause]) -> Iterator[str]:
-    """Return in words what remains possible in the place of each cause, with probabilities and channels."""
+    """Yield in words what remains possible in the place of each cause, with probabilities and channels."""
     for cause in causes:
         for id in cause.equivalent:
             share = (cause.probabilities or {}).get(id)
