@@ -97,9 +97,9 @@ def calibrated_units(fleet: Path, axis: str | None) -> tuple[list[CalibratedUnit
     if not fleet.is_dir():
         raise InputError(str(fleet), "is no folder", "what gyrotc fleet wrote")
     summary = read_optional(fleet / "fleet.json", FleetSummary)
-    found = sorted(p.parent for p in fleet.glob("*/training.json"))
+    folders = sorted(p.parent for p in fleet.glob("*/training.json"))
     listed = {unit.name: unit for unit in summary.serials} if summary else None
-    places = [place for place in found if listed is None or place.name in listed]
+    places = [place for place in folders if listed is None or place.name in listed]
     units = [calibrated_unit(place) for place in places if not (listed and listed[place.name].barred)]
     axes = sorted({str(u.model.axis) for u in units if u.model.axis})
     if axis is None and axes:
@@ -108,7 +108,7 @@ def calibrated_units(fleet: Path, axis: str | None) -> tuple[list[CalibratedUnit
     chosen = [u for u in of_axis if u.by_itself]
     distinct = {u.model.serial: u for u in chosen}
     counts = {
-        "not in fleet.json": len(found) - len(places),
+        "not in fleet.json": len(folders) - len(places),
         "barred by a finding of the fleet": len(places) - len(units),
         "of another axis": len(units) - len(of_axis),
         "calibrated with a lot or an earlier model": len(of_axis) - len(chosen),
@@ -116,8 +116,8 @@ def calibrated_units(fleet: Path, axis: str | None) -> tuple[list[CalibratedUnit
     }
     left_out = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
     if len(distinct) < LEAST_UNITS:
-        enough = f"{len(distinct)} calibrated units" + (f", {left_out}" if left_out else "")
-        raise InputError(str(fleet), enough, f"{LEAST_UNITS} at least")
+        found = f"{len(distinct)} calibrated units" + (f", {left_out}" if left_out else "")
+        raise InputError(str(fleet), found, f"{LEAST_UNITS} at least")
     return [*distinct.values()], left_out
 
 

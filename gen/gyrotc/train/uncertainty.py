@@ -340,7 +340,7 @@ def uncertainty_of(
         added: What terms add to the map at each sample of `data`, deg/h.
     """
     samples = cleaned_samples(data)
-    process = fit.process or fit_process(samples, fit.scaling, _power_on(samples, fit))
+    process = fit.process or fit_process(samples, fit.scaling, fit.power_on)
     errors = _Errors.of(process, fit)
     at_samples = errors.at_samples(samples)
     t, r = _points(fit)
@@ -365,12 +365,8 @@ def uncertainty_of(
     }
 
 
-def _power_on(samples: TrainingData, fit: Fit) -> NDArray[np.int64]:
-    return np.arange(int(samples.run.max()) + 1) if fit.power_on is None else fit.power_on
-
-
 def _asked(samples: TrainingData, process: Process) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
-    """Return where corrections are asked for, C and C/min, and weights: as the samples or a lot's units show."""
+    """Return where corrections are asked for, C and C/min, and weights: as samples or prior show."""
     if process.asked is None:
         return (samples.temperature_c, samples.slope_c_per_min), samples.weight
     return (process.asked.temperature_c, process.asked.slope_c_per_min), process.asked.share

@@ -176,12 +176,11 @@ def test_a_reason_without_a_fail_is_refused(passing: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("text", ["schema = 1"])
-def test_no_limits_are_no_pass(tmp_path: Path, text: str) -> None:
+def test_no_limits_are_no_pass(tmp_path: Path) -> None:
     """Before: a limits file of `schema = 1` alone gave "limits: PASS"."""
     from gyrotc.cli.results import verdict_words
 
-    folder = _built(tmp_path, text)
+    folder = _built(tmp_path, "schema = 1")
     held = json.loads((folder / "limits.json").read_text())
     assert (held["met"], held["verdict"], held["limits"]) == (False, None, [])
     unit = unit_of(folder)
