@@ -109,8 +109,8 @@ class Cluster:
     """A Dask cluster.
 
     Attributes:
-        address: Of its scheduler.
-        wait_s: How long a fleet waits where there is no worker.
+        address: Address of the scheduler.
+        wait_s: Longest time that a fleet waits for a first worker, s.
         say: Called with what is waited for, and with the address of the dashboard.
     """
 

@@ -78,10 +78,10 @@ class Task:
         unit: Its recordings by an absolute path: a worker may run in another folder.
         shown: The path as the user has typed it.
         fleet: The options; without the other units.
-        out: Where the result goes, absolute.
+        out: Absolute path of the result.
         program: Hash of the program that asks for it.
         key: Hash of what it is to be made of, as the one who asks has found it; empty: that could not be read.
-        version: Of the gyrotc that asks for it.
+        version: Version of the gyrotc that asks for it.
     """
 
     unit: Unit

@@ -249,7 +249,8 @@ def drawing(
     """Draw panels in a grid as one `<svg>` element, with one legend above.
 
     Args:
-        height: Of the axes of a row, points; `heights`: of each row.
+        height: Height of the axes of a row, points.
+        heights: Height of each row, in place of `height`.
         share_x, share_y: All panels have one range; a shared y axis is written at the left only.
     """
     rows = -(-len(panels) // columns)

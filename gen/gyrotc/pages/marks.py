@@ -115,7 +115,7 @@ def scale_of(
     Args:
         numbers: Finite, shape (n,); n may be 0.
         limits: From and to, where they are given.
-        log: Whether it is logarithmic; a number: linear up to there.
+        log: True for a logarithmic axis; a number: linear up to there.
         margin: Room at either side, as a share of the range; none at a given limit.
         whole: Only whole numbers are written.
     """

@@ -138,7 +138,7 @@ class Limit(Part):
         default=(), description="reasons why the verdict is no PASS although the figure may be within its bound"
     )
     constant: Figure = Field(
-        default=None, description="the same figure with a constant as correction; null if there is none"
+        default=None, description="this figure with a constant as correction; null if there is none"
     )
     constant_passes: bool = Field(
         default=False,

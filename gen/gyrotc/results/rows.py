@@ -37,11 +37,11 @@ class RowsCount(Part):
 class LeftOutRows(Part):
     """A stretch of rows that were left out."""
 
-    file: str = Field(description="as in `dataset.toml`")
+    file: str = Field(description="name of the file in `dataset.toml`")
     from_s: float = Field(description="time of the first row, s")
-    to_s: float = Field(description="half a row after the last, s")
+    to_s: float = Field(description="time half a row after the last one, s")
     rows: Annotated[int, Field(ge=1)] = Field(description="number of rows")
-    reason: str = Field(description="why they were left out")
+    reason: str = Field(description="reason why the rows were left out")
 
 
 class RowsUsed(RowsCount):
