@@ -227,6 +227,15 @@ class _Solution:
 
     A column of which the others hold all but a billionth of its energy gets next to nothing: what is left of it is
     rounding. Sums of products show no less.
+
+    Attributes:
+        own_scale, map_scale: Reciprocal norms of the own columns of each run, shape (runs, k), and of the map's, (p,).
+        own_root, map_root: Cholesky factors of the products of the scaled columns, those of the map beside the own
+            ones, shape (runs, k, k) and (p, p).
+        held: Inner products of map and rate with each run's own columns made orthonormal, shape (runs, k, p + 1).
+        map_held: Those of the rate with the map's columns made orthonormal beside the own ones, shape (p,).
+        left: Sum of the squares that the fit leaves.
+        rank: Number of columns that the others do not hold.
     """
 
     def __init__(self, products: FloatArray, own: int) -> None:

@@ -108,8 +108,8 @@ def piles(rate: FloatArray) -> Iterator[tuple[Repeats, IntArray]]:
 
     Rows within an octave of one another are one stretch: what lies between two rows at an end stop is the part of the
     noise that the stop did not cut off. Where a stop is within the noise of the rows beside it, stretches need one row
-    in 16 there: fewer shift the mean by less than a thirtieth of the noise, and leaving them out would shift it by four
-    times as much.
+    in 16 there: fewer shift the mean by less than a thirtieth of the noise, and leaving them out would shift it by more
+    than four times as much.
     """
     n = len(rate)
     if n == 0 or len(np.unique(rate[:_SAMPLE])) < _MIN_LEVELS:
