@@ -29,7 +29,8 @@ from .blocks import Records
 _FEWEST_PIECES = 12  # a bootstrap of fewer pieces has limits that are single pieces
 _SEED = 1  # of the draws
 _DRAWS = 1000  # 25 draws lie beyond each limit of the middle 95 %
-_FAR = 4.0  # robust standard deviations: a difference beyond says no more of the floor than one of as much
+# Larger differences are clipped, in robust standard deviations, so that outliers do not raise the floor.
+_CLIP_SIGMAS = 4.0
 
 
 def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float) -> list[list[Averages]]:
@@ -38,7 +39,7 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
     A target is switched on with its gyro: where the file goes on from before the power-on of a run, the replay begins
     at the power-on.
 
-    At which temperatures is not asked (NaN): beside the histories they would be what fills memory.
+    Temperatures of the means are NaN: in addition to the histories they would fill the memory.
     """
     tables = [next(iter(quantise_all(model, None).tables.values())) for model in models]
     found: list[list[Averages]] = [[] for _ in models]
@@ -62,9 +63,9 @@ def emitted_means(models: Sequence[Model], runs: Sequence[Run], average_s: float
 
 
 def _followed(run: Run, model: Model, table: Table) -> FollowedHistory:
-    """A history made when the rows are gone, which take more than it; of its samples nothing is kept.
+    """Return the history of a run without its samples, made after the rows are freed, which take more memory.
 
-    So what a call of `sample` returns is not known; corrections, and which blocks are valid, are.
+    What a call of `sample` returns is therefore not known; corrections, and which blocks are valid, are.
     """
     rows = replace(_rows_since_power_on(run), rate_dph=np.zeros(0))
     channels, missed, per_block = replay_inputs(rows, run, model, table)
@@ -84,16 +85,22 @@ def _rows_since_power_on(run: Run) -> Rows:
 
 
 def floor_of(records: Records, left_dph: FloatArray, average_s: float) -> float:
-    """Noise floor of means over `average_s`, deg/h: the Allan deviation of what map and causes leave of block means.
+    """Return the noise floor of means over `average_s`, deg/h.
 
-    Of these, shape (N,), and not of what a correction leaves: its delay is far above the noise on a quick ramp. From
-    all differences of neighbouring means, so that it does not hang on where means begin; a far one counts as less.
+    The floor is the Allan deviation of the residuals of the block means. Residuals of a correction would not do: on a
+    quick ramp its delay is far above the noise. All pairs of neighbouring means are used, so the result does not
+    depend on where the means begin.
+
+    Args:
+        records: Runs with the blocks that `left_dph` belongs to.
+        left_dph: Block means less map and causes, shape (N,).
+        average_s: Averaging time of the floor.
     """
     width = max(round(average_s / records.block_s), 1)
     run = np.repeat(np.arange(len(records.kept)), [kept.size for kept in records.kept])
     parts = stretches(left_dph, np.concatenate(records.kept).astype(float), run, 1.0)
     steps = np.abs(np.concatenate([steps_of(p, width) for p in parts if p.size >= 2 * width] or [left_dph]))
-    near = np.minimum(steps, _FAR * MAD_TO_SIGMA * np.median(steps))
+    near = np.minimum(steps, _CLIP_SIGMAS * MAD_TO_SIGMA * np.median(steps))
     return float(np.sqrt(np.mean(near**2) / 2.0 * width * records.block_s / average_s))
 
 

@@ -1,4 +1,4 @@
-"""The stages of `gyrotc diagnose` in order: screen, noise, compare, detect, attribute, measure."""
+"""Run the stages of `gyrotc diagnose` before the extension: screen, search, attribute, compare with the simulation."""
 
 from __future__ import annotations
 
