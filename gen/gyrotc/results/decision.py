@@ -22,8 +22,8 @@ def decision_of(limits: HeldLimits | None, verification: Verification | None, ev
 def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool, *, diagnosed: bool) -> str:
     """Return what to do next with a unit, one step.
 
-    What makes the recordings worthless comes first. A diagnosis is made of the recordings that are there, so it comes
-    before any advice to record more.
+    Code that failed a check comes first, then recordings that are worthless. A diagnosis is made of the recordings that
+    are there, so it comes before any advice to record more.
 
     DATASET stands for the recordings, DIR for the result.
 

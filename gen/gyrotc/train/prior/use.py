@@ -1,6 +1,6 @@
 """Prior of a unit's map, its update with the runs, and the fit with it.
 
-The posterior over the lot's envelope takes the place of the process of the unit alone.
+The posterior over the envelopes of prior and unit takes the place of the process of the unit alone.
 
 The network that a table holds follows the posterior as it follows the process of a unit alone: same compression, same
 proofs. What the posterior may be wrong by becomes the table's sigma.
@@ -59,7 +59,7 @@ class MapPrior:
     own: FloatArray
 
     def with_runs(self, unit: UnitMeans) -> MapPosterior:
-        """Update the prior with recordings of a unit; also returns the distance of the unit from the prior."""
+        """Update the prior with recordings of a unit, and test by their p-value whether the unit fits it."""
         sums = sums_of([unit], self.basis, self.center_dph, self.unit_dph)
         precision, moment = sums.precision[0], sums.moment[0]
         found, likely, p = [], [], []
@@ -67,9 +67,8 @@ class MapPrior:
             shrunk = np.linalg.inv(np.linalg.inv(covariance) + precision)
             found.append((mean + shrunk @ (moment - precision @ mean), shrunk))
             likely.append(float(evidence(sums, mean, covariance)[0]) + float(np.log(share)))
-            factor = np.linalg.cholesky(
-                covariance / student_variance(self.freedom)
-            )  # the test counts the few by itself
+            # The test allows for the few units by itself.
+            factor = np.linalg.cholesky(covariance / student_variance(self.freedom))
             p.append(p_value(*scores(precision, moment, mean, factor), self.freedom))
         weight = np.exp(np.array(likely) - max(likely))
         weight /= weight.sum()
