@@ -36,6 +36,8 @@ from .static_map import fits_exactly
 from .summary import not_testable, result_of
 from .verdict import holds
 
+__all__ = ["Diagnosis", "diagnose"]
+
 
 @dataclass(frozen=True)
 class Diagnosis:
