@@ -35,6 +35,7 @@ class RunRecord:
         outliers: Rows of each stretch of them whose rates were left out as outliers.
         environment: Environment as the data set names it.
         channels: Auxiliary channels by name, shape (n,) each.
+        file: Name of the file of the run.
     """
 
     name: str
@@ -45,6 +46,7 @@ class RunRecord:
     read: int = 0
     outliers: tuple[int, ...] = ()
     channels: Mapping[str, FloatArray] = field(default_factory=dict)
+    file: str = ""
 
     @property
     def row_s(self) -> float:
@@ -226,7 +228,7 @@ def _record(
     history = History(time_s=rows.time_s, temperature_c=temperature, on_s=on, run=number, runs=count, day=day)
     values = {name: without_gaps(rows.time_s, rows.channels[name]) for name in channels}
     rate = np.where(usable, rows.rate_dph, 0.0)
-    return RunRecord(name_of(run), history, rate, usable, run.environment, read, outliers, values)
+    return RunRecord(name_of(run), history, rate, usable, run.environment, read, outliers, values, run.file)
 
 
 def name_of(run: Run) -> str:

@@ -28,6 +28,8 @@ from .detection import Found
 from .diagnosis import Diagnosis
 from .refinement import Refined
 
+__all__ = ["series_of"]
+
 _TYPICAL_LIMIT = 10.0  # -ln p of 1 % for the whole search where nothing reaches it
 _SHOWN = -40.0  # of 2 log likelihood below its top: ten times the fall at 95 %, more would flatten it
 _FAR_BELOW = -1e6  # of a parameter that cannot be; JSON has no infinity
@@ -54,7 +56,7 @@ def series_of(found: Diagnosis) -> DiagnosisSeries | None:
         block_s=records.block_s,
         average_s=found.result.average_s,
         runs=tuple(_run(records, number, residual, low, high, named) for number in range(len(records.runs))),
-        scored=tuple(_scored(before, after) for before, after in scored),
+        scored=tuple(_scored(before, after) for before, after in scored if before.time_s.size),
         likelihoods=tuple(_likelihood(cause) for cause in causes),
         scores=_scores(analysis.attribution, named=bool(causes)),
     )
@@ -80,7 +82,7 @@ def _run(
 
     return RunSeries(
         name=run.name,
-        file=run.name.partition("@")[0],
+        file=run.file,
         environment=run.environment,
         first_s=float(history.time_s[0]),
         hours=_values((records.kept[number] + 0.5) * records.block_s / 3600.0),

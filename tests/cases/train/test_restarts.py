@@ -84,6 +84,16 @@ def test_diagnosis_takes_both_sides_of_a_restart_as_runs(tmp_path: Path) -> None
     assert [run.name for run in series.runs] == ["0.csv", f"0.csv@{BACK_S + ROW_S:g}", "1.csv", "2.csv"]
 
 
+def test_the_name_of_a_file_may_hold_the_sign_before_the_start_of_a_run(tmp_path: Path) -> None:
+    folder = recorded(tmp_path, 3)
+    text = (folder / "dataset.toml").read_text("utf-8")
+    (folder / "0.csv").rename(folder / "0@1.csv")
+    (folder / "dataset.toml").write_text(text.replace('"0.csv"', '"0@1.csv"'), "utf-8")
+    series = series_of(diagnose(load(folder)))
+    assert series is not None
+    assert [run.file for run in series.runs] == ["0@1.csv", "0@1.csv", "1.csv", "2.csv"]
+
+
 @pytest.mark.parametrize("garbage", [0, 3])
 def test_a_restart_is_one_event_whatever_the_rows_beside_the_gap_are(tmp_path: Path, garbage: int) -> None:
     """Rows beside the gap that are left out leave neither a step nor a gap besides the restart."""

@@ -31,6 +31,7 @@ from gyrotc.diagnose import (
     not_testable,
     records_of,
     samples,
+    series_of,
 )
 from gyrotc.diagnose import diagnosis as stages
 from gyrotc.diagnose import refitting as refits
@@ -290,6 +291,20 @@ def test_a_play_has_one_strength_whatever_constant_the_rate_has(tmp_path: Path) 
     raised = [replace(run, data=replace(run.data, bias_dph=run.data.bias_dph + 1000.0)) for run in runs]
     play = Effect("hysteresis", {"width_c": 3.05, "amplitude_dph_per_c": 1.8e-4})
     assert completed(runs, [play], power_on) == completed(raised, [play], power_on) == [play]
+
+
+def test_a_test_run_without_a_whole_mean_has_no_picture(tmp_path: Path) -> None:
+    """A minute of a test run beside others that are scored."""
+    simulate("hysteresis", seed=1, out=tmp_path)
+    path = tmp_path / "dataset.toml"
+    runs = path.read_text("utf-8")
+    assert 'file = "run-12.csv"\n' in runs
+    path.write_text(runs.replace('file = "run-12.csv"\n', 'file = "run-12.csv"\nto_s = 60.0\n'), "utf-8")
+    dataset = load(tmp_path)
+    series = series_of(diagnose(dataset))
+    assert series is not None
+    tests = sum(run.role == "exam" for run in dataset.runs)
+    assert len(series.scored) == tests - 1 > 0
 
 
 def test_a_fit_on_all_samples_is_made_once(case: Case) -> None:
