@@ -335,7 +335,7 @@ class _Search:
         Two other runs at least say what the curve is.
         """
         cells = self._cells[run]
-        edge = round(_GAIN_S / cells.cell_s)
+        edge = max(round(_GAIN_S / cells.cell_s), 1)  # a change of gain has a row before it
         every = max(round(0.25 * _GAIN_S / cells.cell_s), (len(cells) - 2 * edge) // _GAIN_PLACES, 1)
         places = cells.time_s[edge : len(cells) - edge : every].tolist()
         known = any(at.run == run and at.kind == "gain" for at in found)

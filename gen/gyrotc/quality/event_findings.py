@@ -134,10 +134,14 @@ def _end_stop(judgement: Judgement, events: Sequence[Event]) -> Finding:
     stretches = [one for one in judgement.left_out if one.reason == "rate at end stop"]
     rows = sum(one.end - one.first for one in stretches)
     values = " and ".join(f"{one.size:.6g}" for one in events)
+    fate = (
+        f"The stretches with such rows, {_rows(rows)} in all, do not reach the fit."
+        if rows
+        else "Such rows are too few to shift the mean, and stay in the fit."
+    )
     text = (
         f"The rates of {run.file} pile up at {values} deg/h: the sensor or its converter was at an end stop, or wrote "
-        f"this value for readings that it did not have. The stretches with such rows, {rows} rows in all, do not reach "
-        "the fit."
+        f"this value for readings that it did not have. {fate}"
     )
     return _found(
         "end_stop",

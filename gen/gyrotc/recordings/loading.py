@@ -398,6 +398,11 @@ def load_reporting(
         )
     shared = shared_rows(runs, recordings, problems)
     kept = counted_once(runs_by_entry, shared) if once else runs_by_entry
+    warnings += [
+        f"{run.file}: left out, since fewer than {MIN_ROWS} of its rows are not in another run as well"
+        for number, run in runs_by_entry.items()
+        if number not in kept
+    ]
     counted = tuple(kept.values())
     dataset = _dataset(folder, description, axis, counted, channels, tuple(warnings), trusted_texts)
     return replace(

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gyrotc.quality import Judgement, judge_runs
+from gyrotc.quality import Judgement, check, judge_runs
 from gyrotc.recordings import Rows, Run
 from numpy.typing import NDArray
+from recordings import toml, write_csv
 
 Array = NDArray[np.float64]
 SEED = 20261128
@@ -118,6 +119,16 @@ def test_rates_at_an_end_stop_are_left_out(row_s: float) -> None:
     judgement = judged(time, temperature, np.minimum(rate, stop))
     assert judgement.count()["rate at end stop"] > 0.29 * len(rate)
     assert [one.size for one in judgement.events if one.kind == "end_stop"] == [stop]
+
+
+def test_few_rows_at_an_end_stop_stay_in_the_fit_and_the_finding_says_so(tmp_path: Path) -> None:
+    time, temperature, rate = sound(np.random.default_rng(SEED), 1.0)
+    clipped = np.minimum(rate, np.quantile(rate, 0.997))
+    write_csv(tmp_path / "a.csv", {"time_s": time, "temperature_c": temperature, "rate_dph": clipped})
+    (tmp_path / "dataset.toml").write_text(toml('file = "a.csv"'), "utf-8")
+    [found] = [one for one in check(tmp_path).warnings if one.id == "end_stop"]
+    assert found.evidence["rows"] == 0
+    assert "stay in the fit" in found.text
 
 
 @pytest.mark.parametrize("row_s", [1.0, 10.0, 60.0])

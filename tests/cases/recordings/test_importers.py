@@ -667,6 +667,15 @@ def test_columns_that_an_import_leaves_out_are_named_of_text_as_well(tmp_path: P
     assert "left out: Status (no numbers; --set where" in printed
 
 
+def test_columns_of_one_name_are_named_apart_whatever_the_others_are_called(tmp_path: Path) -> None:
+    """The sixth column would be the second "Volts #6"."""
+    lines = ["time_s,temperature_c,rate_dph,Volts #6,Volts,Volts"]
+    lines += [f"{k},20.{k},0.0{k},1.0{k},2.0{k},3.0{k}" for k in range(100, 300)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    printed = run_gyrotc("import", tmp_path / "log.csv", "--serial", "A", "--out", tmp_path / "A").stdout
+    assert "left out: Volts #6, Volts, Volts #7 ([channels] of the map" in printed
+
+
 def _hdf5(path: Path, columns: dict[str, np.ndarray]) -> None:
     with h5py.File(path, "w") as file:
         for name, values in columns.items():

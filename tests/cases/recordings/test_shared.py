@@ -179,6 +179,19 @@ def test_values_beyond_float32_are_no_trouble() -> None:
     fingerprints_of(time, wild, [wild])
 
 
+def test_a_run_that_has_hardly_a_row_of_its_own_is_left_out_and_said(tmp_path: Path) -> None:
+    """Nine of its rows are in no other run, which are no recording."""
+    first, second = columns(3000, seed=3), columns(3000, seed=3)
+    for name in ("temperature_c", "rate_dph"):
+        second[name][2991:] += 0.5
+    write_csv(tmp_path / "R" / "a.csv", first)
+    write_csv(tmp_path / "R" / "b.csv", second)
+    (tmp_path / "R" / "dataset.toml").write_text(toml(TRAIN, 'file = "b.csv"'), "utf-8")
+    dataset = load(tmp_path / "R")
+    assert [run.file for run in dataset.runs] == ["a.csv"]
+    assert [text for text in dataset.warnings if text.startswith("b.csv: left out")]
+
+
 def test_a_copy_counts_once(tmp_path: Path) -> None:
     for name, seed, late in (("a.csv", 3, 0.0), ("b.csv", 4, 0.0), ("c.csv", 3, 20.0)):
         table = columns(3000, seed=seed)

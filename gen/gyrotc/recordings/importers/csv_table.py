@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import itertools
 import re
 import shlex
 from collections import Counter
@@ -304,11 +305,12 @@ def _column(name: str, unit: str, dialect: Dialect, cells: Sequence[str]) -> Col
 
 
 def _unique(names: Sequence[str]) -> list[str]:
-    """Return distinct names: a column without a name, or with one that repeats, gets its number."""
+    """Return distinct names: a column without a name, or with a repeated one, gets its number or the next free one."""
     seen: set[str] = set()
     result = []
-    for k, name in enumerate(names, start=1):
-        one = name if name and name not in seen else f"{name} #{k}".strip()
+    for place, name in enumerate(names, start=1):
+        numbered = (f"{name} #{number}".strip() for number in itertools.count(place))
+        one = name if name and name not in seen else next(other for other in numbered if other not in seen)
         seen.add(one)
         result.append(one)
     return result
