@@ -69,7 +69,7 @@ _MAX_STEP_C = 1.0  # beside the rate: room for resolution and noise of a coarse 
 # Gathered means are kept to this share of their noise, and their inputs to a tenth of what sensors resolve.
 _MEANS_SHARE = 0.01
 _MEANS_C_DECIMALS, _MEANS_C_PER_MIN_DECIMALS, _MAX_DECIMALS = 3, 4, 12
-_COUNT_DECIMALS = 3  # of means of which many count as one
+_COUNT_DIGITS = 4  # of the number of means, which may be a small share of one
 _MIN_SAMPLES = 8  # two to a parameter of a plane, and two to spare
 _NOT_GENERAL = ("does_not_generalise", "no_temperature_information")
 
@@ -294,7 +294,7 @@ def _means(data: TrainingData, fitted: Fit) -> MapMeans:
         temperature_c=rounded(found.temperature_c, _MEANS_C_DECIMALS),
         slope_c_per_min=rounded(found.slope_c_per_min, _MEANS_C_PER_MIN_DECIMALS),
         bias_dph=rounded(found.bias_dph, decimals),
-        count=rounded(found.count, _COUNT_DECIMALS),
+        count=tuple(float(f"{count:.{_COUNT_DIGITS}g}") for count in found.count),
         sigma_dph=found.sigma_dph,
         mean_s=mean_s,
     )

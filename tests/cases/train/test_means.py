@@ -66,3 +66,17 @@ def test_the_means_of_a_unit_do_not_depend_on_the_correction_that_was_asked_for(
     assert line is not None and gaussians is not None
     assert line.sigma_dph == pytest.approx(gaussians.sigma_dph)
     assert line.bias_dph == pytest.approx(gaussians.bias_dph, abs=1e-3 * line.sigma_dph)
+
+
+def test_a_single_row_of_many_counts_for_a_share_of_a_mean(tmp_path: Path) -> None:
+    """A hundred rows a second, whose rates are missing for a minute but for one: no mean that `lot` takes counts 0."""
+    rng = np.random.default_rng(SEED)
+    time = np.arange(0.0, 600.0, 0.01)
+    for k in range(2):
+        rate = NOISE_DPH * np.sqrt(1000.0) * rng.standard_normal(time.size)
+        rate[(time > 290.0) & (time < 360.0) & (np.arange(time.size) != 32_000)] = np.nan
+        write_csv(tmp_path / f"{k}.csv", {"time_s": time, "temperature_c": 0.05 * time + 1.2 * k, "rate_dph": rate})
+    (tmp_path / "dataset.toml").write_text(toml(*(f'file = "{k}.csv"' for k in range(2))), "utf-8")
+    means = fit_dataset(load(tmp_path), FitOptions(method="linear")).training.means
+    assert means is not None
+    assert 0.0 < min(means.count) < 1e-3
