@@ -18,6 +18,7 @@ from .. import __version__
 from ..common.errors import InputError
 from ..common.metrics import Averages, average_rows
 from ..common.progress import Progress, Stages, silent
+from ..common.threads import with_one_thread
 from ..quality.judgement import judge
 from ..recordings.fit_options import COMPARED, DEFAULTS, BuildOptions
 from ..recordings.records import Dataset, Run
@@ -42,6 +43,7 @@ class _Held:
     from_s: float | None = None  # where its means begin: with the run, also where nothing is accepted yet
 
 
+@with_one_thread
 def compare(
     dataset: Dataset,
     options: BuildOptions = DEFAULTS,

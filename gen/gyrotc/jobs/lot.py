@@ -12,6 +12,7 @@ from .. import __version__
 from ..common.arrays import FloatArray
 from ..common.errors import InputError
 from ..common.progress import Progress, silent
+from ..common.threads import with_one_thread
 from ..model import Model, load_model
 from ..results.base import read_optional, read_result
 from ..results.fleet import AtRest, CrossValidation, FleetSummary, Lot, LotCluster, LotUnit
@@ -65,6 +66,7 @@ def checksum_of(lot: Lot) -> str:
     return digest_of({key: value for key, value in lot.content().items() if key != "checksum"})
 
 
+@with_one_thread
 def lot_of(fleet: Path, *, axis: str | None = None, progress: Progress = silent) -> Lot:
     """Learn a lot from the folder that `gyrotc fleet` (or several calls of `build`) wrote.
 
