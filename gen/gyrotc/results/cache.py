@@ -66,11 +66,8 @@ def kept(name: str, content_of: Callable[[bytes], T | None]) -> T | None:
         The value, or None if there is none; a file that is not as it was written is removed.
     """
     path = folder() / name
-    return content_in(path, content_of) if _is_own() and path.is_file() else None
-
-
-def content_in(path: Path, content_of: Callable[[bytes], T | None]) -> T | None:
-    """Return what a file keeps, as `kept` does; a file that is not as it was written is removed."""
+    if not (_is_own() and path.is_file()):
+        return None
     try:
         data = read_input(path, "recording_mib", "what was kept")
         head, content = data[:_HEAD_BYTES], data[_HEAD_BYTES:]
