@@ -5,7 +5,7 @@
  * Nothing here depends on the width of int, on byte order, on the right shift of a negative number, or on a
  * conversion that wraps. No operation can overflow with a table that the generator made: docs/numerics.md says
  * which range each has, and a test build asserts them (GTC_ASSERT), but for the casts of a slope and of the ends of
- * a play to 32 bits (NARROW), whose range the proof of run-time errors shows (docs/proof.md).
+ * a play to 32 bits (NARROW), whose range the proof of run-time errors shows for -90 to 200 C (docs/proof.md).
  *
  * SPDX-License-Identifier: MIT
  */
