@@ -131,7 +131,8 @@ def seen(data: TrainingData) -> UnitMeans:
     """Means of samples, as a fit has them."""
     samples = cleaned_samples(data)
     scaling = scaling_of(samples)
-    return means_of_unit(samples, scaling, fit_process(samples, scaling))[0]
+    power_on = np.arange(int(samples.run.max()) + 1)
+    return means_of_unit(samples, scaling, fit_process(samples, scaling, power_on), power_on)[0]
 
 
 def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:
@@ -143,7 +144,7 @@ def best_power(prior: LotPrior, short: UnitMeans, whole: UnitMeans) -> float:
         whole: Means of all runs, which tell the map.
     """
     known = prior.with_runs(whole)
-    precision = sums_of([short], prior.basis, prior.center_dph, prior.unit_dph).precision[0]
+    precision = sums_of([short], prior.basis, prior.center_dph, prior.unit_dph, prior.own).precision[0]
     powers = []
     for mean, covariance in zip(prior.means, prior.covariances, strict=True):
         away = known.mean - mean

@@ -112,6 +112,39 @@ def test_evidence_is_that_of_the_normal_distribution_of_the_recordings() -> None
     assert state.evidence == pytest.approx(total, rel=1e-7)
 
 
+def test_what_a_power_on_has_of_its_own_is_no_part_of_the_map() -> None:
+    """Against scipy's density of recordings whose offset and line over T scatter from power-on to power-on."""
+    rng = np.random.default_rng(4)
+    basis = PriorBasis.over(*ENVELOPE)
+    basis = basis.only(np.arange(93) < 9)
+    unit = replace(calibrated(rng, unit_map(rng, 1e-4), 30), power_on=np.repeat([3, 5], 15))
+    own, mean, covariance = np.array([0.3, 0.1]), 0.1 * rng.normal(size=9), 0.04 * np.eye(9)
+    values = basis.values(unit.temperature_c, unit.slope_c_per_min)
+    same = np.kron(np.eye(2), np.ones((15, 15)))
+    noise = np.diag((unit.sigma_dph / 1e-3) ** 2 / unit.count) + same * ((values[:, :2] * own) @ values[:, :2].T)
+    y = (unit.bias_dph - 7e-3) / 1e-3
+    full = multivariate_normal.logpdf(y, values @ mean, values @ covariance @ values.T + noise)
+    known = full - multivariate_normal.logpdf(y, np.zeros(30), noise)
+    assert evidence(sums_of([unit], basis, 7e-3, 1e-3, own), mean, covariance) == pytest.approx([known], rel=1e-9)
+
+
+def test_one_power_on_tells_the_constant_no_better_than_power_ons_repeat() -> None:
+    """Error of the map's mean over its 1 sigma, for units of a lot whose power-ons scatter by four times the noise."""
+    lot, _, _ = family(11)
+    prior, rng = prior_of(lot.model_copy(update={"between_dph": 3e-4})), np.random.default_rng(31)
+    t, r = (x.ravel() for x in np.meshgrid(np.linspace(-39, 59, 15), np.linspace(-2.3, 2.3, 5)))
+    ratios = []
+    for _ in range(40):
+        own = unit_map(rng, 2e-4)
+        run = calibrated(rng, own, 100)
+        run = replace(run, bias_dph=run.bias_dph + 3e-4 * rng.normal(), power_on=np.zeros(100, dtype=np.int64))
+        found = prior.with_runs(run)
+        error = np.mean(found.mean_dph(t, r) - bias(own, t, r))
+        mean_of_map = np.mean(prior.basis.values(t, r), axis=0)
+        ratios.append(error / (prior.unit_dph * np.sqrt(mean_of_map @ found.covariance @ mean_of_map)))
+    assert 0.75 < np.sqrt(np.mean(np.square(ratios))) < 1.25
+
+
 def test_each_further_round_raises_the_evidence() -> None:
     rng = np.random.default_rng(5)
     units = [calibrated(rng, unit_map(rng, 3e-4)) for _ in range(10)]

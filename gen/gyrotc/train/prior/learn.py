@@ -331,16 +331,41 @@ def learn_prior(units: Sequence[UnitMeans], envelope: Envelope, progress: Progre
     return Learned(state, center, unit, scale, inside, p, left)
 
 
-def sums_of(units: Sequence[UnitMeans], basis: PriorBasis, center: float, unit: float) -> UnitSums:
-    """Return the log likelihood of the coefficients, in units of the lot."""
+def sums_of(
+    units: Sequence[UnitMeans], basis: PriorBasis, center: float, unit: float, own: FloatArray | None = None
+) -> UnitSums:
+    """Return the log likelihood of the coefficients, in units of the lot.
+
+    Args:
+        units: Their recordings.
+        basis: The functions.
+        center, unit: Zero and unit of the coefficients, deg/h.
+        own: Variances of what a power-on has of its own, of the first coefficients, in units of the lot; None: the
+            recordings of a unit are taken as they are.
+    """
     n = len(basis.kept)
-    precision, moment = np.empty((len(units), n, n)), np.empty((len(units), n))
+    precision, moment = np.zeros((len(units), n, n)), np.zeros((len(units), n))
     for k, u in enumerate(units):
-        values = basis.values(u.temperature_c, u.slope_c_per_min)
-        weight = u.count * (unit / u.sigma_dph) ** 2
-        precision[k] = (values * weight[:, None]).T @ values
-        moment[k] = values.T @ (weight * (u.bias_dph - center) / unit)
+        for part in (u,) if own is None else u.power_ons():
+            values = basis.values(part.temperature_c, part.slope_c_per_min)
+            weight = part.count * (unit / part.sigma_dph) ** 2
+            joint = (values * weight[:, None]).T @ np.column_stack([values, (part.bias_dph - center) / unit])
+            joint = joint if own is None else _about_the_map(joint, np.sqrt(own))
+            precision[k] += joint[:, :n]
+            moment[k] += joint[:, n]
     return UnitSums(precision, moment)
+
+
+def _about_the_map(joint: FloatArray, root: FloatArray) -> FloatArray:
+    """Return precision and moment of a power-on with what it has of its own integrated out.
+
+    Args:
+        joint: Precision and moment side by side, shape (n, n + 1), as if the power-on had nothing of its own.
+        root: Roots of the variances of what it has, of the first coefficients.
+    """
+    first = len(root)
+    inner = np.eye(first) + root[:, None] * joint[:first, :first] * root
+    return np.asarray(joint - (joint[:, :first] * root) @ np.linalg.solve(inner, root[:, None] * joint[:first]))
 
 
 def that_count(sums: UnitSums, variance: FloatArray) -> NDArray[np.bool_]:

@@ -42,6 +42,12 @@ class UnitMeans:
         arrays = self.temperature_c[mask], self.slope_c_per_min[mask], self.bias_dph[mask], self.count[mask]
         return UnitMeans(*arrays, self.sigma_dph, power_on)
 
+    def power_ons(self) -> list[UnitMeans]:
+        """Return the means of each power-on."""
+        if self.power_on is None:
+            return [self]
+        return [self.select(self.power_on == number) for number in np.unique(self.power_on)]
+
 
 def means_of_unit(
     samples: TrainingData, scaling: Scaling, process: Process | None, power_on: NDArray[np.int64] | None = None

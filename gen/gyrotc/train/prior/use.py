@@ -60,7 +60,7 @@ class MapPrior:
 
     def with_runs(self, unit: UnitMeans) -> MapPosterior:
         """Update the prior with recordings of a unit, and test by their p-value whether the unit fits it."""
-        sums = sums_of([unit], self.basis, self.center_dph, self.unit_dph)
+        sums = sums_of([unit], self.basis, self.center_dph, self.unit_dph, self.own)
         precision, moment = sums.precision[0], sums.moment[0]
         found, likely, p = [], [], []
         for mean, covariance, share in zip(self.means, self.covariances, self.share, strict=True):
