@@ -103,7 +103,7 @@ static const range_t term_limits[GTC_N_KINDS][GTC_TERM_WORDS - 2U] = {
         RANGE(0.0F, 0.0F,              0, 0),
     },
     {
-        RANGE(0.0F, 1.0e9F,            0, 2130706432),               /* play: width */
+        RANGE(0.0F, 1.0e9F,            0, 2121269247),               /* play: width */
         RANGE(-1.0e9F, 1.0e9F,         -2147483647, 2147483647),     /* play: amplitude */
         RANGE(-1.0e9F, 1.0e9F,         -1073741824, 1073741824),     /* play: slope of the amplitude over T */
         RANGE(-200.0F, 400.0F,         -13107200, 26214400),         /* play: reference of T */

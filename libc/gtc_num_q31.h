@@ -4,8 +4,9 @@
  *
  * Nothing here depends on the width of int, on byte order, on the right shift of a negative number, or on a
  * conversion that wraps. No operation can overflow with a table that the generator made: docs/numerics.md says
- * which range each has, and a test build asserts them (GTC_ASSERT), but for the casts of a slope and of the ends of
- * a play to 32 bits (NARROW), whose range the proof of run-time errors shows for -90 to 200 C (docs/proof.md).
+ * which range each has, and a test build asserts them (GTC_ASSERT). Two casts to 32 bits (NARROW) have no assertion;
+ * the proof of run-time errors shows their range (docs/proof.md): a slope's for block means of -90 to 200 C, the ends
+ * of a play's for every temperature that an envelope may have, -200 to 400 C, and every width that a table may have.
  *
  * SPDX-License-Identifier: MIT
  */

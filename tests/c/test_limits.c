@@ -309,8 +309,6 @@ TEST(parameters_of_terms_keep_to_their_ranges)
     REFUSED(TERMS, of_kind(GTC_TERM_MEMORY, 2U), 1.1F, -1L);
     REFUSED(TERMS, of_kind(GTC_TERM_MEMORY, 2U), -0.1F, -2147483647L);
     REFUSED(TERMS, of_kind(GTC_TERM_MEMORY, 4U), -1.0F, -1L);
-    REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 2U), -1.0F, -1L);
-    REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 2U), 1.1e9F, 2130706433L);
     REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 4U), 1.1e9F, 1073741825L);
     REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 5U), 400.5F, 26214401L);
     REFUSED(TERMS, of_kind(GTC_TERM_PLAY, 5U), -200.5F, -13107201L);
@@ -337,6 +335,16 @@ TEST(functions_of_a_channel_keep_to_their_ranges)
     REFUSED(CURVED, product + 5U, 1.1e9F, 1073741825L);
     REFUSED(CURVED, product + 6U, 1.0F, 1L);
     REFUSED(CURVED, product + 7U, 1.0F, 1L);
+}
+
+/* The hottest envelope, 400 C, and the widest play make the largest number of 32 bits. */
+TEST(the_ends_of_a_play_fit_a_word_at_the_edge_of_any_envelope)
+{
+    const uint_least32_t width = of_kind(GTC_TERM_PLAY, 2U);
+
+    OPENED(TERMS, width, 1.0e9F, 2147483647L - (400L * 65536L));
+    REFUSED(TERMS, width, 1.1e9F, 2147483648L - (400L * 65536L));
+    REFUSED(TERMS, width, -1.0F, -1L);
 }
 
 TEST(terms_read_the_channels_that_are_theirs)
@@ -404,6 +412,7 @@ int main(void)
 #if GTC_WITH_TERMS
     RUN(parameters_of_terms_keep_to_their_ranges);
     RUN(functions_of_a_channel_keep_to_their_ranges);
+    RUN(the_ends_of_a_play_fit_a_word_at_the_edge_of_any_envelope);
     RUN(terms_read_the_channels_that_are_theirs);
 #endif
     RUN(a_table_of_more_than_16384_words_is_refused_by_each_way_in);

@@ -19,12 +19,15 @@ typedef float num_t;
 typedef float wide_t;
 #define LOWEST (-90.0F)
 #define HIGHEST 200.0F
+#define ENVELOPE_LEAST (-200.0F) /* libc/gtc_limits.inl: no envelope goes beyond */
+#define ENVELOPE_MOST 400.0F
 #define STEEPEST 100000.0F /* C per block: far more than any slope of plausible means */
 #define FOLLOWED 400.0F /* a memory beyond it begins again */
 #define FINITE(x) \is_finite(x)
 #define NUMBER(word) ((word).value)
 #define MEMBER_NUMBER(member) ((member).value)
 #define ANY_PLAUSIBLE() Frama_C_float_interval(LOWEST, HIGHEST)
+#define ANY_IN_ENVELOPE() Frama_C_float_interval(ENVELOPE_LEAST, ENVELOPE_MOST)
 /* What tests/prove/primitives_f32.c shows for every float32. */
 /*@ assigns \result \from x;
     behavior number: assumes \is_finite(x); ensures \result == 0;
@@ -56,12 +59,15 @@ typedef int_least32_t num_t;
 typedef int_least64_t wide_t;
 #define LOWEST (-90L * 65536L)
 #define HIGHEST (200L * 65536L)
+#define ENVELOPE_LEAST (-200L * 65536L)
+#define ENVELOPE_MOST (400L * 65536L)
 #define STEEPEST 2147483647L
 #define FOLLOWED (400L * 65536L)
 #define FINITE(x) \true
 #define NUMBER(word) ((word).integer)
 #define MEMBER_NUMBER(member) (member)
 #define ANY_PLAUSIBLE() (int_least32_t)Frama_C_long_interval(LOWEST, HIGHEST)
+#define ANY_IN_ENVELOPE() (int_least32_t)Frama_C_long_interval(ENVELOPE_LEAST, ENVELOPE_MOST)
 #endif
 
 #if defined(ANY_TABLE)

@@ -1,8 +1,9 @@
 /* terms.c - every function of every extension term of the table, on every state.
  *
- * The step functions call them with a plausible temperature; they touch nothing but the state of their own term.
- * The state of a memory is any number at all: beyond FOLLOWED it begins again. A play is as far from a plausible
- * temperature as it is wide; the mean of a channel is a number. That a memory moves towards its argument and no
+ * The step functions call them with a temperature within the envelope, which is within ENVELOPE_LEAST to ENVELOPE_MOST
+ * and may lie beyond every plausible reading; they touch nothing but the state of their own term. The state of a memory
+ * is any number at all: beyond FOLLOWED it begins again. A play is as far from such a temperature as it is wide; the
+ * mean of a channel is a number. That a memory moves towards its argument and no
  * farther (docs/proof.md), and that a mean lies between its samples, is argued there; follow.c shows that the first
  * has no error.
  */
@@ -61,9 +62,9 @@ static void any_term(unsigned i)
     if (kind == GTC_TERM_PLAY) {
         const num_t width = width_of(i);
 #if defined(F32)
-        state.term[i][0] = Frama_C_float_interval(LOWEST - width, HIGHEST + width);
+        state.term[i][0] = Frama_C_float_interval(ENVELOPE_LEAST - width, ENVELOPE_MOST + width);
 #else
-        state.term[i][0] = (int_least32_t)Frama_C_long_interval(LOWEST - width, HIGHEST + width);
+        state.term[i][0] = (int_least32_t)Frama_C_long_interval(ENVELOPE_LEAST - width, ENVELOPE_MOST + width);
 #endif
     }
 #endif
@@ -87,8 +88,9 @@ static void invariant_holds(unsigned i, unsigned call)
     (void)call;
 #if GTC_WITH_PLAY && !defined(ANY_TABLE) /* relates two numbers there */
     if (kind == GTC_TERM_PLAY) {
-        const num_t width = width_of(i);
-        //@ check LOWEST - width <= state.term[i][0] <= HIGHEST + width;
+        const num_t least = (num_t)(ENVELOPE_LEAST - width_of(i)); /* rounded as the runtime rounds it */
+        const num_t most = (num_t)(ENVELOPE_MOST + width_of(i));
+        //@ check least <= state.term[i][0] <= most;
     }
 #endif
 #if GTC_WITH_MEMORY
@@ -104,12 +106,12 @@ static void one_call(unsigned i, unsigned call)
     any_term(i);
     if (call == 0U) {
 #if WITH_RETAINED
-        begin_term(&state, &THE_TABLE, i, ANY_PLAUSIBLE());
+        begin_term(&state, &THE_TABLE, i, ANY_IN_ENVELOPE());
     } else if (call == 1U) {
-        step_term(&state, &THE_TABLE, i, ANY_PLAUSIBLE());
+        step_term(&state, &THE_TABLE, i, ANY_IN_ENVELOPE());
 #endif
     } else {
-        effect.temp = ANY_PLAUSIBLE();
+        effect.temp = ANY_IN_ENVELOPE();
         effect.slope = any_number(0);
         effect.remarks = Frama_C_interval(0, 63);
         effect.edge_effect = any_number(0);
@@ -119,7 +121,7 @@ static void one_call(unsigned i, unsigned call)
 #else
         effect.added = Frama_C_long_long_interval(-0x1000000000000000LL, 0x1000000000000000LL);
 #endif
-        apply_term(&state, &THE_TABLE, i, ANY_PLAUSIBLE(), &effect);
+        apply_term(&state, &THE_TABLE, i, ANY_IN_ENVELOPE(), &effect);
         (void)saturate(effect.added, MEMBER_NUMBER(THE_TABLE.effect[0]), MEMBER_NUMBER(THE_TABLE.effect[1]),
                        &effect.remarks);
     }
