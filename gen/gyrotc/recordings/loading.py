@@ -86,7 +86,7 @@ def check_description(description: Description, applied: Applied | None, exam_on
         expected = 'applied_model = "FILE": the model.json with that hash'
         problems.add(InputError(f"{FILE}, field applied_table", found, expected))
     if applied is not None and applied.hash != stated:
-        found = f"{stated!r}, and applied_model has the hash {applied.hash}"
+        found = f"{quoted(stated)}, and applied_model has the hash {applied.hash}"
         problems.add(InputError(f"{FILE}, field applied_table", found, "the hash of that model"))
 
 

@@ -71,7 +71,8 @@ class Rows:
 
     def has_channel(self, name: str) -> bool:
         """Test whether there is a channel of this name, or a difference of two columns."""
-        return name in self.channels or all(self._is_column(part) for part in name.split(" - "))
+        first, minus, second = name.partition(" - ")
+        return name in self.channels or (minus != "" and self._is_column(first) and self._is_column(second))
 
     def channel(self, name: str) -> FloatArray:
         """A recorded channel, or a difference of two columns by the name "a - b" (or of "temperature_c").

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 
 from ..common.arrays import FloatArray
-from ..common.errors import InputError
+from ..common.errors import InputError, quoted
 
 Quantity = Literal["time", "temperature", "rate"]
 
@@ -173,18 +173,18 @@ def conversion(text: str, kind: str) -> Conversion:
         return _of_register(text, kind)
     given, wanted = _size(text), _size(NATIVE_UNITS.get(kind, kind))
     if not given.named:
-        raise UnitError(f"{text!r} is a number without a unit")
+        raise UnitError(f"{quoted(text)} is a number without a unit")
     if given.kind != wanted.kind:
-        raise UnitError(f"{text!r} is no unit of the kind {NATIVE_UNITS.get(kind, kind)}")
+        raise UnitError(f"{quoted(text)} is no unit of the kind {NATIVE_UNITS.get(kind, kind)}")
     turns = given.powers["pi"] - wanted.powers["pi"]
     try:
         factor = float(given.size / wanted.size) * math.pi ** max(turns, 0) / math.pi ** max(-turns, 0)
     except (OverflowError, ZeroDivisionError):
         factor = math.inf
     if not 0.0 < factor < math.inf:
-        raise UnitError(f"{text!r} is no unit: its size is {factor:g}")
+        raise UnitError(f"{quoted(text)} is no unit: its size is {factor:g}")
     if given.zero and not _is_decimal(given.size / (_FAHRENHEIT if given.zero == _ZERO["F"] else 1)):
-        raise UnitError(f"{text!r} scales counts and states no offset ('raw/128 + 0 degC' does)")
+        raise UnitError(f"{quoted(text)} scales counts and states no offset ('raw/128 + 0 degC' does)")
     return Conversion(text, factor, float((given.zero - wanted.zero) / wanted.size))
 
 
@@ -204,7 +204,7 @@ def _of_register(text: str, kind: str) -> Conversion:
     Raises:
         UnitError: What precedes the unit is no line, or the unit is none.
     """
-    unknown = UnitError(f"{text!r} is no line of raw and a unit, such as 'raw/340 + 36.53 degC'")
+    unknown = UnitError(f"{quoted(text)} is no line of raw and a unit, such as 'raw/340 + 36.53 degC'")
     if len(text) > _MOST:
         raise unknown
     end = 0
@@ -276,7 +276,7 @@ def channel_kind(name: str, declared: Mapping[str, str]) -> Quantity | None:
 @cache
 def _size(text: str) -> _Size:
     """A unit as a number of base units."""
-    unknown = UnitError(f"{text!r} is not known as a unit")
+    unknown = UnitError(f"{quoted(text)} is not known as a unit")
     plain = " ".join(text.replace("º", "°").replace("μ", "µ").split())
     if len(plain) > _MOST:
         raise unknown

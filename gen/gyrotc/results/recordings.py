@@ -77,7 +77,10 @@ class ImportedFile(Part):
     trusted: tuple[str, ...] = Field(
         description="columns whose values look like another unit, accepted by `trust_units`"
     )
-    source: OriginalFile = Field(description="logger's file that the run was made of, without files joined to it")
+    source: OriginalFile = Field(description="logger's file that the run was made of")
+    joined: tuple[OriginalFile, ...] = Field(
+        default=(), description="files with the temperature that were joined to it"
+    )
 
 
 class ImportedFiles(Result):

@@ -261,6 +261,8 @@ def test_a_joined_reading_holds_for_the_stated_time(folder: Path, gyrotc: Comman
     assert imported(gyrotc, folder, "a.csv", ["--join", "chamber.csv", "--tolerance-s", "30"]) == ROWS - 57
     text = (folder / "a.csv-out" / "map.toml").read_text()
     assert '[[join]]\nfile = "chamber.csv"\ntolerance_s = 30.0' in text
+    (run,) = read_result(folder / "a.csv.json", ImportedFiles).runs
+    assert [run.source.file, *(one.file for one in run.joined)] == ["a.csv", "chamber.csv"]
 
 
 def test_clocks_that_cannot_be_compared_are_refused(tmp_path: Path, gyrotc: Command) -> None:
@@ -280,6 +282,26 @@ def test_the_serial_is_that_of_the_device(tmp_path: Path, gyrotc: Command) -> No
     done = gyrotc("import", tmp_path / "a.csv", tmp_path / "b.csv", "--out", tmp_path / "S")
     assert done.returncode == 2
     assert "b.csv: the rows are of 'G-b', those of a.csv of 'G-a'" in done.stderr
+
+
+def test_a_refusal_quotes_no_more_of_a_file_than_fits_into_a_line(tmp_path: Path, gyrotc: Command) -> None:
+    """A name of a gyro, of a column, and a unit that go on for 4,000 letters."""
+    long = "x" * 4000
+    for name in ("a", "b"):
+        devices = [f"{name}{long}"] * ROWS
+        (tmp_path / f"{name}.csv").write_bytes(table(f"serial,{NAMES}", devices, fixed(TIME), T, R))
+    (tmp_path / "c.csv").write_bytes(table(f"time_s,temperature_c {long},rate_dph", fixed(TIME), T, R))
+    for arguments in (
+        ("a.csv", "b.csv", "--serial", "R"),
+        ("c.csv",),
+        ("c.csv", "--column", f"temperature=temperature_c {long}", "--temperature-unit", long),
+    ):
+        done = gyrotc(
+            "import", *(tmp_path / one if one.endswith(".csv") else one for one in arguments), "--out", tmp_path / "R"
+        )
+        assert done.returncode == 2
+        assert "x" * 40 in done.stderr
+        assert "x" * 80 not in done.stderr, arguments
 
 
 def test_a_second_import_removes_no_recording(tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -231,9 +231,10 @@ def test_a_difference_of_columns_is_formed_by_its_name() -> None:
     assert rows.channel("case_c - temperature_c").tolist() == [5.0] * 3
     assert rows.channel("lid_c - case_c").tolist() == [5.0] * 3
     assert rows.has_channel("lid_c - case_c")
-    assert not rows.has_channel("lid_c - mirror_c")
-    with pytest.raises(KeyError):
-        rows.channel("mirror_c")
+    for name in ("lid_c - mirror_c", "mirror_c", "temperature_c", "lid_c - case_c - lid_c"):
+        assert not rows.has_channel(name)
+        with pytest.raises(KeyError):
+            rows.channel(name)
 
 
 @pytest.fixture(scope="module")

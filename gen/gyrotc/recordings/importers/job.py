@@ -137,7 +137,7 @@ class ImportedRun:
 
     def result(self) -> ImportedFile:
         """Return what the result of `gyrotc import` states of the run."""
-        source = self.sources[0].model_dump()
+        source, *joined = (OriginalFile(**one.model_dump()) for one in self.sources)
         return ImportedFile(
             file=self.file,
             read=self.read,
@@ -145,7 +145,8 @@ class ImportedRun:
             rows=self.rows,
             left_out=dict(self.left_out),
             trusted=self.trusted,
-            source=OriginalFile(**source),
+            source=source,
+            joined=tuple(joined),
         )
 
 
@@ -492,7 +493,9 @@ def _source(path: Path, run: str) -> SourceEntry:
 def _of_several(devices: Mapping[str, str]) -> InputError:
     """The refusal of files of several gyros, by the file of each."""
     (first, file), (second, other) = list(devices.items())[:2]
-    found = f"the rows are of {second or 'no named gyro'!r}, those of {file} of {first or 'no named gyro'!r}"
+    found = (
+        f"the rows are of {quoted(second or 'no named gyro')}, those of {file} of {quoted(first or 'no named gyro')}"
+    )
     expected = f"a data set for each gyro, or --column device={NO_DEVICE} if they are of one"
     return InputError(other, found, expected)
 

@@ -61,12 +61,12 @@ class Units:
             try:
                 conversion(in_file, kind)
             except UnitError:
-                found = f"the file gives it in {in_file!r}, which is no {kind}"
+                found = f"the file gives it in {quoted(in_file)}, which is no {kind}"
                 expected = f"{OPTIONS[kind]} with one of {_EXAMPLES[kind]}, or another column by --column {kind}=..."
                 raise InputError(f"{self._file}, column {column.name}", found, expected) from None
             return in_file
         if kind not in self._asked:
-            answer = self._ask(f"{self._file}: unit of the {kind} in column {column.name!r} ({_EXAMPLES[kind]})")
+            answer = self._ask(f"{self._file}: unit of the {kind} in column {quoted(column.name)} ({_EXAMPLES[kind]})")
             if answer:
                 self._asked[kind] = self._checked(kind, answer, "the answer")
         if kind not in self._asked:
@@ -87,7 +87,7 @@ class Units:
 def said(missing: Sequence[_Missing]) -> Iterator[str]:
     """Yield what is missing, once for each kind."""
     for kind, column in {kind: column for kind, column, _ in reversed(missing)}.items():
-        yield f"no unit of the {kind} in column {column!r}"
+        yield f"no unit of the {kind} in column {quoted(column)}"
 
 
 _HEXADECIMAL = re.compile(r"(?=.*[A-Fa-f])[0-9A-Fa-f]+h?|[0-9A-Fa-f]+h")
@@ -114,9 +114,9 @@ def in_text(file: LoggerFile, kind: str) -> str:
             if column.kind == "text" and meaning(column.name, column.unit, table.name).kind == kind:
                 shown = next((cell for cell in reversed(column.sample) if cell), "")
                 if _HEXADECIMAL.fullmatch(shown):
-                    return f"; or, as {column.name} holds {shown[:40]!r}, 0x before each of its numbers"
+                    return f"; or, as {column.name} holds {quoted(shown)}, 0x before each of its numbers"
                 return (
-                    f"; or, as {column.name} holds {shown[:40]!r}, --set csv.decimal=, (or .) and "
+                    f"; or, as {column.name} holds {quoted(shown)}, --set csv.decimal=, (or .) and "
                     "--set csv.thousands=. (or another mark), or --set csv.missing=WORD"
                 )
     return ""
@@ -206,7 +206,7 @@ def _where(file: LoggerFile, main: LoggerTable, chosen: Map) -> Where | None:
     where = Where.of(chosen.where)
     if main.column(where.column) is None:
         names = ", ".join(column.name for column in main.columns)
-        found = f"no column {where.column!r} beside the rates"
+        found = f"no column {quoted(where.column)} beside the rates"
         raise InputError(file.path.name, found, f"--set where=... with one of: {names}")
     return where
 

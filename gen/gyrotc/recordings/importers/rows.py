@@ -15,7 +15,7 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from ...common.arrays import FloatArray
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...results.files import create
 from ..csv_file import number_in
 from ..description import Layout, column_faults, likely_temperature
@@ -245,7 +245,7 @@ class ImportedRows:
         columns = columns or _same_time(self.plan, table)
         where = self._file_of(table)
         if not columns and table.rate_hz is None:
-            found = f"table {table.name!r} has no column of time like that of {self.plan.main.name!r}"
+            found = f"table {quoted(table.name)} has no column of time like that of {quoted(self.plan.main.name)}"
             raise InputError(where, found, "--column temperature=... of the table with the rates")
         unit = None
         if columns and columns[0].kind == "number":
