@@ -59,10 +59,9 @@ from .played import samples as samples
 from .played import terms_of as terms_of
 from .posterior import EQUIVALENT as EQUIVALENT
 from .posterior import LOOKED_AT as LOOKED_AT
+from .posterior import Posterior as Posterior
 from .posterior import Rival as Rival
 from .posterior import odds_of as odds_of
-from .posterior import probabilities_of as probabilities_of
-from .posterior import remaining as remaining
 from .profile_likelihood import Gains as Gains
 from .profile_likelihood import Point as Point
 from .profile_likelihood import SizeLimit as SizeLimit

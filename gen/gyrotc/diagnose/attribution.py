@@ -7,6 +7,7 @@ dictionary (lack of fit).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from .candidates import Candidate, price_of, searched
 from .detection import Found, detect
 from .joined import Held
 from .marginal_likelihood import MarginalLikelihood
-from .posterior import Rival, odds_of, probabilities_of, remaining
+from .posterior import Posterior, Rival, odds_of
 from .profile_likelihood import Gains, Point, best_of, clear_pair, makes_sense
 from .refinement import Refined, cancelling, model_columns, refine, sized
 from .rivals import calibrated, kinds_of, ranked_rivals
@@ -45,8 +46,7 @@ class Attribution:
         detected: Whether it found anything that is likelier than nothing.
         causes: The chosen causes, strongest first.
         p_values: The p-value of each cause, adjusted for the whole search.
-        rivals: For each, what remains possible in its place, the likeliest first.
-        probabilities: For each, of every cause in its place, itself first, of something unnamed and of nothing, by id.
+        posteriors: For each, the probabilities of everything in its place; none of a single cycle.
         gain: Twice the log-likelihood ratio of all causes together.
         left: What all causes leave.
         last: The search after the last cause.
@@ -59,18 +59,17 @@ class Attribution:
     detected: bool
     causes: tuple[Refined, ...]
     p_values: tuple[float, ...]
-    rivals: tuple[tuple[Rival, ...], ...]
+    posteriors: tuple[Posterior, ...]
     gain: float
     left: Misfit
     last: list[Found]
     other: Contest
-    probabilities: tuple[dict[str, float], ...] = ()
     wide: WideMemory | None = None
     refuted: bool = False
 
     def without_causes(self) -> Attribution:
         """Return the result with nothing named."""
-        return replace(self, causes=(), p_values=(), rivals=(), probabilities=(), wide=None)
+        return replace(self, causes=(), p_values=(), posteriors=(), wide=None)
 
     @property
     def columns(self) -> FloatArray:
@@ -129,25 +128,27 @@ def attribute(search: Search) -> Attribution:
     )
     ahead = _ahead(gains, stage, singles)
     places = [_place(search, weigher, singles, pairs, stage, k) for k in range(len(stage.chosen))]
-    ranked = [_ranked(weigher, place, stage.chosen, k, ahead) for k, place in enumerate(places)]
-    other = _contest(gains, stage.wide, stage.refined, tuple(map(remaining, ranked)))
-    rivals = []
-    for k, (place, near) in enumerate(zip(places, ranked, strict=True)):
-        without = [Rival(UNNAMED, -other.lead), Rival(NOTHING, place.over_nothing + _more(stage.chosen[k], ahead))]
-        if len(places) == 1 and odds_of(without[1]) > max(odds_of(without[0]), 1.0):
+    near = [
+        Posterior(stage.chosen[k].id, _ranked(weigher, place, stage.chosen, k, ahead)) for k, place in enumerate(places)
+    ]
+    other = _contest(gains, stage, near)
+    posteriors = []
+    for k, (place, likely) in enumerate(zip(places, near, strict=True)):
+        without = Rival(UNNAMED, -other.lead), Rival(NOTHING, place.over_nothing + _more(stage.chosen[k], ahead))
+        if len(places) == 1 and Posterior(likely.id, without).is_chance:
             return nothing
-        rivals.append((*calibrated(gains, place.pool, stage.chosen, k, near), *without))
+        simulated = calibrated(gains, place.pool, stage.chosen, k, likely.rivals)
+        posteriors.append(Posterior(likely.id, (*simulated, *without)))
     return Attribution(
         first=first,
         detected=True,
         causes=stage.refined,
         p_values=tuple(_p_value(first, r.candidate) for r in stage.refined),
-        rivals=tuple(map(remaining, rivals)),
+        posteriors=tuple(posteriors),
         gain=stage.gain,
         left=stage.left,
         last=stage.found,
         other=other,
-        probabilities=tuple(probabilities_of(c.id, of) for c, of in zip(stage.chosen, rivals, strict=True)),
         wide=stage.wide,
     )
 
@@ -227,12 +228,10 @@ def _ahead(gains: Gains, stage: _Stage, singles: list[Point]) -> float:
     return max(stage.wide.criterion(gains.size) - play.criterion(gains.size), 0.0)
 
 
-def _contest(
-    gains: Gains, wide: WideMemory | None, causes: tuple[Refined, ...], rivals: tuple[tuple[Rival, ...], ...]
-) -> Contest:
+def _contest(gains: Gains, stage: _Stage, near: Sequence[Posterior]) -> Contest:
     """The best shape that no cause has, against the causes or any other one that does as well in their place."""
-    others = [[r.id for r in near if r.id != c.candidate.id] for c, near in zip(causes, rivals, strict=True)]
-    return contest(gains, causes, others, wide)
+    others = [[r.id for r in place.remaining if r.id != place.id] for place in near]
+    return contest(gains, stage.refined, others, stage.wide)
 
 
 def _stage(search: Search, gains: Gains, chosen: tuple[Candidate, ...]) -> _Stage | None:

@@ -171,7 +171,7 @@ def _extension(refitting: Refitting, analysis: Analysis, cycle: Cycle | None, sa
         floor = floor_of(records, cycle.residual - cycle.explained, average_s)
         return extend(refitting, cycle.able, (), floor, say)
     named = _named(analysis)
-    likely = [place[c.candidate.id] for c, place in zip(named, analysis.attribution.probabilities, strict=False)]
+    likely = [posterior.probability for posterior in analysis.attribution.posteriors] if named else []
     return extend(refitting, named, likely, floor_of(records, analysis.left_dph(named=bool(named)), average_s), say)
 
 

@@ -301,8 +301,7 @@ class Cycle:
             before,
             causes=self.causes,
             p_values=(self.p_value,) * count,
-            rivals=(self.rivals, *((),) * (count - 1)),
-            probabilities=(),
+            posteriors=(),
             left=replace(before.left, share=share),
             wide=None,
         )

@@ -86,7 +86,7 @@ def result_of(
         cycle: What a single chamber cycle tells; None where there are more.
     """
     verdict = verdict_of(analysis.attribution, analysis.noise, cycle)
-    listed = tuple(_cause(analysis, extension, k) for k in range(len(causes)))
+    listed = tuple(_cause(analysis, extension, k, cycle) for k in range(len(causes)))
     listed += tuple(_noise_cause(n) for n in analysis.noise)
     untestable = _untestable(analysis, cycle)
     extended = _extended(extension)
@@ -184,11 +184,15 @@ def _statistics(analysis: Analysis) -> Iterator[Statistic]:
         yield Statistic(**vars(d), extended=extended.get(d.statistic))
 
 
-def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
+def _cause(analysis: Analysis, extension: Extension, k: int, cycle: Cycle | None) -> NamedCause:
     attribution = analysis.attribution
     cause = attribution.causes[k]
     id = cause.candidate.id
-    near = attribution.rivals[k]
+    if cycle is None:
+        posterior = attribution.posteriors[k]
+        near, probabilities = posterior.remaining, posterior.probabilities
+    else:
+        near, probabilities = cycle.rivals if k == 0 else (), None
     rivals = tuple(dict.fromkeys(r.id for r in near))[:_MOST_EQUIVALENT]
     words = CATALOGUE[id].words
     named = NamedCause(
@@ -208,7 +212,7 @@ def _cause(analysis: Analysis, extension: Extension, k: int) -> NamedCause:
     repair = CATALOGUE[id].repair
     values = {name: interval.value for name, interval in cause.parameters.items()}
     reported: dict[str, str | tuple[str, ...] | dict[str, float] | None] = {
-        "probabilities": attribution.probabilities[k] if k < len(attribution.probabilities) else None,
+        "probabilities": probabilities,
         "repair": None if repair is None else repair(cause.candidate.values | values),
         "channel": cause.candidate.channel,
         "equivalent_channels": channels or None,

@@ -6,11 +6,10 @@ where it has `SURE` in its place; below, what else remains possible is listed wi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from ..causes import CATALOGUE, separate_by
 from ..results.diagnosed import (
-    LIKELIER_THAN_ALL_ELSE,
     NOTHING,
     UNNAMED,
     DiagnosisVerdict,
@@ -53,17 +52,8 @@ def holds(attribution: Attribution) -> bool:
     little = any(left.worst < p and left.share < share for p, share in _MISFITS)
     plausible = bool(attribution.causes) and all(cause.plausible for cause in attribution.causes)
     seen = min(attribution.p_values, default=1.0) <= _SEEN
-    return (
-        plausible and seen and not little and not attribution.refuted and all(map(_likely, attribution.probabilities))
-    )
-
-
-def _likely(probabilities: Mapping[str, float]) -> bool:
-    """Test whether a cause is likelier than something unnamed, and its family likelier than all else together."""
-    named, *others = probabilities
-    family = [id for id in others if id in CATALOGUE and CATALOGUE[id].family == CATALOGUE[named].family]
-    share = sum(probabilities[id] for id in (named, *family))
-    return probabilities[named] > probabilities[UNNAMED] and share > LIKELIER_THAN_ALL_ELSE
+    named = all(posterior.is_named for posterior in attribution.posteriors)
+    return plausible and seen and not little and not attribution.refuted and named
 
 
 def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], cycle: Cycle | None = None) -> DiagnosisVerdict:
@@ -81,7 +71,7 @@ def verdict_of(attribution: Attribution, noise: Sequence[NoiseFinding], cycle: C
     if holds(attribution):
         if attribution.left.p_value < _REMAINDER:
             return "partial"
-        return "ambiguous" if any(attribution.rivals) else "explained"
+        return "ambiguous" if any(posterior.remaining for posterior in attribution.posteriors) else "explained"
     if attribution.detected:
         return "unexplained"
     return "noise_differs" if noise else "consistent"

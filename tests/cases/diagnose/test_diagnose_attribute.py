@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,6 +28,7 @@ from gyrotc.diagnose import (
     NoiseFinding,
     PieceGain,
     Point,
+    Posterior,
     Records,
     Refined,
     Refitting,
@@ -60,7 +61,6 @@ from gyrotc.diagnose import (
     overlap,
     overtones_of,
     parabola_top,
-    probabilities_of,
     profile_interval,
     proportional_map,
     random_size,
@@ -68,7 +68,6 @@ from gyrotc.diagnose import (
     reach_of,
     records_of,
     refine,
-    remaining,
     replaced_map,
     samples,
     searched,
@@ -220,7 +219,7 @@ def test_the_planted_cause_is_named_with_its_parameters(case: Case) -> None:
     assert size.low < SIZE < size.high
     assert case.found.left.share > 0.9 and case.found.left.p_value > 0.01
     assert case.found.other.lead < -10.0, "no shape without a name does nearly as well"
-    assert case.found.probabilities[0]["hysteresis"] > 0.95
+    assert case.found.posteriors[0].probability > 0.95
 
 
 def test_refinement_ends_at_the_maximum_of_the_likelihood(case: Case) -> None:
@@ -307,7 +306,7 @@ def test_what_has_no_name_is_the_likelier_explanation_of_it(
     noise = LEVEL_DPH * rng.standard_normal(shape.size)
     found = attribute(campaign.search(1e-4 * campaign.temperature + 3.0 * LEVEL_DPH * shape / shape.std() + noise))
     assert found.detected and not holds(found)
-    assert all(place[UNNAMED] > 0.5 for place in found.probabilities)
+    assert all(posterior.probabilities[UNNAMED] > 0.5 for posterior in found.posteriors)
 
 
 @pytest.mark.parametrize("size", [1.0, 20.0])
@@ -349,7 +348,13 @@ def test_a_cause_is_named_where_its_family_is_likelier_than_all_else(
 ) -> None:
     """Causes of one family may be equally likely: the verdict is then ambiguous, and still says something."""
     assert holds(case.found)
-    assert holds(replace(case.found, probabilities=(stated,))) == named
+    assert holds(replace(case.found, posteriors=(_stated(stated),))) == named
+
+
+def _stated(probabilities: dict[str, float]) -> Posterior:
+    """The posterior with these probabilities, the chosen cause first."""
+    (chosen, own), *others = probabilities.items()
+    return Posterior(chosen, tuple(Rival(id, 0.0, odds=share / own) for id, share in others))
 
 
 def test_what_a_cause_mimics_itself_cannot_be_reported_apart(case: Case) -> None:
@@ -398,7 +403,7 @@ def test_a_cause_beside_offsets_of_power_ons_is_not_taken_for_their_imperfection
 
 def test_rivals_are_near_in_the_criterion() -> None:
     singles = [_point(g, (id, 1.0)) for g, id in ((100.0, "hysteresis"), (97.0, "thermal_gradient"), (60.0, "warm_up"))]
-    near = remaining(ranked_rivals(singles, singles[0].members, 0, 400))
+    near = Posterior("hysteresis", ranked_rivals(singles, singles[0].members, 0, 400)).remaining
     assert [r.id for r in near] == ["thermal_gradient"]
     prices = [p.criterion(400) for p in singles]
     assert near[0].distance == pytest.approx(prices[0] - prices[1])
@@ -407,32 +412,39 @@ def test_rivals_are_near_in_the_criterion() -> None:
         _point(198.0, ("hysteresis", 1.0), ("ageing", 1.0)),
         _point(199.0, ("thermal_gradient", 1.0), ("ageing", 1.0)),
     ]
-    first, second = (remaining(ranked_rivals(pairs, pairs[0].members, k, 400)) for k in range(2))
+    first, second = (
+        Posterior(member.id, ranked_rivals(pairs, pairs[0].members, k, 400)).remaining
+        for k, member in enumerate(pairs[0].members)
+    )
     assert [r.id for r in first] == [] and [r.id for r in second] == ["ageing"]
+
+
+def _probabilities(named: str, rivals: Sequence[Rival]) -> dict[str, float]:
+    return Posterior(named, tuple(rivals)).probabilities
 
 
 def test_what_is_called_equal_and_the_probabilities_agree() -> None:
     """A rival at the edge of what counts as equal has 1 in 10; several farther ones together make a case, too."""
-    at_edge = probabilities_of("hysteresis", [Rival("ageing", EQUIVALENT)])
+    at_edge = _probabilities("hysteresis", [Rival("ageing", EQUIVALENT)])
     assert at_edge == pytest.approx({"hysteresis": 0.9, "ageing": 0.1})
-    assert probabilities_of("hysteresis", [Rival("ageing", 0.0)])["ageing"] == pytest.approx(0.5)
-    unnamed = probabilities_of("hysteresis", [Rival(UNNAMED, 0.0)])
+    assert _probabilities("hysteresis", [Rival("ageing", 0.0)])["ageing"] == pytest.approx(0.5)
+    unnamed = _probabilities("hysteresis", [Rival(UNNAMED, 0.0)])
     assert unnamed[UNNAMED] == pytest.approx(0.75), "more kinds of effects have no name than have one"
-    assert probabilities_of("hysteresis", [Rival(UNNAMED, np.inf)]) == {"hysteresis": 1.0, UNNAMED: 0.0}
-    assert probabilities_of("hysteresis", [Rival(UNNAMED, -1e6)])["hysteresis"] < 1e-100
-    far_behind = probabilities_of("hysteresis", [Rival("ageing", 60.0)])
+    assert _probabilities("hysteresis", [Rival(UNNAMED, np.inf)]) == {"hysteresis": 1.0, UNNAMED: 0.0}
+    assert _probabilities("hysteresis", [Rival(UNNAMED, -1e6)])["hysteresis"] < 1e-100
+    far_behind = _probabilities("hysteresis", [Rival("ageing", 60.0)])
     assert 0.0 < far_behind["ageing"] < 1e-6, "every hypothesis is told, the hopeless ones too"
     same = [Rival("auxiliary", 1.0, "supply_v"), Rival("auxiliary", 2.0, "pressure_hpa")]
-    assert probabilities_of("auxiliary", same) == {"auxiliary": 1.0}, "another channel is no other cause"
+    assert _probabilities("auxiliary", same) == {"auxiliary": 1.0}, "another channel is no other cause"
     size, far = 400, EQUIVALENT + 1.0
     singles = [_point(100.0, ("hysteresis", 1.0))]
     price = singles[0].criterion(size)
     for id in ("thermal_gradient", "warm_up", "ageing"):
         one = _point(0.0, (id, 1.0))
         singles.append(_point(price - far - one.criterion(size), (id, 1.0)))
-    near = remaining(ranked_rivals(singles[:2], singles[0].members, 0, size))
+    near = Posterior("hysteresis", ranked_rivals(singles[:2], singles[0].members, 0, size)).remaining
     assert near == (), "one alone is ruled out"
-    near = remaining(ranked_rivals(singles, singles[0].members, 0, size))
+    near = Posterior("hysteresis", ranked_rivals(singles, singles[0].members, 0, size)).remaining
     assert near, "three together are not"
 
 
@@ -444,8 +456,8 @@ def test_nothing_else_remains_possible_exactly_where_the_printed_probability_is_
     ids = ("ageing", "turn_on_offset", "warm_up", "thermal_gradient", "cavity_lag", "power_on_temperature")
     rivals = [Rival(id, d) for id, d in zip(ids, distances, strict=False)]
     rivals += [Rival(UNNAMED, unnamed), Rival(NOTHING, nothing)]
-    printed = probabilities_of("hysteresis", rivals)
-    left = remaining(rivals)
+    printed = _probabilities("hysteresis", rivals)
+    left = Posterior("hysteresis", tuple(rivals)).remaining
     assume(abs(printed["hysteresis"] - 0.9) > 1e-9)
     assert (left == ()) == (printed["hysteresis"] > 0.9)
     assert printed["hysteresis"] + sum(printed[r.id] for r in left) >= 0.9 - 1e-9
@@ -455,8 +467,8 @@ def test_nothing_else_remains_possible_exactly_where_the_printed_probability_is_
 @given(st.lists(st.floats(0.0, 40.0), min_size=2, max_size=5), st.floats(0.0, 40.0))
 def test_a_cause_more_in_the_catalogue_changes_no_odds_of_the_others(distances: list[float], new: float) -> None:
     rivals = [Rival(f"cause {k}", d) for k, d in enumerate(distances)] + [Rival(UNNAMED, 3.0), Rival(NOTHING, 9.0)]
-    before = probabilities_of("hysteresis", rivals)
-    after = probabilities_of("hysteresis", [*rivals, Rival("new", new)])
+    before = _probabilities("hysteresis", rivals)
+    after = _probabilities("hysteresis", [*rivals, Rival("new", new)])
     for id in before:
         assert after[id] / after["hysteresis"] == pytest.approx(before[id] / before["hysteresis"], rel=1e-9)
 
@@ -697,9 +709,8 @@ def attribution(**changes: Any) -> Any:
         "detected": True,
         "causes": (SimpleNamespace(plausible=True),),
         "p_values": (1e-3,),
-        "rivals": ((),),
         "left": Misfit(0.5, 0.5, 1.0),
-        "probabilities": ({"hysteresis": 0.9, UNNAMED: 0.1},),
+        "posteriors": (Posterior("hysteresis", (Rival(UNNAMED, 30.0),)),),
         "other": SimpleNamespace(lead=-np.inf),
         "refuted": False,
     }
@@ -711,8 +722,8 @@ def attribution(**changes: Any) -> Any:
     [
         ("explained", attribution(), []),
         ("explained", attribution(), NOISE),
-        ("ambiguous", attribution(rivals=((Rival("ageing", 2.0),),)), []),
-        ("ambiguous", attribution(rivals=((Rival(UNNAMED, 2.0),),)), []),
+        ("ambiguous", attribution(posteriors=(Posterior("hysteresis", (Rival("ageing", 2.0),)),)), []),
+        ("ambiguous", attribution(posteriors=(Posterior("hysteresis", (Rival(UNNAMED, 9.0),)),)), []),
         ("partial", attribution(left=Misfit(1e-4, 1e-4, 0.95)), []),
         ("partial", attribution(left=Misfit(1e-9, 1e-9, 0.85)), []),
         ("unexplained", attribution(left=Misfit(1e-9, 1e-9, 0.75)), []),
@@ -721,11 +732,11 @@ def attribution(**changes: Any) -> Any:
         ("unexplained", attribution(left=Misfit(0.2, 1e-9, 0.75)), NOISE),
         ("unexplained", attribution(causes=(SimpleNamespace(plausible=False),)), []),
         ("unexplained", attribution(p_values=(0.98,), left=Misfit(0.06, 0.06, 0.12)), []),
-        ("unexplained", attribution(causes=(), rivals=()), []),
+        ("unexplained", attribution(causes=(), posteriors=()), []),
         ("unexplained", attribution(refuted=True), []),
-        ("unexplained", attribution(probabilities=({"hysteresis": 0.3, UNNAMED: 0.7},)), []),
-        ("noise_differs", attribution(detected=False, causes=(), rivals=()), NOISE),
-        ("consistent", attribution(detected=False, causes=(), rivals=()), []),
+        ("unexplained", attribution(posteriors=(Posterior("hysteresis", (Rival(UNNAMED, 2.0),)),)), []),
+        ("noise_differs", attribution(detected=False, causes=(), posteriors=()), NOISE),
+        ("consistent", attribution(detected=False, causes=(), posteriors=()), []),
     ],
 )
 def test_the_verdict_follows_from_what_was_found(verdict: str, found: Any, noise: list[NoiseFinding]) -> None:

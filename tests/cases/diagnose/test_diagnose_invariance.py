@@ -218,7 +218,8 @@ def test_one_channel_under_two_names_is_an_equivalence_set(made: Callable[[str],
     (name,) = case.records.runs[0].channels
     twice = changed(case.records, lambda r: replace(r, channels={**r.channels, "copy_v": r.channels[name]}))
     found = answer(twice, case.declared)
-    (cause,), ((rival,),) = found.analysis.attribution.causes, found.analysis.attribution.rivals
+    (cause,), (posterior,) = found.analysis.attribution.causes, found.analysis.attribution.posteriors
+    (rival,) = posterior.remaining
     assert found.verdict == "ambiguous"
     assert (cause.candidate.id, rival.id) == ("auxiliary", "auxiliary")
     assert {cause.candidate.channel, rival.channel} == {name, "copy_v"}

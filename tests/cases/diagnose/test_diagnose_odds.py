@@ -17,6 +17,7 @@ from gyrotc.diagnose import (
     Gains,
     MarginalLikelihood,
     Point,
+    Posterior,
     Records,
     Rival,
     RivalPlace,
@@ -32,9 +33,7 @@ from gyrotc.diagnose import (
     noise_findings,
     odds_of,
     p_value_of_energy,
-    probabilities_of,
     ranked_rivals,
-    remaining,
     rival_key,
     search_of,
 )
@@ -109,7 +108,7 @@ def _reported(gains: Gains, *, weighed: bool = True) -> tuple[str, dict[str, flo
     ranked = ranked_rivals(singles, chosen, 0, gains.size)
     near = evidence.judged(singles, chosen, 0, ranked) if weighed else ranked
     likely = calibrated(gains, singles, chosen, 0, near)
-    return chosen[0].id, probabilities_of(chosen[0].id, likely)
+    return chosen[0].id, Posterior(chosen[0].id, likely).probabilities
 
 
 @pytest.mark.parametrize("clock", ["time_misalignment", "a queue of 13 to 20 minutes"])
@@ -235,9 +234,9 @@ def test_two_causes_with_one_signature_have_even_odds_at_any_price(campaign: Cam
     pool = [Point((twin,), best.gain), best]
     ranked = ranked_rivals(pool, (twin,), 0, gains.size)
     assert ranked[0].distance > 5.0, "a straight line costs one parameter less than a play"
-    assert probabilities_of("ageing", ranked)["ageing"] > 0.8
+    assert Posterior("ageing", ranked).probability > 0.8
     found = calibrated(gains, pool, (twin,), 0, ranked)
-    assert probabilities_of("ageing", found) == pytest.approx({"ageing": 0.5, "hysteresis": 0.5}, abs=0.01)
+    assert Posterior("ageing", found).probabilities == pytest.approx({"ageing": 0.5, "hysteresis": 0.5}, abs=0.01)
 
 
 @pytest.mark.parametrize("size", [8.0, 15.0, 40.0])
@@ -254,7 +253,9 @@ def test_it_only_takes_away_from_the_named_cause(campaign: Campaign, size: float
         assert before[rival.id, rival.channel] <= odds_of(rival) <= 1.0
     assert [odds_of(r) for r in found] == sorted(map(odds_of, found), reverse=True)
     if size == 40.0:
-        assert chosen[0].id == "hysteresis" and remaining(found) == (), "a clear cause stays clear"
+        assert chosen[0].id == "hysteresis" and Posterior("hysteresis", found).remaining == (), (
+            "a clear cause stays clear"
+        )
 
 
 def _said(gains: Gains, pool: Sequence[Point], simulated: bool) -> tuple[str, float]:
@@ -262,7 +263,7 @@ def _said(gains: Gains, pool: Sequence[Point], simulated: bool) -> tuple[str, fl
     chosen = best_of(list(pool), gains.size).members
     ranked = ranked_rivals(list(pool), chosen, 0, gains.size)
     reported = calibrated(gains, pool, chosen, 0, ranked) if simulated else ranked
-    return chosen[0].id, probabilities_of(chosen[0].id, reported)[chosen[0].id]
+    return chosen[0].id, Posterior(chosen[0].id, tuple(reported)).probability
 
 
 def test_what_is_said_is_true_at_least_as_often(campaign: Campaign) -> None:

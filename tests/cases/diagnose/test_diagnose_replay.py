@@ -475,7 +475,7 @@ def test_a_loop_about_one_temperature_is_no_lag(campaign: Campaign, seed: int) -
     assert MarginalLikelihood(gains).preferred(list(gains.single())).members[0].id == "cavity_lag"
     found = attribute(search)
     assert named(found) == ["hysteresis"] and found.left.share > 0.9
-    assert "cavity_lag" not in [r.id for r in found.rivals[0]]
+    assert "cavity_lag" not in [r.id for r in found.posteriors[0].remaining]
 
 
 @pytest.mark.parametrize("seed", range(2))
