@@ -153,8 +153,7 @@ def commands(root: Path) -> list[Case]:
     return [
         case("simulate", lambda v: [scenario, "--seed", v, "--out", root / "made"], root / "made"),
         case("build", lambda v: [described[v % 2], "--out", out, "--numeric", "f32"], out),
-        case("fit", lambda v: [described[v % 2], "--out", root / "fitted", "--json", root / "fit.json"],
-             root / "fitted", root / "fit.json"),
+        case("fit", lambda v: [described[v % 2], "--out", root / "fitted"], root / "fitted"),
         case("emit", lambda v: [out / "model.json", "--out", other, "--numeric", numerics[v % 2]], other),
         case("verify", lambda v: [other, "--target", targets[v % 2]], other),
         case("evaluate", lambda _: [other, data, "--trace", other / "trace"], other),

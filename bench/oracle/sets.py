@@ -104,9 +104,9 @@ def _paper(s: Steps) -> None:
     """All that can be done with one unit without a compiler."""
     s.run("simulate", "paper", "--seed", 1, "--out", "data")
     s.run("check", "data", "--json", "check.json")
-    s.run("fit", "data", "--out", "result", "--json", "fit.json")
-    s.run("emit", "result/model.json", "--out", "result", "--json", "emit.json")
-    s.run("evaluate", "result", "data", "--numeric", "f32", "--trace", "result/trace", "--json", "evaluate.json")
+    s.run("fit", "data", "--out", "result")
+    s.run("emit", "result/model.json", "--out", "result")
+    s.run("evaluate", "result", "data", "--trace", "result/trace")
     s.run("report", "result")
     s.run("diagnose", "data", "--out", "diagnosis")
     s.run("compare", "data", "--out", "comparison", "--quiet")  # it prints how long training took
@@ -131,8 +131,8 @@ def _unit(s: Steps) -> None:
     s.write(lambda f: [_text(n, t)(f) for n, t in (("product.toml", _PRODUCT), ("facts.toml", _LABORATORY),
                                                    ("few.toml", _FEW.format("separating")))])  # fmt: skip
     s.run("simulate", "few.toml", "--seed", 4, "--out", "data")
-    s.run("build", "data", "--out", "result", "--limits", "product.toml", "--json", "build.json")
-    s.run("verify", "result", "--target", "host-gcc-O2", "--json", "verify.json")
+    s.run("build", "data", "--out", "result", "--limits", "product.toml")
+    s.run("verify", "result", "--target", "host-gcc-O2")
     accepted, facts = ("--accept-fail", "the only unit at hand"), ("--facts", "facts.toml")
     for name, options in {
         "certificate": (*facts, *accepted, "--out", "certificate"),
@@ -142,17 +142,8 @@ def _unit(s: Steps) -> None:
     }.items():
         s.run("certificate", "result", "--number", "2026-0042", *options, name=name)
     s.run("simulate", "paper-20C", "--seed", 4, "--out", "check-run", name="simulate a check run")
-    s.run(
-        "fit",
-        "check-run",
-        "--prior",
-        "result",
-        "--ageing",
-        "1e-4",
-        "--out",
-        "confirmed",
-        name="fit to a check run",
-    )
+    again = ("build", "check-run", "--prior", "result", "--limits", "product.toml")
+    s.run(*again, "--out", "confirmed", name="build from a check run")
     s.run("check", "data", "--previous", "result")
     s.write(_fit('method = "bank"'), name="state the method bank")
     s.run("fit", "data", "--out", "bank", name="fit a bank")
@@ -162,7 +153,7 @@ def _unit(s: Steps) -> None:
 def _extended(s: Steps) -> None:
     """A build with the causes that are found."""
     s.run("simulate", "two-causes", "--seed", 2, "--out", "data")
-    s.run("diagnose", "data", "--out", "diagnosis", "--json", "diagnose.json")
+    s.run("diagnose", "data", "--out", "diagnosis")
     s.run("build", "data", "--extend", "--numeric", "q31", "--out", "result")
 
 
@@ -197,7 +188,7 @@ def _simulated(scenario: str, *, seed: int, noise: str = "", few: bool = True) -
         s.run("simulate", source, "--seed", seed, "--out", "data")
         s.run("check", "data", "--json", "check.json")
         s.run("fit", "data", "--out", "result")
-        s.run("emit", "result/model.json", "--out", "result", "--json", "emit.json")
+        s.run("emit", "result/model.json", "--out", "result")
         s.run("diagnose", "data", "--out", "diagnosis")
 
     return do
@@ -211,7 +202,7 @@ def _channels(s: Steps) -> None:
     s.write(_fit("channels = true"), name="state channels")
     s.run("fit", "data", "--out", "result")
     s.run("emit", "result/model.json", "--out", "result")
-    s.run("evaluate", "result", "data", "--numeric", "f32")
+    s.run("evaluate", "result", "data")
 
 
 def _pulses(s: Steps) -> None:
@@ -243,15 +234,15 @@ def _lot(s: Steps) -> None:
     """A fleet, what its units share, and a new unit of the lot with one short run."""
     runs = {"whole": '"slow", "fast", "slow"', "short": '"fast"'}
     s.write(lambda f: [_text(f"{n}.toml", f"{_CYCLES}profiles = [{p}]\n")(f) for n, p in runs.items()])
-    lot = ("--seed", 5, "--family", 0.95, "--format", "parquet")
-    s.run("simulate", "whole.toml", *lot, "--units", 9, "--unrelated", 1, "--out", "whole")
+    lot = ("--seed", 5, "--format", "parquet")
+    s.run("simulate", "whole.toml", *lot, "--units", 9, "--out", "whole")
     s.run("simulate", "short.toml", *lot, "--units", 10, "--out", "short", name="simulate a new unit")
     s.write(_reversed_unit, name="a unit with its sign reversed")
-    s.run("fleet", "whole", "--out", "fleet", "--jobs", 1, "--json", "fleet.json")
+    s.run("fleet", "whole", "--out", "fleet", "--jobs", 1)
     s.run("lot", "fleet", "--out", "lot.json")
     unit = "short/LOT-0005-010"
-    s.run("fit", unit, "--lot", "lot.json", "--out", "with-lot")
-    s.run("diagnose", unit, "--lot", "lot.json", "--json", "diagnose.json")
+    s.run("build", unit, "--lot", "lot.json", "--out", "with-lot")
+    s.run("diagnose", unit, "--lot", "lot.json", "--out", "diagnosis")
 
 
 def _reversed_unit(folder: Path) -> None:
@@ -269,7 +260,7 @@ def _reversed_unit(folder: Path) -> None:
 def _measured(folder: str, axis: str, *commands: str) -> RecordingSet:
     def do(s: Steps) -> None:
         s.write(lambda f: shutil.copytree(s.measured / folder, f / "data", ignore=shutil.ignore_patterns("raw")))
-        s.run("check", "data", "--axis", axis, "--json", "check.json")
+        s.run("check", "data", "--json", "check.json")
         if "fit" in commands:
             s.run("fit", "data", "--axis", axis, "--out", "result")
             s.run("emit", "result/model.json", "--out", "result")
@@ -360,7 +351,7 @@ def _events(s: Steps) -> None:
         s.run("check", place, "--json", f"{place}.json", name=f"check: {name}")
         s.run("fit", place, "--out", f"{place}-result", name=f"fit: {name}")
     for name in ("step", "spikes"):
-        s.run("diagnose", name, "--json", f"{name}-found.json", name=f"diagnose: {name}")
+        s.run("diagnose", name, "--out", f"{name}-found", name=f"diagnose: {name}")
 
 
 def _graded(s: Steps) -> None:
@@ -390,7 +381,7 @@ def _axes(s: Steps) -> None:
             write_csv(folder / "data" / f"{k}.csv", table | rates)
 
     s.write(make)
-    s.run("check", "data", "--axis", "all", "--json", "check.json")
+    s.run("check", "data", "--json", "check.json")
     s.run("build", "data", "--axis", "all", "--numeric", "f32", "--out", "result")
     s.run("certificate", "result", "--number", "7", "--out", "draft", "--draft")
 
@@ -426,8 +417,9 @@ def _wrong(s: Steps) -> None:
     s.run("fit", "RLG-1", "--out", "result")
     s.run("emit", "result/model.json", "--out", "result")
     for words in (
-        ("fit", "RLG-1", "--axis", "x"), ("fit", "RLG-1", "--lot", "none.json"), ("fit", "RLG-1", "--prior", "none"),
-        ("fit", "nowhere"), ("build", "RLG-1", "--numeric", "f99"), ("build", "RLG-1", "--limits", "bad.toml"),
+        ("fit", "RLG-1", "--axis", "x"), ("fit", "nowhere"), ("build", "RLG-1", "--lot", "none.json"),
+        ("build", "RLG-1", "--prior", "none"), ("build", "RLG-1", "--numeric", "f99"),
+        ("build", "RLG-1", "--limits", "bad.toml"),
         ("fleet", "fleet.toml", "--out", "fleet"), ("fleet", "nowhere", "--out", "fleet"),
         ("simulate", "bad.toml", "--out", "made"), ("simulate", "nothing", "--out", "made"),
         ("lot", "nowhere", "--out", "lot.json"),
@@ -443,7 +435,7 @@ def _wrong(s: Steps) -> None:
         lambda f: next((f / "result" / "c").glob("gtc_*.h")).write_text("int x;\n"),
         name="a table changed by hand",
     )
-    s.run("verify", "result", "--target", "host-gcc-O2", "--json", "verify.json")
+    s.run("verify", "result", "--target", "host-gcc-O2")
 
 
 def _changed_model(folder: Path) -> None:

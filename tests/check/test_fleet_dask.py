@@ -19,6 +19,7 @@ from pathlib import Path
 import distributed
 import pytest
 from conftest import ROOT, Command, on_terminal
+from gyrotc.common import InputError
 from gyrotc.fleet import Cluster, load_manifest, run_fleet
 from gyrotc.fleet import run as running
 from gyrotc.results import FleetEntry
@@ -177,15 +178,14 @@ def test_a_worker_that_finds_other_recordings_refuses_them(
 def test_without_a_worker_it_is_reported_what_is_waited_for(
     world: Path, alone: Dask, tmp_path: Path, gyrotc: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fleet = ("fleet", world / "lab" / "few", "--out", tmp_path / "out")
-    done = gyrotc(*fleet, "--scheduler", alone.address, "--wait", "1")
-    assert done.returncode == 2 and not (tmp_path / "out" / "fleet.json").exists()
-    assert done.stdout == f"waiting for a worker of {alone.address} (0 now, 1 is enough), 1 s at most\n"
-    [line] = done.stderr.splitlines()
-    assert f"{alone.address}: no worker in 1 s; expected dask worker {alone.address}" in line
+    lab, out, reported = world / "lab" / "few", tmp_path / "out", []
+    with pytest.raises(InputError, match=f"{alone.address}: no worker in 1 s; expected dask worker {alone.address}"):
+        run_fleet(load_manifest(lab), out, cluster=Cluster(alone.address, 1.0, reported.append))
+    assert not (out / "fleet.json").exists()
+    assert reported == [f"waiting for a worker of {alone.address} (0 now, 1 is enough), 1 s at most"]
     alone.kill("scheduler")
     monkeypatch.setattr(running, "_CONNECT_S", 1.0)
-    done = gyrotc(*fleet, "--scheduler", alone.address)
+    done = gyrotc("fleet", lab, "--out", out, "--scheduler", alone.address)
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and alone.address in done.stderr
 
 

@@ -101,7 +101,6 @@ def evaluate(
     folder: Path,
     dataset: Dataset,
     *,
-    numeric: str | None = None,
     average_s: float | None = None,
     trace: Path | None = None,
     trace_rows: int | None = None,
@@ -113,8 +112,9 @@ def evaluate(
 ) -> Evaluation:
     """Evaluate `folder` (model and C) on a data set; return the content of `evaluate.json`.
 
+    The first table that was emitted is executed.
+
     Args:
-        numeric: Arithmetic to run; default the first emitted one.
         average_s: Averaging of all RMS figures; default the model's.
         trace: Folder for one CSV per run.
         trace_rows: Most rows of it: a longer run's are means of as few rows as that takes; None: every row.
@@ -132,10 +132,7 @@ def evaluate(
     model = load_model(folder / "model.json")
     refuse_another_gyro(folder, model, dataset)
     tables = emitted_tables(folder / "c", model)
-    chosen = numeric or next(iter(tables))
-    if chosen not in tables:
-        raise CheckFailed(f"{folder / 'c'}: no {chosen} table was emitted")
-    table = tables[chosen]
+    table = next(iter(tables.values()))
     window = average_s or model.average_s
     judged = judged or judge(dataset)
     parts = []

@@ -12,8 +12,8 @@ from ..common.progress import Progress
 from ..common.texts import toml_key
 from ..pages.display import sci, words
 from .application import app
-from .options import JsonOption, OutOption, written_place
-from .output import tell, write_json
+from .options import OutOption, written_place
+from .output import tell
 from .progress import progress
 
 if TYPE_CHECKING:
@@ -31,11 +31,6 @@ def fleet(
         str | None,
         typer.Option("--scheduler", help="Address of a Dask scheduler to use instead; default: this machine."),
     ] = None,
-    wait: Annotated[
-        int,
-        typer.Option("--wait", metavar="S", min=1, help="Longest wait for a worker of --scheduler, s."),
-    ] = 60,
-    json_file: JsonOption = None,
 ) -> None:
     """Calibrate many gyros, and name those that are outliers.
 
@@ -49,12 +44,11 @@ def fleet(
     from ..fleet.run import Cluster, forgotten_units, run_fleet
 
     wanted = load_manifest(manifest)
-    cluster = Cluster(scheduler, wait, tell) if scheduler else None
+    cluster = Cluster(scheduler, say=tell) if scheduler else None
     with progress() as say:
         done = _Done(len(wanted.units), say)
         entries = run_fleet(wanted, out, jobs=jobs, cluster=cluster, done=done)
     summary = summary_of(entries)
-    write_json(json_file, summary.content())
     _tell_comparison(summary)
     for place in wanted.skipped:
         tell(f"{printable(str(place))}: no recordings and no dataset.toml, so no gyro", wrong=True)

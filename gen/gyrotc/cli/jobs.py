@@ -13,10 +13,8 @@ import typer
 from ..common.errors import CheckFailed
 from .application import app
 from .options import (
-    AgeingOption,
     AxisOption,
     DatasetArg,
-    JsonOption,
     LotOption,
     NumericOption,
     OutOption,
@@ -25,7 +23,7 @@ from .options import (
     lot_in,
     numerics_of,
 )
-from .output import show, tell, write_json
+from .output import show, tell
 from .progress import progress
 from .results import built_lines, verify_table
 
@@ -88,12 +86,10 @@ def build(
     ] = None,
     lot: LotOption = None,
     prior: PriorOption = None,
-    ageing: AgeingOption = None,
     previous: Annotated[
         Path | None,
         typer.Option("--previous", help="An earlier result of this gyro to compare with; default: that of --prior."),
     ] = None,
-    json_file: JsonOption = None,
 ) -> None:
     """The main job: check, fit, emit, verify, evaluate, report.
 
@@ -112,14 +108,9 @@ def build(
         limits=limits,
         previous=previous,
         prior=prior,
-        ageing_dph=ageing,
     )
     with progress() as say:
         results = run(dataset, out, request, progress=say)
-    if len(results) == 1:
-        write_json(json_file, results[0].evaluation.content())
-    else:
-        write_json(json_file, {str(r.evaluation.axis): r.evaluation.content() for r in results})
     for result in results:
         if result.verification.failed:
             show(verify_table(result.verification))
@@ -138,7 +129,6 @@ def compare(
         Path | None, typer.Option("--out", help="Folder for compare.json and compare.svg; default: print only.")
     ] = None,
     axis: AxisOption = None,
-    json_file: JsonOption = None,
 ) -> None:
     """Train every method on this data, as in the paper's Table 1.
 
@@ -160,7 +150,6 @@ def compare(
         if stage:
             write_atomically(stage.folder / "compare.json", json_text(result.content()))
             write_atomically(stage.folder / "compare.svg", comparison_picture(result))
-    write_json(json_file, result.content())
     for table in comparison_tables(result):
         show(table)
 
@@ -174,7 +163,6 @@ def diagnose(
     ] = None,
     axis: AxisOption = None,
     lot: LotOption = None,
-    json_file: JsonOption = None,
 ) -> None:
     """Name the cause of what a static map leaves in recordings.
 
@@ -187,8 +175,6 @@ def diagnose(
 
     with progress() as say:
         results = run(dataset, out, FitOptions(prior=lot_in(lot)), axis=axis, progress=say)
-    contents = {name: result.content() for name, result in results.items()}
-    write_json(json_file, contents.get("", contents))
     for name, result in results.items():
         for line in diagnosis_lines(result):
             tell(line)

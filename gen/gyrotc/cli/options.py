@@ -113,13 +113,6 @@ PriorOption = Annotated[
     Path | None,
     typer.Option("--prior", help="An earlier result of this gyro as prior, tested by the new runs; default: none."),
 ]
-AgeingOption = Annotated[
-    float | None,
-    typer.Option(
-        "--ageing",
-        help="Standard deviation of the drift since --prior, deg/h; default: by drift and dates, else 0.",
-    ),
-]
 AcceptOption = Annotated[
     str | None,
     typer.Option(

@@ -12,7 +12,7 @@ import typer
 
 from ..common.errors import InputError, quoted
 from .application import app
-from .options import AxisOption, DatasetArg, JsonOption, OutOption, SeedOption
+from .options import DatasetArg, JsonOption, OutOption, SeedOption
 from .output import tell, write_json
 from .progress import progress
 
@@ -200,14 +200,6 @@ def simulate(
             "--units", help="Simulate a lot of so many gyros, each in a folder of its own; default: one gyro."
         ),
     ] = None,
-    family: Annotated[
-        float | None,
-        typer.Option("--family", help="With --units: how much gyros share, 0 (nothing) ... 1; default 0.9."),
-    ] = None,
-    unrelated: Annotated[
-        int | None,
-        typer.Option("--unrelated", help="With --units: gyros that share nothing with the others; default 0."),
-    ] = None,
 ) -> None:
     """Make a data set from the physical simulation.
 
@@ -219,13 +211,9 @@ def simulate(
     """
     from ..simulate.data_set import simulate as run
 
-    of_lot = {"family": family, "unrelated": unrelated}
-    stated = {name: value for name, value in of_lot.items() if value is not None}
     if units is not None:
-        _simulate_lot(scenario, {"units": units, **stated}, seed, out, raw_hz, pulses, format)
+        _simulate_lot(scenario, units, seed, out, raw_hz, pulses, format)
         return
-    if stated:
-        raise InputError(f"--{next(iter(stated))}", "without --units", "the number of gyros of the lot")
     with progress() as say:
         run(
             scenario,
@@ -241,7 +229,7 @@ def simulate(
 
 def _simulate_lot(
     scenario: str,
-    stated: dict[str, Any],
+    units: int,
     seed: int,
     out: Path,
     raw_hz: float | None,
@@ -252,7 +240,7 @@ def _simulate_lot(
     from ..simulate.data_set import RowForm
     from ..simulate.lot import LotOrder, simulate_lot
 
-    order = LotOrder(**stated)
+    order = LotOrder(units)
     with progress() as say:
         simulate_lot(
             order,
@@ -262,13 +250,12 @@ def _simulate_lot(
             form=RowForm.of(raw_hz=raw_hz, pulses=pulses, format=format.value),
             progress=say,
         )
-    tell(f"{out}: {order.units} data sets of scenario {scenario}, family {order.family:g}, seed {seed}")
+    tell(f"{out}: {units} data sets of scenario {scenario}, seed {seed}")
 
 
 @app.command()
 def check(
     dataset: DatasetArg,
-    axis: AxisOption = None,
     previous: Annotated[
         Path | None,
         typer.Option(
@@ -286,7 +273,7 @@ def check(
     from ..jobs.inspection import check as run
 
     with progress() as say:
-        result = run(dataset, axis=axis, previous=previous, progress=say)
+        result = run(dataset, previous=previous, progress=say)
     write_json(json_file, result.result().content())
     for line in result.lines():
         tell(line, wrong=bool(result.problems))

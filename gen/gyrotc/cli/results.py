@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from ..pages.unit import UnitResults
     from ..results.evaluation import Changes, EvaluatedRun, Evaluation, ModelSizes, Pooled
     from ..results.release import (
-        EmittedTable,
         JointVerification,
-        MapError,
         ReadLog,
         Verification,
         VerifiedFile,
@@ -117,12 +115,16 @@ def verified_line(result: Verification) -> str:
 _NOTABLE_GROWTH = 0.01
 
 
-def rounding_lines(tables: Iterable[EmittedTable | MapError]) -> Iterator[str]:
-    """One line for each table whose rounding costs more than the third digit of an RMS."""
-    for table in tables:
-        if table.rms_growth is not None and table.rms_growth > _NOTABLE_GROWTH:
+def rounding_lines(growths: Mapping[str, float | None]) -> Iterator[str]:
+    """Yield a line for each arithmetic whose rounding costs more than the third digit of an RMS.
+
+    Args:
+        growths: Share by which rounding can raise an RMS at the noise floor, by arithmetic; None: no floor is known.
+    """
+    for numeric, growth in growths.items():
+        if growth is not None and growth > _NOTABLE_GROWTH:
             yield (
-                f"{table.numeric}: rounding can raise an RMS at the noise floor by {table.rms_growth:.1%} of it; "
+                f"{numeric}: rounding can raise an RMS at the noise floor by {growth:.1%} of it; "
                 "at_most.error_bound_dph of a limits file refuses what is too much"
             )
 
@@ -148,7 +150,7 @@ def verify_notes(result: Verification) -> Iterator[str]:
     if result.outdated_boards:
         names = ", ".join(result.outdated_boards)
         yield f"{names}: ran another model or other code, so these results are dropped; run the board test again"
-    yield from rounding_lines(result.errors)
+    yield from rounding_lines({error.numeric: error.rms_growth for error in result.errors})
     for error in result.errors:
         yield from (f"{error.numeric}: {text}" for text in error.first_mismatches)
         yield (

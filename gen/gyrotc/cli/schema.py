@@ -48,7 +48,7 @@ def kinds() -> dict[str, type[BaseModel]]:
     from ..results.evaluation import Changes, Comparison, Evaluation
     from ..results.fleet import FleetEntry, FleetSummary, Lot
     from ..results.recordings import Checked, ImportedFiles, SimulatedTruth
-    from ..results.release import Budget, Emitted, HeldLimits, JointVerification, MapOnGrid, Verification
+    from ..results.release import Budget, HeldLimits, JointVerification, MapOnGrid, Verification
     from ..results.training import Manifest, Training
     from ..tables.record import EmissionRecord
 
@@ -60,7 +60,6 @@ def kinds() -> dict[str, type[BaseModel]]:
         "diagnose": Diagnosed,
         "diagnosis-series": DiagnosisSeries,
         "emission": EmissionRecord,
-        "emit": Emitted,
         "entry": FleetEntry,
         "evaluate": Evaluation,
         "fleet": FleetSummary,

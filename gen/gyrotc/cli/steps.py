@@ -11,25 +11,19 @@ from typing import Annotated
 
 import typer
 
-from .. import __version__
 from ..common.errors import CheckFailed, InputError, quoted
 from .application import app
 from .options import (
-    AgeingOption,
     AxisOption,
     DatasetArg,
     DirArg,
-    JsonOption,
-    LotOption,
     NumericOption,
     OutOption,
-    PriorOption,
     TargetOption,
-    lot_in,
     numerics_of,
     written_place,
 )
-from .output import ERR, show, tell, write_json
+from .output import ERR, show, tell
 from .progress import progress
 from .results import (
     evaluation_table,
@@ -86,10 +80,6 @@ def fit(
     dataset: DatasetArg,
     out: OutOption,
     axis: AxisOption = None,
-    lot: LotOption = None,
-    prior: PriorOption = None,
-    ageing: AgeingOption = None,
-    json_file: JsonOption = None,
 ) -> None:
     """Train a model: write DIR/model.json and DIR/training.json.
 
@@ -98,12 +88,9 @@ def fit(
     Example: gyrotc fit recordings --out result
     """
     from ..jobs.fitting import fit as run
-    from ..train.fitting import FitOptions
 
-    options = FitOptions(prior=lot_in(lot))
     with progress() as say:
-        fitted = run(dataset, out, options, axis=axis, prior=prior, ageing_dph=ageing, progress=say)
-    write_json(json_file, fitted.training.content())
+        fitted = run(dataset, out, axis=axis, progress=say)
     training = fitted.training
     for line in training_lines(training):
         tell(line)
@@ -152,7 +139,6 @@ def emit(
             "--answers", callback=written_place, help="Write the answers that the board test must print here, too."
         ),
     ] = None,
-    json_file: JsonOption = None,
 ) -> None:
     """Write the C files of a model into DIR/c.
 
@@ -161,7 +147,6 @@ def emit(
     from ..model import load_model
     from ..results.folder import result_folder, write_result
     from ..results.json_text import json_text
-    from ..results.release import Emitted, EmittedTable
     from ..tables.emission import answers_file
     from ..tables.emission import emit as run
     from ..tables.map_grid import csv_text, grid_of_map, map_result
@@ -174,23 +159,6 @@ def emit(
         if there.is_file() and there.read_text("utf-8") != loaded.to_json():
             stage.stale()  # evaluated, verified, drawn: all of another model
         emission = run(loaded, stage.folder, numerics=numerics_of(numeric), zero_at=zero_at, progress=say)
-    result = Emitted(
-        gyrotc_version=__version__,
-        serial=loaded.serial,
-        axis=loaded.axis,
-        id=loaded.id,
-        tables=tuple(
-            EmittedTable(
-                numeric=t.numeric,
-                table_bytes=t.table_bytes,
-                error_bound_dph=t.error_bound_dph,
-                rms_growth=rms_growth(loaded, t),
-            )
-            for t in emission.tables.values()
-        ),
-        refused=emission.refused,
-    )
-    write_json(json_file, result.content())
     if map_file is not None:
         grid = grid_of_map(loaded if zero_at is None else loaded.zeroed_at(zero_at))
         text = csv_text(grid) if map_file.suffix == ".csv" else json_text(map_result(grid).content())
@@ -201,7 +169,7 @@ def emit(
         tell(f"{answers}: status and bits of every result of board_test.c")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
-    for line in rounding_lines(result.tables):
+    for line in rounding_lines({t.numeric: rms_growth(loaded, t) for t in emission.tables.values()}):
         tell(line)
     tell(f"{out / 'c'}: tables gtc_{loaded.id} in {', '.join(emission.tables)}")
 
@@ -220,7 +188,6 @@ def verify(
             "--exhaustive", help="Visit every input of the fixed-point table, which takes minutes; default: a sample."
         ),
     ] = False,
-    json_file: JsonOption = None,
 ) -> None:
     """Test whether DIR/c is what gyrotc makes of DIR/model.json.
 
@@ -262,7 +229,6 @@ def verify(
         with result_folder(folder, "verify", entries=("verify.json",)) as stage:
             result = verify_axes(folder, results)
             write_atomically(stage.folder / "verify.json", json_text(result.content()))
-    write_json(json_file, result.content())
     for one in results.values():
         show(verify_table(one))
         for line in verify_notes(one):
@@ -282,7 +248,6 @@ def verify(
 def evaluate(
     folder: DirArg,
     dataset: DatasetArg,
-    numeric: NumericOption = None,
     trace: Annotated[
         Path | None,
         typer.Option(
@@ -290,7 +255,6 @@ def evaluate(
             help="Folder for one CSV per run, every row; default: only the traces of the page, where DIR has them.",
         ),
     ] = None,
-    json_file: JsonOption = None,
 ) -> None:
     """Replay recordings through the compiled C code and measure.
 
@@ -310,8 +274,7 @@ def evaluate(
     if trace is None and (folder / "trace").is_dir():  # what the page is drawn from
         trace, rows = folder / "trace", TRACE_ROWS
     with evaluation_folders(folder, trace, dataset) as (stage, traces), progress() as say:
-        result = evaluate_again(folder, recordings, stage, numeric=numeric, trace=traces, trace_rows=rows, progress=say)
-    write_json(json_file, result.content())
+        result = evaluate_again(folder, recordings, stage, trace=traces, trace_rows=rows, progress=say)
     show(evaluation_table(result))
     unit = unit_in(folder)
     if unit.limits is not None:

@@ -110,12 +110,12 @@ class Cluster:
 
     Attributes:
         address: Address of the scheduler.
-        wait_s: Longest time that a fleet waits for a first worker, s.
+        wait_s: Longest time that a fleet waits for a worker, s.
         say: Called with what is waited for, and with the address of the dashboard.
     """
 
     address: str
-    wait_s: float
+    wait_s: float = 60.0
     say: Callable[[str], None] = lambda _: None
 
 

@@ -112,7 +112,6 @@ class BuildRequest:
         previous: An earlier result of the same gyro, to find what changed.
         prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
             check run) do not speak against it; also the `previous` one where none is given.
-        ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as limits or dates say, else 0.
     """
 
     fit: FitOptions = field(default_factory=FitOptions)
@@ -123,7 +122,6 @@ class BuildRequest:
     limits: Path | None = None
     previous: Path | None = None
     prior: Path | None = None
-    ageing_dph: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +155,7 @@ def build(source: Path, out: Path, request: BuildRequest | None = None, *, progr
     known = applied_in(source)
     if request.extend and (request.fit.prior is not None or request.prior is not None):
         raise InputError("--extend", "with --lot or --prior: both know maps alone", "one of them")
-    refuse_together(request.fit, request.prior, request.ageing_dph)
+    refuse_together(request.fit, request.prior)
     limits = load_limits(request.limits) if request.limits else None
     if limits and not request.targets:
         request = replace(request, targets=limits.needs.targets)
@@ -213,7 +211,7 @@ def build_into(
 def _build_axis(dataset: Dataset, work: Path, order: _Order, say: Stages) -> Built:
     request = order.request
     options = request.fit.with_stated(dataset.fit)
-    options = with_prior(options, dataset, request.prior, request.ageing_dph, order.limits)
+    options = with_prior(options, dataset, request.prior, order.limits)
     previous = request.previous or request.prior
     earlier = load_earlier(previous, dataset.serial, dataset.axis) if previous else None
     say("judging rows")

@@ -31,7 +31,6 @@ def evaluate_again(
     dataset: Dataset,
     into: Path,
     *,
-    numeric: str | None = None,
     trace: Path | None = None,
     trace_rows: int | None = None,
     progress: Progress = silent,
@@ -46,7 +45,7 @@ def evaluate_again(
     verification = read_optional(folder / "verify.json", Verification)
     limits = read_optional(folder / "limits.json", HeldLimits)
     budget = read_optional(folder / "budget.json", Budget)
-    evaluation = evaluate(folder, dataset, numeric=numeric, trace=trace, trace_rows=trace_rows, progress=progress)
+    evaluation = evaluate(folder, dataset, trace=trace, trace_rows=trace_rows, progress=progress)
     model = load_model(folder / "model.json")
     written: list[UnitResult] = [evaluation]
     if limits is not None:

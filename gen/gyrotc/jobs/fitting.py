@@ -22,8 +22,6 @@ def fit(
     options: FitOptions | None = None,
     *,
     axis: str | None = None,
-    prior: Path | None = None,
-    ageing_dph: float | None = None,
     progress: Progress = silent,
 ) -> Fitted:
     """Return the model of recordings, with what was decided on the way.
@@ -31,10 +29,8 @@ def fit(
     Args:
         source: Folder of recordings.
         out: Folder of the result, which is replaced as a whole; None: no files.
-        options: Options of training, and the lot of the unit; None: all at their defaults.
+        options: Options of training; None: all at their defaults.
         axis: Axis of three-axis recordings.
-        prior: An earlier result of the same gyro that is taken for what is known of it.
-        ageing_dph: How far its bias may have moved since, 1 sigma, deg/h; None: as dates say, else 0.
         progress: Takes note of every stage.
 
     Raises:
@@ -45,10 +41,6 @@ def fit(
         if stage:
             stage.of(dataset.serial, dataset.axis)
         options = (options or FitOptions()).with_stated(dataset.fit)
-        if prior is not None or ageing_dph is not None:
-            from .recalibration import with_prior  # 0.2 s: it reads a judged result, and most gyros have none yet
-
-            options = with_prior(options, dataset, prior, ageing_dph)
         fitted = fit_dataset(dataset, options, progress=progress)
         if stage:
             fitted.model.save(stage.folder / "model.json")

@@ -18,17 +18,14 @@ from ..train.fitting import FitOptions
 from ..train.prior.earlier import EarlierPrior, posterior_of_result, widened
 
 
-def prior_from(
-    folder: Path, dataset: Dataset, *, ageing_dph: float | None = None, limits: Limits | None = None
-) -> EarlierPrior:
+def prior_from(folder: Path, dataset: Dataset, limits: Limits | None = None) -> EarlierPrior:
     """Return what an earlier result says of a unit today.
 
     Args:
         folder: What `gyrotc build` wrote of the same gyro.
         dataset: The recordings of the check run.
-        ageing_dph: How far the bias may have moved since, 1 sigma; None: by the limits file's drift of the type or by
-            the unit's earlier calibrations, and the dates; else 0.
-        limits: Limits of the product.
+        limits: Limits of the product, with the drift of the type; None: the earlier calibrations of the unit state
+            how far the bias may have moved since.
 
     Raises:
         InputError: It is of another gyro, cannot be read, or is made from the same recordings.
@@ -40,53 +37,45 @@ def prior_from(
             raise InputError(run.file, f"the model in {folder} was made from it", "recordings of its own")
     where = earlier.folder / "training.json"
     posterior = posterior_of_result(read_result(where, Training), where)
-    aged, stated = _ageing(earlier, dataset, ageing_dph, limits)
-    return widened(posterior, aged, stated, earlier.model.hash, earlier.date)
+    ageing_dph, source = _ageing(earlier, dataset, limits)
+    return widened(posterior, ageing_dph, source, earlier.model.hash, earlier.date)
 
 
-def refuse_together(options: FitOptions, prior: Path | None, ageing_dph: float | None) -> None:
-    """Refuse options that contradict each other.
+def refuse_together(options: FitOptions, prior: Path | None) -> None:
+    """Refuse an earlier result in addition to a lot.
 
     Raises:
-        InputError: They do.
+        InputError: Both are named.
     """
     if prior is not None and options.prior is not None:
         found = "with --prior: what the lot knew of the unit is in its earlier model already"
         raise InputError("--lot", found, "one of the two")
-    if prior is None and ageing_dph is not None:
-        raise InputError("--ageing", "without --prior", "an earlier model that may have aged")
 
 
-def with_prior(
-    options: FitOptions, dataset: Dataset, folder: Path | None, ageing_dph: float | None, limits: Limits | None = None
-) -> FitOptions:
+def with_prior(options: FitOptions, dataset: Dataset, folder: Path | None, limits: Limits | None) -> FitOptions:
     """Return options of a fit with the prior of an earlier result; unchanged if none is named.
 
     Raises:
         InputError: As `refuse_together` and `prior_from`.
     """
-    refuse_together(options, folder, ageing_dph)
+    refuse_together(options, folder)
     if folder is None:
         return options
-    return replace(options, prior=prior_from(folder, dataset, ageing_dph=ageing_dph, limits=limits))
+    return replace(options, prior=prior_from(folder, dataset, limits))
 
 
-def _ageing(earlier: Earlier, dataset: Dataset, stated: float | None, limits: Limits | None) -> tuple[float, str]:
+def _ageing(earlier: Earlier, dataset: Dataset, limits: Limits | None) -> tuple[float, str]:
     """Return the standard deviation of the drift of the bias, deg/h, and the source of this figure."""
-    if stated is not None:
-        if not (math.isfinite(stated) and stated >= 0.0):
-            raise InputError("--ageing", f"{stated:g}", "deg/h, 0 or more")
-        return stated, "as stated"
     try:
         then, now = (date.fromisoformat(str(day)[:10]) for day in (earlier.date, started_on(dataset)))
     except ValueError:
-        return 0.0, "none: one of the calibrations has no date, and no --ageing is stated"
+        return 0.0, "none: one of the calibrations has no date"
     years = max((now - then).days, 0) / DAYS_A_YEAR
     drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
     if drift is not None:
         return drift * years / math.sqrt(3.0), "the type's largest drift, by the limits file"
     drifts = yearly_drifts(earlier.history)
     if not drifts:
-        return 0.0, "none: neither --ageing, nor a drift of the type, nor earlier calibrations"
+        return 0.0, "none: neither a drift of the type, nor earlier calibrations"
     drift = math.sqrt(math.fsum(d**2 for d in drifts) / len(drifts))
     return drift * years, f"by {len(drifts) + 1} earlier calibrations"

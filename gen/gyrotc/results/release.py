@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from .base import TABLE_BYTES, Amount, Axis, Count, Figure, Numeric, Part, Positive, Result, UnitResult
+from .base import TABLE_BYTES, Amount, Axis, Count, Figure, Part, Positive, Result, UnitResult
 
 
 class Instrument(Part):
@@ -177,24 +177,6 @@ STATED = (
 _RMS_GROWTH = (
     "largest share by which rounding can raise the RMS of a residual at the noise floor; null if no floor is known"
 )
-
-
-class EmittedTable(Part):
-    """Size and error bound of one table."""
-
-    numeric: Numeric = Field(description="arithmetic of the table")
-    table_bytes: Count = Field(description=TABLE_BYTES)
-    error_bound_dph: float = Field(description="largest error of the map for any input, deg/h")
-    rms_growth: Figure = Field(default=None, description=_RMS_GROWTH)
-
-
-class Emitted(UnitResult):
-    """Tables that were written."""
-
-    schema_: Annotated[Literal["gyrotc.emit/1"], Field(alias="schema")] = "gyrotc.emit/1"
-    id: str = Field(description="id of the table, part of every emitted name")
-    tables: tuple[EmittedTable, ...] = Field(description="tables, one for each arithmetic")
-    refused: dict[str, str] = Field(description="arithmetics that were left out, with the reason")
 
 
 class MapOnGrid(UnitResult):

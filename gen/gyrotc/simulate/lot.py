@@ -72,11 +72,11 @@ class LotOrder:
         if not 1 <= self.units <= _MOST_UNITS:
             raise InputError("--units", str(self.units), f"1 ... {_MOST_UNITS}")
         if not 0.0 <= self.family <= 1.0:
-            raise InputError("--family", f"{self.family:g}", "0 (nothing shared) ... 1 (all the same)")
+            raise InputError("family", f"{self.family:g}", "0 (nothing shared) ... 1 (all the same)")
         if not 1 <= self.clusters <= self.units:
-            raise InputError("--clusters", str(self.clusters), "1 ... the number of units")
+            raise InputError("clusters", str(self.clusters), "1 ... the number of units")
         if not 0 <= self.unrelated < self.units:
-            raise InputError("--unrelated", str(self.unrelated), "0 or more, and fewer than units")
+            raise InputError("unrelated", str(self.unrelated), "0 or more, and fewer than units")
 
 
 def simulate_lot(

@@ -283,7 +283,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("recalibration")
     run_here("fit", dataset(place / "first", 11, "2025-01-01", check=False), "--out", place / "old")
     dataset(place / "check", 12, "2026-01-01", check=True)
-    reported = run_here("fit", place / "check", "--prior", place / "old", "--out", place / "new")
+    reported = run_here("build", place / "check", "--prior", place / "old", *HOST, "--out", place / "new")
     assert "earlier model: the model " in reported and "is confirmed" in reported
     return place
 
@@ -293,10 +293,13 @@ def test_the_commands_say_what_became_of_the_earlier_model(world: Path, tmp_path
     assert training.prior is not None and training.prior.date == "2025-01-01"
     assert "is confirmed" in json.loads((world / "new" / "model.json").read_text())["meta"]["prior"]
     bumped = dataset(tmp_path / "bumped", 13, "2026-06-01", check=True, change=CHANGES["local"])
-    reported = run_here("fit", bumped, "--prior", world / "new", "--out", tmp_path / "bad")
-    assert "no longer holds" in reported and "finding prior_does_not_hold" in reported
-    reported = run_here("fit", bumped, "--prior", world / "new", "--ageing", "5e-3", "--out", tmp_path / "aged")
-    assert "ageing of 0.005 deg/h" in reported
+    build = ("build", bumped, "--prior", world / "new", *HOST)
+    reported = run_here(*build, "--out", tmp_path / "bad")
+    assert "no longer holds" in reported and "findings: prior_does_not_hold" in reported
+    limits = tmp_path / "product.toml"
+    limits.write_text("schema = 1\n[interval]\ndays = 365\ndrift_dph_per_year = 0.02\n", "utf-8")
+    reported = run_here(*build, "--limits", limits, "--out", tmp_path / "aged")
+    assert "ageing of 0.0048 deg/h (1 sigma; the type's largest drift, by the limits file)" in reported
 
 
 def sigma_dph(result: Path) -> float:
@@ -355,14 +358,12 @@ def test_a_build_of_a_unit_that_has_moved_says_where(world: Path, tmp_path: Path
 
 def test_what_cannot_be_a_prior_is_reported(world: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="was made from it"):
-        run_here("fit", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
-    with pytest.raises(InputError, match="--ageing"):
-        run_here("fit", world / "check", "--ageing", "1e-4", "--out", tmp_path / "a")
+        run_here("build", world / "first", "--prior", world / "old", "--out", tmp_path / "a")
     with pytest.raises(InputError, match=r"--prior .* has no model\.json"):
-        run_here("fit", world / "check", "--prior", world, "--out", tmp_path / "a")
+        run_here("build", world / "check", "--prior", world, "--out", tmp_path / "a")
     other = dataset(tmp_path / "other", 14, "2026-01-01", check=True)
     text = (other / "dataset.toml").read_text().replace("RLG-0007", "RLG-0008")
     (other / "dataset.toml").write_text(text)
     with pytest.raises(InputError, match="RLG-0008"):
-        run_here("fit", other, "--prior", world / "old", "--out", tmp_path / "a")
+        run_here("build", other, "--prior", world / "old", "--out", tmp_path / "a")
     assert not (tmp_path / "a").exists()

@@ -443,14 +443,14 @@ def test_the_command_holds_recordings_against_an_earlier_result(
     calibrated: Path, tmp_path: Path, gyrotc: Command
 ) -> None:
     write_csv(tmp_path / "RLG-0042" / "a.csv", swapped(three(5), "x -y z"))
-    done = gyrotc("check", tmp_path / "RLG-0042", "--axis", "all", "--previous", calibrated)
+    done = gyrotc("check", tmp_path / "RLG-0042", "--previous", calibrated)
     assert done.returncode == 0, done.stderr
     assert "axis y stands with the other sign in the column of y" in done.stdout
     (tmp_path / "RLG-0042").rename(tmp_path / "RLG-7")
-    refused = gyrotc("check", tmp_path / "RLG-7", "--axis", "all", "--previous", calibrated)
+    refused = gyrotc("check", tmp_path / "RLG-7", "--previous", calibrated)
     assert refused.returncode == 2
     assert "--previous: is of gyro RLG-0042" in refused.stderr
-    nothing = gyrotc("check", tmp_path / "RLG-7", "--axis", "all", "--previous", tmp_path)
+    nothing = gyrotc("check", tmp_path / "RLG-7", "--previous", tmp_path)
     assert nothing.returncode == 2
     assert "has no model.json" in nothing.stderr
 

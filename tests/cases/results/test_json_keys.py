@@ -153,10 +153,14 @@ def test_check_fit_and_compare(tmp_path: Path, gyrotc: Command) -> None:
         write_csv(tmp_path / "RLG-1" / f"run-0{k}.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
     (tmp_path / "RLG-1" / "dataset.toml").unlink()
     results = {}
-    for command in (["check"], ["fit", "--out", tmp_path / "out"], ["compare"]):
-        done = gyrotc(command[0], tmp_path / "RLG-1", *command[1:], "--json", tmp_path / "result.json")
+    for command, option, place, file in (
+        ("check", "--json", "check.json", "check.json"),
+        ("fit", "--out", "fit", "fit/training.json"),
+        ("compare", "--out", "compare", "compare/compare.json"),
+    ):
+        done = gyrotc(command, tmp_path / "RLG-1", option, tmp_path / place)
         assert done.returncode == 0, done.stderr
-        results[command[0]] = read(tmp_path / "result.json")
+        results[command] = read(tmp_path / file)
     assert absent(HEAD | {"problems": [], "warnings": [], "runs": []}, results["check"]) == []
     assert absent(HEAD, results["fit"]) == []
     assert absent(COMPARE, results["compare"]) == []
@@ -168,9 +172,9 @@ def test_diagnose(tmp_path: Path, gyrotc: Command) -> None:
     described(tmp_path / "RLG-1")
     rows = columns(360)
     write_csv(tmp_path / "RLG-1" / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
-    done = gyrotc("diagnose", tmp_path / "RLG-1", "--json", tmp_path / "result.json")
+    done = gyrotc("diagnose", tmp_path / "RLG-1", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert absent(DIAGNOSE, read(tmp_path / "result.json")) == []
+    assert absent(DIAGNOSE, read(tmp_path / "out" / "diagnose.json")) == []
 
 
 def test_every_command_has_an_example_in_its_help() -> None:

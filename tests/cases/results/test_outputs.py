@@ -454,7 +454,7 @@ def test_recordings_are_no_place_for_a_result(made: Path, gyrotc: Command) -> No
         refused(gyrotc, made, command, data, "--out", data, reported="is the data set")
         refused(gyrotc, made, command, data, "--out", data / "x", reported="inside the data set")
         refused(gyrotc, made, command, data, "--out", made, reported="above the data set")
-    refused(gyrotc, made, "fit", data, "--out", made / "new", "--json", data / "run-01.csv", reported="run-01.csv")
+    refused(gyrotc, made, "check", data, "--json", data / "run-01.csv", reported="run-01.csv")
     refused(gyrotc, made, "emit", made / "result", "--out", data / ".." / "A" / "run-01.csv", reported="is a file")
 
 
@@ -483,7 +483,7 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(made: Path, tmp_path:
     steps = (
         ("fit", made / "A", "--out", out),
         ("emit", out / "model.json", "--out", out, "--numeric", "f32"),
-        ("evaluate", out, made / "A", "--trace", out / "trace", "--json", out / "more.json"),
+        ("evaluate", out, made / "A", "--trace", out / "trace"),
         ("report", out),
         ("verify", out, "--target", "host-gcc-O2"),
     )
@@ -492,7 +492,7 @@ def test_steps_add_to_one_folder_and_a_new_fit_begins_anew(made: Path, tmp_path:
         assert done.returncode == 0, done.stderr
         assert not result_faults(out)
     assert {p.name for p in out.iterdir()} == {
-        MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "more.json", "verify.json",
+        MARKER, "model.json", "training.json", "c", "evaluate.json", "trace", "report.html", "verify.json",
     }  # fmt: skip
     (out / "trace" / "notes.txt").write_text("mine")
     refused(gyrotc, tmp_path, *steps[2], reported="trace/notes.txt")

@@ -272,7 +272,7 @@ def test_a_lot_is_a_folder_of_data_sets_that_seed_and_order_fix(short: Path, tmp
     "wrong", [{"units": 0}, {"units": 3, "family": 1.5}, {"units": 3, "clusters": 4}, {"units": 3, "unrelated": 3}]
 )
 def test_a_lot_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=f"--{[*wrong][-1]}"):
+    with pytest.raises(InputError, match=[*wrong][-1]):
         LotOrder(**wrong)  # type: ignore[arg-type]
 
 
@@ -280,9 +280,6 @@ def test_the_command_makes_one_unit_or_a_lot(short: Path, tmp_path: Path) -> Non
     done = invoked("simulate", short, "--units", "2", "--out", tmp_path / "lot")
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in (tmp_path / "lot").iterdir()) == ["LOT-0001-001", "LOT-0001-002"]
-    alone = invoked("simulate", "paper", "--family", "0.5", "--out", tmp_path / "none")
-    assert isinstance(alone.exception, InputError) and "--family: without --units" in str(alone.exception)
-    assert not (tmp_path / "none").exists()
 
 
 FASTEST = 10.0

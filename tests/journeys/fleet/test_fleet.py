@@ -50,7 +50,7 @@ def three(tmp_path: Path) -> Path:
 
 def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Command) -> None:
     out = tmp_path / "out"
-    done = gyrotc("fleet", three, "--out", out, "--json", tmp_path / "fleet.json")
+    done = gyrotc("fleet", three, "--out", out)
     assert done.returncode == 1
     assert done.stderr == "gyrotc: 1 of 3 gyros failed\n"
     lines = {line.split(":")[0]: line for line in done.stdout.splitlines()}
@@ -59,7 +59,6 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     verified = verify(out / "RLG-1", compiled=False).emitted
     assert {file.verdict for file in verified} == {"equal"}, "the folder of a gyro is complete"
     summary = json.loads((out / "fleet.json").read_text())
-    assert json.loads((tmp_path / "fleet.json").read_text()) == summary
     assert (summary["schema"], summary["done"], summary["failed"]) == ("gyrotc.fleet/1", 2, 1)
     rows = list(csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines()))
     assert [row["status"] for row in rows] == ["done", "done", "failed"]

@@ -374,15 +374,17 @@ def test_build_gives_what_the_command_gives(tmp_path: Path) -> None:
 def test_fit_diagnose_and_check_give_what_the_commands_give(tmp_path: Path) -> None:
     rows = columns(720)
     write_csv(tmp_path / "RLG-1" / "run-01.csv", rows | {"rate_dph": rows["rate_dph"] - 20.0})
-    for command, file in (("fit", "training.json"), ("diagnose", "diagnose.json"), ("check", "check.json")):
-        out = ("--out", tmp_path / "out") if command == "fit" else ()
-        run_gyrotc(command, tmp_path / "RLG-1", *out, "--json", tmp_path / file)
+    for command, option, place in (("fit", "--out", "fit"), ("diagnose", "--out", "found"), ("check", "--json", "c")):
+        run_gyrotc(command, tmp_path / "RLG-1", option, tmp_path / place)
     fitted = gyrotc.fit(tmp_path / "RLG-1", tmp_path / "fitted")
     without_times = {"curves": None}  # they hold the seconds that a search took
-    assert fitted.training.content() | without_times == _json(tmp_path / "training.json") | without_times
+    assert fitted.training.content() | without_times == _json(tmp_path / "fit" / "training.json") | without_times
     assert load_model(tmp_path / "fitted") == fitted.model
-    assert diagnose(tmp_path / "RLG-1")[""].content() == _json(tmp_path / "diagnose.json")
-    assert gyrotc.check(tmp_path / "RLG-1").result().content() == _json(tmp_path / "check.json")
+    found = _json(tmp_path / "found" / "diagnose.json")
+    files = ("pictures", "series")  # those of the folder
+    again = diagnose(tmp_path / "RLG-1")[""].content()
+    assert {k: v for k, v in again.items() if k not in files} == {k: v for k, v in found.items() if k not in files}
+    assert gyrotc.check(tmp_path / "RLG-1").result().content() == _json(tmp_path / "c")
     with pytest.raises(InputError, match="block_s"):
         gyrotc.fit(tmp_path / "RLG-1", block_s=0.0)
 

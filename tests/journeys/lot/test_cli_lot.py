@@ -47,7 +47,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("lot")
     for name, profiles in (("whole", '"slow", "fast", "slow"'), ("short", '"fast"')):
         (place / f"{name}.toml").write_text(RUNS.replace("PROFILES", profiles), "utf-8")
-    lot = ("--seed", "5", "--family", "0.95", "--format", "parquet")
+    lot = ("--seed", "5", "--format", "parquet")
     run_here("simulate", place / "whole.toml", *lot, "--units", "5", "--out", place / "whole")
     run_here("simulate", place / "short.toml", *lot, "--units", "6", "--out", place / "short")
     with units_in_this_process():
@@ -55,6 +55,13 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     reported = run_here("lot", place / "fleet", "--out", place / "lot.json")
     assert "5 units" in reported and "before any run" in reported
     return place
+
+
+@pytest.fixture(scope="module")
+def new_gyro(world: Path) -> tuple[str, Path]:
+    """The sixth unit built with the lot: what the command printed, and the result."""
+    unit, out = world / "short" / "LOT-0005-006", world / "with"
+    return run_here("build", unit, "--lot", world / "lot.json", *HOST, "--out", out), out
 
 
 def test_the_file_is_small_and_says_from_what_it_was_made(world: Path) -> None:
@@ -72,10 +79,12 @@ def test_the_scatter_of_power_ons_is_that_of_all_units(world: Path) -> None:
     assert load_lot(world / "lot.json").between_dph == pytest.approx(np.sqrt(np.mean(np.square(between))), rel=1e-5)
 
 
-def test_how_many_units_were_left_out_is_said_with_the_reasons(world: Path, tmp_path: Path) -> None:
+def test_how_many_units_were_left_out_is_said_with_the_reasons(
+    world: Path, new_gyro: tuple[str, Path], tmp_path: Path
+) -> None:
     fleet = Path(shutil.copytree(world / "fleet", tmp_path / "fleet"))
     shutil.copytree(fleet / "LOT-0005-002", fleet / "under another name")
-    run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", fleet / "LOT-0005-006")
+    shutil.copytree(new_gyro[1], fleet / "LOT-0005-006")
     summary = json.loads((fleet / "fleet.json").read_text())
     (barred,) = (one for one in summary["serials"] if one["name"] == "LOT-0005-001")
     barred["findings"] = ["sign_reversed"]
@@ -92,12 +101,14 @@ def test_how_many_units_were_left_out_is_said_with_the_reasons(world: Path, tmp_
     assert expected in lot.text and [u.serial for u in lot.units] == [f"LOT-0005-00{k}" for k in range(2, 6)]
 
 
-def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world: Path) -> None:
-    reported = run_here("fit", world / "short" / "LOT-0005-006", "--lot", world / "lot.json", "--out", world / "with")
+def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(
+    world: Path, new_gyro: tuple[str, Path]
+) -> None:
+    reported, built = new_gyro
     apart = Path(shutil.copytree(world / "short" / "LOT-0005-006", world / "apart" / "LOT-0005-006"))
     run_here("fit", state_fit(apart, method="mrbf"), "--out", world / "alone")
-    lot, model, alone = load_lot(world / "lot.json"), load_model(world / "with"), load_model(world / "alone")
-    use = json.loads((world / "with" / "training.json").read_text())["lot"]
+    lot, model, alone = load_lot(world / "lot.json"), load_model(built), load_model(world / "alone")
+    use = json.loads((built / "training.json").read_text())["lot"]
     assert use["checksum"] == lot.checksum and use["accepted"] and not use["member"]
     assert "lot: a lot of 5 units leaves" in reported and str(model.meta["lot"]).endswith(use["text"])
     assert model.envelope.temperature_c[0] <= lot.temperature_c[0]
@@ -106,10 +117,8 @@ def test_a_new_unit_takes_the_lots_envelope_and_says_what_came_from_where(world:
     assert "".join(model.coverage.rows).count("1") > 0
 
 
-def test_header_and_report_show_the_lot(world: Path) -> None:
-    out = world / "built"
-    unit = world / "short" / "LOT-0005-006"
-    run_here("build", unit, "--lot", world / "lot.json", *HOST, "--out", out)
+def test_header_and_report_show_the_lot(world: Path, new_gyro: tuple[str, Path]) -> None:
+    out, unit = new_gyro[1], world / "short" / "LOT-0005-006"
     assert "a lot of 5 units leaves" in next((out / "c").glob("gtc_lot*.h")).read_text()
     page = (out / "report.html").read_text()
     assert "<h3>The lot</h3>" in page and "the lot alone, 5 units" in page
@@ -133,7 +142,7 @@ def test_a_fleet_with_a_lot_is_done_again_when_the_lot_changes(world: Path) -> N
 def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> None:
     """The map beside the causes, from one of three runs, has less error on the others; a single cycle goes without."""
     (tmp_path / "fast.toml").write_text(RUNS.replace("PROFILES", '"fast", "slow", "fast"'), "utf-8")
-    lot = ("--seed", "5", "--family", "0.95", "--format", "parquet", "--units", "6")
+    lot = ("--seed", "5", "--format", "parquet", "--units", "6")
     run_here("simulate", tmp_path / "fast.toml", *lot, "--out", tmp_path / "units")
     dataset, lot = load(tmp_path / "units" / "LOT-0005-006"), load_lot(world / "lot.json")
     records = records_of(dataset, "train", block_s=10.0, average_s=100.0)
@@ -147,11 +156,9 @@ def test_a_diagnosis_starts_from_the_lots_map(world: Path, tmp_path: Path) -> No
         left.append(float(np.mean(away**2)))
         assert (fitted.lot is not None and fitted.lot.accepted) == (options.prior is not None)
     assert left[0] < left[1]
-    reported = run_here(
-        *("diagnose", world / "short" / "LOT-0005-006", "--lot", world / "lot.json"),
-        *("--json", tmp_path / "found.json"),
-    )
-    assert "lot: not used: " in reported and "single cycle" in json.loads((tmp_path / "found.json").read_text())["lot"]
+    unit, out = world / "short" / "LOT-0005-006", tmp_path / "found"
+    reported = run_here("diagnose", unit, "--lot", world / "lot.json", "--out", out)
+    assert "lot: not used: " in reported and "single cycle" in json.loads((out / "diagnose.json").read_text())["lot"]
 
 
 def test_a_lot_that_was_changed_is_refused(world: Path, tmp_path: Path) -> None:

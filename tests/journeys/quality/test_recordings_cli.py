@@ -91,8 +91,6 @@ def test_check_takes_every_axis_and_fit_names_them(tmp_path: Path, gyrotc: Comma
     assert refused.returncode == 2 and "--axis x|y|z|all" in refused.stderr
     every = gyrotc("check", tmp_path / "IMU")
     assert every.returncode == 0 and [f", axis {a} " in every.stdout for a in "xyz"] == [True] * 3
-    assert gyrotc("check", tmp_path / "IMU", "--axis", "all").stdout == every.stdout
-    assert gyrotc("check", tmp_path / "IMU", "--axis", "y").returncode == 0
 
 
 def test_the_model_does_not_depend_on_the_form_of_a_recording(tmp_path: Path, gyrotc: Command) -> None:
