@@ -368,7 +368,8 @@ def _evaluated(part: _Part, average_s: float, constant_dph: float) -> EvaluatedR
 def _result(
     model: Model, dataset: Dataset, table: Table, parts: list[_Part], sizes: Footprint | None, *, average_s: float
 ) -> Evaluation:
-    exam = [p.averages for p in parts if p.run.role == "exam"]
+    tests = [p for p in parts if p.run.role == "exam"]
+    exam = [p.averages for p in tests]
     train = [p.averages for p in parts if p.run.role == "train"]
     floor = simulated_floor(dataset.folder, [p.run.file for p in parts if p.run.role == "exam"], average_s)
     source = "simulated" if floor is not None else model.noise_floor_source
@@ -384,7 +385,13 @@ def _result(
         noise_floor_dph=floor if floor is not None else model.noise_floor_dph,
         noise_floor_source=source,
         constant_dph=constant_dph,
-        requirements=requirements_of(model, [p.run for p in parts], [p.facts for p in parts], exam),
+        requirements=requirements_of(
+            model,
+            [p.run for p in parts],
+            [p.facts for p in parts],
+            [p.robust for p in tests],
+            [p.rows for p in tests],
+        ),
         mismatches=sum(compared) if len(compared) == len(parts) else None,
         runs=tuple(_evaluated(p, average_s, constant_dph) for p in parts),
         train=Pooled.of(train, constant_dph) if train else None,

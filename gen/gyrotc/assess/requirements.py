@@ -19,6 +19,7 @@ from ..quality.findings import RunFacts
 from ..recordings.records import Run
 from ..results.evaluation import Requirement
 from ..results.release import Verdict
+from ..results.rows import RowsCount
 
 LEAST_FREEDOM = 5.0
 """Degrees of freedom below which U is unknown by a third: 1/sqrt(2 freedom), JCGM 100:2008, E.4.3."""
@@ -26,48 +27,60 @@ LEAST_FREEDOM = 5.0
 LEAST_POWER_ONS = int(LEAST_FREEDOM) + 1
 """Power-ons of a PASS: the scatter from power-on to power-on then has five degrees of freedom."""
 
-# Share of the trained cells of the envelope that an exam must visit. Cells at the edge of the envelope hold the few
+# Share of the trained cells of the envelope that test runs must visit. Cells at the edge of the envelope hold the few
 # means at which a chamber overshoots, and another run of the same programme may miss them.
-_LEAST_VISITED = 0.9
+_MIN_VISITED = 0.9
+
+# Share of the rows of the test runs that must be usable for a PASS. The figures are of all rows, and a row of a dead
+# logger has no noise: more of them would lower RMS and uncertainty.
+_MIN_USABLE = 0.9
+# If the usable rows are fewer than the others, the figures are not those of a gyro.
+_MIN_TESTABLE = 0.5
 
 
 def requirements_of(
-    model: Model, runs: Sequence[Run], facts: Sequence[RunFacts], exam: Sequence[Averages]
+    model: Model,
+    runs: Sequence[Run],
+    facts: Sequence[RunFacts],
+    test_means: Sequence[Averages],
+    test_rows: Sequence[RowsCount],
 ) -> tuple[Requirement, ...]:
     """Return what a PASS needs of the recordings, and what they allow.
 
     Args:
-        runs: All that were evaluated.
-        facts: Of each of them.
-        exam: Means of the test runs; empty where spans of the training runs were left out in turn, or training itself
-            is judged: then what is judged is what was certified.
+        model: The model that is judged.
+        runs: All runs that were evaluated.
+        facts: Facts of each of them.
+        test_means: Means of the usable rows of the test runs; empty if folds or the training runs themselves are
+            judged: their temperatures are those that are certified.
+        test_rows: Counts of the rows of the test runs.
     """
-    found = [_rows(facts), _power_ons(runs)]
-    return (_coverage(model, exam), *found) if exam else tuple(found)
+    requirements = [_rows(facts, test_rows), _power_ons(runs)]
+    return (_coverage(model, test_means), *requirements) if test_means else tuple(requirements)
 
 
-def _coverage(model: Model, exam: Sequence[Averages]) -> Requirement:
-    (low, high), share = model.envelope.temperature_c, _visited(model, exam)
-    temperature = np.concatenate([a.temperature_c for a in exam])
+def _coverage(model: Model, test_means: Sequence[Averages]) -> Requirement:
+    (low, high), share = model.envelope.temperature_c, _visited(model, test_means)
+    temperature = np.concatenate([a.temperature_c for a in test_means])
     t0, t1 = (float(temperature.min()), float(temperature.max())) if temperature.size else (0.0, 0.0)
     text = (
         f"The test runs visit {t0:.1f} to {t1:.1f} C and {share:.0%} of the temperatures and rates of temperature that "
-        f"the map was trained on, of {low:.1f} to {high:.1f} C; a PASS needs {_LEAST_VISITED:.0%} of these"
+        f"the map was trained on, of {low:.1f} to {high:.1f} C; a PASS needs {_MIN_VISITED:.0%} of these"
     )
-    if share >= _LEAST_VISITED:
+    if share >= _MIN_VISITED:
         return Requirement(id="exam_covers_envelope", verdict="PASS", text=text)
     verdict: Verdict = "NOT TESTABLE" if t1 - t0 < LEAST_SPAN_C else "CONDITIONAL PASS"
     advice = f"Record test runs over {low:.1f} to {high:.1f} C at the rates of temperature of the training runs."
     return Requirement(id="exam_covers_envelope", verdict=verdict, text=text, next=advice)
 
 
-def _visited(model: Model, exam: Sequence[Averages]) -> float:
+def _visited(model: Model, test_means: Sequence[Averages]) -> float:
     """Return the share of trained cells with a mean of a test run in them or in a neighbour."""
     coverage = model.coverage
     cells = coverage.cells if coverage else (32, 12)
     trained = coverage.trained if coverage else np.ones(cells[::-1], bool)
     visited: BoolArray = np.zeros(trained.shape, dtype=bool)
-    for a in exam:
+    for a in test_means:
         if a.time_s.size:
             t = a.temperature_c
             rate = np.gradient(t, a.time_s / 60.0) if t.size > 1 else np.zeros(1)
@@ -81,8 +94,8 @@ def _visited(model: Model, exam: Sequence[Averages]) -> float:
     return float(np.mean(near_visited[trained])) if trained.any() else 0.0
 
 
-def _rows(facts: Sequence[RunFacts]) -> Requirement:
-    """Refuse rates that do not come from a gyro at work: of one value, or cut at the end of a range."""
+def _rows(facts: Sequence[RunFacts], test_rows: Sequence[RowsCount]) -> Requirement:
+    """Refuse rates that do not come from a gyro at work, and figures of rows that may not be used."""
     reasons = [
         *(f"{f.file}: the rate has one value in all rows" for f in facts if "rate" in f.constant),
         *(
@@ -91,11 +104,21 @@ def _rows(facts: Sequence[RunFacts]) -> Requirement:
             if f.saturated_rows
         ),
     ]
-    if not reasons:
-        return Requirement(id="rows", verdict="PASS", text="No run is constant or cut at the end of a range")
+    bad, kept = (sum(getattr(rows, name) for rows in test_rows) for name in ("bad", "kept"))
+    share = kept / (kept + bad) if kept + bad else 1.0
+    usable = f"{share:.0%} of the rows of the test runs may be used" if test_rows else ""
+    if reasons or share < _MIN_TESTABLE:
+        verdict: Verdict = "NOT TESTABLE"
+    else:
+        verdict = "PASS" if share >= _MIN_USABLE else "CONDITIONAL PASS"
+    if share < _MIN_USABLE:
+        reasons.append(f"{usable}; a PASS needs {_MIN_USABLE:.0%}")
+    if verdict == "PASS":
+        text = "No run is constant or cut at the end of a range"
+        return Requirement(id="rows", verdict=verdict, text=f"{text}; {usable}" if usable else text)
     return Requirement(
         id="rows",
-        verdict="NOT TESTABLE",
+        verdict=verdict,
         text="; ".join(reasons),
         next="Look at logger, wiring and range of the gyro, and record these runs again.",
     )

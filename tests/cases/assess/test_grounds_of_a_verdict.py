@@ -106,6 +106,23 @@ def constant(rows: Rows) -> Rows:
     return rows | {"rate_dph": np.full(ROWS, 0.4), "temperature_c": np.full(ROWS, 20.0)}
 
 
+def goes_on(rows: Rows) -> Rows:
+    """The recording goes on for seven times as long after the logger has died; what it repeats is right."""
+    dead = 7 * ROWS
+    time_s = rows["time_s"][-1] + PERIOD_S * np.arange(1, dead + 1)
+    last_c = rows["temperature_c"][-1]
+    bias = 0.6 * ((last_c - 20.0) / 20.0) ** 2 + 0.02 * last_c
+    after = {"time_s": time_s, "temperature_c": np.full(dead, last_c), "rate_dph": np.full(dead, bias)}
+    return {name: np.concatenate([values, after[name]]) for name, values in rows.items()}
+
+
+def repeats(rows: Rows) -> Rows:
+    """A fifth of the rates are repeated; the temperatures go on."""
+    rate = rows["rate_dph"].copy()
+    rate[600:780] = rate[599]
+    return rows | {"rate_dph": rate}
+
+
 def saturated(rows: Rows) -> Rows:
     return rows | {"rate_dph": np.clip(rows["rate_dph"], 0.0, 0.9)}
 
@@ -119,6 +136,8 @@ CASES = {
     "exam at a hold of 0.6 C": (exam_rows(held_at(20.0, 0.6)), "NOT TESTABLE", "exam_covers_envelope"),
     "exam over a third of the range": (exam_rows(half), "CONDITIONAL PASS", "exam_covers_envelope"),
     "exam of a dead logger": (exam_rows(constant), "NOT TESTABLE", "rows"),
+    "exam whose logger died after it": (exam_rows(goes_on), "NOT TESTABLE", "rows"),
+    "exam of repeated rates": (exam_rows(repeats), "CONDITIONAL PASS", "rows"),
     "gyro beyond its range": (all_rows(saturated), "NOT TESTABLE", "rows"),
     "gyro beyond its range in the exam": (exam_rows(saturated), "NOT TESTABLE", "rows"),
     "three power-ons": (few, "CONDITIONAL PASS", "power_ons"),
