@@ -16,6 +16,7 @@ from .metrics import statistics_of as statistics_of
 from .metrics import time_statistics as time_statistics
 from .progress import Progress as Progress
 from .progress import Stages as Stages
+from .splines import cubic_splines as cubic_splines
 from .statistics import CHI2_95_ONE as CHI2_95_ONE
 from .statistics import CHI2_95_TWO as CHI2_95_TWO
 from .statistics import NORMAL_95 as NORMAL_95

@@ -20,6 +20,7 @@ from scipy.linalg.lapack import dtbtrs
 
 from ..common.arrays import FloatArray, IntArray
 from ..common.metrics import median_step
+from ..common.splines import cubic_splines
 from ..common.statistics import cell_means, running_mean
 
 RowArrays = tuple[FloatArray, FloatArray, FloatArray]
@@ -421,18 +422,15 @@ def own_energy(raw: FloatArray, held: FloatArray) -> FloatArray:
 
 def maps_of(cells: Sequence[RunCells], knots_c: float) -> list[FloatArray]:
     """Return the columns of a map over temperature and its rate at the cells of each run, shape (p, n)."""
-    from scipy.interpolate import BSpline  # as `_filtered`
-
     low = min(float(one.temperature_c.min()) for one in cells)
     high = max(float(one.temperature_c.max()) for one in cells)
     if high - low < _LEAST_SPAN_C:
         return [np.zeros((0, len(one))) for one in cells]
-    inner = np.linspace(low, high, max(int(np.ceil((high - low) / knots_c)), 1) + 1)
-    knots = np.r_[[low] * 3, inner, [high] * 3]
+    knots = np.linspace(low, high, max(int(np.ceil((high - low) / knots_c)), 1) + 1)
     found = []
     for one in cells:
         x = np.clip(one.temperature_c, low, high)
-        pieces = BSpline.design_matrix(x, knots, 3).toarray()[:, 1:].T  # with the first they add up to a level
+        pieces = cubic_splines(x, knots)[:, 1:].T  # with the first they add up to a level
         slope = running_mean(np.gradient(one.temperature_c, one.time_s), max(round(_SLOPE_S / one.cell_s), 1))
         r, u = 60.0 * slope, (x - 0.5 * (low + high)) / (high - low)
         found.append(np.concatenate([pieces, [r, r * u, r * u * u, r * np.abs(r), r * r]]))

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
+from ..common.splines import cubic_splines
 from ..common.statistics import running_mean
 from .odds import CELL_S, OCTAVE, WINDOW
 
@@ -63,8 +63,7 @@ def _columns(t: FloatArray, x: FloatArray) -> FloatArray | None:
     columns = [np.ones_like(t), since / max(float(since[-1]), 1.0), *(np.exp(-since / tau) for tau in taus)]
     low, high = float(x.min()), float(x.max())
     if high - low >= _MIN_SPAN_C:
-        knots = np.r_[[low] * 3, _knots(np.sort(x)), [high] * 3]
-        columns += list(BSpline.design_matrix(x, knots, 3).toarray()[:, 1:].T)
+        columns += list(cubic_splines(x, _knots(np.sort(x)))[:, 1:].T)
         quick, slope = (
             60.0 * running_mean(np.gradient(x, t), max(round(window * rows_per_s), 1)) for window in _SLOPES_S
         )
