@@ -10,9 +10,10 @@ _DEGREE = 3
 
 
 def cubic_splines(x: FloatArray, knots: FloatArray) -> FloatArray:
-    """Return the cubic B-splines over some knots at some places, shape (n, knots + 2), by the recursion of Cox and de Boor.
+    """Return the cubic B-splines over some knots at some places, shape (n, knots + 2).
 
-    The outer knots are repeated, so that the splines add up to 1 everywhere between them.
+    The recursion is that of Cox and de Boor. The outer knots are repeated, so that the splines add up to 1 everywhere
+    between them.
 
     Args:
         x: Places from the first knot to the last, shape (n,).

@@ -10,7 +10,6 @@ instead of writing a foreign unit's code; those for HTML escape, and take as it 
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import math
@@ -95,9 +94,12 @@ def c_code(text: str) -> CText:
     return CText(text)
 
 
-@functools.cache
-def c_environment() -> jinja2.Environment:
-    """The templates of C, compiled once in a process. Filters: `comment` for text, `hex32`, `tenths`."""
+def c_environment(compiled: jinja2.BytecodeCache | None = None) -> jinja2.Environment:
+    """Return the templates of C, with the filters `comment` for text, `hex32` and `tenths`.
+
+    Args:
+        compiled: Keeps the compiled templates.
+    """
     import jinja2
 
     def only_c(value: Any) -> Any:
@@ -105,6 +107,7 @@ def c_environment() -> jinja2.Environment:
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("gyrotc", "tables/templates"),
+        bytecode_cache=compiled,
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         autoescape=False,  # that is HTML's; here `finalize` lets nothing through
@@ -136,12 +139,20 @@ def _only_c(value: Any) -> Any:
 # ---- HTML and SVG ----
 
 
-def html_environment(**filters: Callable[..., str]) -> jinja2.Environment:
-    """Templates of pages: everything is escaped but what `checked_svg` returned."""
+def html_environment(
+    compiled: jinja2.BytecodeCache | None = None, /, **filters: Callable[..., str]
+) -> jinja2.Environment:
+    """Return the templates of pages: everything is escaped but what `checked_svg` returned.
+
+    Args:
+        compiled: Keeps the compiled templates.
+        filters: By name, besides those of jinja2.
+    """
     import jinja2
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("gyrotc", "pages/templates"),
+        bytecode_cache=compiled,
         undefined=jinja2.StrictUndefined,
         autoescape=True,
         finalize=_only_html,

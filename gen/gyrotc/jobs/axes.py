@@ -7,13 +7,13 @@ from pathlib import Path
 
 from .. import __version__
 from ..common.errors import CheckFailed, InputError
-from ..common.texts import c_environment
 from ..model import Model, load_model
 from ..pages.report import axes_page
 from ..results.base import NUMERICS
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
 from ..results.release import JointVerification, Verification
+from ..results.templates import c_templates
 from ..tables.emission import emitted_tables
 from ..tables.record import RECORD, joint_record_text
 from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts
@@ -68,7 +68,7 @@ def joint_texts(
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
     listed = list(models.values())
     main = (
-        c_environment()
+        c_templates()
         .get_template("main_axes.c.j2")
         .render(models=listed, n=numeric, period_us=example_period_us(listed[0]), samples=example_samples(listed[0]))
     )

@@ -25,6 +25,7 @@ from ..pages.unit import UnitResults
 from ..quality.judgement import Judged, judge
 from ..recordings.loading import asked_axes, load
 from ..recordings.records import Dataset
+from ..results.cache import program_of
 from ..results.diagnosed import Diagnosed
 from ..results.evaluation import Changes, Evaluation
 from ..results.files import sha256, write_atomically
@@ -299,8 +300,6 @@ def _versions() -> dict[str, str]:
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:
     """Return hashes of everything in the folder, versions and meta, for a certificate."""
-    from ..results.cache import program_of  # the package of fleets imports this module
-
     files = sorted(p for p in folder.rglob("*") if p.is_file() and p.name != MARKER)
     return Manifest(
         gyrotc_version=__version__,

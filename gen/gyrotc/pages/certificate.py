@@ -17,11 +17,11 @@ from typing import Any
 
 from markupsafe import Markup
 
-from ..common.texts import html_environment
 from ..results.decision import worst_of
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import Limit
+from ..results.templates import html_templates
 from .display import bound_words, digits_of, limit_words, measured_words, rounded
 from .report import page_environment
 from .unit import UnitResults
@@ -124,7 +124,7 @@ def dcc_text(
 ) -> str:
     """The XML of a DCC; arguments as of the page."""
     # Text as a DCC takes it: words with a blank between them, and never none
-    environment = html_environment(
+    environment = html_templates(
         line=lambda value: " ".join(str(value).split()) or "-", day=lambda text: text[:10], rounded=rounded
     )
     text = environment.get_template("dcc.xml.j2").render(

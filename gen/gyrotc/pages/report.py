@@ -24,7 +24,7 @@ from ..common.arrays import BoolArray, FloatArray, numpy_of
 from ..common.errors import InputError
 from ..common.inputs import need_memory, open_input, refuse_above
 from ..common.metrics import Averages, average_rows
-from ..common.texts import file_stem, html_environment
+from ..common.texts import file_stem
 from ..mirror.table import HELD
 from ..model import Model
 from ..recordings.description import exclude_line
@@ -34,6 +34,7 @@ from ..results.files import write_atomically
 from ..results.folder import result_folder
 from ..results.release import VERDICTS
 from ..results.rows import LeftOutRows
+from ..results.templates import html_templates
 from ..results.training import NoiseTerms, Training
 from .chart import ACCENT, AFTER, BEFORE, COVERED, HALF, THIRD, Panel, drawing, side_by_side
 from .display import (
@@ -277,7 +278,7 @@ def page_environment() -> jinja2.Environment:
 
     Filters print figures and words (`words`); the test `moved_input` tells causes that change what the map sees.
     """
-    environment = html_environment(
+    environment = html_templates(
         sci=sci, times=_times, known=with_uncertainty, plain=plain, rounded=rounded,
         words=words, candidate=words_of_candidate, limit_words=limit_words, bound_words=bound_words,
         measured_words=measured_words,

@@ -71,6 +71,8 @@ from .release import WorstError as WorstError
 from .signals import Interrupted as Interrupted
 from .signals import die_of as die_of
 from .signals import raise_on_signals as raise_on_signals
+from .templates import c_templates as c_templates
+from .templates import html_templates as html_templates
 from .training import DeclaredUnits as DeclaredUnits
 from .training import Manifest as Manifest
 from .training import Training as Training

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError, quoted
 from ..common.progress import Progress, Stages, silent
-from ..common.texts import CText, c_code, c_environment, c_literal
+from ..common.texts import CText, c_code, c_literal
 from ..mirror.history import answers
 from ..mirror.table import LAYOUT, Table
 from ..model import Model
 from ..results.files import ANSWERS, write_own
 from ..results.folder import result_folder
+from ..results.templates import c_templates
 from .error_bounds import MARGIN, channel_error_dph
 from .quantisation import NUMERICS, quantise
 from .record import RECORD, SHARED_RUNTIME, Options, read_options, record_text
@@ -246,12 +247,12 @@ def _from_templates(
         "warnings": list(model.warnings),
         **example_values(model),
     }
-    return {name: c_environment().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+    return {name: c_templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
 
 
 def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
     """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
-    template = c_environment().get_template("board_test.c.j2")
+    template = c_templates().get_template("board_test.c.j2")
     text = template.render(
         id=model.id,
         symbol=model.symbol,

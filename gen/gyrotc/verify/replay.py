@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from ..common.errors import CheckFailed, InputError
 from ..common.progress import Progress
-from ..common.texts import c_environment
 from ..mirror.front_end import blocks_since_power_on, missed_before, period_us, samples_per_block
 from ..mirror.history import FollowedHistory, Replay, follow_history
 from ..mirror.table import Table, Words
@@ -29,6 +28,7 @@ from ..recordings.records import Dataset, Rows, Run
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import ReplayedRows, VerifiedTarget
+from ..results.templates import c_templates
 from ..tables.quantisation import channels_of
 from .emitted import Job, checked_sources, table_files
 from .toolchain import Target, compile_objects, link, run_program, runtime_object
@@ -126,7 +126,7 @@ def replay_program(
         CheckFailed: The compiler refused, or the folder holds other code than gyrotc's and is not `trusted`.
     """
     text = (
-        c_environment()
+        c_templates()
         .get_template("replay.c.j2")
         .render(
             id=model.id,

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..common.errors import CheckFailed
-from ..common.texts import c_environment
 from ..mirror.table import Table
 from ..model import Model
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import FunctionCost
+from ..results.templates import c_templates
 from ..tables.text import example_period_us
 from .emitted import checked_sources, table_files
 from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
@@ -48,7 +48,7 @@ def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
     if target is None:
         return None
     text = (
-        c_environment()
+        c_templates()
         .get_template("footprint.c.j2")
         .render(
             id=model.id,
