@@ -126,8 +126,9 @@ static int centers_fit(const TABLE *table)
     return (n == table->n_centers) ? 1 : 0;
 }
 
-/* 1 if this runtime can use the table, and its counts say where its arrays end. */
-static int is_laid_out(const TABLE *table)
+/* 1 if this runtime has what the table needs, and the counts are small enough that the arrays can be read for the CRC,
+ * which then shows whether they are right. Ranges of words are not tested: has_sound_words(). */
+static int has_bounded_counts(const TABLE *table)
 {
     return (fits_runtime(table) && (table->n_networks <= MAX_NETWORKS) && (table->n_fallback_models <= table->n_terms)
             && centers_fit(table) && (table->n_sigma <= MAX_TABLE_WORDS) && (table->n_probes <= MAX_TABLE_WORDS)
@@ -200,7 +201,7 @@ int PUBLIC(check)(const TABLE *table)
 
     if (table == NULL) {
         status = GTC_E_ARG;
-    } else if (!is_laid_out(table)) {
+    } else if (!has_bounded_counts(table)) {
         status = GTC_E_LAYOUT;
     } else if (!arithmetic_works()) {
         status = GTC_E_SELF_TEST;

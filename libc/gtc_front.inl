@@ -614,7 +614,7 @@ static uint_least32_t samples_in_block(const TABLE *table, uint_least32_t period
 }
 
 /* GTC_OK, or why a state cannot be started. */
-static int can_start(const STATE *state, const TABLE *table, uint_least32_t period_us)
+static int check_start(const STATE *state, const TABLE *table, uint_least32_t period_us)
 {
     int status = GTC_OK;
 
@@ -717,7 +717,7 @@ static void start_state(STATE *state, const TABLE *table, uint_least32_t period_
 
 int PUBLIC(init)(STATE *state, const TABLE *table, uint_least32_t period_us)
 {
-    const int status = can_start(state, table, period_us);
+    const int status = check_start(state, table, period_us);
 
     if (status == GTC_OK) {
         start_state(state, table, period_us);
@@ -725,9 +725,9 @@ int PUBLIC(init)(STATE *state, const TABLE *table, uint_least32_t period_us)
     return status;
 }
 
-/* GTC_OK for a state that was started with this table. One that was overwritten may have times that would divide by
- * nothing, or that never pass. */
-static int is_started(const STATE *state, const TABLE *table)
+/* GTC_OK for a state that was started with this table, else GTC_E_ARG or GTC_E_ID. One that was overwritten may have
+ * times that would divide by nothing, or that never pass: GTC_E_ARG. */
+static int check_state(const STATE *state, const TABLE *table)
 {
     int status = GTC_OK;
 
@@ -853,7 +853,7 @@ static int ignore_call(STATE *state, const TABLE *table)
 /* Times are put on a grid of sample periods, from the start on, so that no error of them adds up. */
 int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, const NUM *channels)
 {
-    const int started = is_started(state, table);
+    const int started = check_state(state, table);
     uint_least32_t since_slot_us;
     uint_least32_t slots;
 
@@ -879,7 +879,7 @@ int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, 
 /* Samples come each period. */
 int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, const NUM *channels)
 {
-    const int started = is_started(state, table);
+    const int started = check_state(state, table);
     NUM nothing[GTC_MAX_CHANNELS];
     uint_least32_t c;
 
@@ -902,7 +902,7 @@ int PUBLIC(sample)(STATE *state, const TABLE *table, uint_least32_t elapsed_us, 
 /* Limited once more, so that a state that was overwritten cannot leave the authority. */
 int PUBLIC(bias)(const STATE *state, const TABLE *table, NUM *bias)
 {
-    const int started = (bias == NULL) ? GTC_E_ARG : is_started(state, table);
+    const int started = (bias == NULL) ? GTC_E_ARG : check_state(state, table);
     int_least32_t remarks;
 
     if (started != GTC_OK) {

@@ -537,7 +537,7 @@ static inline float add_squares(float a, float b)
     return add(a, b);
 }
 
-/* A square, or what stands for it where a state was overwritten so that it is none; the sum of two is one */
+/* The square; `other` where a state was overwritten so that it is none, or so large that the sum of two is infinite. */
 static inline float square_or(float square, float other)
 {
     return ((square >= 0.0F) && (square <= 1.0e38F)) ? square : other;

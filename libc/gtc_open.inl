@@ -141,8 +141,9 @@ static int terms_fit(const TABLE *table)
 }
 #endif
 
-/* 1 if this runtime can use the table and its counts say where its arrays end, else 0. */
-static int is_readable(const TABLE *table)
+/* 1 if this runtime has what the table needs, and counts, arrays and terms go together, so that the words of each
+ * record can be read; else 0. */
+static int has_sound_structure(const TABLE *table)
 {
     return (fits_runtime(table) && wholes_fit(table, FIRST_COUNT) && arrays_fit(table) && parts_fit(table)
             && grids_fit(table) && terms_fit(table) && centers_fit(table)
@@ -259,10 +260,11 @@ static int parameters_fit(const TABLE *table)
 }
 #endif
 
-/* 1 if this build of the runtime can use the table: no function meets a run-time error with it; else 0. */
-static int is_usable(const TABLE *table)
+/* 1 if the structure is sound and every word is in its range, so that no function meets a run-time error with the
+ * table; else 0. */
+static int has_sound_words(const TABLE *table)
 {
-    return (is_readable(table) && wholes_fit(table, 0U) && members_fit(table)
+    return (has_sound_structure(table) && wholes_fit(table, 0U) && members_fit(table)
 #if GTC_WITH_TERMS
             && parameters_fit(table)
 #endif
@@ -402,7 +404,7 @@ int PUBLIC(check_words)(const TABLE *table)
 
     if (table == NULL) {
         status = GTC_E_ARG;
-    } else if (!is_usable(table)) {
+    } else if (!has_sound_words(table)) {
         status = GTC_E_LAYOUT;
     } else {
         /* every word is in its range */
@@ -435,7 +437,7 @@ int PUBLIC(open)(TABLE *table, const gtc_word_t *words, uint_least32_t n_words, 
         return GTC_E_IMAGE;
     }
     read_image(&read, words);
-    if (!is_usable(&read)) {
+    if (!has_sound_words(&read)) {
         return GTC_E_LAYOUT;
     }
     *table = read;

@@ -13,7 +13,7 @@
 #if GTC_WITH_UNCERTAINTY
 int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)
 {
-    int status = (snapshot == NULL) ? GTC_E_ARG : is_started(state, table);
+    int status = (snapshot == NULL) ? GTC_E_ARG : check_state(state, table);
     SQUARE constant;
 
     if (status != GTC_OK) {
@@ -37,7 +37,7 @@ int PUBLIC(snapshot)(const STATE *state, const TABLE *table, SNAPSHOT *snapshot)
 #endif
 
 #if GTC_WITH_REZERO
-/* Of a measurement and what it is compared with, in standard deviations: a rest is wrong once in 16,000. */
+/* Standard deviations that the mean rate of a rest may lie from 0; a true rest lies farther once in 16,000. */
 #define GATE 4U
 
 /* The variance of the constant after a rest: `rest` of the correction and of the noise, `of_map` of the correction. */
@@ -51,7 +51,7 @@ static SQUARE variance_left(const TABLE *table, SQUARE prior, SQUARE rest, SQUAR
 }
 
 /* GTC_OK, or why a rest cannot move the constant. */
-static int can_rezero(const TABLE *table, NUM mean_rate)
+static int check_rest(const TABLE *table, NUM mean_rate)
 {
     int status = GTC_OK;
 
@@ -89,7 +89,7 @@ static int update_constant(STATE *state, const TABLE *table, NUM mean_rate, uint
 
 int PUBLIC(rezero)(STATE *state, const TABLE *table, NUM mean_rate, uint_least32_t seconds)
 {
-    int status = is_started(state, table);
+    int status = check_state(state, table);
 
     if (status != GTC_OK) {
         return status;
@@ -97,7 +97,7 @@ int PUBLIC(rezero)(STATE *state, const TABLE *table, NUM mean_rate, uint_least32
     if (seconds == 0U) {
         rezero_clear(state, table);
     } else {
-        status = can_rezero(table, mean_rate);
+        status = check_rest(table, mean_rate);
         if (status == GTC_OK) {
             status = update_constant(state, table, mean_rate, seconds);
         }

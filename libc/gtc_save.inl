@@ -224,7 +224,7 @@ static uint_least32_t save_crc(const gtc_word_t words[GTC_SAVE_WORDS])
 
 int PUBLIC(save)(const STATE *state, const TABLE *table, gtc_word_t words[GTC_SAVE_WORDS])
 {
-    const int status = (words == NULL) ? GTC_E_ARG : is_started(state, table);
+    const int status = (words == NULL) ? GTC_E_ARG : check_state(state, table);
 
     if (status != GTC_OK) {
         return status;
@@ -238,7 +238,7 @@ int PUBLIC(save)(const STATE *state, const TABLE *table, gtc_word_t words[GTC_SA
     return GTC_OK;
 }
 
-/* Whether the words are a whole state of this table, saved by a build like this one. */
+/* GTC_OK for words that are a whole state of this table, saved by a build like this one, or why they are not. */
 static int inspect_saved(const TABLE *table, const gtc_word_t words[GTC_SAVE_WORDS])
 {
     int status = GTC_OK;
@@ -256,8 +256,8 @@ static int inspect_saved(const TABLE *table, const gtc_word_t words[GTC_SAVE_WOR
     return status;
 }
 
-/* Of a state that was read, what is retained over a time without power: terms. If it had not begun when it was saved,
- * it had itself been without power before. */
+/* Reduces a state that was read to what is retained over a time without power: its terms. If it had not begun when it
+ * was saved, it had itself been without power before. */
 static void retain(STATE *state, const TABLE *table, uint_least32_t off_blocks)
 {
 #if GTC_WITH_TERMS
@@ -313,7 +313,7 @@ static int take_over(STATE *state, const TABLE *table, uint_least32_t period_us,
 int PUBLIC(restore)(STATE *state, const TABLE *table, uint_least32_t period_us,
                     const gtc_word_t words[GTC_SAVE_WORDS], uint_least32_t off_blocks)
 {
-    int status = (words == NULL) ? GTC_E_ARG : can_start(state, table, period_us);
+    int status = (words == NULL) ? GTC_E_ARG : check_start(state, table, period_us);
     STATE read;
 
     if (status == GTC_OK) {

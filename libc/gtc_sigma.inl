@@ -123,8 +123,8 @@ static void uncertainty_input(STATE *state, const TABLE *table, NUM temp, NUM as
 
 /* ---- the parts of a variance ------------------------------------------------------------------------- */
 
-/* Of the map, from the grid of covered or that of uncovered cells: where it was asked, but with the slope that the
- * correction should have had, where one is known that is not in it yet; `unknown` where the input is no number. */
+/* Variance of the map, from the grid of covered or that of uncovered cells: where it was asked, but with the slope that
+ * the correction should have had, where one is known that is not in it yet; `unknown` where the input is no number. */
 static SQUARE variance_of_map(const STATE *state, const TABLE *table, SQUARE unknown)
 {
     NUM slope = state->uncertainty.input[1];
@@ -158,7 +158,7 @@ static WIDE without_readings(const STATE *state, WIDE x)
     return add(scaled(state->input[0].held_blocks, x), rounded_quotient(scaled(missing, x), samples));
 }
 
-/* Of an input that went on while nothing was read. */
+/* Variance of an input that went on while nothing was read. */
 static SQUARE variance_of_age(const STATE *state, const gtc_word_t *rules)
 {
     WIDE moved;
@@ -172,8 +172,8 @@ static SQUARE variance_of_age(const STATE *state, const gtc_word_t *rules)
     return add_squares(square, squared(without_readings(state, ELEMENT(rules[RULE_REST]))));
 }
 
-/* Of a slope that the correction does not have: while it is held, as the temperature may then turn to any slope, and
- * while the window fills. */
+/* Variance of a slope that the correction does not have: while it is held, as the temperature may then turn to any
+ * slope, and while the window fills. */
 static SQUARE variance_of_slope(const STATE *state, const gtc_word_t *rules)
 {
     SQUARE square = NO_SQUARE;
@@ -190,7 +190,7 @@ static SQUARE variance_of_slope(const STATE *state, const gtc_word_t *rules)
     return square;
 }
 
-/* Of inputs beyond the envelope. */
+/* Variance of inputs beyond the envelope. */
 static SQUARE variance_beyond(const STATE *state, const TABLE *table, const gtc_word_t *rules)
 {
     SQUARE sum = NO_SQUARE;
@@ -209,7 +209,8 @@ static SQUARE variance_beyond(const STATE *state, const TABLE *table, const gtc_
 }
 
 #if GTC_WITH_RETAINED || GTC_WITH_CHANNELS
-/* Of what terms do not know of the time before they began, or of a channel that is held, lost or beyond its range. */
+/* Variance of what terms do not know of the time before they began, or of a channel that is held, lost or beyond its
+ * range. */
 static SQUARE variance_of_terms(const STATE *state, const TABLE *table, const gtc_word_t *rules)
 {
     SQUARE sum = squared(state->uncertainty.edge_effect);
@@ -243,7 +244,7 @@ static SQUARE variance_of_terms(const STATE *state, const TABLE *table, const gt
 }
 #endif
 
-/* Of the correction in force, but for the constant from power-on to power-on. Of a state that was overwritten
+/* Variance of the correction in force, but for the constant from power-on to power-on. Of a state that was overwritten
  * nothing is known. */
 static SQUARE variance(const STATE *state, const TABLE *table)
 {

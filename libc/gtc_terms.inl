@@ -198,7 +198,8 @@ static void note_known(EFFECT *effect, uint_least32_t i, int is_known)
 }
 #endif
 
-/* Whether the channel of a term has a mean, with the remarks about it; else the fallback model is added. */
+/* Gets the mean of the channel of a term, with the remarks about it. Returns 0 if there is none: then the fallback
+ * model was added. */
 static int get_channel_mean(const STATE *state, const TABLE *table, uint_least32_t i, EFFECT *effect, NUM *mean)
 {
     const gtc_word_t *const term = term_of(table, i);

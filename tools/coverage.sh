@@ -36,7 +36,7 @@ done
 missed=0
 for numeric in f32 q31; do
   options=("" "-DGTC_WITH_BANK=1")
-  wrong=s/0x3ED6B6D8UL/0x3ED6B6D9UL/
+  wrong=s/0xF33649C0UL/0xF33649C1UL/
   if [ $numeric = q31 ]; then
     options+=("-DGTC_HALF_MULTIPLY=1 -DGTC_WITH_BANK=1")
     wrong=s/0x7FFFFFFEUL/0x7FFFFFFFUL/

@@ -49,7 +49,7 @@ PARTS = {
     "step": Part(
         "step",
         precision=4,
-        options=("-eva-split-return-function", "can_start:0,is_started:0"),
+        options=("-eva-split-return-function", "check_start:0,check_state:0"),
         contracts={"f32": "mean_of,window_slope,is_missing", "q31": "mean_of,window_slope"},
         checks=14,
     ),
