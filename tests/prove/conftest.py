@@ -6,6 +6,7 @@ may run in several processes (`-n 2`).
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -36,7 +37,8 @@ class _OfATest(Results):
         self.place, self.item = item.session.items.index(item), item
 
     def add(self, name: str, record: dict[str, Any]) -> None:
-        self.item.user_properties.append((name, (self.place, record)))
+        plain = json.loads(json.dumps(record))  # numbers of numpy do not pass between processes
+        self.item.user_properties.append((name, (self.place, plain)))
 
 
 @pytest.fixture
