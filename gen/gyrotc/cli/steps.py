@@ -203,6 +203,7 @@ def verify(
     from ..results.files import write_atomically
     from ..results.folder import result_folder
     from ..results.json_text import json_text
+    from ..results.marker import check_intact
     from ..results.release import Budget, JointVerification, Verification
     from ..verify.job import verify as run
 
@@ -239,6 +240,7 @@ def verify(
         n_targets = sum(len(one.targets) for one in results.values())
         raise CheckFailed(f"{result.failed} checks failed; {n_targets} targets")
     for part in parts:
+        check_intact(part, ("budget.json",), needed=False)
         budget = read_optional(part / "budget.json", Budget)
         if budget is not None and budget.expired(date.today()):
             raise CheckFailed(f"{part}: the calibration was valid until {budget.valid_until}; calibrate again")

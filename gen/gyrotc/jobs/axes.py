@@ -12,6 +12,7 @@ from ..pages.report import axes_page
 from ..results.base import NUMERICS
 from ..results.files import write_atomically, write_own
 from ..results.folder import scratch_folder
+from ..results.marker import read_marker
 from ..results.release import JointVerification, Verification
 from ..results.templates import c_templates
 from ..tables.emission import emitted_tables
@@ -85,15 +86,19 @@ def axes_in(folder: Path) -> tuple[str, ...]:
 
 
 def refuse_parts_of_two(folder: Path, models: Mapping[str, Model]) -> None:
-    """Refuse a result whose axes were not built together from recordings of one gyro.
+    """Refuse a result whose axes were not built together from recordings of one gyro, or are not all there.
 
     Args:
         folder: The result; messages name it.
         models: Models by the axis that their folder stands for; "": of one rate.
 
     Raises:
-        InputError: An axis is not the one that its folder names, or serials, days or recordings differ.
+        InputError: An axis is missing or not the one that its folder names, or serials, days or recordings differ.
     """
+    marker = read_marker(folder)
+    for part in marker.parts if marker else ():
+        if part in AXES and part not in models:
+            raise InputError(str(folder / part), "is missing", "all axes, as build wrote them")
     first = next(iter(models.values()))
     for axis, model in models.items():
         if (model.axis or "") != axis:

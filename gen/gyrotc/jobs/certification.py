@@ -135,12 +135,13 @@ def certificate(
 
     Raises:
         InputError: Something that a certificate must say is missing (all of it is named), a file is not as it was
-            built, parts are of two units, its last day has passed, the verdict is not PASS and not accepted,
+            built, parts are missing or of two units, its last day has passed, the verdict is not PASS and not accepted,
             or `out` cannot be replaced.
     """
     places = [folder / axis for axis in axes_in(folder)] or [folder]
     units = [unit_of(place) for place in places]
     refuse_parts_of_two(folder, {axis: unit.model for axis, unit in zip(axes_in(folder) or ("",), units, strict=True)})
+    check_intact(folder, ("c",))
     _refuse_two_limits(folder, units)
     why = reason_of_release(folder, units, accept_fail)
     first = units[0]

@@ -90,6 +90,14 @@ def twice(units: Path, folder: Path) -> None:
     shutil.copytree(folder / "x", folder / "y")
 
 
+def without_one(units: Path, folder: Path) -> None:
+    shutil.rmtree(folder / "y")
+
+
+def another_name(units: Path, folder: Path) -> None:
+    (folder / "x").rename(folder / "X")
+
+
 PARTS = {
     "an axis of another serial": (taken_from("other"), "differ in serial"),
     "an axis of other recordings": (taken_from("again"), "differ in recordings"),
@@ -97,6 +105,8 @@ PARTS = {
     "an axis of other limits": (taken_from("lax"), "different limits"),
     "two axes exchanged": (swapped, "holds axis y"),
     "an axis twice": (twice, "holds axis x"),
+    "an axis taken away": (without_one, "y: is missing"),
+    "an axis under another name": (another_name, "x: is missing"),
 }
 
 
@@ -109,6 +119,24 @@ def test_parts_of_two_units_are_no_unit(case: str, units: Path, tmp_path: Path) 
     with pytest.raises(InputError, match=message):
         draft(folder, tmp_path)
     assert message == "different limits" or run_gyrotc("report", folder).returncode == 2
+
+
+def test_a_certificate_is_of_the_files_that_go_into_the_firmware(units: Path, tmp_path: Path) -> None:
+    """The joint C files of another gyro beside the axes of this one."""
+    folder = shutil.copytree(units / "unit", tmp_path / "unit")
+    shutil.rmtree(folder / "c")
+    shutil.copytree(units / "other" / "c", folder / "c")
+    with pytest.raises(InputError, match="is not as gyrotc wrote it"):
+        draft(folder, tmp_path)
+
+
+def test_a_last_day_that_was_put_off_does_not_verify(units: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(units / "expired", tmp_path / "unit")
+    budget = folder / "x" / "budget.json"
+    text = budget.read_text()
+    budget.write_text(text.replace(json.loads(text)["valid_until"], "2999-12-31"))
+    done = run_gyrotc("verify", folder, "--target", "host-gcc-O2")
+    assert done.returncode == 2 and "budget.json: is not as gyrotc wrote it" in done.stderr, done.stderr
 
 
 def test_a_calibration_whose_last_day_has_passed_is_not_certified_and_does_not_verify(
