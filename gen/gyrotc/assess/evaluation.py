@@ -54,7 +54,7 @@ from ..verify.replay import replay_case_of, replay_on, replay_program
 from ..verify.sizes import Footprint, footprint
 from ..verify.toolchain import Target, all_targets
 from .budget import figure_uncertainties, root_mean, squares_in_all, squares_of
-from .findings import beyond_noise, findings_of, residual_test
+from .findings import beyond_noise, coarse_arithmetic, findings_of, residual_test
 from .requirements import requirements_of
 
 __all__ = ["AnsweredRows", "Watch", "evaluate"]
@@ -163,7 +163,8 @@ def evaluate(
         result = result.model_copy(update={"left_out": of_these.left_out})
     result = _with_what_is_known(result, parts, known)
     of_runs = [found for p in parts for found in p.findings]
-    found = findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), of_these)
+    found = [*coarse_arithmetic(model, table)]
+    found += findings_of(dataset, [p.facts for p in parts], of_runs, model, result.content(), of_these)
     found += [*beyond_noise(result), *late_findings([(p.run, p.averages) for p in parts])]
     return result.model_copy(update={"findings": tuple(found)})
 

@@ -12,6 +12,7 @@ noise floor comes from successive differences, so that slow structure raises bot
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.metrics import MAD_TO_SIGMA
+from ..mirror.table import Table
 from ..model import Model
 from ..quality.findings import RunFacts, finding, temperature_findings
 from ..quality.inspection import findings_of_data_set
@@ -26,6 +28,7 @@ from ..recordings.records import Dataset
 from ..results.base import Finding
 from ..results.evaluation import PARTS, RMS_OVER_FLOOR, Evaluation, ResidualTest
 from ..results.training import Training
+from ..tables.quantisation import rms_growth
 from ..train.noise import robust_sigma
 
 _LAGS = 10  # means: of 100 s a third of the shortest ramp of a chamber's cycle
@@ -127,6 +130,24 @@ def beyond_noise(result: Evaluation) -> Iterator[Finding]:
         noise_floor_dph=result.noise_floor_dph,
         ratio=test.rms_over_floor,
         limits=[low, high],
+    )
+
+
+def coarse_arithmetic(model: Model, table: Table) -> Iterator[Finding]:
+    """Report an arithmetic whose rounding alone can bring the RMS to where structure is reported."""
+    growth, floor_dph = rms_growth(model, table), model.noise_floor_dph
+    if growth is None or floor_dph is None or growth <= RMS_OVER_FLOOR - 1.0:
+        return
+    error_dph, constant_dph = floor_dph * math.sqrt((1.0 + growth) ** 2 - 1.0), model.fallback_dph
+    yield finding(
+        "coarse_arithmetic",
+        f"Rounding of the {table.numeric} table can be {error_dph:.2g} deg/h, and the noise floor is {floor_dph:.2g} "
+        f"deg/h: a constant of {constant_dph:.6g} deg/h in the rate takes the digits.",
+        advice=f"Subtract a constant near {constant_dph:.6g} deg/h from the rate, in the recordings and in the "
+        "firmware, and build again.",
+        error_dph=error_dph,
+        noise_floor_dph=floor_dph,
+        constant_dph=constant_dph,
     )
 
 

@@ -181,7 +181,8 @@ def last_day(calibrated_on: str | None, days: float | None) -> str | None:
 
 
 FindingName = Literal[
-    "any", "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
+    "any", "coarse_arithmetic",
+    "no_temperature_information", "fails_on_unseen_span", "jump_in_temperature", "earth_rate_not_stated",
     "large_weights", "sparse_coverage", "run_outlier", "counter_wrapped", "rate_outliers", "runs_contradict",
     "does_not_generalise", "map_refused", "map_beyond_data",
     "not_of_its_lot", "prior_does_not_hold",

@@ -22,7 +22,8 @@ def decision_of(limits: HeldLimits | None, verification: Verification | None, ev
 def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool, *, diagnosed: bool) -> str:
     """Return what to do next with a unit, one step.
 
-    Code that failed a check comes first, then recordings that are worthless. A diagnosis is made of the recordings that
+    Code that failed a check comes first, then recordings that are worthless, then an arithmetic whose rounding is above
+    the noise. A diagnosis is made of the recordings that
     are there, so it comes before any advice to record more.
 
     DATASET stands for the recordings, DIR for the result.
@@ -38,6 +39,9 @@ def next_step(evaluation: Evaluation, limits: HeldLimits | None, failures: bool,
     lacking = evaluation.gravest_lack
     if lacking and lacking.verdict == "NOT TESTABLE":
         return lacking.next
+    coarse = [one.next for one in evaluation.findings if one.id == "coarse_arithmetic"]
+    if coarse:
+        return coarse[0]
     if evaluation.structure_left and not diagnosed:
         return "gyrotc diagnose DATASET: the residual is more than noise, and it names the cause."
     if lacking:

@@ -253,6 +253,15 @@ def test_a_constant_in_the_rate_changes_nothing_but_itself(
     assert [f["id"] for f in one["findings"]] == [f["id"] for f in other["findings"]]
 
 
+def test_a_constant_that_takes_the_digits_of_float32_is_named(tmp_path: Path) -> None:
+    """At 1e5 deg/h a step of float32 is 0.008 deg/h, above the noise floor: no cause is to be looked for."""
+    runs = all_rows(lambda rows: rows | {"rate_dph": rows["rate_dph"] + 1e5})(unit())
+    found = built(tmp_path, written(tmp_path / "RLG-1", runs))
+    one = found["evaluate"]["findings"][0]
+    assert one["id"] == "coarse_arithmetic" and one["evidence"]["error_dph"] > found["evaluate"]["noise_floor_dph"]
+    assert "next: Subtract a constant near 10000" in found["done"].stdout
+
+
 def test_figures_of_the_judged_runs_do_not_depend_on_their_order(plain: dict[str, Any], tmp_path: Path) -> None:
     """One test run has spikes and another moves less, so that no two runs have the same figures."""
     runs = unit()
