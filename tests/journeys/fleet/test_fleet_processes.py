@@ -97,7 +97,8 @@ def _dies(task: Task) -> FleetEntry:
 
 def reported(out: Path, entries: list[FleetEntry], why: str) -> None:
     """Check that the deadly gyro and the one without recordings have failed, each with its reason in fleet.json."""
-    assert [entry.status for entry in entries] == ["done", "failed", "done", "failed"]
+    reasons = [entry.reason for entry in entries]
+    assert [entry.status for entry in entries] == ["done", "failed", "done", "failed"], reasons
     units = {unit["name"]: unit for unit in json.loads((out / "fleet.json").read_text())["serials"]}
     assert why in units["RLG-1"]["reason"] and "run-01.csv" in units["RLG-3"]["reason"]
     for name, unit in units.items():
