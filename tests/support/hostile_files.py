@@ -25,7 +25,7 @@ from logger_files import CSV_CASES, truth
 from mutation import mutated
 
 SECRET = "years-of-work"  # beside the input: no import opens it
-_GIANT = 2**24  # numbers of a packed file: 128 MiB once unpacked
+_GIANT = 2**22  # numbers of a packed file: 32 MiB once unpacked
 
 
 def _h5(path: Path, fill: Callable[..., None]) -> None:

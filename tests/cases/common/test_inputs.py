@@ -207,36 +207,47 @@ def test_the_noise_of_a_truth(tmp_path: Path) -> None:
         assert "is no whole array of numbers" in refused(lambda: simulated_floor(tmp_path, ["a.csv"], 10.0))
 
 
+FAULTY = """
+import json, os, pathlib, sys
+import gyrotc.cli.main, gyrotc.jobs
+def fail(*a, **k): raise RAISED
+pathlib.Path.iterdir = fail
+folder, cases = sys.argv[1:]
+for number, (raised, environment) in enumerate(json.loads(cases)):
+    child = os.fork()
+    if child:
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+        continue
+    RAISED = eval(raised)
+    os.environ.update(environment)
+    os.dup2(os.open(f"{number}.txt", os.O_CREAT | os.O_WRONLY), 2)
+    sys.argv = ["gyrotc", "check", folder]
+    gyrotc.cli.main.main()
+"""
+
+
 def test_a_fault_of_the_program_is_one_line_and_a_report(tmp_path: Path) -> None:
-    program = (
-        "import pathlib, sys\n"
-        "from gyrotc.cli.main import main\n"
-        "def fail(*a, **k): raise {0}\n"
-        "pathlib.Path.iterdir = fail\n"
-        f"sys.argv = ['gyrotc', 'check', {str(tmp_path)!r}]\n"
-        "main()\n"
-    )
-    state = {"XDG_STATE_HOME": str(tmp_path / "state")}
-
-    def done(raised: str, **environment: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", program.format(raised)]
-        env = os.environ | state | environment
-        return subprocess.run(command, capture_output=True, text=True, check=False, env=env)
-
-    first = done("KeyError('a\\nb')")
-    assert first.returncode == 70 and first.stderr.count("\n") == 1
-    kept = Path(first.stderr.split("please send ")[1].strip())
+    state, place = {"XDG_STATE_HOME": str(tmp_path / "state")}, tmp_path / "place"
+    place.mkdir()
+    (tmp_path / "file").write_text("")
+    elsewhere = {"XDG_STATE_HOME": str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
+    raised = [
+        ("KeyError('a\\nb')", state), ("KeyError('other')", state), ("KeyError()", elsewhere),
+        ("KeyboardInterrupt", state), ("MemoryError", state),
+    ]  # fmt: skip
+    command = [sys.executable, "-c", FAULTY, tmp_path, json.dumps(raised)]
+    done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=True)
+    first, other, moved, interrupted, out_of_memory = ((place / f"{k}.txt").read_text() for k in range(5))
+    assert done.stdout.split() == ["70", "70", "70", "130", "2"], "and nothing else on standard output"
+    assert first.count("\n") == 1
+    kept = Path(first.split("please send ")[1].strip())
     assert kept.parent == tmp_path / "state" / "gyrotc" and kept.stat().st_mode & 0o777 == 0o600
     assert "Traceback (most recent call last)" in kept.read_text() and "KeyError" in kept.read_text()
-    number = first.stderr.split("internal fault ")[1].split()[0]
-    assert number in kept.name and number in done("KeyError('other')").stderr, "one fault, one id"
-    (tmp_path / "file").write_text("")
-    elsewhere = done("KeyError()", XDG_STATE_HOME=str(tmp_path / "file"), TMPDIR=str(tmp_path))
-    assert f"please send {tmp_path}/crash-" in elsewhere.stderr
-    interrupted = done("KeyboardInterrupt")
-    assert (interrupted.returncode, interrupted.stdout) == (130, "") and "Traceback" not in interrupted.stderr
-    out_of_memory = done("MemoryError")
-    assert out_of_memory.returncode == 2 and out_of_memory.stderr.startswith("gyrotc: not enough memory")
+    number = first.split("internal fault ")[1].split()[0]
+    assert number in kept.name and number in other, "one fault, one id"
+    assert f"please send {tmp_path}/crash-" in moved
+    assert "Traceback" not in interrupted
+    assert out_of_memory.startswith("gyrotc: not enough memory")
 
 
 def test_what_is_kept_and_damaged_or_of_another_name_is_thrown_away(

@@ -349,9 +349,10 @@ def test_a_cause_beside_offsets_is_shipped_and_its_gain_is_that_of_runs_less_the
     gain = found.extended.gain
     assert gain.shown == "gain" and gain.about_means and "less their means" in found.text
     assert gain.exam_rms_after_dph < 1.1 * (found.noise_floor_dph or 0.0) < found.extended.exam_rms_dph
-    own = {cause.id: cause.gain for cause in found.physical}
-    assert own["turn_on_offset"] is None, "no table corrects it"
-    assert own["hysteresis"] is not None and own["hysteresis"].exam_rms_after_dph == gain.exam_rms_after_dph
+    first, second = (cause.gain for cause in found.physical)
+    assert first is not None and second is not None and found.baseline is not None
+    assert first.exam_rms_before_dph == pytest.approx(found.baseline.exam_rms_dph, rel=1e-9)
+    assert second.exam_rms_before_dph == pytest.approx(first.exam_rms_after_dph, rel=1e-9), "each beside those before"
 
 
 def test_the_strength_of_a_play_over_temperature_is_shipped_and_gains_on_the_exam(tmp_path: Path) -> None:

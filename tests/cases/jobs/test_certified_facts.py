@@ -20,13 +20,13 @@ DAYS = 365
 
 
 def recorded(folder: Path, serial: str, calibrated_on: str, seed: int = 1) -> Path:
-    """Two runs of three axes."""
+    """Two runs of two axes."""
     rng = np.random.default_rng(seed)
     text = f'schema = 1\nserial = "{serial}"\nearth_rate = "none"\n'
     for k in range(2):
         t = 10.0 * np.arange(360.0)
         temperature = 20.0 + 15.0 * np.sin(2.0 * np.pi * t / t[-1])
-        rates = {f"rate_{axis}_dph": 0.01 * temperature + rng.normal(0.0, 0.02, t.size) for axis in "xyz"}
+        rates = {f"rate_{axis}_dph": 0.01 * temperature + rng.normal(0.0, 0.02, t.size) for axis in "xy"}
         write_csv(folder / f"run-{k}.csv", {"time_s": t, "temperature_c": temperature} | rates)
         text += f'[[run]]\nfile = "run-{k}.csv"\n'
     (folder / "dataset.toml").write_text(text + f"[meta]\ncalibrated_on = {calibrated_on}\n")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROWS = (100_000, 500_000)
+ROWS = (100_000, 300_000)
 PROGRAM = """
 import sys
 from gyrotc.cli import main
