@@ -2,18 +2,22 @@
 
 Faults are drawn by cosmic-ray's operators (another comparison, another arithmetic operation, a number off by one, a
 condition turned round, a loop that ends at once, ...) at places drawn with equal chance from all places of a part of
-the package. Each is planted in a copy of the sources, where the tests that concern the part run, the quickest first. It
-is found if a test fails. Texts are left out, and annotations, which are never executed.
+the package. Each is planted in a copy of the sources, where those tests of the part run that execute the place. It is
+found if one of them fails. Texts are left out, and annotations, which are never executed.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import queue
 import subprocess
 import tempfile
+import threading
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +28,7 @@ from tools.documents import copy_of_sources
 from ..campaigns import Settings, say
 from ..page import Figure, ResultsTable
 from ..records import ROOT, Record
+from .reach import OUTPUT
 
 if TYPE_CHECKING:
     from .faults import Fault  # needs cosmic-ray, as only a measurement does
@@ -34,8 +39,8 @@ FAULTS, QUICK_FAULTS = 300, 20
 AIM = 0.85
 _SEED = 1
 _PYTEST = (".venv/bin/python", "-m", "pytest", "-x", "-q", "-p", "no:randomly", "-p", "no:cacheprovider")
-#: A fault that makes the tests of one pattern run for longer, s, is found; without a fault they take a few minutes.
-_LIMIT_S = 1800
+#: Tests with a fault are stopped after so many times what they took without it, and a minute: it is found.
+_LIMIT = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +49,7 @@ class Part:
 
     Attributes:
         modules: Patterns of its modules, below gen/gyrotc.
-        tests: Patterns of test files or folders, below tests; each runs only if those before it found nothing.
+        tests: Patterns of test files, below tests; those of one run only if those before it found nothing.
     """
 
     modules: tuple[str, ...]
@@ -54,29 +59,46 @@ class Part:
 PARTS = {
     "assess": Part(
         ("assess/*.py",),
-        ("cases/assess", "journeys/test_figures_read_back.py", "journeys/jobs", "cases/results/test_json_keys.py"),
+        (
+            "cases/assess/test_decision_borders.py", "cases/assess/*.py", "journeys/test_figures_read_back.py",
+            "journeys/jobs/*.py", "cases/results/test_json_keys.py",
+        ),
     ),
     "quality": Part(
         ("quality/*.py",),
-        ("cases/quality", "cases/malformed/test_recordings.py", "journeys/quality", "properties/recordings"),
+        (
+            "cases/quality/test_check.py", "cases/quality/*.py", "cases/malformed/test_recordings.py",
+            "cases/train/test_restarts.py", "journeys/quality/*.py", "properties/recordings/*.py",
+        ),
     ),
     "tables": Part(
         ("tables/*.py",),
-        ("cases/tables", "cases/mirror", "cases/model", "cases/verify", "journeys/repository/test_examples.py"),
+        (
+            "cases/tables/*.py", "cases/mirror/*.py", "cases/model/*.py", "cases/verify/*.py",
+            "journeys/repository/test_examples.py",
+        ),
     ),
     "choice": Part(
         ("train/choice.py", "train/candidates.py", "train/folds.py", "train/objection.py"),
-        ("cases/train/test_choice.py", "cases/train", "properties/train"),
+        (
+            "cases/train/test_choice.py", "cases/train/test_ladder.py", "cases/train/*.py", "properties/train/*.py",
+        ),
     ),
     "sigma": Part(
         ("train/uncertainty.py", "mirror/sigma.py"),
-        ("cases/train/test_stated_sigma.py", "cases/mirror", "cases/train", "cases/runtime"),
+        (
+            "cases/train/test_stated_sigma.py", "cases/mirror/test_sigma.py", "cases/train/*.py", "cases/mirror/*.py",
+            "cases/runtime/*.py",
+        ),
     ),
     "verdict": Part(
         ("diagnose/attribution.py", "diagnose/posterior.py", "diagnose/shipping.py", "diagnose/verdict.py"),
-        ("cases/diagnose", "properties/diagnose", "journeys/diagnose"),
+        (
+            "cases/diagnose/test_diagnose_odds.py", "cases/diagnose/test_diagnose_attribute.py", "cases/diagnose/*.py",
+            "properties/diagnose/*.py", "journeys/diagnose/*.py",
+        ),
     ),
-}
+}  # fmt: skip
 
 
 def measure(settings: Settings) -> Record:
@@ -104,39 +126,14 @@ def table(record: Record) -> ResultsTable:
     return ResultsTable(__doc__.split("\n\n", 1)[1], ("part", "faults, and those that no test finds", "found "), rows)
 
 
-def _paths(part: Part) -> tuple[list[Path], list[str]]:
-    """Return the modules of a part, and its tests as pytest takes them."""
+def _paths(part: Part) -> tuple[list[Path], list[list[str]]]:
+    """Return the modules of a part, and its test files, a list for each pattern; each file once."""
     modules = [path for pattern in part.modules for path in _there(ROOT / "gen" / "gyrotc", pattern)]
-    tests = [str(path.relative_to(ROOT)) for pattern in part.tests for path in _there(ROOT / "tests", pattern)]
-    return modules, tests
-
-
-def _tried(
-    name: str, modules: Sequence[Path], tests: Sequence[str], count: int, seed: int, workers: int
-) -> dict[str, Any]:
-    from .faults import drawn
-
-    faults = drawn(modules, count, np.random.default_rng([seed, *name.encode()]))
-    missed: list[Fault] = []
-    with tempfile.TemporaryDirectory(prefix="gyrotc-mutation-") as folder, ThreadPoolExecutor(workers) as threads:
-        copies: queue.SimpleQueue[Path] = queue.SimpleQueue()
-        for number in range(workers):
-            copies.put(copy_of_sources(Path(folder, str(number))))
-
-        def finds(fault: Fault | None) -> str:
-            copy = copies.get()
-            try:
-                return _finding(copy, fault, tests)
-            finally:
-                copies.put(copy)
-
-        if failed := finds(None):
-            raise SystemExit(f"{name}: {failed} fails without a fault")
-        for number, (fault, found) in enumerate(zip(faults, threads.map(finds, faults), strict=True), start=1):
-            say(f"{name} {number} of {len(faults)}: {fault.place} {fault.after}: {found or 'not found'}")
-            missed += [] if found else [fault]
-    listed = [{"place": one.place, "before": one.before, "after": one.after} for one in missed]
-    return {"part": name, "faults": len(faults), "found": len(faults) - len(missed), "missed": listed}
+    stages: list[list[str]] = []
+    for pattern in part.tests:
+        files = [str(path.relative_to(ROOT)) for path in _there(ROOT / "tests", pattern)]
+        stages.append([file for file in files if not any(file in stage for stage in stages)])
+    return modules, stages
 
 
 def _there(folder: Path, pattern: str) -> list[Path]:
@@ -146,19 +143,108 @@ def _there(folder: Path, pattern: str) -> list[Path]:
     return [path for path in found if path.stem != "__init__"]
 
 
-def _finding(copy: Path, fault: Fault | None, tests: Sequence[str]) -> str:
-    """Return the tests that fail with a fault; empty if none does."""
+@dataclass
+class _Map:
+    """Which tests execute which lines; each test file is followed once, when it is first asked for.
+
+    Attributes:
+        copy: The sources without a fault.
+    """
+
+    copy: Path
+    known: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def reaching(self, fault: Fault, files: Sequence[str]) -> dict[str, float]:
+        """Return the tests of some files that execute the place of a fault, and their seconds; quick files first.
+
+        A place outside of functions counts as executed by the tests that execute any function of its module.
+        """
+        found: list[dict[str, float]] = []
+        for file in files:
+            reach = self._of(file)
+            shared = fault.reached_by(reach["fixtures"])
+            found.append(
+                {
+                    name: one["seconds"]
+                    for name, one in reach["tests"].items()
+                    if shared or fault.reached_by(one["lines"])
+                }
+            )
+        return {
+            name: seconds
+            for tests in sorted(found, key=lambda one: sum(one.values()))
+            for name, seconds in tests.items()
+        }
+
+    def _of(self, file: str) -> dict[str, Any]:
+        if file not in self.known:
+            with tempfile.NamedTemporaryFile() as output:
+                environment = os.environ | {OUTPUT: output.name}
+                if _pytest(self.copy, ["-p", "bench.mutation.reach", file], None, environment):
+                    raise SystemExit(f"{file} fails without a fault")
+                self.known[file] = json.load(output)
+        return self.known[file]
+
+
+def _tried(
+    name: str, modules: Sequence[Path], stages: Sequence[Sequence[str]], count: int, seed: int, workers: int
+) -> dict[str, Any]:
+    from .faults import drawn
+
+    faults = drawn(modules, count, np.random.default_rng([seed, *name.encode()]))
+    missed: list[Fault] = []
+    with tempfile.TemporaryDirectory(prefix="gyrotc-mutation-") as folder, ThreadPoolExecutor(workers) as threads:
+        reach, lock = _Map(copy_of_sources(Path(folder, "whole"))), threading.Lock()
+        copies: queue.SimpleQueue[Path] = queue.SimpleQueue()
+        for number in range(workers):
+            copies.put(copy_of_sources(Path(folder, str(number))))
+
+        def finds(fault: Fault) -> tuple[str, float]:
+            copy = copies.get()
+            spent = 0.0
+            try:
+                for files in stages:
+                    with lock:
+                        tests = reach.reaching(fault, files)
+                    begun = time.monotonic()
+                    failed = _finding(copy, fault, tests)
+                    spent += time.monotonic() - begun
+                    if failed:
+                        return failed, spent
+                return "", spent
+            finally:
+                copies.put(copy)
+
+        seconds = 0.0
+        for number, (fault, (found, spent)) in enumerate(zip(faults, threads.map(finds, faults), strict=True), start=1):
+            say(f"{name} {number} of {len(faults)}, {spent:.0f} s: {fault.place} {fault.after}: {found or 'not found'}")
+            missed += [] if found else [fault]
+            seconds += spent
+    listed = [{"place": one.place, "before": one.before, "after": one.after} for one in missed]
+    return {
+        "part": name, "faults": len(faults), "found": len(faults) - len(missed), "seconds_each": seconds / len(faults),
+        "missed": listed,
+    }  # fmt: skip
+
+
+def _finding(copy: Path, fault: Fault, tests: dict[str, float]) -> str:
+    """Return the test that fails with a fault; empty if none does."""
     from .faults import planted
 
+    if not tests:
+        return ""
     with planted(copy, fault):
-        for test in tests:
-            try:
-                done = subprocess.run(
-                    [*_PYTEST, test], cwd=copy, check=False, timeout=_LIMIT_S, stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                )  # fmt: skip
-            except subprocess.TimeoutExpired:
-                return test
-            if done.returncode != 0:
-                return test
-    return ""
+        try:
+            return _pytest(copy, list(tests), _LIMIT * sum(tests.values()) + 60.0)
+        except subprocess.TimeoutExpired:
+            return "it never ends"
+
+
+def _pytest(copy: Path, words: Sequence[str], limit_s: float | None, environment: dict[str, str] | None = None) -> str:
+    """Run tests in a copy of the sources until one fails; return the line that names it, empty if none does."""
+    done = subprocess.run(
+        [*_PYTEST, *words], cwd=copy, check=False, timeout=limit_s, stdin=subprocess.DEVNULL, capture_output=True,
+        text=True, errors="replace", env=environment,
+    )  # fmt: skip
+    named = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return "" if done.returncode == 0 else next(iter(named), f"pytest ends with {done.returncode}")[:200]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +29,8 @@ class Fault:
         line: Number of the line that differs first.
         before, after: That line without and with the fault.
         text: The whole module with the fault.
+        span: First and last line of the statement with the place, in the module without the fault; None outside of
+            functions.
     """
 
     file: Path
@@ -36,6 +38,12 @@ class Fault:
     before: str
     after: str
     text: str
+    span: tuple[int, int] | None
+
+    def reached_by(self, lines: Mapping[str, Sequence[int]]) -> bool:
+        """Test whether lines that were executed, by module below the package, are those of the place."""
+        numbers = lines.get(self.file.relative_to("gen/gyrotc").as_posix(), ())
+        return bool(numbers) if self.span is None else any(self.span[0] <= n <= self.span[1] for n in numbers)
 
     @property
     def place(self) -> str:
@@ -121,4 +129,13 @@ def _fault(path: Path, operator: str, occurrence: int) -> Fault | None:
         return None
     lines = zip(before.splitlines(), after.splitlines(), strict=False)
     line, (one, other) = next((k, pair) for k, pair in enumerate(lines, start=1) if pair[0] != pair[1])
-    return Fault(path.relative_to(ROOT), line, one.strip(), other.strip(), after)
+    return Fault(path.relative_to(ROOT), line, one.strip(), other.strip(), after, _span(ast.parse(before), line))
+
+
+def _span(tree: ast.AST, line: int) -> tuple[int, int] | None:
+    """Return the lines of the innermost statement around a line; None outside of functions."""
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    statements = [node for function in functions for node in ast.walk(function) if isinstance(node, ast.stmt)]
+    spans = [(node.lineno, node.end_lineno or node.lineno) for node in statements]
+    around = [span for span in spans if span[0] <= line <= span[1]]
+    return min(around, key=lambda span: span[1] - span[0], default=None)
