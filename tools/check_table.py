@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Checks emitted tables against model.json without a line of gyrotc: standard library only.
 
-    tools/check_table.py DIR [ANSWERS]   DIR holds model.json and c/, as `gyrotc emit` or `gyrotc build` leave them;
-                                         ANSWERS is what `gyrotc emit --answers` wrote
+    tools/check_table.py DIR [BOARD]   DIR holds model.json and c/, as `gyrotc emit` or `gyrotc build` leave them;
+                                       BOARD is the folder that `gyrotc emit --board` wrote
 
 Reads the tables from the C source and from the image, computes the equation of docs/FORMAT.md with the words
 of the table and with the numbers of the model, and compares the two within the bound that the emitted header
-prints; banks of networks with their hand-over. Known answers, and ANSWERS, are judged by the model, too. The bound
-leaves out extension terms: their records are compared word by word with what the model's parameters give.
+prints; banks of networks with their hand-over. Known answers, and those of BOARD, are judged by the model, too. The
+bound leaves out extension terms: their records are compared word by word with what the model's parameters give.
 The checksum of the model and the hashes in `c/emission.json` must hold.
 Exit status: 0 all agrees, 1 something differs (each is printed), 2 a file cannot be read.
 """
@@ -651,19 +651,19 @@ def check_answer(model: Model, image: Image, words: list[int], bound: float) -> 
             yield f"answer at T = {t:.4f}, slope = {slope:.6f} has status {words[3]}, coverage says otherwise"
 
 
-def known_answers(folder: Path, name: str, image: Image, answers: Path | None) -> Iterator[list[int]]:
+def known_answers(board: Path | None, name: str, image: Image) -> Iterator[list[int]]:
     """Known answers of the table, and of the board test's map if given: temperature, slope, bias, status."""
     probes = image.array["probes"]
     yield from (probes[k : k + 4] for k in range(0, len(probes), 4))
-    if answers is None:
+    if board is None:
         return
-    header = (folder / f"vectors_{name}.h").read_text(encoding="ascii")
+    header = (board / f"vectors_{name}.h").read_text(encoding="ascii")
     number = {k: int(v, 0) for k, v in re.findall(r"#define VECTORS_(\w+) \(?(-?\w+?)U?L\)?(?:\s|$)", header)}
     direct = re.search(rf"vectors_{image.numeric}_direct.*?= \{{(.*?)\n\}};", header, re.S)
-    text = answers.read_text(encoding="ascii")
+    text = (board / "answers.txt").read_text(encoding="ascii")
     lines = re.search(rf"begin {image.numeric} \w+\n((?:\w{{8}} \w{{8}}\n)+)", text)
     if direct is None or lines is None:
-        raise Unreadable(f"{answers}: no {image.numeric} answers")
+        raise Unreadable(f"{board}: no {image.numeric} answers")
     inputs = [[int(w, 16) for w in pair] for pair in re.findall(r"0x(\w{8})UL, 0x(\w{8})UL", direct[1])]
     x = number["SEED"]
     for _ in range(number["RANDOM"]):
@@ -689,7 +689,7 @@ def check_record(c: Path, model: Model, record: dict[str, Any]) -> Iterator[str]
             yield f"{name} is not the file that emission.json names"
 
 
-def check(folder: Path, answers: Path | None) -> list[str]:
+def check(folder: Path, board: Path | None) -> list[str]:
     """Everything that is wrong with an emitted folder, and with the answers of its board test if given."""
     model = Model(folder / "model.json")
     name = model.id()
@@ -719,7 +719,7 @@ def check(folder: Path, answers: Path | None) -> list[str]:
             *check_bound(model, bound),
             *check_map(model, image, bound),
         ]
-        for words in known_answers(c, name, image, answers):
+        for words in known_answers(board, name, image):
             found += check_answer(model, image, words, bound)
         wrong += [f"{image.where}: {text}" for text in found]
     return wrong

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from checked_tables import checked, extended
 from conftest import ROOT
-from emitted import GOLDEN, emitted, flip, spoil
+from emitted import GOLDEN, board_folder, emitted, flip, spoil
 from gyrotc.mirror import Table
 from gyrotc.model import Model, load_model
-from gyrotc.tables import Emission, answers_file, emit, emit_texts, quantise_all, write_texts
+from gyrotc.tables import Emission, emit, emit_texts, quantise_all, write_texts
 
 UNCERTAIN = ROOT / "examples" / "nav_loop" / "filter_model.json"
 
@@ -204,8 +204,7 @@ def test_seeded_fault_of_quantisation_is_seen(
     table = quantise_all(model, [numeric]).tables[numeric]
     emission = Emission({numeric: FAULTS[name](table)}, {})
     write_texts(tmp_path, emit_texts(model, emission, asked=True), model)
-    (tmp_path / "answers.txt").write_bytes(answers_file(model, emission))
-    done = checked(tmp_path, tmp_path / "answers.txt")
+    done = checked(tmp_path, board_folder(tmp_path / "board", model, emission))
     assert done.returncode == 1, (name, done.stdout, done.stderr)
 
 
@@ -229,11 +228,10 @@ def test_one_flipped_bit_of_source_image_hex_or_answers_is_seen(tmp_path: Path) 
         flip(folder / "c" / file, pattern, bit)
         done = checked(folder)
         assert done.returncode == 1, (file, done.stdout, done.stderr)
-    folder, answers = emitted(tmp_path / "answers"), tmp_path / "answers.txt"
-    answers.write_bytes(answers_file(load_model(GOLDEN), quantise_all(load_model(GOLDEN), None)))
-    assert checked(folder, answers).returncode == 0
-    flip(answers, r"\n00000004 ([0-9a-f]{8})\n", 28)
-    assert checked(folder, answers).returncode == 1
+    folder, board = emitted(tmp_path / "answers"), board_folder(tmp_path / "board")
+    assert checked(folder, board).returncode == 0
+    flip(board / "answers.txt", r"\n00000004 ([0-9a-f]{8})\n", 28)
+    assert checked(folder, board).returncode == 1
     folder = emitted(tmp_path / "image")
     path = folder / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from gyrotc.model import Model, load_model
 from gyrotc.recordings import Dataset, load
-from gyrotc.tables import emit
+from gyrotc.tables import Emission, board_test_texts, emit, quantise_all
 from gyrotc.verify import Target, all_targets, compiler_version, verify
 from recordings import csv_text, toml
 
@@ -32,6 +32,15 @@ def emitted(folder: Path, model: Model | None = None) -> Path:
     """`folder` with `model.json` and `c/`, as `gyrotc emit` leaves it."""
     model = model or load_model(GOLDEN)
     emit(model, folder)
+    return folder
+
+
+def board_folder(folder: Path, model: Model | None = None, emission: Emission | None = None) -> Path:
+    """`folder` with the board test of a model, its vectors and its answers, as `gyrotc emit --board` writes it."""
+    model = model or load_model(GOLDEN)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in board_test_texts(model, emission or quantise_all(model, None)).items():
+        (folder / name).write_bytes(data)
     return folder
 
 

@@ -133,11 +133,9 @@ def emit(
             help="Write the map at 61 x 25 points here, too: CSV or JSON; default: nowhere.",
         ),
     ] = None,
-    answers: Annotated[
+    board: Annotated[
         Path | None,
-        typer.Option(
-            "--answers", callback=written_place, help="Write the answers that the board test must print here, too."
-        ),
+        typer.Option("--board", help="Write the board test, its vectors and answers here, too; default: nowhere."),
     ] = None,
 ) -> None:
     """Write the C files of a model into DIR/c.
@@ -145,9 +143,10 @@ def emit(
     Example: gyrotc emit result/model.json --out result --map result/map.csv
     """
     from ..model import load_model
+    from ..results.files import write_own
     from ..results.folder import result_folder, write_result
     from ..results.json_text import json_text
-    from ..tables.emission import answers_file
+    from ..tables.emission import board_test_texts
     from ..tables.emission import emit as run
     from ..tables.map_grid import csv_text, grid_of_map, map_result
     from ..tables.quantisation import rms_growth
@@ -164,9 +163,12 @@ def emit(
         text = csv_text(grid) if map_file.suffix == ".csv" else json_text(map_result(grid).content())
         write_result(map_file, text)
         tell(f"{map_file}: {grid.summary}")
-    if answers is not None:
-        write_result(answers, answers_file(loaded, emission).decode("ascii"))
-        tell(f"{answers}: status and bits of every result of board_test.c")
+    if board is not None:
+        with result_folder(board, "emit", kind="board test") as stage:
+            stage.of(loaded.serial, loaded.axis)
+            for name, data in board_test_texts(loaded, emission).items():
+                write_own(stage.folder / name, data)
+        tell(f"{board}: board_test.c, its vectors and its answers, to compile with the files of {out / 'c'}")
     for name, reason in emission.refused.items():
         ERR.print(f"{name} left out: {reason}", highlight=False, soft_wrap=True)
     for line in rounding_lines({t.numeric: rms_growth(loaded, t) for t in emission.tables.values()}):

@@ -65,7 +65,7 @@ def joint_texts(
     held = [n for n in NUMERICS if f"gtc_{n}_table_t" in headers]  # of all axes
     texts = runtime_texts(joint_needs(needs_of(model) for model in models.values()), held)
     for axis, model in models.items():
-        own = (f"gtc_{model.id}.", f"gtc_{model.id}_", f"vectors_{model.id}.")
+        own = (f"gtc_{model.id}.", f"gtc_{model.id}_")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
     listed = list(models.values())
     main = (

@@ -108,12 +108,10 @@ def _replace(path: Path, *content: bytes) -> None:
 _MOST_BYTES = 2**30  # 1 GiB: no result comes near it
 _PAGE, _HEAD = b'<meta name="generator" content="gyrotc">', 1000  # a page, and where that stands in it
 _MAP = b"serial,axis,temperature_c,slope_c_per_min,bias_dph"  # how a map in CSV begins
-ANSWERS = b"# gyrotc: answers of the board test\n"
-"""First line of the file that `emit --answers` writes."""
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuse to replace a file that gyrotc did not write (`--json`, `--map`, `--answers`).
+    """Refuse to replace a file that gyrotc did not write (`--json`, `--map`).
 
     Raises:
         InputError: There is such a file, a folder, or a link to a device or a pipe.
@@ -128,7 +126,7 @@ def check_replaceable(path: Path) -> None:
             return
         with path.open("rb") as stream:
             head = stream.read(_HEAD)
-            if _PAGE in head or head.startswith((_MAP, ANSWERS)):
+            if _PAGE in head or head.startswith(_MAP):
                 return
         content = json.loads(path.read_bytes()) if path.stat().st_size < _MOST_BYTES else None
     except FileNotFoundError:

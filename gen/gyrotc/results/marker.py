@@ -51,7 +51,7 @@ class Marker:
     """The files of a folder that gyrotc wrote, and the result that they are.
 
     Attributes:
-        kind: One of `KINDS`, or `trace` (traces outside a result).
+        kind: One of `KINDS`, `trace` (traces outside a result) or `board test`.
         command: Command that wrote the folder last.
         serial: Serial number of the gyro; None if the folder is not of one gyro.
         axis: Axis; None if the folder is not of one axis.

@@ -1,5 +1,6 @@
 from .emission import Emission as Emission
-from .emission import answers_file as answers_file
+from .emission import board_test_sources as board_test_sources
+from .emission import board_test_texts as board_test_texts
 from .emission import emit as emit
 from .emission import emit_texts as emit_texts
 from .emission import emitted_tables as emitted_tables

@@ -1,4 +1,4 @@
-"""Write the C files of a model: tables, runtime, image, vectors, board test, example.
+"""Write the C files of a model: tables, runtime, image and example, which firmware compiles; and a board test.
 
 A pure function of the model: no date, no path, no host, no version, so one model gives the same bytes on every
 machine. All arithmetic was done in `tables.quantise`; here integers are printed.
@@ -23,7 +23,7 @@ from ..common.texts import CText, c_code, c_literal
 from ..mirror.history import answers
 from ..mirror.table import LAYOUT, Table
 from ..model import Model
-from ..results.files import ANSWERS, write_own
+from ..results.files import write_own
 from ..results.folder import result_folder
 from ..results.templates import c_templates
 from .error_bounds import MARGIN, channel_error_dph
@@ -36,7 +36,8 @@ from .vectors import MISSING_READING, Vectors, answers_text, make_vectors
 
 __all__ = [
     "Emission",
-    "board_test_text",
+    "board_test_sources",
+    "board_test_texts",
     "emit",
     "emit_texts",
     "emitted_tables",
@@ -146,7 +147,7 @@ def emit_texts(
         emission: Its tables.
         asked: The arithmetics were asked for by name.
         zero_at: Temperature at which the tables' map is 0, C; None: not shifted.
-        runtime_apart: Table and image alone: vectors, board test and the rest are made again where they are needed.
+        runtime_apart: Table and image alone.
     """
     options = Options.model_validate(
         {
@@ -163,9 +164,29 @@ def expected_answers(model: Model, emission: Emission) -> dict[str, NDArray[np.u
     return dict(_expected(_Made.of(model, emission)))
 
 
-def answers_file(model: Model, emission: Emission) -> bytes:
-    """Return the expected answers as text: status and bits of every result of the board test, in its order."""
-    return ANSWERS + answers_text(_expected(_Made.of(model, emission)))
+def board_test_sources(model: Model, emission: Emission) -> dict[str, bytes]:
+    """Return the board test and its vectors by name; they compile beside table and runtime."""
+    vectors = _vectors(_Made.of(model, emission))
+    values = {
+        "id": model.id,
+        "symbol": model.symbol,
+        "numerics": tuple(emission.tables),
+        "v": vectors,
+        "n_channels": vectors.n_channels,
+        "missing": MISSING_READING,
+        "has_time": "time" not in model.left_out,
+        "has_uncertainty": "uncertainty" not in model.left_out,
+    }
+    named = {"board_test.c": "board_test.c.j2", f"vectors_{model.id}.h": "vectors.h.j2"}
+    return {name: c_templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
+
+
+def board_test_texts(model: Model, emission: Emission) -> dict[str, bytes]:
+    """Return the board test, its vectors and the answers that it must print, by name.
+
+    The answers, status and bits of every result in the order of the test, are larger than all that firmware compiles.
+    """
+    return board_test_sources(model, emission) | {"answers.txt": answers_text(_expected(_Made.of(model, emission)))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,10 +224,9 @@ def _texts(made: _Made, options: Options) -> dict[str, bytes]:
     numerics = tuple(emission.tables)
     named = {f"gtc_{model.id}.h": "table.h.j2", f"gtc_{model.id}.c": "table.c.j2"}
     if options.runtime is None:
-        named |= {f"vectors_{model.id}.h": "vectors.h.j2", "main.c": "main.c.j2"}
-    texts = _from_templates(named, model, emission, options, _vectors(made))
+        named["main.c"] = "main.c.j2"
+    texts = _from_templates(named, model, emission, options)
     if options.runtime is None:
-        texts["board_test.c"] = board_test_text(model, numerics, _vectors(made).n_channels)
         texts |= runtime_texts(needs_of(model), numerics)
     for numeric, table in emission.tables.items():
         suffix = "" if numeric == numerics[0] else f"_{numeric}"
@@ -217,9 +237,7 @@ def _texts(made: _Made, options: Options) -> dict[str, bytes]:
     return texts
 
 
-def _from_templates(
-    named: Mapping[str, str], model: Model, emission: Emission, options: Options, vectors: Vectors
-) -> dict[str, bytes]:
+def _from_templates(named: Mapping[str, str], model: Model, emission: Emission, options: Options) -> dict[str, bytes]:
     """Files by name of which `named` gives the template."""
     numerics = tuple(emission.tables)
     values: dict[str, Any] = {
@@ -231,16 +249,14 @@ def _from_templates(
         "options": options.text,
         "layout": LAYOUT,
         "numerics": numerics,
-        "v": vectors,
         "n": numerics[0],
-        "n_channels": vectors.n_channels,
+        "n_channels": next(iter(emission.tables.values())).n_channels,
         "id_code": emission.tables[numerics[0]].id,
         "tables": [table_text(t, model) for t in emission.tables.values()],
         "facts": list(_facts(model)),
         "valid": _valid(model),
         "block_s": f"{model.block_s:g}",
         "sizes": list(_sizes(model, emission)),
-        "has_time": "time" not in model.left_out,
         "runtime": options.runtime,
         "left_out": ", ".join(part.replace("_", " ") for part in model.left_out),
         "macros": list(_macros(model, emission)),
@@ -248,21 +264,6 @@ def _from_templates(
         **example_values(model),
     }
     return {name: c_templates().get_template(t).render(values).encode("ascii") for name, t in named.items()}
-
-
-def board_test_text(model: Model, numerics: Sequence[str], n_channels: int) -> bytes:
-    """`board_test.c` for a table: the same for every model of this id, these arithmetics and channels."""
-    template = c_templates().get_template("board_test.c.j2")
-    text = template.render(
-        id=model.id,
-        symbol=model.symbol,
-        numerics=numerics,
-        n_channels=n_channels,
-        missing=MISSING_READING,
-        has_time="time" not in model.left_out,
-        has_uncertainty="uncertainty" not in model.left_out,
-    )
-    return text.encode("ascii")
 
 
 def _facts(model: Model) -> Iterator[str]:

@@ -3,7 +3,6 @@ from .board import compared_words as compared_words
 from .board import log_parts as log_parts
 from .board import read_output as read_output
 from .emitted import Job as Job
-from .emitted import board_files as board_files
 from .emitted import checked_sources as checked_sources
 from .emitted import table_files as table_files
 from .exhaustive import Visited as Visited

@@ -23,8 +23,9 @@ from ..mirror.history import answers
 from ..results.files import write_own
 from ..results.folder import scratch_folder
 from ..results.release import CallCost, LogPart, ReadLog, VerifiedTarget
+from ..tables.emission import Emission, board_test_sources
 from ..tables.vectors import Vectors
-from .emitted import Job, board_files, checked_sources, table_files
+from .emitted import Job, checked_sources, table_files
 from .sizes import function_costs
 from .toolchain import (
     Object,
@@ -266,15 +267,14 @@ def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
     """Compile runtime, table and a test program for each arithmetic, and run it."""
-    n_channels = next(iter(job.tables.values())).n_channels
-    files = table_files(job.c_folder, job.model, tuple(job.tables))
-    if not job.board_test:
-        files = board_files(job.c_folder, job.model, tuple(job.tables), n_channels)
+    board = work / "board"
+    board.mkdir()
+    for name, data in board_test_sources(job.model, Emission(job.tables, {})).items():
+        write_own(board / name, data)
     c: Path | CheckFailed
     try:
+        files = table_files(job.c_folder, job.model, tuple(job.tables))
         c = checked_sources(job.c_folder, work, files, trusted=job.trusted)
-        for name, data in job.board_test.items():
-            write_own(c / name, data)
     except CheckFailed as error:
         c = error
     for numeric in numerics:
@@ -322,7 +322,7 @@ def _ran(job: Job, target: Target, numeric: str, shared: _Shared, work: Path, c:
     defines = [f"BOARD_{n.upper()}={int(n == numeric)}" for n in job.tables]
     if target.counts:
         defines.append('BOARD_HEADER="board.h"')
-    test = compile_objects(target, [c / "board_test.c"], work, include=c, defines=defines)
+    test = compile_objects(target, [work / "board" / "board_test.c"], work, include=c, defines=defines)
     program = work / f"board_{numeric}"
     link(target, [*test, *shared.objects], program)
     run = run_program(target, program)

@@ -3,9 +3,9 @@
 `emit_texts` makes the files again in memory; nothing that lies in the folder has a say in what they should be, but for
 the options in its record, and that is compared, too.
 
-A folder may come from somebody else, and what is compiled there is run here. The runtime and the board test must be,
-byte for byte, those of this gyrotc; table and vectors must consist, line by line, of what the emitter writes: numbers,
-the names it knows, and comments. Whether the numbers are right is not asked here.
+A folder may come from somebody else, and what is compiled there is run here. The runtime must be, byte for byte, that
+of this gyrotc; the table must consist, line by line, of what the emitter writes: numbers, the names it knows, and
+comments. Whether the numbers are right is not asked here. The board test is not taken from a folder: it is made again.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import os
 import re
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from ..common.errors import CheckFailed, InputError
 from ..common.texts import C_COMMENT, C_INITIALISER
 from ..mirror.table import Table
-from ..model import SERIAL, Model
+from ..model import Model
 from ..results.base import NUMERICS
 from ..results.files import sha256, write_own
 from ..results.marker import EXAMPLE, MARKER
 from ..results.release import VerifiedFile
-from ..tables.emission import Emission, board_test_text, emit_texts, quantise_all
+from ..tables.emission import Emission, emit_texts, quantise_all
 from ..tables.record import Options, read_options
 from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts, stated_needs
 
@@ -49,7 +49,6 @@ class Job:
     tables: dict[str, Table]
     expected: dict[str, NDArray[np.uint32]]
     trusted: bool = False  # the user takes the code of the folder as it is
-    board_test: Mapping[str, bytes] = field(default_factory=dict)  # of the board test, which the folder does not have
 
 
 def c_hash(c_folder: Path) -> str:
@@ -89,12 +88,6 @@ def texts_again(model: Model, options: Options, emission: Emission) -> dict[str,
         zero_at=options.zero_at_c,
         runtime_apart=options.runtime is not None,
     )
-
-
-def board_files_again(model: Model, emission: Emission) -> dict[str, bytes]:
-    """Return the board test of a model and its vectors, by name."""
-    texts = emit_texts(model, emission)
-    return {name: texts[name] for name in ("board_test.c", f"vectors_{model.id}.h")}
 
 
 def runtime_place(c_folder: Path) -> Path:
@@ -207,7 +200,6 @@ _TEXT = C_COMMENT.pattern
 _NOTE = rf"(?: +/\* {_TEXT} \*/)?"
 _CELLS = C_INITIALISER.pattern
 _HEX = "0x[0-9a-f]{8}UL"
-_INTEGER = "-?[0-9]{1,10}"
 
 # {id}, {symbol} and {SYMBOL} are the table's; a line of a file must match one of its patterns as a whole.
 _TABLE_C = (
@@ -233,20 +225,6 @@ _TABLE_H = (
     r'#define GTC_{SYMBOL}_[A-Z0-9_]{{1,32}} (?:<cells>|\((?:<cells>)\)|"<name>")<note>',
     r"extern const gtc_<n>_table_t gtc_{symbol}_\1;",
 )
-_VECTORS_H = (
-    "#(?:ifndef|define) VECTORS_{SYMBOL}_INCLUDED",
-    "#include <stdint.h>",
-    '#define VECTORS_ID "{id}"',
-    r"#define VECTORS_[A-Z_]{{1,20}} +(?:<hex>|[0-9]{{1,10}}(?:UL)?|\(<integer>L\))<note>",
-    r"static const uint_least32_t vectors_<n>_direct\[VECTORS_DIRECT\]\[2\] = \{{",
-    r"    \{{ <hex>, <hex> \}},",
-    r"typedef struct \{{",
-    "    (?:int kind|uint_least32_t count|int_least32_t start, step, noise|uint_least32_t bits_<n>);",
-    r"\}} vectors_segment_t;",
-    r"static const vectors_segment_t vectors_segments\[VECTORS_SEGMENTS\] = \{{",
-    r"    \{{ VECTORS_[A-Z]{{1,20}}, [0-9]{{1,10}}UL(?:, <integer>L){{3}}(?:, <hex>){{1,2}} \}},",
-    r"\}};",
-)
 _ANY = ("", "#endif", r"/\* <text> \*/")
 
 
@@ -259,15 +237,6 @@ def table_files(c_folder: Path, model: Model, numerics: Sequence[str]) -> dict[s
         **{name: functools.partial(_runtime, name, needs) for name in runtime},
         f"gtc_{model.id}.h": _grammar(_TABLE_H, model),
         f"gtc_{model.id}.c": _grammar(_TABLE_C, model),
-    }
-
-
-def board_files(c_folder: Path, model: Model, numerics: Sequence[str], n_channels: int) -> dict[str, Check]:
-    """The board test of a model with its vectors, beside runtime and table."""
-    board = board_test_text(model, numerics, n_channels)
-    return table_files(c_folder, model, numerics) | {
-        f"vectors_{model.id}.h": _grammar(_VECTORS_H, model),
-        "board_test.c": lambda data: None if data == board else "is not the board test of this gyrotc",
     }
 
 
@@ -311,8 +280,8 @@ def _grammar(lines: Sequence[str], model: Model) -> Check:
     """A check that a file is one comment, and then nothing but lines of these forms."""
     names = {"id": model.id, "symbol": model.symbol, "SYMBOL": model.symbol.upper()}
     parts = {
-        "<n>": _N, "<note>": _NOTE, "<text>": _TEXT, "<cells>": _CELLS, "<hex>": _HEX, "<integer>": _INTEGER,
-        "<serial>": SERIAL.strip("^$"), "<name>": '[^\\x00-\\x1f"?%\\\\\\x7f-\\xff]{1,67}',
+        "<n>": _N, "<note>": _NOTE, "<text>": _TEXT, "<cells>": _CELLS, "<hex>": _HEX,
+        "<name>": '[^\\x00-\\x1f"?%\\\\\\x7f-\\xff]{1,67}',
     }  # fmt: skip
     filled = (form.format(**names) for form in lines)
     marks = re.compile("|".join(parts))

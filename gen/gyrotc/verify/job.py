@@ -34,7 +34,6 @@ from ..tables.vectors import Vectors, make_vectors
 from .board import board_entries, log_entries
 from .emitted import (
     Job,
-    board_files_again,
     c_hash,
     file_entries,
     made_again,
@@ -94,8 +93,7 @@ def verify(
     if exhaustive and "q31" not in tables:
         raise InputError("--exhaustive", f"{folder / 'c'} has no fixed-point table", "one emitted with q31")
     vectors = make_vectors(model, tuple(tables))
-    tests = board_files_again(model, emission) if options.runtime and compiled else {}
-    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code, tests)
+    job = Job(folder / "c", model, tables, expected_answers(model, emission), trust_code)
     texts = texts_again(model, options, emission)
     emitted = tuple(file_entries(job.c_folder, texts))
     if options.runtime and compiled:

@@ -13,22 +13,15 @@ from pathlib import Path
 
 import pytest
 from checked_tables import SCRIPT, checked, extended
-from emitted import GOLDEN, emitted
-from gyrotc.model import Model, load_model
-from gyrotc.tables import answers_file, quantise_all
+from emitted import GOLDEN, board_folder, emitted
+from gyrotc.model import load_model
 from models import random_model
 
 
-def _check_alone(folder: Path, answers: Path) -> subprocess.CompletedProcess[str]:
+def _check_alone(folder: Path, board: Path) -> subprocess.CompletedProcess[str]:
     """Without site packages, so that nothing of gyrotc can be imported."""
-    command = [sys.executable, "-I", "-S", str(SCRIPT), str(folder), str(answers)]
+    command = [sys.executable, "-I", "-S", str(SCRIPT), str(folder), str(board)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def _answers(model: Model, folder: Path) -> Path:
-    path = folder / "answers.txt"
-    path.write_bytes(answers_file(model, quantise_all(model, None)))
-    return path
 
 
 def test_it_imports_the_standard_library_only() -> None:
@@ -42,14 +35,14 @@ def test_it_imports_the_standard_library_only() -> None:
 def test_emitted_tables_are_the_model(seed: int | None, tmp_path: Path) -> None:
     model = load_model(GOLDEN) if seed is None else random_model(seed)
     emitted(tmp_path, model)
-    done = _check_alone(tmp_path, _answers(model, tmp_path))
+    done = _check_alone(tmp_path, board_folder(tmp_path / "board", model))
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("seed", [1])
 def test_tables_with_terms_and_banks_are_the_model(seed: int, tmp_path: Path, few_vectors: None) -> None:
     emitted(tmp_path, extended(seed))
-    done = checked(tmp_path, _answers(extended(seed), tmp_path))
+    done = checked(tmp_path, board_folder(tmp_path / "board", extended(seed)))
     assert done.returncode == 0, done.stdout + done.stderr
 
 

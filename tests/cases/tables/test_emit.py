@@ -18,6 +18,7 @@ from gyrotc.mirror import MAGIC, Table, evaluate_map, gauss
 from gyrotc.model import Guard, Model, Term, load_model
 from gyrotc.tables import (
     NUMERICS,
+    board_test_sources,
     emit,
     emit_texts,
     expected_answers,
@@ -36,7 +37,8 @@ RUNTIME = {"gtc.h", "gtc_f32.c", "gtc_q31.c", "emission.json"}  # the record has
 
 def _golden_texts() -> dict[str, bytes]:
     model = load_model(EXAMPLE / "model.json")
-    return emit_texts(model, quantise_all(model, None))
+    emission = quantise_all(model, None)
+    return emit_texts(model, emission) | board_test_sources(model, emission)
 
 
 def test_emitted_files_are_the_golden_ones() -> None:
@@ -180,18 +182,21 @@ def test_what_a_product_does_not_need_is_in_neither_table_nor_runtime(tmp_path: 
     assert checked.returncode == 0, checked.stdout
 
 
-def test_the_answers_of_the_board_test_are_written_where_they_are_asked_for(tmp_path: Path, gyrotc: Command) -> None:
-    """They are ten times as large as all that firmware compiles, which is not beside them."""
-    out, answers = tmp_path / "result", tmp_path / "answers.txt"
+def test_the_board_test_is_written_where_it_is_asked_for(tmp_path: Path, gyrotc: Command) -> None:
+    """It is not beside the files that firmware compiles, and its answers are larger than all of these."""
+    out, board = tmp_path / "result", tmp_path / "board"
     for _ in range(2):  # a second call replaces what the first one wrote
-        assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--answers", answers).returncode == 0
+        assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--board", board).returncode == 0
+    names = {"board_test.c", "vectors_rlg_0042.h", "answers.txt"}
+    assert {path.name for path in board.iterdir()} - {"SHA256SUMS"} == names
+    assert not names & {path.name for path in (out / "c").iterdir()}
     model = load_model(EXAMPLE / "model.json")
     rows = expected_answers(model, quantise_all(model, None))
     lines = [f"{status:08x} {bits:08x}" for numeric in rows for status, bits in rows[numeric].tolist()]
-    assert [line for line in answers.read_text("ascii").splitlines() if line[:1] not in "#b"] == lines
-    assert sum(path.stat().st_size for path in (out / "c").iterdir()) < 300_000
-    answers.write_text("of somebody else\n")
-    assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--answers", answers).returncode == 2
+    assert [line for line in (board / "answers.txt").read_text("ascii").splitlines() if line[0] != "b"] == lines
+    assert sum((board / name).stat().st_size for name in names - {"answers.txt"}) < 100_000
+    (board / "notes.txt").write_text("of somebody else\n")
+    assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--board", board).returncode == 2
 
 
 def test_the_runtime_of_several_tables_has_what_each_needs() -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command
-from emitted import GOLDEN, emitted, entries, flip, recorded, spoil
+from emitted import GOLDEN, board_folder, emitted, entries, flip, recorded, spoil
 from gyrotc.common import CheckFailed, InputError
 from gyrotc.jobs import axes_in, joint_texts, verify_axes
 from gyrotc.model import load_model
@@ -59,12 +59,6 @@ def test_a_flipped_bit_of_a_weight_fails(copy: Path) -> None:
     assert entry["status"] == "fail" and entry["mismatches"] >= 1
 
 
-def test_a_flipped_bit_of_a_vector_fails(copy: Path) -> None:
-    flip(copy / "c" / "vectors_rlg_0042.h", r"VECTORS_SEED 0x([0-9a-f]{8})UL", bit=7)
-    for entry in entries(copy, FAST).values():
-        assert entry["status"] == "fail" and entry["mismatches"] > 1000
-
-
 def test_a_flipped_bit_of_the_image_fails(copy: Path) -> None:
     path = copy / "c" / "gtc_rlg_0042.bin"
     data = bytearray(path.read_bytes())
@@ -89,7 +83,9 @@ def test_a_flipped_bit_of_the_reference_fails(whole: Path, monkeypatch: pytest.M
 
 
 def test_a_program_that_stops_half_way_is_no_pass(copy: Path) -> None:
-    spoil(copy / "c" / "board_test.c", r"static void end\(void\)\n\{", "static void end(void)\n{\n    return;")
+    for numeric in ("f32", "q31"):
+        head = rf"(int gtc_{numeric}_bias\([^;{{]*\{{\n)"
+        spoil(copy / "c" / f"gtc_{numeric}.c", head, r"extern void exit(int);\n\1    exit(0);\n")
     for entry in entries(copy, FAST).values():
         assert entry["status"] == "fail" and "did not run to its end" in entry["error"]
 
@@ -135,7 +131,7 @@ def test_exit_status_of_the_command(copy: Path, gyrotc: Command) -> None:
     assert unknown.returncode == 2 and "cortex-m4f" in unknown.stderr
     bare = gyrotc("verify", copy.parent)
     assert bare.returncode == 2
-    flip(copy / "c" / "vectors_rlg_0042.h", r"VECTORS_SEED 0x([0-9a-f]{8})UL")
+    flip(copy / "c" / "gtc_rlg_0042.c", r"B\(0x([0-9a-f]{8})UL\)")
     spoilt = gyrotc("verify", copy, "--target", FAST)
     assert spoilt.returncode == 1 and "reference" in spoilt.stdout
     assert json.loads((copy / "verify.json").read_text())["failed"] >= 1
@@ -162,7 +158,8 @@ def _board_output(folder: Path, *defines: str) -> str:
     work = folder / "work"
     work.mkdir(exist_ok=True)
     c = folder / "c"
-    sources = [c / "board_test.c", c / "gtc_f32.c", c / "gtc_q31.c", c / "gtc_rlg_0042.c"]
+    board_test = board_folder(work, load_model(folder / "model.json")) / "board_test.c"
+    sources = [board_test, c / "gtc_f32.c", c / "gtc_q31.c", c / "gtc_rlg_0042.c"]
     compile_c(target, sources, work / "board", include=c, defines=defines)
     return run_program(target, work / "board").stdout.decode("ascii")
 
@@ -293,7 +290,6 @@ TAMPERED: dict[str, tuple[str, Spoil]] = {
     "block in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", "Block:       10", "Block: 20")),
     "bound in comment": ("gtc_rlg_0042.h", lambda c: spoil(c / "gtc_rlg_0042.h", r"<= 1\.\d+e-0", "<= 1.00e-1")),
     "serial in table": ("gtc_rlg_0042.c", lambda c: spoil(c / "gtc_rlg_0042.c", "0x32343030UL", "0x33343030UL")),
-    "vectors made fewer": ("vectors_rlg_0042.h", lambda c: spoil(c / "vectors_rlg_0042.h", "20000UL", "2UL")),
     "open accepts anything": ("gtc_f32.c", _at_start("open", "return GTC_OK;")),
     "blind check": ("gtc_f32.c", _at_start("check", "return GTC_OK;")),
     "restore takes foreign states": ("gtc_f32.c", _at_start("restore", "return GTC_OK;")),
