@@ -16,7 +16,7 @@ from ..assess.changes import changes_since, load_earlier
 from ..assess.evaluation import Watch, evaluate
 from ..assess.limits import Limits, held_against, load_limits
 from ..assess.product_guards import guarded
-from ..common.errors import InputError
+from ..common.errors import CheckFailed, InputError
 from ..common.progress import Progress, Stages, silent
 from ..common.threads import with_one_thread
 from ..model import Model, load_model
@@ -34,7 +34,7 @@ from ..results.json_text import json_text
 from ..results.marker import MARKER
 from ..results.release import HeldLimits, Verification
 from ..results.training import Manifest, Training
-from ..tables.emission import emit
+from ..tables.emission import Emission, emit
 from ..tables.runtime import RUNTIME_FILES
 from ..train.fitting import FitOptions, Fitted, fit_dataset, units_of
 from ..verify.job import chosen_targets, verify
@@ -229,13 +229,7 @@ def _build_axis(dataset: Dataset, work: Path, order: _Order, say: Stages) -> Bui
         )
         fitted = replace(fitted, model=model)
     _write(work / "training.json", fitted.training.content())
-    emission = emit(
-        fitted.model,
-        work,
-        numerics=request.numerics,
-        runtime_apart=order.in_fleet,
-        progress=say.within("emitting C", "emitting C: "),
-    )
+    emission = _emit(fitted.model, work, order, say.within("emitting C", "emitting C: "))
     verification = verify(
         work, targets=request.targets, compiled=not order.in_fleet, progress=say.within("verifying", "verifying: ")
     )
@@ -296,6 +290,25 @@ def _write(path: Path, result: dict[str, Any]) -> None:
 def _versions() -> dict[str, str]:
     """Return the versions of the libraries behind the figures; a fleet asks for each of its serials."""
     return {name: metadata.version(name) for name in _VERSIONED}
+
+
+def _emit(model: Model, work: Path, order: _Order, progress: Progress) -> Emission:
+    """Write the C files in the arithmetics that the job names, else those that the product needs, else all.
+
+    Where one is refused that the product needs, all others are written: the limit is then not met, and the result says
+    why.
+
+    Raises:
+        CheckFailed: An arithmetic that the job names is refused, or all are.
+    """
+    write = functools.partial(emit, model, work, runtime_apart=order.in_fleet, progress=progress)
+    needed = order.limits.needs.arithmetics if order.limits else ()
+    if order.request.numerics is not None or not needed:
+        return write(numerics=order.request.numerics)
+    try:
+        return write(numerics=needed)
+    except CheckFailed:
+        return write(numerics=None)
 
 
 def _manifest(folder: Path, dataset: Dataset, model: Model, refused: dict[str, str]) -> Manifest:

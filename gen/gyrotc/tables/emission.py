@@ -99,10 +99,10 @@ def emit(
         runtime_apart: Write the tables only: the runtime is in `SHARED_RUNTIME`, once for many gyros.
         progress: Takes note of every stage.
     """
-    say = Stages(progress, {"rounding": 0.85, "answering the vectors": 0.15})
+    say = Stages(progress, {"rounding": 0.95, "writing": 0.05})
     shifted = model if zero_at is None else model.zeroed_at(zero_at)
     emission = quantise_all(shifted, numerics, say.within("rounding"))
-    say("answering the vectors")
+    say("writing")
     texts = emit_texts(model, emission, asked=numerics is not None, zero_at=zero_at, runtime_apart=runtime_apart)
     write_texts(out, texts, model)
     return emission

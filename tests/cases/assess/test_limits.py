@@ -207,6 +207,34 @@ def test_limits_and_an_earlier_result_through_the_command(tmp_path: Path, gyrotc
     assert not (tmp_path / "three").exists()
 
 
+def test_a_product_gets_the_arithmetic_and_the_parts_that_it_needs(tmp_path: Path, gyrotc: Command) -> None:
+    """What it can do without is not among the files, which are 100 kB at most."""
+    recording(tmp_path / "data", "RLG-1")
+    product = tmp_path / "product.toml"
+    product.write_text('schema = 1\n[needs]\narithmetics = ["f32"]\nimage = false\nuncertainty = false\n')
+    out = tmp_path / "out"
+    done = gyrotc("build", "--target", "host-gcc-O2", "--limits", product, tmp_path / "data", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert {path.suffix for path in (out / "c").iterdir()} == {".c", ".h", ".bin", ".hex", ".json"}
+    assert {path.name for path in (out / "c").glob("*.[ch]")} == {
+        "gtc.h", "gtc_f32.c", "gtc_rlg_1.h", "gtc_rlg_1.c", "main.c",
+    }  # fmt: skip
+    assert sum(path.stat().st_size for path in (out / "c").iterdir()) < 100_000
+    assert json.loads((out / "verify.json").read_text())["options"]["numeric"] == ["f32"]
+
+
+def test_an_arithmetic_that_is_needed_and_refused_misses_its_limit(tmp_path: Path, gyrotc: Command) -> None:
+    """The other arithmetic is written all the same, with the reason."""
+    recording(tmp_path / "data", "RLG-1")
+    product = tmp_path / "product.toml"
+    product.write_text('schema = 1\nq31_bias_frac_bits = 60\n[needs]\narithmetics = ["q31"]\n')
+    out = tmp_path / "out"
+    done = gyrotc("build", "--target", "host-gcc-O2", "--limits", product, tmp_path / "data", "--out", out)
+    assert done.returncode == 1 and "limit needs.arithmetics" in done.stderr
+    assert (out / "c" / "gtc_f32.c").exists() and not (out / "c" / "gtc_q31.c").exists()
+    assert list(json.loads((out / "manifest.json").read_text())["refused"]) == ["q31"]
+
+
 _TERM = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")
 _TRAINED = Guard(
     low=27.0, high=29.0, max_step=2.0, max_rate_per_min=0.5, agree_s=1.0, stuck_s=0.0, missing_s=300.0,
