@@ -89,6 +89,7 @@ def test_a_bias_that_every_run_makes_anew_leaves_the_constant_and_says_why() -> 
     [finding] = found.findings
     assert finding["id"] == "does_not_generalise"
     assert "3 whole runs" in finding["text"] and "Repeat" in finding["text"]
+    assert finding["evidence"]["best"] != "constant", "the best of those that were tried in its place"
     assert "nothing is shown to be better" in found.reason
 
 
@@ -182,6 +183,21 @@ def test_a_map_that_leaves_its_process_or_the_data_is_refused_with_words() -> No
     assert "the means span" in objection_to(replace(far, process=None), *arguments)
     heavy = {**good, "weights": [1e8, *good["weights"][1:]]}
     assert "more than a table holds" in objection_to(replace(far, networks=[heavy]), *arguments)
+
+
+@pytest.mark.parametrize("average_s", [100.0, 200.0])
+@pytest.mark.parametrize(("sigmas", "refused"), [(3.5, False), (5.0, True)])
+def test_a_map_may_leave_its_process_by_four_times_the_noise_of_a_mean(
+    sigmas: float, refused: bool, average_s: float
+) -> None:
+    data = samples(0)
+    found = fit(data)
+    process = found.outcome.process
+    assert process is not None and process.seconds < average_s
+    noise_dph = process.noise_dph * np.sqrt(process.seconds / average_s)
+    [good] = found.networks
+    moved = replace(found.outcome, networks=[{**good, "w0": good["w0"] + sigmas * noise_dph}])
+    assert ("leaves the process" in objection_to(moved, data, found.scaling, average_s)) == refused
 
 
 @pytest.mark.parametrize("share", [k / 32.0 for k in range(1, 32, 2)])
