@@ -322,15 +322,15 @@ def test_a_cause_that_is_not_quite_the_formula_keeps_its_name_however_clear(camp
 
 def test_nothing_is_likelier_than_any_cause_of_plain_noise(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the search lets through: a false alarm at its level has a criterion below that of no cause."""
-    print("seeds", SEED + 10, "to", SEED + 15)
+    print("seeds", SEED + 10, "to", SEED + 13)
     monkeypatch.setattr("gyrotc.diagnose.attribution.LEVEL", 1.0)
     claimed = []
-    for k in range(6):
+    for k in range(4):
         noise = LEVEL_DPH * np.random.default_rng(SEED + 10 + k).standard_normal(campaign.records.size)
         found = attribute(campaign.search(1e-4 * campaign.temperature + noise))
         claimed.append(found.detected)
         assert found.detected or not found.causes
-    assert claimed == [False] * 6
+    assert claimed == [False] * 4
 
 
 @pytest.mark.parametrize(
@@ -889,7 +889,7 @@ def left_by_true_cause(search: Search) -> Misfit:
     return misfit(search.extended(model_columns(causes)), "map and beside", causes)
 
 
-@pytest.mark.parametrize("seed", [2, 3, 5, 7])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_noise_that_the_declaration_lacks_is_no_structure(campaign: Campaign, seed: int) -> None:
     """The declared white noise, contradicted by the data, made 1e-11 to 1e-47 of what a true cause left."""
     search = measured(campaign, FLICKER, seed, WHITE)
