@@ -53,7 +53,7 @@ test:
 	@cmake -S tests/fuzz -B build/fuzz -DCMAKE_C_COMPILER=clang >build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@cmake --build build/fuzz -j2 >>build/fuzz.log 2>&1 || { cat build/fuzz.log; exit 1; }
 	@ctest --test-dir build/fuzz -j2 --output-on-failure
-	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile
+	@$(PYTHON) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder
 
 ## the emitted code on every target, negative controls, nav_loop: docs/results.md
 targets:

@@ -43,8 +43,32 @@ HOST = ("--numeric", "f32", "--target", "host-gcc-O2")
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
+# A file that has taken longer, s, begins first: else a worker may be left alone with it at the end.
+_LONG_S = 8.0
+_SECONDS_KEPT = "gyrotc/seconds_of_files"
+_seconds: dict[str, float] = {}
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Add up how long the tests of each file take."""
+    file = report.nodeid.partition("::")[0]
+    _seconds[file] = _seconds.get(file, 0.0) + report.duration
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Keep how long each file took, at most, for the order of the next run."""
+    cache = getattr(session.config, "cache", None)
+    if cache is not None and "PYTEST_XDIST_WORKER" not in os.environ:
+        known = cache.get(_SECONDS_KEPT, {})
+        cache.set(_SECONDS_KEPT, known | {file: max(s, known.get(file, 0.0)) for file, s in _seconds.items()})
+
+
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests of measured recordings that this machine does not have."""
+    """Put long files first, and leave out tests of measured recordings that this machine does not have."""
+    cache = getattr(config, "cache", None)
+    seconds = {} if cache is None else cache.get(_SECONDS_KEPT, {})
+    items.sort(key=lambda item: min(-seconds.get(item.nodeid.partition("::")[0], 0.0), -_LONG_S))
     needed = {item: mark.args[0] for item in items if (mark := item.get_closest_marker("measured"))}
     absent = [item for item, name in needed.items() if not (MEASURED / name).is_dir()]
     config.hook.pytest_deselected(items=absent)
