@@ -16,7 +16,8 @@ from ..common.errors import InputError
 from ..common.inputs import PLAUSIBLE_C
 
 ChamberCelsius = Annotated[float, Field(ge=PLAUSIBLE_C[0], le=PLAUSIBLE_C[1])]
-AboveZero = Annotated[float, Field(gt=0.0)]
+# A smaller or larger value has no meaning in any field, and its ratio to another can be no number.
+AboveZero = Annotated[float, Field(ge=1e-9, le=1e9)]
 
 
 class _Strict(BaseModel):

@@ -7,7 +7,7 @@ programme each), sets (which profiles are run, when, and in which role) and caus
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,10 +16,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from ..causes import CATALOGUE
 from ..common.errors import InputError
 from ..common.inputs import read_toml, refuse_above, refused
-from .profile import AboveZero, Step
+from ..recordings.description import Instant
+from .profile import AboveZero, ChamberCelsius, Step
+
+# Larger values have no meaning in any field, and their products are no numbers.
+_MAX_VALUE = 1e9
 
 Identifier = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-NonNegative = Annotated[float, Field(ge=0.0)]
+Value = Annotated[float, Field(ge=-_MAX_VALUE, le=_MAX_VALUE)]
+NonNegative = Annotated[float, Field(ge=0.0, le=_MAX_VALUE)]
 Minutes = Annotated[float, Field(ge=0.0, le=1e7)]
 
 _FOLDER = Path(__file__).parent / "scenarios"
@@ -40,7 +45,7 @@ class Thermometer(_Strict):
     name: Identifier
     node: str
     lag_s: NonNegative = 10.0
-    offset_c: float = 0.0
+    offset_c: Value = 0.0
     noise_c: NonNegative = 0.01
     resolution_c: NonNegative = 0.01
     loose_from_day: NonNegative | None = None
@@ -56,9 +61,9 @@ class NodeDifference(_Strict):
 
     node: str
     against: str
-    dph_per_c: float
+    dph_per_c: Value
     saturation_c: AboveZero = 1e6
-    growth_per_c: float = 0.0
+    growth_per_c: Value = 0.0
 
 
 class Laser(_Strict):
@@ -75,27 +80,33 @@ class Laser(_Strict):
     gas_node: str = "gas"
     path_node: str = "block"
     loss_ppm: AboveZero = 300.0
-    loss_ppm_per_c: float = 0.1
+    loss_ppm_per_c: Value = 0.1
     contamination_ppm: NonNegative = 6.0
     contamination_tau_s: AboveZero = 7200.0
     walk_ppm: NonNegative = 20.0
     gain_ppm: AboveZero = 900.0
-    gain_per_c: float = -1e-3
-    gas_c: float = 50.0
+    gain_per_c: Value = -1e-3
+    gas_c: Value = 50.0
     depletion_day: AboveZero = 10000.0
     intensity_level_v: AboveZero = 2.0
     intensity_noise_v: NonNegative = 5e-4
     wavelength_nm: AboveZero = 632.8
     path_mm: AboveZero = 280.0
-    expansion_ppm_per_c: float = 0.03
-    expansion_ppm_per_c2: float = 1e-4
-    mirror_nm_per_c: float = 0.0
+    expansion_ppm_per_c: Value = 0.03
+    expansion_ppm_per_c2: Value = 1e-4
+    mirror_nm_per_c: Value = 0.0
     reset_share: Annotated[float, Field(ge=0.5, le=2.0)] = 0.6
     stroke_v: AboveZero = 60.0
     stroke_noise_v: NonNegative = 0.02
-    null_dph_per_ppm: float = 1e-4
-    null_growth_per_c: float = 0.0
-    stroke_dph: float = 5e-4
+    null_dph_per_ppm: Value = 1e-4
+    null_growth_per_c: Value = 0.0
+    stroke_dph: Value = 5e-4
+
+    @model_validator(mode="after")
+    def _check(self) -> Laser:
+        if self.gain_ppm <= self.loss_ppm:
+            raise ValueError("gain_ppm is not above loss_ppm, so that no light oscillates; raise it, or lower the loss")
+        return self
 
 
 class Chamber(_Strict):
@@ -132,7 +143,7 @@ class Gyro(_Strict):
     """The instrument: serial number (`{seed}` is filled in), range of its bias, thermal network."""
 
     serial: Annotated[str, Field(pattern=r"^[A-Za-z0-9._{}-]{1,56}$")] = "SIM-{seed}"
-    bias_dph: tuple[float, float] = (5.8e-3, 8.5e-3)
+    bias_dph: tuple[Value, Value] = (5.8e-3, 8.5e-3)
     node: dict[str, Node] = Field(default_factory=_default_nodes)
     cavity_node: str = "cavity"
 
@@ -176,7 +187,7 @@ class NoiseLevels(_Strict):
     bias_instability_dph: NonNegative = 0.0
     rate_random_walk_dph_per_sqrt_h: NonNegative = 0.0
     quantum_arcsec: NonNegative = 0.0
-    arw_growth_per_c: float = 0.0
+    arw_growth_per_c: Value = 0.0
     arw_growth_per_c_per_min: NonNegative = 0.0
     outliers_per_h: NonNegative = 0.0
     outlier_arcsec: NonNegative = 0.2
@@ -186,8 +197,8 @@ class Channel(_Strict):
     """A recorded auxiliary channel."""
 
     name: Identifier
-    level: float = 0.0
-    per_air_c: float = 0.0
+    level: Value = 0.0
+    per_air_c: Value = 0.0
     wander_sigma: NonNegative = 0.0
     wander_tau_s: AboveZero = 1800.0
     steps_per_h: NonNegative = 0.0
@@ -202,7 +213,7 @@ class ScenarioCause(BaseModel):
 
     id: str
     channel: str | None = None
-    __pydantic_extra__: dict[str, float] = Field(init=False)
+    __pydantic_extra__: dict[str, Value] = Field(init=False)
 
     @model_validator(mode="after")
     def _check(self) -> ScenarioCause:
@@ -229,10 +240,10 @@ class ScenarioCause(BaseModel):
 class Profile(_Strict):
     """One chamber programme; power-on and the recorded part are in minutes from its start."""
 
-    start_c: float
+    start_c: ChamberCelsius
     power_on_min: Minutes = 0.0
     record_from_min: Minutes = 0.0
-    record_min: Annotated[Minutes, Field(gt=0.0)]
+    record_min: Annotated[Minutes, Field(ge=1.0)]
     steps: Annotated[list[Step], Field(min_length=1)]
 
 
@@ -240,9 +251,16 @@ class RunSet(_Strict):
     """Profiles that are run one after the other, every `every_h` hours."""
 
     role: Literal["train", "exam"] = "train"
-    started: datetime
+    started: Instant
     every_h: AboveZero = 24.0
     profiles: Annotated[list[str], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check(self) -> RunSet:
+        last_s = self.started.timestamp() + 3600.0 * self.every_h * (len(self.profiles) - 1)
+        if last_s > datetime.now(timezone.utc).timestamp() + 86400.0:
+            raise ValueError("started, every_h: the last run starts after today; start earlier or wait less")
+        return self
 
 
 class Scenario(_Strict):

@@ -345,6 +345,7 @@ def test_class_noise_is_that_of_an_ordinary_unit() -> None:
     assert gyro_map(plan, 3).described() == gyro_map(plan, 3).described() != gyro_map(plan, 4).described()
 
 
+FAR = 'extends = "paper"\n[[set]]\nstarted = {}\n{}\nprofiles = ["20 C", "20 C"]'
 BROKEN = {
     'title = "x"': "profile",
     "title = ": "TOML|value",
@@ -359,6 +360,16 @@ BROKEN = {
     'extends = "paper"\n[gyro.node.cavity]\nheat_capacity_j_per_k = 1.0\nto = {nose = 1.0}': "nose",
     'extends = "paper"\n[gyro.node.cavity]\nheat_capacity_j_per_k = 1.0': "to the air",
     'extends = "paper"\n[[set]]\nstarted = 2026-01-01T00:00:00Z\nprofiles = ["none"]': "none",
+    'extends = "paper"\n[profile."20 C"]\nstart_c = 1e300': "field profile.20 C.start_c: .* less than or equal to 200",
+    'extends = "paper"\n[profile."20 C"]\nrecord_min = 0.001': "field profile.20 C.record_min: .* equal to 1",
+    'extends = "paper"\n[gyro]\nbias_dph = [1e300, 1.1e300]': "field gyro.bias_dph.0: .* equal to 1000000000",
+    'extends = "paper"\n[chamber]\nripple_c = 1e300': "field chamber.ripple_c: .* equal to 1000000000",
+    'extends = "paper"\n[chamber]\nlag_s = 1e-300': "field chamber.lag_s: .* equal to 0.000000001",
+    'extends = "paper"\n[[cause]]\nid = "warm_up"\ntau_s = 5.0\namplitude_dph = 1e300': "amplitude_dph: .* equal to",
+    'extends = "signals"\n[laser]\ngain_ppm = 300.0': "field laser: gain_ppm is not above loss_ppm",
+    FAR.format("2026-03-01T08:00:00Z", "every_h = 1e9"): "field set.0: .*every_h: the last run starts after today",
+    FAR.format("2026-03-01T08:00:00Z", "every_h = 1e12"): "field set.0.every_h: .* equal to 1000000000",
+    FAR.format("9999-12-31T08:00:00Z", ""): "field set.0.started: .* not after today",
 }
 
 
@@ -368,6 +379,16 @@ def test_a_wrong_scenario_is_reported_with_its_place(content: str, tmp_path: Pat
     path.write_text(content, "utf-8")
     with pytest.raises(InputError, match=BROKEN[content]):
         read(path)
+
+
+def test_a_start_without_an_offset_is_in_utc(tmp_path: Path) -> None:
+    """As in `dataset.toml`; runs with and without an offset can be in one campaign."""
+    path = tmp_path / "mixed.toml"
+    starts = ["2026-03-01T08:00:00", "2026-03-01T11:00:00+02:00"]
+    sets = "".join(f'[[set]]\nstarted = {start}\nprofiles = ["20 C"]\n' for start in starts)
+    path.write_text(f'extends = "paper"\n[profile."20 C"]\nrecord_min = 90\n{sets}', "utf-8")
+    first, second = (run.started for run in load(made(path, tmp_path / "data", row_s=10.0)).runs)
+    assert first and second and (second - first).total_seconds() == 3600.0
 
 
 def test_scenarios_that_extend_each_other_are_refused(tmp_path: Path) -> None:
