@@ -358,6 +358,6 @@ class Dataset:
 
     def __repr__(self) -> str:
         axis = f" axis {self.axis}" if self.axis else ""
-        exam = sum(run.role == "exam" for run in self.runs)
+        train, test = (sum(run.role == role for run in self.runs) for role in ("train", "exam"))
         rows = sum(run.n_rows for run in self.runs)
-        return f"Dataset({self.serial}{axis}: {len(self.runs)} runs, {exam} of them test runs, {rows} rows)"
+        return f"Dataset({self.serial}{axis}: {train} training runs, {test} test runs, {rows} rows)"

@@ -118,7 +118,8 @@ def refused_result(path: Path, content: Any, error: InputError) -> InputError:
         manifest = read_json(path.parent / "manifest.json", "a manifest")
         program = manifest.get("program") if isinstance(manifest, dict) else None
         if isinstance(program, str) and program and program != program_of():
-            written, here = f"{_version_in(manifest)} (program {program[:12]})", f" (program {program_of()[:12]})"
+            written = f"{_version_in(manifest)} (program {program[:12]})".lstrip()
+            here = f" (program {program_of()[:12]})"
             return _of_another(path, written, here, error)
     return error if written in ("", __version__) else _of_another(path, written, "", error)
 

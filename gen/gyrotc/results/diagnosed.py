@@ -48,9 +48,9 @@ class GainOnUnseen(Part):
 
     @property
     def text(self) -> str:
-        """The gain on unseen runs in a sentence."""
+        """The gain on held-out runs in a sentence."""
         rms = f"RMS {self.exam_rms_before_dph:.4g} -> {self.exam_rms_after_dph:.4g} deg/h"
-        runs = "On unseen runs less their means" if self.about_means else "On unseen runs"
+        runs = "On held-out runs less their means" if self.about_means else "On held-out runs"
         if self.shown == "loss":
             return f"{runs} the extension does harm: {rms}."
         if self.shown == "undecided":

@@ -323,7 +323,7 @@ def test_a_frame_gives_the_rows_that_it_holds() -> None:
     assert [(run.file, run.role) for run in data.runs] == [("cold.parquet", "train"), ("warm.parquet", "exam")]
     np.testing.assert_allclose(data.runs[0].rows().rate_dph, runs["cold"]["gyro"] * 3600.0, rtol=1e-12)
     np.testing.assert_allclose(data.runs[0].rows().temperature_c, runs["cold"]["T [K]"] - 273.15, atol=1e-9)
-    assert repr(data) == "Dataset(RLG-1: 2 runs, 1 of them test runs, 1440 rows)"
+    assert repr(data) == "Dataset(RLG-1: 1 training runs, 1 test runs, 1440 rows)"
     assert data._repr_html_().count("<tr>") == 3
     folder = data.folder
     del data
@@ -430,6 +430,9 @@ def test_a_result_of_another_program_is_refused_by_its_name(tmp_path: Path) -> N
     told = str(refused.value)
     assert told.startswith(f"{training}: was written by gyrotc 0.1.0 (program {'5' * 12}), and this is gyrotc")
     assert told.endswith("; expected a result of this gyrotc: give the command that made it again")
+    manifest.write_text(json.dumps({"gyrotc_version": "", "program": "5" * 64}))
+    with pytest.raises(InputError, match=f"was written by gyrotc \\(program {'5' * 12}\\), and"):
+        read_result(training, Training)
     manifest.unlink()
     with pytest.raises(InputError, match="is missing") as refused:
         read_result(training, Training)
