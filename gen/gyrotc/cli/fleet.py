@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,9 +60,29 @@ def fleet(
             wrong=True,
         )
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
+    tell(f"next: {_after_fleet(summary, out)}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
         raise CheckFailed(f"{summary.failed} of {summary.units} gyros failed{left}")
+
+
+def _after_fleet(summary: FleetSummary, out: Path) -> str:
+    """Return the one step after a fleet: mend what stopped gyros, else look at gyros, state limits, use the tables."""
+    from ..fleet.manifest import RUNTIME
+
+    if summary.unfinished:
+        return "give the command again: it goes on with the gyros that are not done"
+    stopped = [unit.name for unit in summary.serials if unit.status == "failed" and unit.verdict is None]
+    if stopped:
+        return f"mend what stopped {stopped[0]} (its line above), and give the command again"
+    outliers = {outlier.name for outlier in summary.outliers} | {reason.name for reason in summary.reasons}
+    suspect = [u.name for u in summary.serials if u.status == "failed" or u.barred or u.name in outliers]
+    if suspect:
+        more = f", then at {len(suspect) - 1} more" if len(suspect) > 1 else ""
+        return f"look at {suspect[0]}{more}: gyrotc report {shlex.quote(str(out / suspect[0]))}"
+    if not any(unit.verdict for unit in summary.serials):
+        return "state limits of the product in a manifest (docs/fleet.md), and give the command again with the manifest"
+    return f"compile the tables in {out}/*/c with the runtime in {out / RUNTIME}"
 
 
 def _tell_comparison(summary: FleetSummary) -> None:

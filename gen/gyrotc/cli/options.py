@@ -127,6 +127,10 @@ def _result_place(folder: Path) -> Path:
     """Check that a folder holds a result; the message names a folder beside it that does."""
     if _holds_result(folder):
         return folder
+    if (folder / "fleet.json").is_file():
+        found = "is a fleet, whose page fleet.html gyrotc fleet draws"
+        example = next((f", e.g. {place}" for place in _below(folder) if _holds_result(place)), "")
+        raise InputError(str(folder), found, f"the folder of a gyro{example}")
     near = next((place for place in (folder.parent, *_below(folder)) if _holds_result(place)), None)
     expected = f"{near}, which holds one" if near is not None else "a folder that gyrotc build wrote"
     raise InputError(str(folder), "holds no result" if folder.is_dir() else "is no folder", expected)

@@ -120,6 +120,8 @@ def import_(
         )  # fmt: skip
     if result is not None:
         write_json(json_file, result.result().content())
+        if not dry_run:
+            tell(f"next: gyrotc check {shlex.quote(str(out))}")
 
 
 def _with_keys(content: dict[str, Any], stated: list[str]) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def _ageing(earlier: Earlier, dataset: Dataset, limits: Limits | None) -> tuple[
     try:
         then, now = (date.fromisoformat(str(day)[:10]) for day in (earlier.date, started_on(dataset)))
     except ValueError:
-        return 0.0, "none: one of the calibrations has no date"
+        return 0.0, "none: a calibration has no date, which is `started` of its runs"
     years = max((now - then).days, 0) / DAYS_A_YEAR
     drift = limits.interval.drift_dph_per_year if limits and limits.interval else None
     if drift is not None:

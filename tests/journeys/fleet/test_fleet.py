@@ -56,6 +56,7 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     lines = {line.split(":")[0]: line for line in done.stdout.splitlines()}
     assert "done; RMS" in lines["RLG-1"] and "done; RMS" in lines["RLG-2"]
     assert "failed; run-01.csv, line 1: no column temperature_c" in lines["RLG-3"]
+    assert lines["next"] == "next: mend what stopped RLG-3 (its line above), and give the command again"
     verified = verify(out / "RLG-1", compiled=False).emitted
     assert {file.verdict for file in verified} == {"equal"}, "the folder of a gyro is complete"
     summary = json.loads((out / "fleet.json").read_text())
@@ -72,6 +73,9 @@ def test_a_fleet_through_the_command(three: Path, tmp_path: Path, gyrotc: Comman
     again = gyrotc("fleet", three, "--out", out, "--jobs", "1")
     assert again.returncode == 0, again.stderr
     assert again.stdout.count("done (done before)") == 2 and "RLG-3: done; RMS" in again.stdout
+    assert again.stdout.splitlines()[-1].startswith("next: state limits of the product in a manifest")
+    of_all = gyrotc("report", out)
+    assert of_all.returncode == 2 and f"expected the folder of a gyro, e.g. {out / 'RLG-1'}" in of_all.stderr
     assert {p: p.stat().st_mtime_ns for p in (out / "RLG-1").rglob("*.c")} == before
 
 
