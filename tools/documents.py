@@ -87,6 +87,14 @@ def shown(text: str) -> list[Shown]:
     ]
 
 
+def typed(text: str) -> Iterator[list[str]]:
+    """Yield the words of every command in the blocks of a page, run or only shown, without prompt and quotes."""
+    for block in _FENCE.finditer(text):
+        for line in block["body"].replace("\\\n", " ").splitlines():
+            for part in re.split(r"&&|[;|]", line.strip().removeprefix("$ ").partition(" #")[0]):
+                yield part.replace('"', "").replace("'", "").split()
+
+
 def _commands(body: str, line: int) -> list[Step]:
     found: list[Step] = []
     open_line = False

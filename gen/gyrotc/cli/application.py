@@ -75,7 +75,7 @@ def _main(
             "--max",
             metavar="NAME=VALUE",
             callback=lambda texts: set_ceilings(texts or []),
-            help="Move a ceiling of inputs, before the command; may be repeated: " + ", ".join(MOVABLE) + ".",
+            help="Move a ceiling of inputs, also after the command; may be repeated: " + ", ".join(MOVABLE) + ".",
         ),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; also after the command.")] = False,

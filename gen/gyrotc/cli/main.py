@@ -14,6 +14,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -163,15 +164,23 @@ def _without_warnings() -> None:
         logging.disable()  # of Dask: what becomes of a gyro is reported by the fleet
 
 
-# Options of the whole program, taken after the command as well
+# Options of the whole program, taken after the command as well; the last one has a value.
 _ANYWHERE = ("-q", "--quiet", "-v", "--verbose")
+_CEILING = "--max"
 
 
 def hoisted(arguments: list[str]) -> list[str]:
     """The arguments with what concerns the whole program in front; what stands behind `--` is left alone."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    front = [a for a in arguments[:end] if a in _ANYWHERE]
-    return [*front, *(a for a in arguments[:end] if a not in _ANYWHERE), *arguments[end:]]
+    front: list[str] = []
+    others: list[str] = []
+    words = iter(arguments[:end])
+    for word in words:
+        if word == _CEILING:
+            front += [word, *islice(words, 1)]
+        else:
+            (front if word in _ANYWHERE or word.startswith(f"{_CEILING}=") else others).append(word)
+    return [*front, *others, *arguments[end:]]
 
 
 def application() -> Typer:

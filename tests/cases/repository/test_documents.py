@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from conftest import require
+from gyrotc.cli.main import application
 from gyrotc.verify import all_targets
+from typer.main import get_command
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tools" / "check_libc")]
@@ -40,6 +42,33 @@ def test_commands_output_and_status_of_a_page() -> None:
     first, second = documents.steps(text)
     assert (first.command, first.line, first.output) == ("echo a \\\n  b", 3, ["a b"])
     assert (second.command, second.output, second.status) == ("false", [], 1)
+
+
+HOW_TO = re.compile(r"  - How to:\n((?:      - .*\n)+)")
+
+
+def test_every_option_is_typed_where_a_user_needs_it() -> None:
+    """On README, the tutorial or a page that says how to do something."""
+    listed = HOW_TO.search((ROOT / "docs" / "mkdocs.yml").read_text("utf-8"))
+    assert listed is not None
+    pages = [ROOT / "README.md", *(ROOT / "docs" / name for name in re.findall(r"[\w-]+\.md", listed[1]))]
+    pages.append(ROOT / "docs" / "tutorial.md")
+    commands = get_command(application()).commands  # type: ignore[attr-defined]
+    seen: dict[str, set[str]] = {name: set() for name in commands}
+    for words in (words for page in pages for words in documents.typed(page.read_text("utf-8"))):
+        name = next((word for word in words if word in commands), "") if words[:1] == ["gyrotc"] else ""
+        seen.setdefault(name, set()).update(words)
+    options = {
+        name: [option for option in command.params if option.param_type_name == "option" and option.name != "help"]
+        for name, command in commands.items()
+    }
+    untyped = {(name, o.opts[0]) for name, found in options.items() for o in found if not {*o.opts} & seen[name]}
+    assert untyped == set()
+
+
+def test_the_words_of_every_command_of_a_page() -> None:
+    text = "```sh not run: x\ngyrotc emit a \\\n  --out 'b' && ls  # all\n```\ngyrotc fit\n"
+    assert list(documents.typed(text)) == [["gyrotc", "emit", "a", "--out", "b"], ["ls"]]
 
 
 def test_a_block_that_is_not_run_says_why() -> None:
