@@ -39,7 +39,8 @@ _FENCE = re.compile(
 )
 _GYROTC = """#!{python}
 from gyrotc.cli.main import main
-main()
+if __name__ == "__main__":  # a fleet starts processes that import this
+    main()
 """
 
 
