@@ -345,7 +345,8 @@ def check_files(folder: Path, name: str, image: Image) -> Iterator[str]:
     parts |= (
         0x100 * bool(image.array["coverage"]) + 0x200 * bool(image.array["sigma"]) + 0x400 * bool(image.array["probes"])
     )
-    parts |= 0x800 * (image.numeric == "q31" and image.member["scale"][2] != 0) + 0x1000 * (image.one("rezero") != 0)
+    parts |= 0x800 * (image.numeric == "q31" and image.member["scale"][2] != 0)
+    parts |= 0x1000 * (image.member["rezero"][0] != 0)
     if parts != image.one("parts"):
         yield f"the parts are {image.one('parts'):#x}, what the table holds makes {parts:#x}"
     source = source_words(text, image.numeric)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 @app.command()
 def fleet(
     manifest: Annotated[
-        Path, typer.Argument(help="A manifest (TOML), or a folder with a data set in each of its folders.")
+        Path,
+        typer.Argument(help="A manifest (TOML, docs/fleet.md), or a folder with a data set in each of its folders."),
     ],
     out: OutOption,
     jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, max=256, help="Processes on this machine.")] = 2,
@@ -43,6 +45,7 @@ def fleet(
     from ..fleet.manifest import load_manifest, printable
     from ..fleet.page import summary_of
     from ..fleet.run import Cluster, forgotten_units, run_fleet
+    from ..results.release import VERDICTS
 
     wanted = load_manifest(manifest)
     cluster = Cluster(scheduler, say=tell) if scheduler else None
@@ -60,6 +63,9 @@ def fleet(
             wrong=True,
         )
     tell(f"{summary.done} of {summary.units} done, {summary.failed} failed: {out / 'fleet.html'}")
+    verdicts = Counter(unit.verdict for unit in summary.serials if unit.verdict)
+    if verdicts:
+        tell("limits: " + ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in VERDICTS))
     tell(f"next: {_after_fleet(summary, out)}")
     if summary.failed or summary.unfinished:
         left = f", {summary.unfinished} are not done yet" if summary.unfinished else ""
@@ -77,6 +83,7 @@ def _after_fleet(summary: FleetSummary, out: Path) -> str:
         return f"mend what stopped {stopped[0]} (its line above), and give the command again"
     outliers = {outlier.name for outlier in summary.outliers} | {reason.name for reason in summary.reasons}
     suspect = [u.name for u in summary.serials if u.status == "failed" or u.barred or u.name in outliers]
+    suspect = suspect or [u.name for u in summary.serials if u.verdict not in (None, "PASS")]
     if suspect:
         more = f", then at {len(suspect) - 1} more" if len(suspect) > 1 else ""
         return f"look at {suspect[0]}{more}: gyrotc report {shlex.quote(str(out / suspect[0]))}"

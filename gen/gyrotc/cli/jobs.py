@@ -82,7 +82,11 @@ def build(
     ] = False,
     limits: Annotated[
         Path | None,
-        typer.Option("--limits", help="Limits of the product (TOML): exit 1 if one is not met; default: none."),
+        typer.Option(
+            "--limits",
+            help="Limits of the product (TOML, docs/limits.md: schema = 1, at_most.rms_over_floor = 1.1, ...): "
+            "exit 1 if one is not met; default: none.",
+        ),
     ] = None,
     lot: LotOption = None,
     prior: PriorOption = None,

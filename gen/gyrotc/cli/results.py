@@ -238,7 +238,7 @@ def verdict_words(unit: UnitResults) -> str:
     for one in unit.held:
         if one.verdict == "FAIL" or (one.verdict != "PASS" and not one.capped):
             reasons.append(f"{limit_words(one.limit)} {bound_words(one)}: {measured_words(one)}, {one.verdict}")
-    return f"{unit.verdict}{product}" + "".join(f"; {why}" for why in (*reasons, *unit.capped)) + doubt
+    return f"{unit.verdict}{product}" + "".join(f"; {why.rstrip('.')}" for why in (*reasons, *unit.capped)) + doubt
 
 
 def size_line(sizes: ModelSizes) -> str:

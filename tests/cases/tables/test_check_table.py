@@ -39,6 +39,13 @@ def test_emitted_tables_are_the_model(seed: int | None, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_a_limit_of_rezero_below_1_deg_h_is_in_the_table(tmp_path: Path) -> None:
+    """As of a laser gyro: an integer of it is 0."""
+    emitted(tmp_path, load_model(GOLDEN).model_copy(update={"rezero_dph": 2.5e-4}))
+    done = checked(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 @pytest.mark.parametrize("seed", [1])
 def test_tables_with_terms_and_banks_are_the_model(seed: int, tmp_path: Path, few_vectors: None) -> None:
     emitted(tmp_path, extended(seed))

@@ -179,7 +179,7 @@ def test_the_same_model_and_figures_as_a_build(three: Path, tmp_path: Path, gyro
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
+def test_limits_options_and_axes_of_a_manifest(tmp_path: Path, gyrotc: Command) -> None:
     gyro(tmp_path / "a" / "RLG-1", "RLG-1")
     rows = columns(360)
     table = {name: rows[name] for name in ("time_s", "temperature_c")}
@@ -200,6 +200,9 @@ def test_limits_options_and_axes_of_a_manifest(tmp_path: Path) -> None:
     assert "limit at_most.table_bytes ≤ 8 is not met" in (entries[0].reason or "")
     assert json.loads((tmp_path / "out" / "IMU-x" / "model.json").read_text())["block_s"] == 20.0
     assert json.loads((tmp_path / "out" / "IMU-y" / "limits.json").read_text())["met"] is False
+    *_, limits, following = gyrotc("fleet", manifest, "--out", tmp_path / "out").stdout.splitlines()
+    assert limits == "limits: 0 PASS, 0 CONDITIONAL PASS, 0 NOT TESTABLE, 3 FAIL"
+    assert following == f"next: look at RLG-1, then at 2 more: gyrotc report {tmp_path / 'out' / 'RLG-1'}"
 
 
 def test_a_missing_manifest_exits_2(tmp_path: Path, gyrotc: Command) -> None:
