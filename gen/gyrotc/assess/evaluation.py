@@ -405,6 +405,7 @@ def _result(
             table_bytes=table.table_bytes,
             rom_bytes=sizes.rom_bytes if sizes else None,
             ram_bytes=sizes.ram_bytes if sizes else None,
+            stack_bytes=sizes.stack_bytes if sizes else None,
             sizes_on=sizes.target if sizes else None,
             sum_abs_weights_dph=model.sum_abs_weights_dph,
         ),

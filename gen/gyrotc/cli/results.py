@@ -20,7 +20,7 @@ from ..pages.display import (
 
 if TYPE_CHECKING:
     from ..pages.unit import UnitResults
-    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, ModelSizes, Pooled
+    from ..results.evaluation import Changes, EvaluatedRun, Evaluation, Pooled
     from ..results.release import (
         JointVerification,
         ReadLog,
@@ -211,7 +211,7 @@ def built_lines(unit: UnitResults, dataset: str, folder: str) -> Iterator[str]:
         yield f"a constant keeps {bounds}, too: {'they ask' if len(kept) > 1 else 'it asks'} nothing of the map"
     if unit.training:
         yield from prior_lines(unit.training)
-    yield size_line(evaluation.model)
+    yield size_line(unit)
     if unit.verification:
         yield verified_line(unit.verification)
     if unit.changes:
@@ -241,13 +241,12 @@ def verdict_words(unit: UnitResults) -> str:
     return f"{unit.verdict}{product}" + "".join(f"; {why.rstrip('.')}" for why in (*reasons, *unit.capped)) + doubt
 
 
-def size_line(sizes: ModelSizes) -> str:
-    """Return the size of the table, and of all that a program links, in one line."""
-    linked = ""
-    if sizes.rom_bytes:
-        linked = f"; with the runtime {sizes.rom_bytes} of code and constants, {sizes.ram_bytes} of memory"
-        linked += f" ({sizes.sizes_on})"
-    return f"table: {sizes.table_bytes} bytes, {sizes.centers} centers{linked}"
+def size_line(unit: UnitResults) -> str:
+    """Return the size of the table, and what a program takes that links it with the runtime, in one line."""
+    sizes = unit.evaluation.model
+    return f"table: {sizes.table_bytes} bytes, {sizes.centers} centers" + (
+        f"; with the runtime {unit.linked}" if unit.linked else ""
+    )
 
 
 def summary_lines(result: Evaluation) -> Iterator[str]:

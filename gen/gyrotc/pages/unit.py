@@ -151,6 +151,21 @@ class UnitResults:
         return self.manifest.firmware if self.manifest else {}
 
     @property
+    def linked(self) -> str:
+        """What a program that links table and runtime takes, in words; empty if nothing was compiled."""
+        sizes = self.evaluation.model
+        if not sizes.rom_bytes:
+            return ""
+        stack = "stack not measured" if sizes.stack_bytes is None else f"{sizes.stack_bytes} of stack"
+        verified = self.verification
+        cost = verified.instructions_of_sample(sizes.sizes_on, self.evaluation.numeric) if verified else None
+        sample = "not measured" if cost is None else f"{cost.mean:.0f} on average, {cost.max} at most"
+        return (
+            f"{sizes.rom_bytes} bytes of code and constants, {sizes.ram_bytes} of memory, {stack}; "
+            f"instructions for a sample: {sample} ({sizes.sizes_on})"
+        )
+
+    @property
     def left_out(self) -> tuple[LeftOutRows, ...]:
         """Stretches of rows that training left out because of what they show."""
         rows = self.training.rows if self.training else None

@@ -184,6 +184,11 @@ class ModelSizes(Part):
         description="read-only memory of all linked code and constants, bytes; null if nothing was compiled"
     )
     ram_bytes: Count | None = Field(description="memory of the caller's state, bytes; null if nothing was compiled")
+    stack_bytes: Count | None = Field(
+        default=None,
+        description="deepest stack of `check`, `init`, `sample` and `bias`, bytes, without helpers of the compiler's"
+        " library; null if it was not measured",
+    )
     sizes_on: str | None = Field(description="target of these sizes; null if nothing was compiled")
     sum_abs_weights_dph: float = Field(description="largest sum of absolute weights of a network, deg/h")
 

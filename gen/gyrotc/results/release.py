@@ -377,6 +377,11 @@ class Verification(_Counted):
     error_bound_dph: float = Field(description="largest bound of all arithmetics, deg/h")
     worst_error_dph: WorstError = Field(description="largest departure of all arithmetics")
 
+    def instructions_of_sample(self, target: str | None, numeric: str) -> CallCost | None:
+        """Return the instructions of a sample on a target, as its emulator counts them; None if not counted."""
+        own = (t.step_instructions for t in self.targets if (t.name, t.numeric) == (target, numeric))
+        return next(own, None)
+
     @property
     def not_installed(self) -> tuple[list[str], list[str]]:
         """Targets whose tools are not installed, and the packages that bring them."""

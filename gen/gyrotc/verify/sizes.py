@@ -24,15 +24,20 @@ from .toolchain import Object, all_targets, compile_objects, link, runtime_objec
 
 _TARGETS = ("cortex-m4f", "host-gcc-O2")  # the first that can be built here
 _STATE = "footprint_state"
+_CALLED = ("check", "init", "sample", "bias")  # by footprint.c.j2
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """Bytes on a target: code and constants of everything linked; the caller's state."""
+    """Bytes on a target: code and constants of everything linked; the caller's state; the deepest stack of a call.
+
+    `stack_bytes` is None if the compiler does not tell. Helpers of the compiler's own library are not in it.
+    """
 
     target: str
     rom_bytes: int
     ram_bytes: int
+    stack_bytes: int | None
 
 
 def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
@@ -68,7 +73,10 @@ def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
         own = {symbol.name for symbol in (*runtime.symbols, *symbols(target, objects[1]))}
         linked = symbols(target, work / "footprint")
         state = next(symbol.size for symbol in linked if symbol.name == _STATE)
-        return Footprint(target.name, sum(symbol.size for symbol in linked if symbol.name in own), state)
+        rom = sum(symbol.size for symbol in linked if symbol.name in own)
+        costs = function_costs(runtime, table.numeric)
+        stack = max((costs[function].stack_bytes for function in _CALLED if function in costs), default=None)
+        return Footprint(target.name, rom, state, stack)
 
 
 PUBLIC = (
