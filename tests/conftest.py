@@ -273,11 +273,11 @@ def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     """
     from gyrotc.verify import toolchain
 
-    compiled = toolchain.printed_by_compiler
+    compiled = toolchain.run_compiler
     kept = made_once(tmp_path_factory, "objects", lambda folder: None)
 
     def command(target: toolchain.Target, words: list[str], folder: Path) -> None:
-        if "-c" not in words or "-fcallgraph-info=su" in words:  # links, or writes more than an object
+        if "-c" not in words or "-MD" in words:  # links, or writes more than an object
             return compiled(target, words, folder)
         known = kept / f"{_read_by(words)}.o"
         if not known.exists():
@@ -288,7 +288,7 @@ def objects_compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         shutil.copyfile(known, words[-1])
         return None
 
-    with mock.patch.object(toolchain, "printed_by_compiler", command):
+    with mock.patch.object(toolchain, "run_compiler", command):
         yield
 
 

@@ -36,8 +36,8 @@ from .toolchain import (
     link,
     run_program,
     runtime_object,
+    shared_object,
     symbols,
-    writable_bytes,
 )
 
 LogWords = NDArray[np.uint32]
@@ -258,11 +258,14 @@ _CONSTANT = "rR"
 def board_entries(job: Job, target: Target) -> list[VerifiedTarget]:
     """Entries of `verify.json` for one target, one for each arithmetic."""
     numerics = [n for n in job.tables if n in target.numerics]
-    package = target.missing()
-    if package is not None:
+    entries = []
+    if target.has_tools():
+        with scratch_folder() as work:
+            entries = list(_entries(job, target, numerics, work))
+    # What was linked shows that nothing is missing: an empty program is linked only to explain a failure.
+    if all(entry.status == "fail" for entry in entries) and (package := target.missing()) is not None:
         return [VerifiedTarget(name=target.name, status="missing", numeric=n, package=package) for n in numerics]
-    with scratch_folder() as work:
-        return list(_entries(job, target, numerics, work))
+    return entries
 
 
 def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Iterator[VerifiedTarget]:
@@ -293,7 +296,8 @@ def _entries(job: Job, target: Target, numerics: list[str], work: Path) -> Itera
             runtime = runtime_object(target, c, numeric, work, fresh=job.trusted)
             if functions := function_costs(runtime, numeric):
                 extra = {"functions": functions}
-            shared = _shared(job, target, c, work, runtime)
+            table = shared_object(target, c / f"gtc_{job.model.id}.c", work, include=c, fresh=job.trusted)
+            shared = _Shared.of(runtime, table, work)
             yield entry(**_ran(job, target, numeric, shared, work, c), **extra)
         except CheckFailed as error:
             yield entry(status="fail", error=str(error), **extra)
@@ -307,14 +311,14 @@ class _Shared:
     symbols: tuple[Symbol, ...]
     writable_bytes: int
 
-
-def _shared(job: Job, target: Target, c: Path, work: Path, runtime: Object) -> _Shared:
-    (table,) = compile_objects(target, [c / f"gtc_{job.model.id}.c"], work, include=c)
-    return _Shared(
-        (runtime.put(work / "gtc.o"), table),
-        (*runtime.symbols, *symbols(target, table)),
-        runtime.writable_bytes + writable_bytes(target, table),
-    )
+    @classmethod
+    def of(cls, runtime: Object, table: Object, work: Path) -> _Shared:
+        """Write the objects into a folder."""
+        return cls(
+            (runtime.put(work / "gtc.o"), table.put(work / "table.o")),
+            (*runtime.symbols, *table.symbols),
+            runtime.writable_bytes + table.writable_bytes,
+        )
 
 
 def _ran(job: Job, target: Target, numeric: str, shared: _Shared, work: Path, c: Path) -> dict[str, Any]:

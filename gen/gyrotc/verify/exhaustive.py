@@ -19,7 +19,7 @@ from ..mirror.table import Table
 from ..model import Model
 from ..results.folder import scratch_folder
 from .emitted import checked_sources, table_files
-from .toolchain import Target, all_targets, compile_objects, confined, link, runtime_object
+from .toolchain import Target, all_targets, compile_objects, confined, link, runtime_object, shared_object
 
 _SLICES = 128  # of exhaustive.c, which is written independently of libc/ but for the code under test
 _LIMIT_S = 4 * 3600  # of processor time for one of the processes; all 2^32 inputs take minutes
@@ -89,7 +89,8 @@ def _host() -> Target:
 def _compiled(target: Target, c_folder: Path, model: Model, work: Path, *, trusted: bool) -> Path:
     c = checked_sources(c_folder, work, table_files(c_folder, model, ("q31",)), trusted=trusted)
     runtime = runtime_object(target, c, "q31", work, fresh=trusted).put(work / "gtc.o")
-    emitted = [runtime, *compile_objects(target, [c / f"gtc_{model.id}.c"], work, include=c)]
+    table = shared_object(target, c / f"gtc_{model.id}.c", work, include=c, fresh=trusted).put(work / "table.o")
+    emitted = [runtime, table]
     # The program itself is no code for targets: it may use what the host has.
     loose = target.model_copy(update={"flags": (*target.flags, "-ffast-math", "-Wno-error")})
     defines = [f"TABLE=gtc_{model.symbol}_q31", f'HEADER="gtc_{model.id}.h"']

@@ -31,7 +31,7 @@ from ..results.release import ReplayedRows, VerifiedTarget
 from ..results.templates import c_templates
 from ..tables.quantisation import channels_of
 from .emitted import Job, checked_sources, table_files
-from .toolchain import Target, compile_objects, link, run_program, runtime_object
+from .toolchain import Target, compile_objects, link, run_program, runtime_object, shared_object
 
 _SHOWN_MISMATCHES = 5  # enough to see a pattern
 _PART = 2**16  # rows that are answered together: bounds memory
@@ -142,8 +142,9 @@ def replay_program(
         program = work / "replay"
         c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)), trusted=trusted)
         runtime = runtime_object(target, c, table.numeric, work, fresh=trusted)
-        objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
-        link(target, [runtime.put(work / "gtc.o"), *objects], program)
+        emitted = shared_object(target, c / f"gtc_{model.id}.c", work, include=c, fresh=trusted)
+        own = compile_objects(target, [source], work, include=c)
+        link(target, [runtime.put(work / "gtc.o"), emitted.put(work / "table.o"), *own], program)
         yield program
 
 

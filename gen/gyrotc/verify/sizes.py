@@ -20,7 +20,7 @@ from ..results.release import FunctionCost
 from ..results.templates import c_templates
 from ..tables.text import example_period_us
 from .emitted import checked_sources, table_files
-from .toolchain import Object, all_targets, compile_objects, link, runtime_object, symbols
+from .toolchain import Object, all_targets, compile_objects, link, runtime_object, shared_object, symbols
 
 _TARGETS = ("cortex-m4f", "host-gcc-O2")  # the first that can be built here
 _STATE = "footprint_state"
@@ -68,9 +68,11 @@ def footprint(c_folder: Path, model: Model, table: Table) -> Footprint | None:
         write_own(source, text)
         c = checked_sources(c_folder, work, table_files(c_folder, model, (table.numeric,)))
         runtime = runtime_object(target, c, table.numeric, work)
-        objects = compile_objects(target, [source, c / f"gtc_{model.id}.c"], work, include=c)
-        link(target, [runtime.put(work / "gtc.o"), *objects], work / "footprint")
-        own = {symbol.name for symbol in (*runtime.symbols, *symbols(target, objects[1]))}
+        emitted = shared_object(target, c / f"gtc_{model.id}.c", work, include=c)
+        own_objects = compile_objects(target, [source], work, include=c)
+        objects = [runtime.put(work / "gtc.o"), emitted.put(work / "table.o"), *own_objects]
+        link(target, objects, work / "footprint")
+        own = {symbol.name for symbol in (*runtime.symbols, *emitted.symbols)}
         linked = symbols(target, work / "footprint")
         state = next(symbol.size for symbol in linked if symbol.name == _STATE)
         rom = sum(symbol.size for symbol in linked if symbol.name in own)

@@ -13,7 +13,6 @@ library that the test programs use. Their standard input is the file `stdin.bin`
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 import os
 import platform
@@ -34,7 +33,7 @@ from ..common.errors import CheckFailed
 from ..common.inputs import read_toml, refused
 from ..results import cache
 from ..results.base import NUMERICS
-from ..results.files import write_own
+from ..results.files import sha256, write_own
 from ..results.folder import scratch_folder
 from ..results.json_text import canonical_json, digest_of
 
@@ -48,6 +47,7 @@ _SAID_BYTES = 64 * 2**20  # kept of what a program says on stderr
 ByteStream = IO[bytes] | int
 
 _groups: set[int] = set()  # of processes that run now
+_linked: set[Target] = set()  # for which this process linked a program
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,12 +170,15 @@ class Target(BaseModel):
 
     def missing(self) -> str | None:
         """The packages that bring what this target lacks here; None if it can be built and run."""
-        tools = [self.compiler, *self.run[:1]]
-        if all(shutil.which(tool) for tool in tools) and _links(self):
+        if self.has_tools() and _links(self):
             return None
         if _VERSION_OF_GCC in self.package and shutil.which("gcc"):
             return self.package.replace(_VERSION_OF_GCC, compiler_version("gcc").split()[-1].split(".")[0])
         return self.package
+
+    def has_tools(self) -> bool:
+        """Test whether compiler and emulator are installed; the compiler may lack the C library of the target."""
+        return all(shutil.which(tool) for tool in (self.compiler, *self.run[:1]))
 
     @property
     def all_flags(self) -> tuple[str, ...]:
@@ -227,7 +230,7 @@ def compile_objects(
     for source in sources:
         objects.append(folder.absolute() / f"{source.stem}.o")
         command = [target.compiler, *flags, "-c", str(source.absolute()), "-o", str(objects[-1])]
-        printed_by_compiler(target, command, folder)
+        run_compiler(target, command, folder)
     return objects
 
 
@@ -238,15 +241,17 @@ def _flags(target: Target, include: Path) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Object:
-    """A compiled source that is the same for every serial, and what was measured on it.
+    """A compiled source, and what was measured on it.
 
     Attributes:
-        name: Hash of what it was made of; empty where that cannot be determined.
+        name: Hash of what it was made of but for headers; empty where that cannot be determined.
+        headers: SHA-256 of each header by its path, which is relative where it lies in the folder of headers.
         code: The file.
         graph: Who calls whom, and the stack of each function, as gcc writes it; empty where it was not asked for.
     """
 
     name: str
+    headers: tuple[tuple[str, str], ...]
     code: bytes
     symbols: tuple[Symbol, ...]
     writable_bytes: int
@@ -258,6 +263,8 @@ class Object:
         return path
 
 
+_FILE_OF_RULE = re.compile(r"(?:\\.|[^\s\\])+")  # spaces in names are escaped
+_ESCAPED = re.compile(r"\\(.)")
 _GRAPH = ("-fstack-usage", "-fcallgraph-info=su")
 
 
@@ -273,6 +280,8 @@ def runtime_object(target: Target, c_folder: Path, numeric: str, work: Path, *, 
 def shared_object(target: Target, source: Path, work: Path, *, include: Path, fresh: bool = False) -> Object:
     """Compile a source, or take the object of an earlier call with the same text, headers, flags, compiler and gyrotc.
 
+    The compiler lists the headers that it read, those of the system among them.
+
     Args:
         work: A folder for the compiler.
         fresh: Compiles in any case: an assembler may read files that no text tells.
@@ -280,13 +289,15 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
     Raises:
         CheckFailed: The compiler refused.
     """
-    name = "" if fresh else _name_of(target, source, work, include)
-    found = cache.kept(name, functools.partial(_object, name)) if name else None
+    name = "" if fresh else _name_of(target, source)
+    found = cache.kept(name, functools.partial(_object, name, include)) if name else None
     if found is None:
-        (path,) = compile_objects(target, [source], work, include=include)
+        listing = target.model_copy(update={"flags": (*target.flags, "-MD")})
+        (path,) = compile_objects(listing, [source], work, include=include)
         graph = path.with_suffix(".ci")
         found = Object(
             name,
+            tuple(_headers(path.with_suffix(".d"), source, include)),
             path.read_bytes(),
             tuple(symbols(target, path)),
             writable_bytes(target, path),
@@ -300,31 +311,45 @@ def shared_object(target: Target, source: Path, work: Path, *, include: Path, fr
 def _content(found: Object) -> bytes:
     """A line of JSON, then the file."""
     rows = [[s.name, s.kind, s.size] for s in found.symbols]
-    measured = {"symbols": rows, "writable_bytes": found.writable_bytes, "graph": found.graph}
+    measured = {
+        "headers": [list(header) for header in found.headers],
+        "symbols": rows,
+        "writable_bytes": found.writable_bytes,
+        "graph": found.graph,
+    }
     return canonical_json(measured) + b"\n" + found.code
 
 
-def _object(name: str, content: bytes) -> Object | None:
+def _object(name: str, include: Path, content: bytes) -> Object | None:
+    """Return the object that was kept, or None if one of its headers changed since."""
     line, _, code = content.partition(b"\n")
     measured = json.loads(line)
+    headers = tuple((str(path), str(digest)) for path, digest in measured["headers"])
+    if any(sha256(include / path) != digest for path, digest in headers):
+        return None
     rows = tuple(Symbol(*row) for row in measured["symbols"])
     sound = code and type(measured["writable_bytes"]) is int and type(measured["graph"]) is str
-    return Object(name, code, rows, measured["writable_bytes"], measured["graph"]) if sound else None
+    return Object(name, headers, code, rows, measured["writable_bytes"], measured["graph"]) if sound else None
 
 
-def _name_of(target: Target, source: Path, work: Path, include: Path) -> str:
+def _headers(listed: Path, source: Path, include: Path) -> Iterator[tuple[str, str]]:
+    """Yield path and SHA-256 of the headers that a compiler listed, as a rule of make, while it compiled a source."""
+    _, _, files = listed.read_text(encoding="utf-8").replace("\\\n", " ").partition(": ")
+    for word in _FILE_OF_RULE.findall(files):
+        path = Path(_ESCAPED.sub(r"\1", word).replace("$$", "$"))
+        if path != source.absolute():
+            inside = path.is_relative_to(include.absolute())
+            yield str(path.relative_to(include.absolute()) if inside else path), sha256(path)
+
+
+def _name_of(target: Target, source: Path) -> str:
     """Name under which an object is kept; empty where compiler or processor cannot be determined."""
     compiler = compiler_identity(target.compiler)
     processor = _processor() if "-march=native" in target.flags else "any"
     if not compiler or not processor:
         return ""
-    command = [target.compiler, *_flags(target, include), "-E", str(source.absolute())]
-    text = printed_by_compiler(target, command, work)
-    places = (str(path.absolute()).encode() for path in (work, include, source.parent))
-    for place in sorted(places, key=len, reverse=True):  # in lines that say where the text stood
-        text = text.replace(place, b"")
     flags = [*target.all_flags, len(target.bare)]
-    made_of = [cache.program_of(), compiler, processor, flags, hashlib.sha256(text).hexdigest()]
+    made_of = [cache.program_of(), compiler, processor, flags, source.name, sha256(source)]
     return f"{digest_of(made_of)}.object"
 
 
@@ -372,7 +397,8 @@ def link(target: Target, objects: Sequence[Path], program: Path) -> None:
     script = ["-T", str(_BARE / target.script)] if target.script else []
     files = [str(f.absolute()) for f in (*objects, *parts)]
     arguments = [*target.all_flags, *script, *files, *target.link, "-Wl,--gc-sections"]
-    printed_by_compiler(target, [target.compiler, *arguments, "-o", str(program.absolute())], program.parent)
+    run_compiler(target, [target.compiler, *arguments, "-o", str(program.absolute())], program.parent)
+    _linked.add(_linking(target))
 
 
 def compile_c(
@@ -446,8 +472,8 @@ def compiler_version(compiler: str) -> str:
     return compiler
 
 
-def printed_by_compiler(target: Target, command: list[str], folder: Path) -> bytes:
-    """Run a compiler in a folder and return what it prints.
+def run_compiler(target: Target, command: list[str], folder: Path) -> None:
+    """Run a compiler in a folder.
 
     Raises:
         CheckFailed: The compiler refused.
@@ -456,15 +482,19 @@ def printed_by_compiler(target: Target, command: list[str], folder: Path) -> byt
     if done.returncode != 0:
         lines = "\n".join(done.stderr.splitlines()[:_SHOWN_LINES])
         raise CheckFailed(f"{target.name}: {target.compiler} failed:\n{lines}")
-    return done.stdout
 
 
 def _links(target: Target) -> bool:
-    """Test whether an empty program can be built: a compiler may lack the C library of the target."""
+    """Test whether a program can be built: one was linked before, or an empty one can be."""
+    return _linking(target) in _linked or _links_empty(_linking(target))
+
+
+def _linking(target: Target) -> Target:
+    """Return the part of a target that decides whether a program can be linked."""
     if target.bare:  # its parts are linked in, whose objects are those that will be needed
-        return _links_empty(target)
+        return target
     flags = tuple(f for f in target.flags if not f.startswith("-O") and f != "-march=native")
-    return _links_empty(target.model_copy(update={"name": target.compiler, "flags": flags, "default": False}))
+    return target.model_copy(update={"name": target.compiler, "flags": flags, "default": False})
 
 
 @functools.cache

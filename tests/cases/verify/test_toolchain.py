@@ -180,6 +180,20 @@ def test_an_object_is_taken_again_for_the_same_text_headers_flags_and_compiler_a
     assert compiled.count == 4
 
 
+def test_an_object_is_compiled_again_after_a_header_of_the_system_changed(
+    source: Path, tmp_path: Path, compiled: _Compiled
+) -> None:
+    system = tmp_path / "some system"
+    system.mkdir()
+    (source.parent / "size.h").rename(system / "size.h")
+    target = HOST.model_copy(update={"flags": (*HOST.flags, "-isystem", str(system))})
+    assert _asked(source, tmp_path, target) == _asked(source, tmp_path, target)
+    assert compiled.count == 1
+    (system / "size.h").write_text("#define SIZE 7\n")
+    assert _asked(source, tmp_path, target).writable_bytes == 28
+    assert compiled.count == 2
+
+
 def test_another_compiler_of_the_same_name_makes_its_own_objects(
     source: Path, tmp_path: Path, compiled: _Compiled, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,16 +221,14 @@ def test_what_is_damaged_or_foreign_is_never_linked(source: Path, tmp_path: Path
     sound = _asked(source, tmp_path)
     [path] = cache.folder().glob("*.object")
     whole = path.read_bytes()
-    (source.parent / "size.h").write_text("#define SIZE 5\n")
-    _asked(source, tmp_path)
+    _asked(source, tmp_path, HOST.model_copy(update={"flags": ("-O1",)}))
     [other] = set(cache.folder().glob("*.object")) - {path}
-    (source.parent / "size.h").write_text("#define SIZE 3\n")
     head = len(cache.head_of_content("", b""))
     spoiled = (
         b"",
         whole[:-1],
         whole[:-9] + bytes([whole[-9] ^ 1]) + whole[-8:],
-        other.read_bytes(),  # of another text, sound in itself
+        other.read_bytes(),  # with other flags, sound in itself
         whole[:head] + whole[head:].replace(b"one", b"two", 1),
         _kept(path, b"{}\n" + sound.code),
         _kept(path, whole[head:].replace(b'"graph":""', b'"graph":1', 1)),
@@ -238,4 +250,4 @@ def test_a_target_shows_the_same_with_kept_objects(name: str, tmp_path: Path, co
     assert all(entry["status"] == "pass" for entry in first)
     before = compiled.count
     assert [entry.content() for entry in board_entries(job, target)] == first
-    assert compiled.count == before, "the runtime is compiled once"
+    assert compiled.count == before, "runtime and table are compiled once"
