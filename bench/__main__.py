@@ -13,7 +13,7 @@ from pathlib import Path
 from . import page, records
 from .campaigns import CAMPAIGNS, Settings, module_of, say
 
-_PEERS = ("sklearn", "fastcan", "sysidentpy", "minisom", "pandas", "polars")
+_PEERS = ("sklearn", "emlearn", "fastcan", "sysidentpy", "minisom", "pandas", "polars")
 _ENVIRONMENT = records.ROOT / "build" / "bench"
 
 

@@ -67,7 +67,7 @@ class Campaign:
 
 CAMPAIGNS = {
     "accuracy": Campaign("Accuracy and training time", "an hour", peers=True),
-    "runtime": Campaign("Instructions, flash and RAM of the C runtime", "ten minutes"),
+    "runtime": Campaign("Instructions, flash and RAM of the C runtime", "ten minutes", peers=True),
     "growth": Campaign("CPU time and memory of commands", "an hour", peers=True),
     "splits": Campaign("Measured gyros: error on held-out history", "ten minutes"),
     "rows": Campaign("Events and faults planted in recordings", "an hour"),
