@@ -7,9 +7,9 @@ is stated by certificates, proven, or seen in earlier calibrations.
 
 Figures are known by type A evaluations (4.2 there). Noise of a gyro is not white: neighbouring means belong together,
 so that the number of means says too much. RMS, standard deviation, mean and improvement come from a delete-one-block
-jackknife (Efron and Stein 1981) over blocks of an hour, whose scatter holds whatever correlation is shorter. Figures of
-windows (30 min, 1 h) and of the first ten minutes are the root mean square of few normal numbers; the largest of many
-follows the extreme-value distribution of Gumbel.
+jackknife (Efron and Stein 1981) over blocks of two hours, whose scatter holds whatever correlation is shorter. Figures
+of windows (30 min, 1 h) and of the first ten minutes are the root mean square of few normal numbers; the largest of
+many follows the extreme-value distribution of Gumbel.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from scipy.special import log_ndtr
 
 from .. import __version__
 from ..common.arrays import FloatArray
-from ..common.metrics import FIRST_S, HALF_HOUR_S, HOUR_S, Averages
+from ..common.metrics import FIRST_S, HALF_HOUR_S, HOUR_S, Averages, jackknife_blocks
 from ..common.statistics import coverage_factor
 from ..model import Model, Rules
 from ..recordings.fit_options import SIMPLE
@@ -270,7 +270,7 @@ def _of_recordings(model: Model, training: Training, evaluation: Evaluation) -> 
     else:
         rules = model.uncertainty_dph.rules if model.uncertainty_dph else None
         yield from _of_map(total, of_noise, rules)
-    yield _unseen(evaluation, training, total if total is not None else of_noise)
+    yield _unseen(evaluation, total if total is not None else of_noise)
 
 
 def _of_map(total: float, of_noise: float, rules: Rules | None) -> Iterator[Contribution | str]:
@@ -298,15 +298,15 @@ def _of_map(total: float, of_noise: float, rules: Rules | None) -> Iterator[Cont
     )
 
 
-def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Contribution | str:
-    """Return what recordings that were left out show beyond noise floor and map.
+def _unseen(evaluation: Evaluation, explained: float) -> Contribution | str:
+    """Return what recordings that were left out show of errors that last, beyond what the table states.
 
     The excess of their mean square is known with an error, and it cannot be negative. Its expectation under both is
     what counts: it falls to nothing only where many means show that nothing is there.
     """
     judged = evaluation.judged()
-    rms = judged[1].after.rms_dph if judged and judged[0] != "train" else None
-    if judged is None or rms is None:
+    lasting = judged[1].lasting if judged and judged[0] != "train" else None
+    if judged is None or lasting is None:
         constant = evaluation.train.constant.rms_dph if evaluation.train else None
         if constant is None:
             return "thermal history that was not trained: no recordings were left out to tell it"
@@ -316,25 +316,18 @@ def _unseen(evaluation: Evaluation, training: Training, explained: float) -> Con
             constant,
             "no recordings were left out, so the map is not shown to be better than a constant: what that leaves",
         )
-    known = (evaluation.uncertainty or {}).get("rms_dph")
-    floor = evaluation.noise_floor_dph or 0.0
-    means = training.samples * training.block_s / training.average_s
-    # Relative standard error of a floor from successive differences (von Neumann): sqrt(3/4n)
-    of_floor = 0.0 if evaluation.noise_floor_source == "simulated" else math.sqrt(0.75 / max(means, 1.0))
-    expected = floor**2 + explained**2
-    # Few means can agree by chance: not less than as many independent ones of at least the expected size allow.
-    of_square = max(
-        2.0 * rms * known.standard if known else 0.0, max(rms**2, expected) * math.sqrt(2.0 / judged[1].samples)
-    )
-    error = math.hypot(of_square, 2.0 * floor**2 * of_floor)
     return part(
         "unseen",
         "thermal history and rates that were not trained",
-        math.sqrt(positive_mean(rms**2 - expected, error)),
-        f"{judged[1].samples} means of {PARTS[judged[0]]}, beyond noise floor and map",
-        freedom=known.freedom if known else float(judged[1].samples),
+        math.sqrt(positive_mean(lasting.mean_square_dph2 - explained**2, lasting.standard_dph2)),
+        f"{judged[1].samples} means of {PARTS[judged[0]]}: what lasts for half an hour, beyond what the table states",
+        freedom=lasting.freedom,
         statistical=True,
     )
+
+
+# Standard deviations below zero from which the asymptotic series of a truncated mean is right to 1 %.
+_FAR_BELOW = -14.0
 
 
 def positive_mean(value: float, sigma: float) -> float:
@@ -348,14 +341,6 @@ def positive_mean(value: float, sigma: float) -> float:
     if z < _FAR_BELOW:  # by its asymptotic series, where the difference below would cancel
         return -sigma / z
     return value + sigma * math.exp(-0.5 * z * z - float(log_ndtr(z))) / math.sqrt(2.0 * math.pi)
-
-
-# Standard deviations below zero from which the asymptotic series of a truncated mean is right to 1 %.
-_FAR_BELOW = -14.0
-
-_BLOCK_S = 7200.0  # six correlation times of 20 minutes: hours were too short there, U held 86-90 % instead of 95
-_LEAST_BLOCKS = 8  # shorter ones where an hour would give fewer: fewer squares hardly tell a variance
-_LEAST_MEANS = 4  # in a block
 
 
 def figure_uncertainties(
@@ -378,7 +363,7 @@ def figure_uncertainties(
             them.
         floor: The noise floor (deg/h), and the number of means that it was estimated from (None: of a simulation).
     """
-    blocks = _blocks(judged, average_s)
+    blocks = [(block.before_dph, block.after_dph) for block in jackknife_blocks(judged, average_s)]
     found = _jackknife(blocks, constant_dph) if len(blocks) >= 2 else {}
     after = np.concatenate([a.after_dph for a in judged]) if judged else np.zeros(0)
     if after.size > 1:
@@ -411,18 +396,6 @@ def root_mean(squares: Iterable[tuple[float, int]]) -> float | None:
     """RMS of several such sums; None where there is no correction."""
     total, number = np.sum([(0.0, 0), *squares], axis=0)
     return float(np.sqrt(total / number)) if number else None
-
-
-def _blocks(judged: Sequence[Averages], average_s: float) -> list[tuple[FloatArray, FloatArray]]:
-    """Stretches of at most an hour inside the runs: means before and after."""
-    total = sum(a.after_dph.size for a in judged)
-    length = max(min(_BLOCK_S / average_s, total / _LEAST_BLOCKS), float(_LEAST_MEANS))
-    parts = []
-    for a in judged:
-        pieces = max(1, round(a.after_dph.size / length))
-        cut = zip(np.array_split(a.before_dph, pieces), np.array_split(a.after_dph, pieces), strict=True)
-        parts += [(before, after) for before, after in cut if after.size]
-    return parts
 
 
 def _jackknife(blocks: Sequence[tuple[FloatArray, FloatArray]], constant_dph: float) -> dict[str, FigureUncertainty]:

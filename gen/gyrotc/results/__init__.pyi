@@ -30,6 +30,7 @@ from .evaluation import EvaluatedRun as EvaluatedRun
 from .evaluation import Evaluation as Evaluation
 from .evaluation import FigureUncertainty as FigureUncertainty
 from .evaluation import Group as Group
+from .evaluation import LastingError as LastingError
 from .evaluation import MapDifference as MapDifference
 from .evaluation import Method as Method
 from .evaluation import ModelSizes as ModelSizes

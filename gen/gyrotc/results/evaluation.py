@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
@@ -9,9 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from ..common.inputs import AverageLength
-from ..common.metrics import Averages, statistics_of
+from ..common.metrics import Averages, jackknife_blocks, lagged_products, statistics_of
 from ..common.statistics import coverage_factor
-from .base import TABLE_BYTES, Amount, Count, Figure, Finding, Numeric, Part, UnitResult
+from .base import TABLE_BYTES, Amount, Count, Figure, Finding, Numeric, Part, Positive, UnitResult
 from .release import VERDICTS, HeldLimits, Verdict
 from .rows import RowsCount
 
@@ -97,6 +98,41 @@ def ratio_of(numerator: float | None, denominator: float | None) -> float | None
     return numerator / denominator if numerator is not None and denominator else None
 
 
+class LastingError(Part):
+    """Square of what remains for half an hour after compensation: an error of the correction does, noise does not."""
+
+    mean_square_dph2: float = Field(
+        description="mean product of two means of a run that are neighbours or up to half an hour apart, (deg/h)²; "
+        "negative by chance if no error lasts"
+    )
+    standard_dph2: float = Field(
+        ge=0.0,
+        description="standard uncertainty of `mean_square_dph2`, (deg/h)², from a jackknife over blocks of the runs; "
+        "at least that of white noise",
+    )
+    freedom: Positive = Field(description="degrees of freedom of `standard_dph2`")
+
+    @classmethod
+    def of(cls, runs: Sequence[Averages]) -> LastingError | None:
+        """Return what lasts in some runs; None if none of them has two means."""
+        steps = np.concatenate([np.diff(run.time_s) for run in runs]) if runs else np.zeros(0)
+        if not steps.size:
+            return None
+        blocks = jackknife_blocks(runs, float(np.median(steps)))
+        products, pairs = np.array([lagged_products(block) for block in blocks]).T
+        if not pairs.any():
+            return None
+        least = float(np.mean(np.concatenate([run.after_dph for run in runs]) ** 2)) / math.sqrt(pairs.sum())
+        remaining = pairs.sum() - pairs
+        without = (products.sum() - products)[remaining > 0] / remaining[remaining > 0]
+        scatter = math.sqrt((len(without) - 1) * float(np.var(without))) if len(without) > 1 else 0.0
+        return cls(
+            mean_square_dph2=float(products.sum() / pairs.sum()),
+            standard_dph2=max(scatter, least),
+            freedom=float(max(len(without) - 1, 1)),
+        )
+
+
 class Pooled(Part):
     """Figures over several runs, every sample with the same weight."""
 
@@ -114,6 +150,9 @@ class Pooled(Part):
         description="RMS before over RMS after compensation: it grows with any constant in the rate"
     )
     samples: Count = Field(description="number of means over `average_s`")
+    lasting: LastingError | None = Field(
+        default=None, description="error after compensation that lasts; null if no run has two means"
+    )
 
     @classmethod
     def of(cls, runs: Sequence[Averages], constant_dph: float | None = None) -> Pooled:
@@ -134,6 +173,7 @@ class Pooled(Part):
             improvement=ratio_of(flat.rms_dph, remains.rms_dph),
             improvement_about_zero=ratio_of(was.rms_dph, remains.rms_dph),
             samples=int(after.size),
+            lasting=LastingError.of(runs),
         )
 
 

@@ -37,6 +37,7 @@ from gyrotc.results import (
     Evaluation,
     FigureUncertainty,
     Finding,
+    LastingError,
     Manifest,
     MapDifference,
     ModelSizes,
@@ -323,50 +324,69 @@ def training_like(samples: int) -> Any:
     return SimpleNamespace(noise_floor_dph=FLOOR, samples=samples, block_s=10.0, average_s=100.0)
 
 
-@pytest.mark.parametrize("source", ["estimated", "simulated"])
 @pytest.mark.parametrize("excess", [-20.0, -3.0, -1.0, 0.0, 1.0, 3.0, 20.0])
 def test_unseen_history_counts_with_the_mean_excess_that_its_error_allows(
-    excess: float, source: str, model_dict: dict[str, Any]
+    excess: float, model_dict: dict[str, Any]
 ) -> None:
-    """RMS² of what was left out less floor² and the table's sigma², with its standard error, cut at 0 by scipy."""
-    samples, standard, rms = 3000, 4e-6, 2e-3
-    of_floor = 0.0 if source == "simulated" else np.sqrt(0.75 / (samples * 10.0 / 100.0))
-    error = np.hypot(2.0 * rms * standard, 2.0 * FLOOR**2 * of_floor)
-    sigma = np.sqrt(rms**2 - FLOOR**2 - excess * error)
-    unseen = unseen_of(model_dict, rms, sigma, source, samples, standard=standard, means=10**9)
+    """Square of what lasts on test runs less the table's sigma², with its standard error, cut at 0 by scipy."""
+    sigma, error = 3e-4, 4e-9
+    lasting = LastingError(mean_square_dph2=sigma**2 + excess * error, standard_dph2=error, freedom=20.0)
     expected = stats.truncnorm.mean(-excess, np.inf, loc=excess * error, scale=error)
-    assert unseen == pytest.approx(np.sqrt(expected), rel=0.01)
+    assert unseen_of(model_dict, lasting, sigma) == pytest.approx(np.sqrt(expected), rel=0.01)
 
 
 def test_less_knowledge_never_states_less_unseen_history(model_dict: dict[str, Any]) -> None:
-    """Of fewer means, of an RMS that is known less well, and of no exam at all."""
-    stated = [unseen_of(model_dict, 1e-3, 3e-4, "estimated", 3000, standard=s) for s in (1e-5, 1e-4, 1e-3)]
+    """Of what lasts and is known less well, of the same residual over less time, and of no test run at all."""
+    known = [LastingError(mean_square_dph2=1e-6, standard_dph2=s, freedom=20.0) for s in (1e-9, 1e-7, 1e-6, 1e-5)]
+    stated = [unseen_of(model_dict, one, 3e-4) for one in known]
     assert stated == sorted(stated) and stated[0] > 0.0
-    means = [unseen_of(model_dict, 1e-3, 3e-4, "estimated", 3000, means=n) for n in (360, 100, 10, 1)]
-    assert means == sorted(means) and means[-1] < 1.1e-3
-    assert unseen_of(model_dict, None, 3e-4, "estimated", 3000) == pytest.approx(0.01), "what a constant leaves"
+    rng = np.random.default_rng(4)
+    shorter = []
+    for means in (1440, 360, 100, 30, 10):
+        drawn = [LastingError.of([averages_of(1e-3 * rng.normal(size=means))]) for _ in range(60)]
+        shorter.append(np.sqrt(np.mean([unseen_of(model_dict, one, 3e-4) ** 2 for one in drawn])))
+    assert shorter == sorted(shorter) and shorter[-1] < 1.1e-3
+    single = LastingError.of([averages_of(np.array([1e-3]))])
+    assert single is None
+    assert unseen_of(model_dict, single, 3e-4) == pytest.approx(0.01), "what a constant leaves"
 
 
-def unseen_of(
-    model_dict: dict[str, Any],
-    rms: float | None,
-    sigma: float,
-    source: str,
-    samples: int,
-    *,
-    standard: float | None = None,
-    means: int = 100,
-) -> float:
-    """Return the contribution of unseen history, deg/h; `rms` None: no run was left out."""
-    figures = Statistics(mean_dph=0.0, std_dph=rms, rms_dph=rms, max_abs_dph=5e-3)
+@pytest.mark.parametrize(("lasting", "noise"), [(2e-4, 7e-4), (7e-4, 2e-4), (0.0, 7e-4)])
+def test_what_lasts_is_told_from_noise(lasting: float, noise: float) -> None:
+    """An error that keeps its sign for four hours beside white noise: 60 draws of eight hours, with its standard."""
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(60):
+        error = lasting * np.sign(np.sin(2.0 * np.pi * (np.arange(288) + 0.5) / 288.0))
+        one = LastingError.of([averages_of(error + noise * rng.normal(size=288))])
+        assert one is not None
+        found.append(one)
+    squares = np.array([one.mean_square_dph2 for one in found])
+    standard = np.array([one.standard_dph2 for one in found])
+    assert abs(squares.mean() - lasting**2) < 4.0 * squares.std() / np.sqrt(60.0) + 0.1 * lasting**2
+    assert squares.std() < 1.5 * np.sqrt(np.mean(standard**2))
+
+
+def averages_of(after_dph: Any) -> Averages:
+    time_s = 100.0 * (np.arange(len(after_dph)) + 0.5)
+    return Averages(time_s, after_dph, after_dph, np.zeros(len(after_dph)))
+
+
+def unseen_of(model_dict: dict[str, Any], lasting: LastingError | None, sigma: float) -> float:
+    """Return the contribution of unseen history, deg/h, of test runs whose error lasts so much."""
+    figures = Statistics(mean_dph=0.0, std_dph=1e-3, rms_dph=1e-3, max_abs_dph=5e-3)
     exam = Pooled(
-        before=figures, constant=figures, after=figures, improvement=1.0, improvement_about_zero=1.0, samples=means
+        before=figures,
+        constant=figures,
+        after=figures,
+        improvement=1.0,
+        improvement_about_zero=1.0,
+        samples=100,
+        lasting=lasting,
     )
-    known = {"rms_dph": FigureUncertainty(standard=standard, freedom=20.0, method="by hand")} if standard else None
-    runs = [evaluated("exam"), evaluated("train")] if rms is not None else [evaluated("train")]
-    made = evaluation_of(runs, noise_floor_source=source, sigma_rms_dph=sigma, uncertainty=known)
-    made = made.model_copy(update={"exam": exam if rms is not None else None})
-    budget = budget_of(Model.from_dict(model_dict), training_like(samples), made, None)
+    made = evaluation_of([evaluated("exam"), evaluated("train")], sigma_rms_dph=sigma)
+    made = made.model_copy(update={"exam": exam, "train": made.exam})
+    budget = budget_of(Model.from_dict(model_dict), training_like(3000), made, None)
     (unseen,) = (one for one in budget.contributions if one.id == "unseen")
     return unseen.contribution_dph
 
