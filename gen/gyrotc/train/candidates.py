@@ -127,7 +127,8 @@ def compare_candidates(
     failed: dict[str, str] = {}
     for name in CANDIDATES[:2]:
         try:
-            maps[name] = history.fit(structure_of(name, history.count))
+            structure = structure_of(name, history.count)
+            maps[name] = history.fit(structure, smooth_map.logarithms_of(structure))
         except TrainingFailed as failure:
             failed[name] = str(failure)
     maps = {name: maps[name] for name in CANDIDATES if name in maps}

@@ -57,8 +57,8 @@ _PRIOR_OF_OWN = (np.log(0.3), 2.0)
 _NOISE_SD = 1.0
 # Prior standard deviations that are searched to either side.
 _SEARCHED = 5.0
-# The search has two starts: a short scale and the map as expected; a long scale, less map, more of the power-ons' own.
-# A candidate of few columns starts at the second alone: on measured recordings the first finds nothing better.
+# The search for a smooth map has two starts: a short scale and the map as expected; a long scale, less map, more of the
+# power-ons' own. That for a candidate of few columns begins where the smooth map ended.
 _START_SCALES = (0.08, 0.35)
 _LESS_MAP, _MORE_OWN = 1.5, 1.0
 _STOP = 1e-3  # of the log posterior
@@ -66,6 +66,8 @@ _MAX_STEPS = 80
 
 # Which of the three variances each of the first columns behind the constant has.
 _PART = (0, 1, 1, 2)
+# The same of what a power-on has of its own, whose constant has a variance, too.
+_OWN_PART = np.array([0, 1, 2, 2, 3])
 
 
 class TrainingFailed(GyrotcError):
@@ -201,7 +203,7 @@ class Structure:
     def scatter(self, p: FloatArray) -> FloatArray:
         """Return the variances of what a power-on has of its own."""
         of = np.exp(2.0 * p[self.map_parameters : self.map_parameters + self.own_parameters])
-        return of[[0, *(1 + part for part in _PART)][: self.own]]
+        return np.asarray(of[_OWN_PART[: self.own]])
 
 
 def _density(size: float, scale: float, n: int, reach: float) -> tuple[FloatArray, FloatArray]:
@@ -247,6 +249,12 @@ class GaussianMap:
     def sigma(self) -> float:
         """Noise of a mean of weight 1."""
         return float(np.exp(self.p[-1]))
+
+    def logarithms_of(self, part: Structure) -> FloatArray:
+        """Return the sizes and scales of this map that a candidate of fewer columns has, too."""
+        of_map, of_own = part.map_parameters, part.own_parameters
+        own = self.p[self.structure.map_parameters :]
+        return np.concatenate([self.p[:of_map], own[:of_own], self.p[-1:]])
 
     @property
     def freedom(self) -> float:
@@ -310,7 +318,7 @@ class GaussianMap:
         """Return roots of the prior variances, the Cholesky factor of the scaled equations, and the mean of b."""
         h = np.sqrt(self.structure.variances(self.p, self.basis)[0])
         scaled = h[:, None] * precision * h
-        scaled[np.diag_indices_from(scaled)] += np.exp(2.0 * self.p[-1])
+        scaled.flat[:: len(h) + 1] += np.exp(2.0 * self.p[-1])
         lower, failed = lapack.dpotrf(scaled, lower=1)
         if failed:
             raise TrainingFailed("the posterior of the map is not positive definite")
@@ -402,7 +410,7 @@ class VarianceSearch:
             fitted -= float(one.moment @ one.moment) / noise
             log_determinant = -float(np.log(np.diagonal(one.inverse, axis1=1, axis2=2)).sum())
         scaled = h[:, None] * precision * h
-        scaled[np.diag_indices_from(scaled)] += noise
+        scaled.flat[:: n + 1] += noise
         lower, failed = lapack.dpotrf(scaled, lower=1)
         if failed:
             return np.inf, np.zeros(len(p))
@@ -423,8 +431,7 @@ class VarianceSearch:
         square = self._squares - 2.0 * beta @ self._moments + beta @ self._products @ beta
         if one is not None:
             more, by_own, of_own = self._own_terms(one, beta, h, inverse, noise)
-            for k, value_k in enumerate(by_own):
-                gradient[m + (0 if k == 0 else 1 + _PART[k - 1])] += value_k
+            gradient[m : m + s.own_parameters] += np.bincount(_OWN_PART[:own], by_own, s.own_parameters)
             used += of_own
             square += more
         gradient[-1] += self._samples - used - square / noise
@@ -448,35 +455,45 @@ class VarianceSearch:
         return float(more), by_own, float(groups * own - remaining.sum())
 
     def starts(self) -> list[FloatArray]:
-        """Return where the search begins: see `_START_SCALES`."""
+        """Return where the search for a smooth map begins: see `_START_SCALES`."""
         s = self.structure
         usual, less = self.mean.copy(), self.mean.copy()
         if s.own:
             less[: min(s.map_parameters, 3)] -= _LESS_MAP
             less[s.map_parameters : -1] += _MORE_OWN
-        if s.columns <= FEW:
-            return [less]
         usual[4], less[4] = np.log(_START_SCALES)
         return [usual, less]
 
     def best(self, start: FloatArray | None = None) -> GaussianMap:
-        """Return the candidate with its most probable variances; `start`: where to begin, if it is known.
+        """Return the candidate with its most probable variances.
+
+        Args:
+            start: Where to begin; None: at the two starts of a smooth map.
 
         Raises:
             TrainingFailed: The equations cannot be solved.
         """
         from scipy.optimize import minimize  # 0.1 s to import
 
+        # Steps along which the posterior is about equally curved: n means know the logarithm of their noise to
+        # 1/sqrt(2 n), and few coefficients stand behind each of the other logarithms.
+        step = np.ones(len(self.mean))
+        step[-1] = 1.0 / np.sqrt(1.0 + 2.0 * self._samples)
+
+        def in_steps(z: FloatArray) -> tuple[float, FloatArray]:
+            value, gradient = self.objective(z * step)
+            return value, gradient * step
+
         best, evaluations = None, 0
         for free in self.starts() if start is None else [start]:
             begin = np.clip(free, self.low, self.high)
             scale = max(abs(self.objective(begin)[0]), 1.0)
             found = minimize(
-                self.objective,
-                begin,
+                in_steps,
+                begin / step,
                 jac=True,
                 method="L-BFGS-B",
-                bounds=list(zip(self.low, self.high, strict=True)),
+                bounds=list(zip(self.low / step, self.high / step, strict=True)),
                 options={"maxiter": _MAX_STEPS, "ftol": _STOP / scale if np.isfinite(scale) else 1e-9},
             )
             evaluations += int(found.nfev)
@@ -484,4 +501,5 @@ class VarianceSearch:
                 best = found
         if best is None:
             raise TrainingFailed("the model of the map cannot be solved")
-        return GaussianMap(self.structure, self.basis, self.power_ons, best.x, float(best.fun), evaluations)
+        p = np.clip(best.x * step, self.low, self.high)
+        return GaussianMap(self.structure, self.basis, self.power_ons, p, float(best.fun), evaluations)

@@ -153,6 +153,10 @@ class TrainingHistory:
     def fit(self, structure: Structure, start: FloatArray | None = None) -> GaussianMap:
         """Return a candidate with its most probable variances.
 
+        Args:
+            structure: Its columns.
+            start: Where the search for the variances begins; None: at the two starts of a smooth map.
+
         Raises:
             TrainingFailed: The equations cannot be solved.
         """

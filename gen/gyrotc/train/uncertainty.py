@@ -41,7 +41,8 @@ from .result import Fit, predict
 _AGES = (1, 2, 3, 5, 8, 12, 17, 23, 30)  # blocks for which a correction is held
 _TURNS = 20000  # pairs of a place in training and a trained slope that are looked at
 _STEP = 0.05  # of a range, for gradients
-_BISECTIONS = 60  # leave less than the last digit of a float64
+_LOG_SHARES = (-30.0, 10.0)  # logarithms of c² x over the squares, between which it is sought
+_SHARE_ERROR = 1e-9  # of the logarithm: no table has so many digits
 _MOST = 20000  # samples that are looked at
 
 
@@ -206,15 +207,16 @@ def _excess(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:
     variance = np.maximum(variance, 1e-12 * float(np.mean(squares)))
     if np.mean(squares / variance) <= 1.0:
         return 0.0
-    low, high = -30.0, 10.0
+    from scipy.optimize import brentq  # 0.1 s to import
+
     scale = float(np.mean(squares) / np.mean(x))
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if np.mean(squares / (variance + np.exp(middle) * scale * x)) > 1.0:
-            low = middle
-        else:
-            high = middle
-    return float(np.sqrt(np.exp(middle) * scale))
+
+    def beyond(log_share: float) -> float:
+        return float(np.mean(squares / (variance + np.exp(log_share) * scale * x))) - 1.0
+
+    low, high = _LOG_SHARES
+    found = low if beyond(low) <= 0.0 else high if beyond(high) >= 0.0 else brentq(beyond, low, high, xtol=_SHARE_ERROR)
+    return float(np.sqrt(np.exp(found) * scale))
 
 
 def _balanced(squares: FloatArray, x: FloatArray, variance: FloatArray) -> float:

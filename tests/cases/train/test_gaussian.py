@@ -185,3 +185,15 @@ def test_the_search_ends_no_worse_than_many_starts_do() -> None:
         start = search.mean.copy()
         start[4] = np.log(scale)
         assert search.best(start).value > best.value - 0.05
+
+
+def test_a_wrong_guess_of_the_noise_costs_the_search_little() -> None:
+    """The noise is known a hundred times better than a scale: with steps alike, three times too little costs 109."""
+    rng = np.random.default_rng(12)
+    t, r = np.sort(rng.uniform(-1.0, 1.0, 4000)), rng.uniform(-1.0, 1.0, 4000)
+    y = np.sin(2.0 * t) + rng.normal(0.0, 0.3, 4000)
+    basis = Basis.over(t, r)
+    sums = [Sums.over(basis.columns(t, r), y, np.ones(4000))]
+    found = [VarianceSearch(Structure(93, 0), basis, sums, white).best() for white in (0.1, 0.3, 0.9)]
+    assert max(one.evaluations for one in found) < 80
+    assert np.ptp([np.log(one.sigma) for one in found]) < 0.01
