@@ -114,11 +114,11 @@ class LastingError(Part):
 
     @classmethod
     def of(cls, runs: Sequence[Averages]) -> LastingError | None:
-        """Return what lasts in some runs; None if none of them has two means."""
+        """Return what lasts in some runs; None if none of them has means at two times."""
         steps = np.concatenate([np.diff(run.time_s) for run in runs]) if runs else np.zeros(0)
-        if not steps.size:
+        if not steps.any():
             return None
-        blocks = jackknife_blocks(runs, float(np.median(steps)))
+        blocks = jackknife_blocks(runs, float(np.median(steps[steps > 0.0])))
         products, pairs = np.array([lagged_products(block) for block in blocks]).T
         if not pairs.any():
             return None
