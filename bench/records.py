@@ -2,7 +2,8 @@
 
 Each campaign has one record, docs/results/<name>.json, which nobody edits by hand. A figure of a page is followed by a
 comment that names its place, `35<!--= rows/events/name=dropout/named; d -->`: the record, the steps to the value, and a
-format of Python. A step `key=value` selects the entry of a list that has this value.
+format of Python. A step `key=value`, or several with `&` between them, selects the one entry of a list that has these
+values: a place by number would name another entry after the next campaign.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _DIGITS = 6
 #: Characters of a line of a record.
 _WIDTH = 500
-_MARK = re.compile(r"([^\s|(*]+)(<!--= ([^;>]+); ([^;>]+?) -->)")
+_MARK = re.compile(r"([^\s|(*]+)(<!--= ([^>]+); ([^;>]+?) -->)")
 
 Record = dict[str, Any]
 
@@ -111,14 +112,18 @@ def figure(docs: Path, place: str, form: str) -> str:
         for step in steps:
             value = _inside(value, step)
         return format(value, form.strip())
-    except (KeyError, IndexError, TypeError, ValueError, StopIteration) as error:
+    except (KeyError, IndexError, TypeError, ValueError) as error:
         raise KeyError(f"{place.strip()} is no value of a record in {docs / 'results'}") from error
 
 
 def _inside(value: Any, step: str) -> Any:
-    key, equal, wanted = step.partition("=")
     if isinstance(value, dict):
         return value[step]
-    if equal:
-        return next(entry for entry in value if str(entry[key]) == wanted)
-    return value[int(step)]
+    if "=" in step:
+        wanted = [condition.split("=", 1) for condition in step.split("&")]
+        (entry,) = (entry for entry in value if all(str(entry[key]) == text for key, text in wanted))
+        return entry
+    entry = value[int(step)]
+    if isinstance(entry, dict):
+        raise KeyError(step)
+    return entry

@@ -56,14 +56,18 @@ def test_a_missed_aim_is_marked_and_reported() -> None:
 def test_a_record_is_read_as_it_was_written_and_pages_get_its_figures(tmp_path: Path) -> None:
     docs = tmp_path / "docs"
     docs.mkdir()
-    (docs / "a.md").write_text("0<!--= one/rows/name=a b/x; .1f --> of 7<!--= one/rows/1/x; .0f -->\n")
-    record = {"rows": [{"name": "a b", "x": 1.25}, {"name": "c" * 400, "x": 2.0}], "list": list(range(200))}
+    (docs / "a.md").write_text("0<!--= one/rows/name=a; b/x; .1f --> of 7<!--= one/rows/name=a b&at=2/x; .0f -->\n")
+    record = {
+        "rows": [{"name": "a; b", "x": 1.25}, {"name": "a b", "at": 2, "x": 2.0}, {"name": "a b", "at": 3}],
+        "list": list(range(200)),
+    }
     write_record(docs, "one", record)
     assert read_record(docs, "one") == record and read_record(docs, "other") is None
     assert (docs / "a.md").read_text().startswith("1.2<!--=") and " of 2<!--=" in (docs / "a.md").read_text()
-    (docs / "a.md").write_text("0<!--= one/rows/9/x; d -->\n")
-    with pytest.raises(KeyError, match="one/rows/9/x is no value"):
-        fill(docs)
+    for place in ("one/rows/9/x", "one/rows/1/x", "one/rows/name=a b/x", "one/rows/name=c/x"):
+        (docs / "a.md").write_text(f"0<!--= {place}; d -->\n")
+        with pytest.raises(KeyError, match=f"{place} is no value"):
+            fill(docs)
 
 
 def test_the_page_of_results_and_every_quoted_figure_are_those_of_the_records(tmp_path: Path) -> None:
