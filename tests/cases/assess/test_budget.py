@@ -24,6 +24,7 @@ from gyrotc.pages import rounded, write_report
 from gyrotc.recordings import load
 from gyrotc.results import (
     Budget,
+    Calibration,
     Changes,
     EvaluatedRun,
     Evaluation,
@@ -61,7 +62,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def of(built: Path, limits: Limits | None = None, **meta: Any) -> Budget:
+def of(built: Path, limits: Limits | None = None, changes: Changes | None = None, **meta: Any) -> Budget:
     model = load_model(built / "model.json")
     return budget_of(
         model.model_copy(update={"meta": {**model.meta, **meta}}),
@@ -69,7 +70,7 @@ def of(built: Path, limits: Limits | None = None, **meta: Any) -> Budget:
         read_result(built / "evaluate.json", Evaluation),
         read_optional(built / "verify.json", Verification),
         limits=limits,
-        changes=read_optional(built / "changes.json", Changes),
+        changes=changes,
     )
 
 
@@ -100,6 +101,36 @@ def test_what_is_stated_is_in_and_what_is_not_is_named(built: Path, tmp_path: Pa
     assert whole.expanded_dph == pytest.approx(whole.coverage_factor * whole.combined_dph)
     assert whole.expanded_dph > bare.expanded_dph
     assert whole.valid_until == "2028-03-06"
+
+
+def test_what_is_computed_from_repeated_measurements_is_of_type_a_and_what_is_stated_of_type_b(
+    built: Path, tmp_path: Path
+) -> None:
+    """JCGM 100:2008, 4.2 and 4.3."""
+    (tmp_path / "limits.toml").write_text(LIMITS)
+    base = {"name": "base", "quantity": "rate", "expanded_uncertainty": 3e-5, "coverage_factor": 3.0}
+    parts = of(built, load_limits(tmp_path / "limits.toml"), instrument=[base]).contributions
+    stated = {"thermometer", "reference", "arithmetic", "ageing"}
+    assert {one.id for one in parts} >= {"noise", "fit", "thermometer", "reference", "ageing"}
+    assert {one.id: one.type for one in parts} == {one.id: "B" if one.id in stated else "A" for one in parts}
+
+
+def test_the_drift_of_a_year_comes_from_earlier_calibrations_with_their_dates(built: Path, tmp_path: Path) -> None:
+    """Two moves in 366 and 365 days, over an interval of two years; a calibration without a date counts for nothing."""
+    (tmp_path / "limits.toml").write_text("schema = 1\n[interval]\ndays = 730.5\n")
+    moved = {"2024-01-01": None, "2025-01-01": 3e-4, "2026-01-01T08:00": -1e-4, None: 9e-4}
+    figures = ("as_found_rms_dph", "as_left_rms_dph", "moved_rms_dph", "expanded_uncertainty_dph", "significant")
+    history = tuple(
+        Calibration.model_validate(
+            {"date": day, "model_hash": "a" * 64, "moved_mean_dph": mean} | dict.fromkeys(figures)
+        )
+        for day, mean in moved.items()
+    )
+    limits = load_limits(tmp_path / "limits.toml")
+    parts = {one.id: one for one in of(built, limits, Changes.model_construct(history=history)).contributions}
+    drifts = np.array([3e-4 / 366.0, -1e-4 / 365.0]) * 365.25
+    assert parts["ageing"].contribution_dph == pytest.approx(2.0 * np.sqrt(np.mean(drifts**2)))
+    assert (parts["ageing"].freedom, parts["ageing"].type) == (2.0, "A")
 
 
 def test_noise_fit_and_power_on_are_what_the_table_states(built: Path) -> None:
