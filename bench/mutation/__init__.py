@@ -61,7 +61,8 @@ PARTS = {
         ("assess/*.py",),
         (
             "cases/assess/test_decision_borders.py", "cases/assess/*.py", "journeys/test_figures_read_back.py",
-            "journeys/jobs/*.py", "cases/results/test_json_keys.py",
+            "journeys/jobs/*.py",
+            "cases/jobs/*.py", "cases/results/test_json_keys.py",
         ),
     ),
     "quality": Part(

@@ -323,7 +323,7 @@ def test_a_cause_that_is_not_quite_the_formula_keeps_its_name_however_clear(camp
 def test_nothing_is_likelier_than_any_cause_of_plain_noise(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the search lets through: a false alarm at its level has a criterion below that of no cause."""
     print("seeds", SEED + 10, "to", SEED + 13)
-    monkeypatch.setattr("gyrotc.diagnose.attribution.LEVEL", 1.0)
+    monkeypatch.setitem(attribute.__globals__, "LEVEL", 1.0)
     claimed = []
     for k in range(4):
         noise = LEVEL_DPH * np.random.default_rng(SEED + 10 + k).standard_normal(campaign.records.size)

@@ -27,8 +27,8 @@ from gyrotc.diagnose import (
     completed,
     cycle_of,
     diagnose,
+    emitted_means,
     fallback_models_of,
-    gain,
     holds,
     is_single_cycle,
     outlasts,
@@ -225,11 +225,11 @@ def test_what_emitted_tables_leave_is_found_with_rows_or_histories_in_memory(
         assert not any(one() is not None for one in alive), "a history is made beside the rows"
         return follow_history(*given, **named)
 
-    monkeypatch.setattr(gain, "follow_history", without_rows)
+    monkeypatch.setitem(emitted_means.__globals__, "follow_history", without_rows)
     front = front_end(runs, BLOCK_S)
     terms = [[], [{"id": "thermal_gradient", "parameters": VALUES["thermal_gradient"], "channel": None}]]
     models = [_model(model_dict, front, one) for one in terms]
-    found = gain.emitted_means(models, runs, 100.0)
+    found = emitted_means(models, runs, 100.0)
     for model, means in zip(models, found, strict=True):
         table = quantise(model, "f32")
         for run, made in zip(runs, means, strict=True):
