@@ -67,7 +67,7 @@ AxisOption = Annotated[
     str | None,
     typer.Option(
         "--axis",
-        help="Axis of a three-axis recording: x, y, z or all; build, check and diagnose take all by default.",
+        help="Axis of a three-axis recording: x, y, z or all; build and diagnose take all by default.",
         autocompletion=completing((*(axis.value for axis in GyroAxis), "all")),
     ),
 ]
