@@ -5,7 +5,8 @@
 #                                      pages; to be looked at, committed and tagged (it says how)
 #   tools/release.sh archive           the last commit, from a clean tree, as archives in build/release/<version>: sdist,
 #                                      wheel, C library, bills of materials, SHA256SUMS; then installed and tried
-#   tools/release.sh archive v0.2.0    what this tag holds
+#   tools/release.sh archive v0.2.0    what this tag holds; refused if a record in docs/results was measured with other
+#                                      sources in gen, libc or include, but for the version (without a tag: a warning)
 #   tools/release.sh archive [TAG] --sdist    without the wheel, which takes a minute of compiling, and not tried
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -30,6 +31,22 @@ prepare() {
   echo "release: look at it, run the tests, then: git commit -am 'Release $1' && git tag -a v$1 -m 'gyrotc $1' && make release TAG=v$1"
 }
 
+# older COMMIT FOLDER: the records of FOLDER that were measured with other sources than those of COMMIT, each with the commit
+# that it states. A record without one is made again and compared by its own command.
+older() {
+  local record measured same
+  for record in "$2"/docs/results/*.json; do
+    [ -e "$record" ] || continue
+    measured=$(sed -n 's/.*"commit": "\([^"]*\)".*/\1/p' "$record" | head -n 1)
+    [ -n "$measured" ] || continue
+    same=
+    if [[ $measured != *+ ]] && git cat-file -e "$measured^{commit}" 2>/dev/null; then
+      [ -n "$(git diff -I'^version = "' -I'^__version__ = "' -I'^#define GTC_VERSION_' "$measured" "$1" -- gen libc include)" ] || same=1
+    fi
+    [ -n "$same" ] || echo "$(basename "$record" .json) ($measured)"
+  done
+}
+
 archive() {
   local commit=HEAD version out
   if [ $# -gt 0 ] && [ "$1" != --sdist ]; then
@@ -51,6 +68,12 @@ archive() {
     [ "v$version" = "$commit" ] || fail "$commit holds another version, $version: tools/release.sh prepare ${commit#v}"
     grep -qE "^## ${version//./\\.} \([0-9]{4}-[0-9]{2}-[0-9]{2}\)$" "$sources/CHANGELOG.md" ||
       fail "CHANGELOG.md of $commit has no dated section $version"
+  fi
+  records=$(older "$commit" "$sources" | paste -sd, | sed 's/,/, /g')
+  if [ -n "$records" ]; then
+    records="records of other sources in gen, libc or include: $records; measure them again: make bench ONLY=NAME, make targets, make prove, make blind"
+    [ "$commit" = HEAD ] || fail "$records"
+    echo "release: $records" >&2
   fi
   out=$PWD/build/release/$version
   rm -rf "$out" && mkdir -p "$out"

@@ -6,6 +6,7 @@ import gzip
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -154,10 +155,12 @@ def test_from_tag_to_archives(clone: Path) -> None:
     reported = _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, python="")
     assert "git tag -a v0.2.0" in reported
     assert "## 0.2.0 (20" in (clone / "CHANGELOG.md").read_text("utf-8")
-    command = clone / "gen" / "gyrotc" / "cli" / "shell.py"
+    command = clone / "gen" / "gyrotc" / "cli" / "schema.py"
     command.write_text(
         command.read_text("utf-8").replace("Print the JSON Schema of", "Print of the tag the JSON Schema of"), "utf-8"
     )
+    _run("git", "commit", "-qam", "The command of the release", cwd=clone)
+    _measured_with(clone, _run("git", "rev-parse", "--short=8", "HEAD", cwd=clone).strip())
     _run("git", "commit", "-qam", "Release 0.2.0", cwd=clone)
     _run("git", "tag", "-a", "v0.2.0", "-m", "x", cwd=clone)
     (clone / "libc" / "gtc_f32.c").write_text("not of the tag", "utf-8")
@@ -181,6 +184,29 @@ def test_from_tag_to_archives(clone: Path) -> None:
     (clone / "libc" / "gtc_f32.c").unlink()
     _run("git", "checkout", "-q", ".", cwd=clone)
     assert "there is a tag v0.2.0 already" in _run("tools/release.sh", "prepare", "0.2.0", cwd=clone, status=2)
+
+
+def _measured_with(folder: Path, commit: str) -> None:
+    """Write a commit into every record, as if it had been measured with its sources."""
+    for record in (folder / "docs" / "results").glob("*.json"):
+        record.write_text(re.sub(r'"commit": "[^"]*"', f'"commit": "{commit}"', record.read_text("utf-8")), "utf-8")
+
+
+@pytest.mark.parametrize("path", ["gen/gyrotc/model.py", "libc/gtc_f32.c", "include/gtc.h"])
+def test_a_release_whose_records_are_of_other_sources_is_refused_by_their_names(clone: Path, path: str) -> None:
+    """The version may differ, and pages; a line of the sources may not."""
+    measured = _run("git", "rev-parse", "--short=8", "HEAD", cwd=clone).strip()
+    _measured_with(clone, measured)
+    with (clone / path).open("a", encoding="utf-8") as source:
+        source.write("\n" if path.endswith(".py") else "/* changed */\n")
+    version = _run(sys.executable, "tools/version.py", cwd=clone).strip()
+    _run("git", "commit", "-qam", "Change", cwd=clone)
+    changelog = clone / "CHANGELOG.md"
+    changelog.write_text(re.sub(r"\(unreleased\)", "(2026-01-01)", changelog.read_text("utf-8"), count=1), "utf-8")
+    _run("git", "commit", "-qam", "Release", cwd=clone)
+    _run("git", "tag", f"v{version}", cwd=clone)
+    reported = _run("tools/release.sh", "archive", f"v{version}", "--sdist", cwd=clone, status=2)
+    assert f"accuracy ({measured}), blind ({measured})" in reported and not (clone / "build" / "release").exists()
 
 
 @pytest.mark.parametrize(
