@@ -10,7 +10,8 @@ import numpy as np
 
 from ..common.arrays import FloatArray
 from ..common.inputs import PLAUSIBLE_C
-from ..common.metrics import MAD_TO_SIGMA, Averages, median
+from ..common.metrics import Averages, median
+from ..common.statistics import noise_of
 from ..results.fleet import (
     ComparedRun,
     Copy,
@@ -111,7 +112,7 @@ def _noise(residual: FloatArray) -> float:
     """Noise of a mean from successive differences, of their bulk: steps and spikes do not count."""
     if residual.size < 3:
         return 0.0
-    return float(MAD_TO_SIGMA * median(np.abs(np.diff(residual))) / np.sqrt(2.0))
+    return float(noise_of(np.diff(residual)) / np.sqrt(2.0))
 
 
 def step_in(residual: FloatArray) -> tuple[int, float, float]:
@@ -181,7 +182,7 @@ def _of_kind(entries: Sequence[FleetUnit]) -> list[FleetOutlier]:
         scaled = np.log(values) if by_ratio else values
         distances = np.abs(scaled - np.median(scaled))
         sigma = max(
-            MAD_TO_SIGMA * float(np.median(distances)),
+            noise_of(distances),
             _LEAST_RATIO / _SIGMAS if by_ratio else _LEAST_OF_RMS / _SIGMAS * usual_rms,
         )
         if sigma == 0.0:
