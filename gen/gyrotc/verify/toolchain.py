@@ -3,8 +3,8 @@
 What is compiled and run may be somebody else's. Every command runs in the folder of its work, with an environment of
 its own, limits of time, memory and file size, no core dumps, and all of its processes end with it.
 
-What was compiled before is not compiled again, the runtime above all, which is the same for every serial: `shared_object`
-keeps objects and what was measured on them between calls.
+What was compiled before is not compiled again, above all the runtime, which is the same for every serial:
+`shared_object` keeps objects and what was measured on them between calls.
 
 Bare-metal targets are linked with parts of `bare/`: start-up code, and the few functions of the C
 library that the test programs use. Their standard input is the file `stdin.bin` of the working folder.
