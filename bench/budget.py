@@ -2,7 +2,9 @@
 
 Units that nothing was tuned on are calibrated as `gyrotc build` does it, with a thermometer and a reference whose
 errors are drawn from what their certificates state, and used at the end of the interval of a drift drawn from what
-the limits file states. Covered is a block of their exam where |true bias − correction| ≤ U.
+the limits file states. A gyro has a new offset at each power-on and a thermal gradient that no term of its table
+corrects, since the budget counts the repeatability of power-ons and thermal history that was not trained. Covered is a
+block of its exam where |true bias − correction| ≤ U.
 """
 
 from __future__ import annotations
@@ -27,9 +29,21 @@ from .records import Record
 from .sigma import CAMPAIGNS, exam_of
 
 FIRST_SEED = 300_000  # of gyros that nothing was tuned on
-UNITS = 200
+UNITS = 100
 _SHARES = (0.4, 0.2, 0.2, 0.2)  # of the first four campaigns, which have no terms
 _THERMOMETER_C, _REFERENCE_DPH, _DRIFT_DPH = 0.05, 3e-5, 1e-4  # 1 sigma, 1 sigma, most in the interval
+# 1 sigma of the offset from power-on to power-on, and the largest amplitude of a gradient. The map follows most of the
+# gradient; what remains of it is of the size of the other sources.
+_TURN_ON_DPH, _GRADIENT_DPH_PER_C = 5e-5, 9e-5
+_CAUSES = """
+[[cause]]
+id = "turn_on_offset"
+std_dph = {turn_on}
+[[cause]]
+id = "thermal_gradient"
+tau_s = 900.0
+amplitude_dph_per_c = {gradient}
+"""
 _LIMITS = f"""schema = 1
 [interval]
 days = 365.25
@@ -48,8 +62,9 @@ expanded_uncertainty = {2.0 * _REFERENCE_DPH}
 _TEXT = """
 {units} simulated gyros that were not used in development are calibrated by `gyrotc build`. The errors of temperature
 sensor ({thermometer} C), rate reference ({reference} deg/h; both 1 sigma) and drift (up to {drift} deg/h) are random
-within what certificates and limits file state. A block of 10 s of a test run is covered if |true bias − correction| ≤ U
-of the budget.
+within what certificates and limits file state. Each power-on has another offset ({turn_on} deg/h, 1 sigma), and each
+gyro a thermal gradient of 15 min that no term corrects (up to {gradient} deg/h/C). A block of 10 s of a test run is
+covered if |true bias − correction| ≤ U of the budget.
 """
 
 
@@ -75,10 +90,8 @@ def coverage_of(number: int, seed: int) -> Covered:
     draw = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory(prefix="gyrotc-budget-") as place:
         work = Path(place)
-        plan: str | Path = campaign.scenario
-        if "\n" in campaign.scenario:
-            plan = work / "scenario.toml"
-            plan.write_text(campaign.scenario, "utf-8")
+        plan = work / "scenario.toml"
+        plan.write_text(_scenario(campaign.scenario, draw.uniform(0.1, 1.0) * _GRADIENT_DPH_PER_C), "utf-8")
         (work / "limits.toml").write_text(_LIMITS, "utf-8")
         simulate(plan, seed=seed, out=work / "data", format="parquet")
         limits = load_limits(work / "limits.toml")
@@ -97,6 +110,12 @@ def coverage_of(number: int, seed: int) -> Covered:
         within += int(np.count_nonzero(np.abs(error[plain]) <= budget.expanded_dph))
         blocks += int(np.count_nonzero(plain))
     return Covered(campaign.name, within / blocks, budget.expanded_dph, budget.coverage_factor)
+
+
+def _scenario(base: str, gradient: float) -> str:
+    """Return the scenario of a unit: `base`, a name or TOML, with the causes that a budget counts."""
+    text = base if "\n" in base else f'extends = "{base}"\ntitle = "With what a budget counts"\n'
+    return text + _CAUSES.format(turn_on=_TURN_ON_DPH, gradient=gradient)
 
 
 def measure(settings: Settings) -> Record:
@@ -124,13 +143,20 @@ def _row(name: str, found: list[Covered]) -> dict[str, Any]:
 
 def table(record: Record) -> ResultsTable:
     """Return the coverage of all campaigns together, with its aim, and of the lowest and highest one."""
-    text = _TEXT.format(units=record["units"], thermometer=_THERMOMETER_C, reference=_REFERENCE_DPH, drift=_DRIFT_DPH)
+    text = _TEXT.format(
+        units=record["units"],
+        thermometer=_THERMOMETER_C,
+        reference=_REFERENCE_DPH,
+        drift=_DRIFT_DPH,
+        turn_on=_TURN_ON_DPH,
+        gradient=_GRADIENT_DPH_PER_C,
+    )
     (together,) = (row for row in record["rows"] if row["campaign"] == "together")
     ends = sorted((row for row in record["rows"] if row is not together), key=lambda row: row["covered"])
     return figures_table(
         text,
         [
-            ("blocks that are covered", Figure(together["covered"], ".1%", at_least=0.93, at_most=0.97)),
+            ("blocks that are covered", Figure(together["covered"], ".1%", at_least=0.92, at_most=0.98)),
             *((f"the same, {row['campaign']}", Figure(row["covered"], ".1%")) for row in (ends[0], ends[-1])),
             ("U, median, deg/h", Figure(together["expanded_dph"], ".2e")),
         ],
