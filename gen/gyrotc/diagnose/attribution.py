@@ -1,8 +1,8 @@
 """Attribution: which causes, alone or in pairs, how sure, and is anything left?
 
-Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, further
-ones while the search finds something beside them. What the chosen causes leave is held against the whole
-dictionary (lack of fit).
+Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, a clear pair in its
+place, and beside a cause that is constant in each run what the search finds within the runs. What the chosen causes
+leave is held against the whole dictionary (lack of fit).
 """
 
 from __future__ import annotations
@@ -79,7 +79,11 @@ class Attribution:
 
 @dataclass(frozen=True)
 class _Stage:
-    """A set of causes with everything that follows from it."""
+    """A set of causes with everything that follows from it.
+
+    Attributes:
+        within_runs: Whether the search found one of them only beside another that is constant in each run.
+    """
 
     chosen: tuple[Candidate, ...]
     refined: tuple[Refined, ...]
@@ -87,6 +91,7 @@ class _Stage:
     gain: float
     left: Misfit
     wide: WideMemory | None = None
+    within_runs: bool = False
 
     @property
     def remains(self) -> bool:
@@ -117,8 +122,27 @@ def attribute(search: Search) -> Attribution:
     if stage.remains:
         pairs = [p for p in gains.pairs() if makes_sense(p)]
         pair = clear_pair(singles, weigher.preferred(pairs), gains.size)
+        within = _within_runs(stage, pairs, gains.size) if pair is None else None
         if pair is not None:
             stage = _beside(search, gains, stage, pair)
+        elif within is not None:
+            two = replace(_beside(search, gains, stage, within), within_runs=True)
+            both = _concluded(search, weigher, singles, pairs, two, nothing)
+            if all(posterior.is_named for posterior in both.posteriors):  # else the first keeps its name
+                return both
+    return _concluded(search, weigher, singles, pairs, stage, nothing)
+
+
+def _concluded(
+    search: Search,
+    weigher: MarginalLikelihood,
+    singles: list[Point],
+    pairs: list[Point],
+    stage: _Stage,
+    nothing: Attribution,
+) -> Attribution:
+    """Return the posteriors of a set of causes; `nothing` where a single one is less likely than chance."""
+    gains = weigher.gains
     stage = _widened(search, gains, stage)
     order = _by_strength(singles, stage.chosen)
     stage = replace(
@@ -140,10 +164,10 @@ def attribute(search: Search) -> Attribution:
         simulated = calibrated(gains, place.pool, stage.chosen, k, likely.rivals)
         posteriors.append(Posterior(likely.id, (*simulated, *without)))
     return Attribution(
-        first=first,
+        first=nothing.first,
         detected=True,
         causes=stage.refined,
-        p_values=tuple(_p_value(first, r.candidate) for r in stage.refined),
+        p_values=tuple(_p_value(nothing.first, r.candidate) for r in stage.refined),
         posteriors=tuple(posteriors),
         gain=stage.gain,
         left=stage.left,
@@ -182,13 +206,17 @@ class _Place:
 def _place(
     search: Search, weigher: MarginalLikelihood, singles: list[Point], pairs: list[Point], stage: _Stage, k: int
 ) -> _Place:
-    """The place of the k-th cause: beside two others the search begins anew with these in every model."""
+    """The place of the k-th cause.
+
+    Beside two others, or one in whose runs it was found, the search begins anew with these in every model: the noise
+    within runs is known only then.
+    """
     gains, chosen = weigher.gains, stage.chosen
     size, others = gains.size, (*chosen[:k], *chosen[k + 1 :])
     if not others:
         best = max((p for p in singles if kinds_of(p.members) == kinds_of(chosen)), key=lambda p: p.criterion(size))
         return _Place(singles, weigher.over_nothing(singles, best))
-    if len(others) == 1:
+    if len(others) == 1 and not (stage.within_runs and _is_between_runs(others[0])):
         pool, without = pairs, max(p.criterion(size) for p in singles if kinds_of(p.members) == kinds_of(others))
     else:
         beside = Gains(_with(search, (*stage.refined[:k], *stage.refined[k + 1 :]))[0])
@@ -265,6 +293,24 @@ def _widened(search: Search, gains: Gains, stage: _Stage) -> _Stage:
     current, held = _with(search, stage.refined, wide)
     left = misfit(current, held, stage.refined, chance=wide.columns.shape[1])
     return replace(stage, found=detect(current, held), left=left, wide=wide)
+
+
+def _within_runs(stage: _Stage, pairs: Sequence[Point], size: int) -> Point | None:
+    """Return the best pair with the cause that the search finds within runs, beside one that is constant in each.
+
+    Such a cause has no form within runs, so what is found there is not its imperfection, and the level of the search is
+    enough.
+    """
+    (first,) = stage.chosen
+    found = next((f.candidate for f in stage.found if f.p_value <= LEVEL and f.candidate.role == "columns"), None)
+    if found is None or not _is_between_runs(first) or _is_between_runs(found):
+        return None
+    both = [p for p in pairs if kinds_of(p.members) == kinds_of((first, found))]
+    return best_of(both, size) if both else None
+
+
+def _is_between_runs(candidate: Candidate) -> bool:
+    return CATALOGUE[candidate.id].family == "between_runs"
 
 
 def _beside(search: Search, gains: Gains, one: _Stage, pair: Point) -> _Stage:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaigns import scenario
 from gyrotc.causes import CATALOGUE, History
 from gyrotc.common import average_rows
 from gyrotc.diagnose import (
@@ -352,6 +353,29 @@ def test_a_cause_beside_offsets_is_shipped_and_its_gain_is_that_of_runs_less_the
     first, second = (cause.gain for cause in found.physical)
     assert first is not None and second is not None
     assert second.exam_rms_before_dph == first.exam_rms_after_dph < first.exam_rms_before_dph, "one after the other"
+
+
+SMALL_BESIDE_OFFSETS = [
+    ("hysteresis", "width_c = 5.0\namplitude_dph_per_c = 2e-4", 303),
+    ("warm_up", "amplitude_dph = 0.003\ntau_s = 2500.0", 708),
+]
+
+
+@pytest.mark.parametrize(("cause", "parameters", "seed"), SMALL_BESIDE_OFFSETS)
+def test_a_small_cause_beside_offsets_is_named_and_shipped(
+    cause: str, parameters: str, seed: int, tmp_path: Path
+) -> None:
+    """A pair must be better than its best member by far more than the search asks for, and the offsets stood alone.
+
+    With the runs' constants taken out the search found the cause at its own level, and the noise was less.
+    """
+    offset = '[[cause]]\nid = "turn_on_offset"\nstd_dph = 0.005\n'
+    file = scenario(tmp_path, f'[[cause]]\nid = "{cause}"\n{parameters}\n{offset}')
+    simulate(file, seed=seed, out=tmp_path / "data", row_s=10.0)
+    found = diagnose(load(tmp_path / "data")).result
+    assert cause in {c.id for c in found.physical} and found.verdict in ("explained", "ambiguous")
+    assert found.extended is not None and found.extended.terms == (cause,)
+    assert found.extended.gain.shown == "gain" and found.extended.gain.about_means
 
 
 def test_the_strength_of_a_play_over_temperature_is_shipped_and_gains_on_the_exam(tmp_path: Path) -> None:
