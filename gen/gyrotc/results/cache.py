@@ -103,6 +103,8 @@ def head_of_content(name: str, content: bytes) -> bytes:
 
 def _is_own() -> bool:
     """Test whether the folder exists, belongs to the user, and nobody else may write into it."""
+    if not folder().is_absolute():  # of a user without a home: it would be made in the working folder
+        return False
     try:
         folder().mkdir(parents=True, exist_ok=True, mode=0o700)
         facts = folder().stat()

@@ -269,6 +269,14 @@ def test_what_is_kept_and_damaged_or_of_another_name_is_thrown_away(
     assert kept.kept("a.object", bytes) is None, "others may write there"
 
 
+def test_nothing_is_kept_in_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "user_cache_path", lambda *_, **__: Path("~/.cache"))  # what a user without a home has
+    monkeypatch.chdir(tmp_path)
+    kept.keep("a.object", b"content")
+    assert kept.kept("a.object", bytes) is None
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_line_without_an_end_does_not_fill_memory(tmp_path: Path) -> None:
     folder = tmp_path / "RLG-1"
     folder.mkdir()
