@@ -1,7 +1,7 @@
 """Changes of a build since an earlier one of the same gyro, with the state of the unit as found.
 
 A gyro that is calibrated again should give nearly the same map. Where it does not, the difference over the
-envelope is the drift of the gyro, of its thermometer or of the procedure, and belongs into the report.
+envelope is the drift of the gyro, of its temperature sensor or of the procedure, and belongs into the report.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A finding has an id that stays stable, a text, and the numbers behind it. Findin
 from figures alone: no name of a file, folder or serial plays a part.
 
 The residual of a run is what compensation leaves of it, in means over `average_s`. Its autocorrelation, and its RMS
-over the noise floor, are held against their distributions for white noise of the same runs, which are drawn: the
+over the noise floor, are compared with their distributions for white noise of the same runs, which are drawn: the
 noise floor comes from successive differences, so that slow structure raises both. Noise of a gyro that is not white
 (bias instability, rate random walk) is more than noise here, too: `gyrotc diagnose` tells it from a cause.
 """

@@ -262,7 +262,7 @@ def evaluate(
 ) -> None:
     """Replay recordings through the compiled C code and measure.
 
-    Every step is compared with the reference. The limits of the result are held against the new figures.
+    Every step is compared with the reference. The limits of the result are compared with the new figures.
 
     Example: gyrotc evaluate result recordings --trace result/trace
     """

@@ -109,7 +109,7 @@ class BuildRequest:
         numerics: Arithmetics of the tables; None: all.
         targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
-        limits: A limits file that the result is held against.
+        limits: A limits file that the result is compared with.
         previous: An earlier result of the same gyro, to find what changed.
         prior: An earlier result of the same gyro that is taken for what is known of it, if the recordings (those of a
             check run) do not speak against it; also the `previous` one where none is given.

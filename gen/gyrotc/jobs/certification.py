@@ -171,13 +171,13 @@ def certificate(
 
 
 def _refuse_two_limits(folder: Path, units: Sequence[UnitResults]) -> None:
-    """Refuse axes that were held against different limits.
+    """Refuse axes that were judged by different limits.
 
     Raises:
         InputError: They were.
     """
     if len({unit.limits.sha256 if unit.limits else None for unit in units}) > 1:
-        raise InputError(str(folder), "axes were held against different limits", "axes that were built together")
+        raise InputError(str(folder), "axes were judged by different limits", "axes that were built together")
 
 
 def _last_day(folder: Path, stated: LaboratoryFacts, first: UnitResults) -> str | None:
@@ -259,8 +259,8 @@ def missing_facts(facts: LaboratoryFacts, units: Sequence[UnitResults]) -> Itera
     instruments = budget.instruments if budget else ()
     if budget and not any(one.quantity == "temperature" and one.certificate for one in instruments):
         yield (
-            "a thermometer with its certificate (state it as [[meta.instrument]] of dataset.toml or as [[instrument]]"
-            ' of the limits file of build, quantity = "temperature"; then build again)'
+            "a temperature sensor with its certificate (state it as [[meta.instrument]] of dataset.toml or as"
+            ' [[instrument]] of the limits file of build, quantity = "temperature"; then build again)'
         )
 
 

@@ -151,7 +151,7 @@ def checked_result(content: Any, kind: type[R], where: str, text: bytes | None =
 
 ADVICE = {
     "coarse_rate": "Record the rate with more digits, in a finer range of the converter, or as pulses.",
-    "coarse_temperature": "Record more digits of the thermometer, or one with a finer resolution.",
+    "coarse_temperature": "Record more digits of the temperature, or use a sensor with a finer resolution.",
     "coarse_time": "Number the rows instead of trusting the stamps: gyrotc import FILE --set time.rate_hz=R, or record "
     "finer stamps.",
     "constant_channel": "Look whether the sensor was connected; take the column out if it says nothing.",
@@ -159,7 +159,7 @@ ADVICE = {
     "earth_rate_not_stated": 'Say in dataset.toml what was done about it: earth_rate = "removed", "none" or "compute".',
     "gaps": "Look at the logger (buffer, disk, cable) at these times. Blocks with fewer than half of their rows are "
     "left out by themselves.",
-    "jump_in_temperature": "Look for a loose contact or a change of the thermometer there; leave the stretch out by "
+    "jump_in_temperature": "Look for a loose contact or a change of the sensor there; leave the stretch out by "
     "exclude, or cut the run by from_s and to_s.",
     "left_out": "Nothing, if it is meant so.",
     "mostly_holds": "Record ramps at several rates, up and down.",
@@ -179,7 +179,7 @@ ADVICE = {
     "rate_held": "Record at the gyro's own rhythm, or keep every row of it once.",
     "shared_axes": "Look at the wiring of the channels and at the columns of the logger.",
     "stuck_rate": "Look at the logger and the gyro's data line there; leave the stretch out by exclude.",
-    "stuck_temperature": "Look at the thermometer's wiring; paste the exclude line.",
+    "stuck_temperature": "Look at the wiring of the temperature sensor; paste the exclude line.",
     "temperature_late": "Pair the files of this run anew and convert them again, or leave the run out.",
     "units_trusted": "Nothing, if the values are right as they are; else declare their unit.",
     "time_drifts": "Find out which clock is right. If the gyro's is: number the rows, gyrotc import FILE --set "

@@ -104,8 +104,8 @@ class TrueRun(Part):
     states: dict[str, str] | None = Field(
         default=None,
         description="files of the true states by name, mean over each step of the noise: temperatures of the nodes "
-        "(C), losses and gain (1e-6), stroke (half wavelengths); null without further thermometers, differences of "
-        "nodes and laser",
+        "(C), losses and gain (1e-6), stroke (half wavelengths); null without further temperature sensors, "
+        "differences of nodes and laser",
     )
 
 

@@ -169,10 +169,10 @@ class CandidateModel(Part):
 
 
 class ChannelTried(Part):
-    """A recorded channel, or a difference of thermometers, that was tried as an input (`channels` of `[fit]`)."""
+    """A recorded channel, or a difference of temperature sensors, tried as an input (`channels` of `[fit]`)."""
 
     name: str = Field(
-        description='column of the channel; "a - b" for a difference, the gyro\'s own thermometer is "temperature_c"'
+        description='column of the channel; "a - b" for a difference, the gyro\'s own sensor is "temperature_c"'
     )
     verdict: Literal["taken", "not earned", "collinear", "refused"] = Field(description="decision on the channel")
     reason: str = Field(description="reason of the decision, in words")
