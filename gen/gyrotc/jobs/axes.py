@@ -15,7 +15,6 @@ from ..results.folder import scratch_folder
 from ..results.marker import read_marker
 from ..results.release import JointVerification, Verification
 from ..results.templates import c_templates
-from ..tables.emission import emitted_tables
 from ..tables.record import RECORD, joint_record_text
 from ..tables.runtime import RUNTIME_FILES, joint_needs, needs_of, runtime_texts
 from ..tables.text import example_period_us, example_samples
@@ -35,10 +34,9 @@ def join_axes(folder: Path, axes: Sequence[str]) -> None:
         CheckFailed: The image does not link, or a table does not pass its self-test in it.
     """
     models = {axis: load_model(folder / axis / "model.json") for axis in axes}
-    numerics = list(emitted_tables(folder / axes[0] / "c", models[axes[0]]))
     c = folder / "c"
     c.mkdir()
-    for name, data in joint_texts(models, _sources(folder, axes), numerics[0]).items():
+    for name, data in joint_texts(models, _sources(folder, axes)).items():
         write_own(c / name, data)
     _run_together(c, [m.id for m in models.values()])
     write_atomically(folder / "report.html", axes_page(folder, axes))
@@ -51,31 +49,43 @@ def _sources(folder: Path, axes: Sequence[str]) -> dict[str, dict[str, bytes]]:
     }
 
 
-def joint_texts(
-    models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]], numeric: str
-) -> dict[str, bytes]:
-    """All files of the `c/` of a unit by name.
+def joint_texts(models: Mapping[str, Model], sources: Mapping[str, Mapping[str, bytes]]) -> dict[str, bytes]:
+    """Return all files of the `c/` of a unit by name.
+
+    The axes may have different arithmetics: a product's may be refused for one axis, which then has the other. `main.c`
+    uses float32 for an axis that has both.
 
     Args:
         models: Models by axis.
         sources: Files of each axis's own `c/` by name.
-        numeric: The arithmetic that `main.c` uses.
     """
-    headers = "".join(sources[a].get(f"gtc_{m.id}.h", b"").decode("latin-1") for a, m in models.items())
-    held = [n for n in NUMERICS if f"gtc_{n}_table_t" in headers]  # of all axes
+    numerics = {axis: _numerics_in(sources[axis].get(f"gtc_{model.id}.h", b"")) for axis, model in models.items()}
+    held = [n for n in NUMERICS if any(n in of_axis for of_axis in numerics.values())]
     texts = runtime_texts(joint_needs(needs_of(model) for model in models.values()), held)
     for axis, model in models.items():
         own = (f"gtc_{model.id}.", f"gtc_{model.id}_")
         texts |= {name: data for name, data in sources[axis].items() if name.startswith(own)}
-    listed = list(models.values())
+    first = next(iter(models.values()))
+    used = {axis: next(iter(of_axis), NUMERICS[0]) for axis, of_axis in numerics.items()}
     main = (
         c_templates()
         .get_template("main_axes.c.j2")
-        .render(models=listed, n=numeric, period_us=example_period_us(listed[0]), samples=example_samples(listed[0]))
+        .render(
+            axes=[{"model": model, "numeric": used[axis]} for axis, model in models.items()],
+            numerics=[n for n in NUMERICS if n in used.values()],
+            temperature_c=sum(first.envelope.temperature_c) / 2,
+            period_us=example_period_us(first),
+            samples=example_samples(first),
+        )
     )
     texts["main.c"] = main.encode("ascii")
     texts[RECORD] = joint_record_text(models, texts)
     return texts
+
+
+def _numerics_in(header: bytes) -> list[str]:
+    """Return the arithmetics of the tables that a header declares."""
+    return [n for n in NUMERICS if f"gtc_{n}_table_t".encode() in header]
 
 
 def axes_in(folder: Path) -> tuple[str, ...]:
@@ -128,8 +138,7 @@ def verify_axes(
     refuse_parts_of_two(folder, models)
     if not (folder / "c").is_dir():
         raise InputError(str(folder / "c"), "is not there", "the files of all axes, as build wrote them")
-    numeric = next(iter(results.values())).errors[0].numeric
-    texts = joint_texts(models, _sources(folder, tuple(results)), numeric)
+    texts = joint_texts(models, _sources(folder, tuple(results)))
     emitted = tuple(file_entries(folder / "c", texts))
     wrong = sum(file.status == "fail" for file in emitted)
     return JointVerification(

@@ -235,6 +235,23 @@ def test_an_arithmetic_that_is_needed_and_refused_misses_its_limit(tmp_path: Pat
     assert list(json.loads((out / "manifest.json").read_text())["refused"]) == ["q31"]
 
 
+def test_the_arithmetic_may_be_refused_for_one_axis_alone(tmp_path: Path, gyrotc: Command) -> None:
+    """Its bias is beyond the range of the product's fixed point; the axes run in one image all the same."""
+    rows = columns(720)
+    constants = {"x": 300.0, "y": -20.0, "z": -20.001}
+    rates = {f"rate_{axis}_dph": rows["rate_dph"] + constant for axis, constant in constants.items()}
+    write_csv(tmp_path / "imu" / "run-01.csv", {name: rows[name] for name in ("time_s", "temperature_c")} | rates)
+    product = tmp_path / "product.toml"
+    product.write_text('schema = 1\nq31_bias_frac_bits = 24\n[needs]\narithmetics = ["q31"]\n')
+    out = tmp_path / "out"
+    host = ("--target", "host-gcc-O2")
+    done = gyrotc("build", *host, "--limits", product, tmp_path / "imu", "--out", out)
+    assert done.returncode == 1 and "axis x: limit needs.arithmetics q31 is not met: f32" in done.stderr
+    tables = {axis: (out / "c" / f"gtc_imu_{axis}.h").read_text() for axis in "xyz"}
+    assert {axis: "gtc_q31_table_t" in text for axis, text in tables.items()} == {"x": False, "y": True, "z": True}
+    assert gyrotc("verify", out, *host).returncode == 0
+
+
 _TERM = Term(id="auxiliary", parameters={"slope_dph_per_unit": 0.01, "reference": 28.0}, channel="supply_v")
 _TRAINED = Guard(
     low=27.0, high=29.0, max_step=2.0, max_rate_per_min=0.5, agree_s=1.0, stuck_s=0.0, missing_s=300.0,

@@ -376,7 +376,7 @@ def test_a_result_of_all_axes_is_judged_with_its_joint_folder(tmp_path: Path) ->
         c = emitted(unit / axis, one) / "c"
         sources[axis] = {p.name: p.read_bytes() for p in c.iterdir()}
     (unit / "c").mkdir()
-    for name, data in joint_texts(models, sources, "f32").items():
+    for name, data in joint_texts(models, sources).items():
         (unit / "c" / name).write_bytes(data)
     assert axes_in(unit) == ("x", "y") and axes_in(unit / "x") == ()
     results = {axis: verify(unit / axis, compiled=False) for axis in "xy"}
