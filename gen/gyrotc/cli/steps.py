@@ -143,6 +143,7 @@ def emit(
     Example: gyrotc emit result/model.json --out result --map result/map.csv
     """
     from ..model import load_model
+    from ..results.destination import check_contents, check_separate
     from ..results.files import write_own
     from ..results.folder import result_folder, write_result
     from ..results.json_text import json_text
@@ -153,6 +154,11 @@ def emit(
 
     loaded = load_model(model)
     there = out / "model.json"
+    if board is not None:  # before anything is written
+        check_separate(board)
+        check_contents(board, "board test", None)
+        if board.resolve() in (out.resolve(), there.resolve(), (out / "c").resolve()):
+            raise InputError("--board", f"{board} is part of the result already", str(out / "board"))
     with progress() as say, result_folder(out, "emit", entries=("c", "model.json")) as stage:
         stage.of(loaded.serial, loaded.axis)
         if there.is_file() and there.read_text("utf-8") != loaded.to_json():

@@ -195,8 +195,17 @@ def test_the_board_test_is_written_where_it_is_asked_for(tmp_path: Path, gyrotc:
     lines = [f"{status:08x} {bits:08x}" for numeric in rows for status, bits in rows[numeric].tolist()]
     assert [line for line in (board / "answers.txt").read_text("ascii").splitlines() if line[0] != "b"] == lines
     assert sum((board / name).stat().st_size for name in names - {"answers.txt"}) < 100_000
-    (board / "notes.txt").write_text("of somebody else\n")
-    assert gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--board", board).returncode == 2
+
+
+def test_nothing_is_emitted_if_the_board_test_cannot_be_written(tmp_path: Path, gyrotc: Command) -> None:
+    out, foreign = tmp_path / "result", tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "notes.txt").write_text("of somebody else\n")
+    for place in (foreign, foreign / "notes.txt", out, out / "c"):
+        done = gyrotc("emit", EXAMPLE / "model.json", "--out", out, "--board", place)
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+        assert not out.exists()
+    assert (foreign / "notes.txt").read_text() == "of somebody else\n"
 
 
 def test_the_runtime_of_several_tables_has_what_each_needs() -> None:
