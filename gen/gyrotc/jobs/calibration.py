@@ -106,7 +106,7 @@ class BuildRequest:
         fit: Options of training, and the lot of the unit.
         axis: Axis of three-axis recordings; None makes a result for each in `out/x`, `out/y`, `out/z`, and in `out/c`
             the runtime once with all tables; "all" the same, but refuses recordings of one rate.
-        numerics: Arithmetics of the tables; None: all.
+        numerics: Arithmetics of the tables; None: those that the limits need, else all.
         targets: Names of the targets that the code is verified on; none: those of the limits, else as `verify`.
         extend: Diagnose first, and build the extended model where it gains on runs that it was not fitted to.
         limits: A limits file that the result is compared with.
