@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -53,7 +54,7 @@ def joint_texts(models: Mapping[str, Model], sources: Mapping[str, Mapping[str, 
     """Return all files of the `c/` of a unit by name.
 
     The axes may have different arithmetics: a product's may be refused for one axis, which then has the other. `main.c`
-    uses float32 for an axis that has both.
+    uses the first that each has, as its own `main.c` does.
 
     Args:
         models: Models by axis.
@@ -84,8 +85,8 @@ def joint_texts(models: Mapping[str, Model], sources: Mapping[str, Mapping[str, 
 
 
 def _numerics_in(header: bytes) -> list[str]:
-    """Return the arithmetics of the tables that a header declares."""
-    return [n for n in NUMERICS if f"gtc_{n}_table_t".encode() in header]
+    """Return the arithmetics of the tables that a header declares, in its order."""
+    return [n for n in re.findall(r"^extern const gtc_(\w+)_table_t ", header.decode("latin-1"), re.M) if n in NUMERICS]
 
 
 def axes_in(folder: Path) -> tuple[str, ...]:

@@ -249,6 +249,10 @@ def test_the_arithmetic_may_be_refused_for_one_axis_alone(tmp_path: Path, gyrotc
     assert done.returncode == 1 and "axis x: limit needs.arithmetics q31 is not met: f32" in done.stderr
     tables = {axis: (out / "c" / f"gtc_imu_{axis}.h").read_text() for axis in "xyz"}
     assert {axis: "gtc_q31_table_t" in text for axis, text in tables.items()} == {"x": False, "y": True, "z": True}
+    main = (out / "c" / "main.c").read_text()
+    assert [name for name in ("x_f32", "x_q31", "y_f32", "y_q31", "z_q31") if f"&gtc_imu_{name})" in main] == [
+        "x_f32", "y_q31", "z_q31",
+    ]  # fmt: skip
     assert gyrotc("verify", out, *host).returncode == 0
 
 
