@@ -3,9 +3,8 @@
  * The step functions call them with a temperature within the envelope, which is within ENVELOPE_LEAST to ENVELOPE_MOST
  * and may lie beyond every plausible reading; they touch nothing but the state of their own term. The state of a memory
  * is any number at all: beyond FOLLOWED it begins again. A play is as far from such a temperature as it is wide; the
- * mean of a channel is a number. That a memory moves towards its argument and no
- * farther (docs/proof.md), and that a mean lies between its samples, is argued there; follow.c shows that the first
- * has no error.
+ * mean of a channel is a number. docs/proof.md argues that a memory moves towards its argument and no farther, and
+ * that a mean lies between its samples; follow.c shows that the first has no error.
  */
 #include "arithmetic.h"
 
