@@ -52,7 +52,8 @@ _STEP_S = 30.0  # what takes no longer is a step
 _DURATIONS_S = (0.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 450.0, 600.0)
 _TRIED_S = (0.0, 150.0, 600.0)  # durations of the search: a place found is then tried for all
 _BACK_S = (120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0)  # after which a displaced rate comes back: octaves
-_CANDIDATES = 0.5**0.25  # share of its size over error that a length keeps half an octave from those of the search
+# A displaced rate, tried with a length half an octave from its own, keeps this share of its size over error.
+_CANDIDATES = 0.5**0.25
 _MARGIN = 1.2  # beyond chance: memories of the temperature leave kinks that no noise makes; chosen on recordings
 _KINDS = 4.0  # kinds of change, as looks: shapes of one kind are nearly one
 _INDEPENDENT = 5.0  # cells to a degree of freedom of a scale from a median of what is correlated
@@ -230,7 +231,13 @@ class _Search:
     """Runs with the noise that their changes are judged against."""
 
     def __init__(self, runs: WhiteRuns, curves: list[FloatArray], share: float) -> None:
-        """Prepare; `share`: of the size that makes a change clear, which those that are returned must have."""
+        """Keep the runs; what noise makes of each shape is estimated when they are first looked at.
+
+        Args:
+            runs: Runs with whitened noise.
+            curves: Times and the map along each run, shape (2, n); the search fits them anew in this list.
+            share: Changes are returned from this share of the size on that makes one clear.
+        """
         self._runs, self._cells, self._curves = runs, runs.regression.cells, curves
         self._looks = _KINDS * sum(len(one) for one in self._cells)
         chance = -float(stdtrit(self._looks / _KINDS / _INDEPENDENT, FALSE_ALARMS / 2.0 / self._looks))
@@ -479,11 +486,8 @@ class _Search:
                 for tried_s in (shifts, cells.cell_s * np.array(_PARTS)):
                     kept = tried_s[(length + tried_s if end else length - tried_s) >= least_s]
                     moved = [_shifted(at, float(s), end) for s in kept]
-                    at = (
-                        max(zip(self._gains(fit, moved), moved, strict=True), key=lambda pair: pair[0])[1]
-                        if moved
-                        else at
-                    )
+                    if moved:
+                        at = moved[int(np.argmax(self._gains(fit, moved)))]
             if at == before:
                 break
         return at

@@ -28,7 +28,8 @@ RowArrays = tuple[FloatArray, FloatArray, FloatArray]
 
 _KNOTS_C = (5.0, 2.5, 1.25)  # between knots of the map: finer ones only where the recordings say so
 _LEAST_SPAN_C = 1.0  # the temperature moves less: a level and a trend say all of it
-# Windows of dT/dt: a fine sensor shows the corners of a programme, a resolution of 0.1 C ramps only (0.01 C/min).
+# Windows of dT/dt. With a fine sensor the short one follows the corners of a programme; with a resolution of 0.1 C only
+# the long one is of use, where that makes an error of 0.01 C/min.
 _SLOPES_S = (60.0, 300.0)
 _WARM_UP_S = (300.0, 1000.0, 3000.0)  # time constants of a level that settles after power-on
 _GAP_CELLS = 3.0  # without rows: the next cell comes behind a gap
