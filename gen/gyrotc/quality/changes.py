@@ -482,8 +482,9 @@ class _Search:
                 length = at.back.middle_s - at.middle_s
                 reach = max(_AROUND_S, (_CANDIDATES**-2 - 1.0) * length)
                 shifts = np.arange(-reach, reach + cells.cell_s, cells.cell_s)
-                shifts = shifts[:: max(len(shifts) // _PLACES, 1)]
-                for tried_s in (shifts, cells.cell_s * np.array(_PARTS)):
+                every = max(len(shifts) // _PLACES, 1)
+                between = cells.cell_s * np.arange(1.0 - every, every)
+                for tried_s in (shifts[::every], between, cells.cell_s * np.array(_PARTS)):
                     kept = tried_s[(length + tried_s if end else length - tried_s) >= least_s]
                     moved = [_shifted(at, float(s), end) for s in kept]
                     if moved:

@@ -214,3 +214,17 @@ def test_a_rate_that_is_displaced_by_twelve_sigma_of_its_mean_is_one_event_of_it
         assert all(abs(low - first) + abs(high - first - count) < 0.5 * count + 8 for low, high in ends)
     assert found.count(True) >= 4  # of one the temperatures explain two thirds
     assert found.count(False) == 0
+
+
+def test_a_rate_that_is_displaced_for_a_day_is_left_out_from_end_to_end() -> None:
+    """Its ends are placed as well as those of a short one."""
+    rng = np.random.default_rng([5, 2])
+    time = np.arange(0.0, 3600.0 * 50, 10.0)
+    temperature = 15.0 + 30.0 * np.sin(time / 9000.0)
+    block = temperature + 0.01 * rng.standard_normal(time.size)
+    rate = 0.01 * np.tanh(temperature / 30.0) + 7e-3 / np.sqrt(10.0) * rng.standard_normal(time.size)
+    first, end = 2426, 14320
+    rate[first:end] += 0.006
+    [event] = judged(time, block, rate).events
+    assert event.kind == "displaced"
+    assert first - 8 <= event.rows[0] <= first and end <= event.rows[1] <= end + 8
