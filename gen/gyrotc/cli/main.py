@@ -177,7 +177,10 @@ def hoisted(arguments: list[str]) -> list[str]:
     words = iter(arguments[:end])
     for word in words:
         if word == _CEILING:
-            front += [word, *islice(words, 1)]
+            value = list(islice(words, 1))
+            if not value:
+                return [word]  # the option says that it lacks its value; in front of a command it would take its name
+            front += [word, *value]
         else:
             (front if word in _ANYWHERE or word.startswith(f"{_CEILING}=") else others).append(word)
     return [*front, *others, *arguments[end:]]

@@ -2,7 +2,7 @@
 
 Stepwise with a look at all pairs: a first cause is taken when the search finds anything at all, a clear pair in its
 place, and beside a cause that is constant in each run what the search finds within the runs. What the chosen causes
-leave is held against the whole dictionary (lack of fit).
+leave is compared with the whole dictionary (lack of fit).
 """
 
 from __future__ import annotations

@@ -153,7 +153,7 @@ _COLOUR_RATIO = 16.0  # twice the log-likelihood ratio between the best colour a
 
 @dataclass(frozen=True)
 class Search(Question):
-    """A data set, the signatures it is held against, and its views.
+    """A data set, the signatures it is compared with, and its views.
 
     Attributes:
         channels: Columns of the auxiliary channels, as they were given.

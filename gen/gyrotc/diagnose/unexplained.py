@@ -1,6 +1,6 @@
 """Lack of fit: do the chosen causes explain the data better than shapes that no cause has, and is anything left?
 
-Three tests: what the causes leave is held against the whole dictionary, flat and weighted; and every cause must
+Three tests: what the causes leave is compared with the whole dictionary, flat and weighted; and every cause must
 have one amplitude over all runs, temperatures and directions: a foreign effect that happens to look like a cause in
 one run does not in the next. Each under every colour of the noise that the data allow, and on their average by
 likelihood, for a colour that is a little too fast makes structure of the noise; and under the declared noise, unless

@@ -1,7 +1,7 @@
 """Find temperature sensors that are not in a run what they are in the others.
 
 In every run a thermometer follows the gyro's own: u − T = offset + share (T − mean) − lag dT/dt. What the other runs
-agree on is held against the run.
+agree on is compared with the run.
 """
 
 from __future__ import annotations

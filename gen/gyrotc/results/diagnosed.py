@@ -218,7 +218,7 @@ class CycleResult(Part):
     not_testable: str | None = Field(
         description="reason why memory cannot be distinguished from a static map; null if it can"
     )
-    gain: GainOnUnseen | None = Field(description="gain of the best memories on unseen runs; null if there are none")
+    gain: GainOnUnseen | None = Field(description="gain of the best memories on held-out runs; null if there are none")
     static: tuple[StaticRate, ...] = Field(description="maps without memory, the best first")
     tried: tuple[TriedMemories, ...] = Field(description="combinations of memories, the best first")
 
@@ -261,7 +261,7 @@ class Diagnosed(UnitResult):
     causes: tuple[NamedCause, ...] = Field(description="named causes and kinds of noise")
     baseline: Baseline | None = Field(description="static map; null if nothing could be decided")
     extended: ExtendedModel | None = Field(
-        description="model with terms for the causes; null if none gains on unseen runs"
+        description="model with terms for the causes; null if none gains on held-out runs"
     )
     considered: tuple[ConsideredCause, ...] = Field(description="all causes of the catalogue")
     missing: tuple[str, ...] = Field(description="causes that these recordings cannot test, with the reason")

@@ -28,7 +28,7 @@ _POWERS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1))  # of T and dT/dt
 # their |weights|: 5.2e-4 and 15; 2.4e-4 and 25. Closer ones cancel one another so much that fixed point loses more.
 _GAUSSIANS = ((3, 1.5, 1.5), (4, 1.5, 2.0))
 _TOLERANCE = 0.01  # of the noise floor
-_GRID = 201  # points at which Gaussians are held against powers, at a hundredth of a half range
+_GRID = 201  # points at which Gaussians are compared with powers, at a hundredth of a half range
 
 
 def without_rate(fitted: NetworkEntry) -> dict[str, Any]:

@@ -46,6 +46,7 @@ def test_options_of_the_whole_program_stand_anywhere() -> None:
     assert hoisted(["build", "data", "-q", "--out", "x"]) == ["-q", "build", "data", "--out", "x"]
     assert hoisted(["check", "--", "-q"]) == ["check", "--", "-q"]
     assert hoisted(["--verbose", "check"]) == ["--verbose", "check"]
+    assert hoisted(["check", "data", "--max"]) == ["--max"]  # and does not take "check" for its value
     assert hoisted(["check", "data", "--max", "columns=2"]) == ["--max", "columns=2", "check", "data"]
     assert hoisted(["check", "--max=columns=2", "data"]) == ["--max=columns=2", "check", "data"]
 
