@@ -33,7 +33,7 @@ def test_one_chamber_cycle_gives_no_correction_that_is_not_shown_to_hold(tmp_pat
     """Whatever is emitted is, on branches left out, no worse than a constant; and it is said."""
     for result in built("mpu6000-chamber-cycle", tmp_path / "out", gyrotc).values():
         assert ("does_not_generalise" in found(result)) == (result["model"]["method"] == "constant")
-        assert "jump_in_temperature" in found(result), "the start-up row"
+        assert "temperature_outliers" in found(result), "the start-up row"
         assert result["evaluate"]["mismatches"] == 0
         candidates = {row["id"]: row for row in result["training"]["candidates"]}
         [chosen] = (row for row in candidates.values() if row["chosen"])
@@ -67,7 +67,7 @@ def test_findings_follow_the_rates_and_not_the_folder(tmp_path: Path, gyrotc: Co
         (folder / "data.csv").write_text("\n".join(["time_s,temperature_c,rate_dph", *scaled]) + "\n")
         assert gyrotc("build", folder, "--out", tmp_path / f"out{scale}", *HOST).returncode == 0
         results.append(found({"evaluate": json.loads((tmp_path / f"out{scale}" / "evaluate.json").read_text())}))
-    assert "jump_in_temperature" in results[0] and results[1] == results[0] | {"earth_rate_not_stated"}
+    assert "temperature_outliers" in results[0] and results[1] == results[0] | {"earth_rate_not_stated"}
 
 
 def test_simulated_data_under_a_real_name_have_no_findings(tmp_path: Path, gyrotc: Command) -> None:
