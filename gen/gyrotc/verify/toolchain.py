@@ -457,19 +457,23 @@ def _inspected(target: Target, tool: str, options: Sequence[str], files: Sequenc
 @functools.cache
 def _tool(compiler: str, tool: str) -> str:
     """Path of the tool that belongs to a compiler."""
-    asked = [compiler, f"-print-prog-name={tool}"]
-    return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or tool
+    return _said_of_itself(compiler, f"-print-prog-name={tool}") or tool
 
 
 @functools.cache
 def compiler_version(compiler: str) -> str:
     """Name and version in one short text, e.g. ``gcc 12.2.0``."""
     for option in ("-dumpfullversion", "-dumpversion"):
-        done = subprocess.run([compiler, option], capture_output=True, text=True, check=False)
-        version = done.stdout.strip()
-        if done.returncode == 0 and len(version.splitlines()) == 1:
+        version = _said_of_itself(compiler, option)
+        if len(version.splitlines()) == 1:
             return f"{compiler} {version}"
     return compiler
+
+
+def _said_of_itself(compiler: str, option: str) -> str:
+    """Return what a compiler prints about itself; empty if it fails."""
+    done = run_to_end([compiler, option], Path(tempfile.gettempdir()), f"{compiler} {option}")
+    return done.stdout.decode("utf-8", "replace").strip() if done.returncode == 0 else ""
 
 
 def run_compiler(target: Target, command: list[str], folder: Path) -> None:
