@@ -218,6 +218,10 @@ def run(arguments: list[str]) -> int:
         print("gyrotc: not enough memory for this job on this machine", file=sys.stderr)
         return GyrotcError.exit_status
     except Exception as error:  # a fault of the program: the user gets one line, the file gets the traceback
+        from ..results.signals import interruption_in
+
+        if (interruption := interruption_in(error)) is not None:
+            raise interruption from None
         if isinstance(error, RuntimeError) and str(error).startswith(_LOOP):
             print(f"gyrotc: {terminal_line(str(error))}; expected a path that ends somewhere", file=sys.stderr)
             return GyrotcError.exit_status

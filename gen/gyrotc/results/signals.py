@@ -25,6 +25,14 @@ class _State:
     waiting: int | None = None
 
 
+def interruption_in(error: BaseException) -> Interrupted | None:
+    """Return the signal behind an error: some libraries make an error of their own of whatever ends their import."""
+    behind: BaseException | None = error
+    while behind is not None and not isinstance(behind, Interrupted):
+        behind = behind.__cause__ or behind.__context__
+    return behind
+
+
 def raise_on_signals() -> None:
     """Let SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread; a signal that is ignored stays so."""
     for number in _ENDING:

@@ -32,7 +32,7 @@ from gyrotc.jobs import build as build_result
 from gyrotc.model import load_model
 from gyrotc.quality import check
 from gyrotc.recordings import FileFormat, load
-from gyrotc.results import MARKER
+from gyrotc.results import MARKER, Interrupted
 from gyrotc.tables import emit
 from gyrotc.train import FitOptions, fit_dataset
 from hypothesis import given
@@ -160,6 +160,20 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     described(folder / "lot" / "RLG-1")
     emitted(folder / "made")
     return folder
+
+
+def test_a_signal_that_a_library_made_an_error_of_is_a_signal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modules in C++ say "initialization failed" of whatever ends their import."""
+
+    def importing(*_arguments: object, **_options: object) -> None:
+        try:
+            raise Interrupted(signal.SIGINT)
+        except Interrupted as end:
+            raise ImportError("initialization failed") from end
+
+    monkeypatch.setattr("gyrotc.cli.main.application", lambda: importing)
+    with pytest.raises(Interrupted):
+        run(["check", "data"])
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -283,7 +283,7 @@ def test_strange_folders_concern_themselves_alone(tmp_path: Path) -> None:
         assert "is a name in the folder of a fleet" in rows[name]["reason"]
     assert len(list(csv.DictReader((out / "fleet.csv").read_text("utf-8").splitlines()))) == 6
     assert r"RLG-\xff" in (out / "fleet.html").read_text("utf-8")
-    assert len(done.stdout.splitlines()) == 7, "a line for each, whatever its name"
+    assert len(done.stdout.splitlines()) == 8, "a line for each, whatever its name, the page, the next step"
 
 
 def test_names_that_are_no_names(tmp_path: Path) -> None:
