@@ -307,14 +307,17 @@ def _unseen(evaluation: Evaluation, explained: float) -> Contribution | str:
     judged = evaluation.judged()
     lasting = judged[1].lasting if judged and judged[0] != "train" else None
     if judged is None or lasting is None:
+        why = "no recordings were left out"
+        if judged is not None and judged[0] != "train":  # too few means, or a result of an older gyrotc
+            why = f"no error that lasts is known of {PARTS[judged[0]]}"
         constant = evaluation.train.constant.rms_dph if evaluation.train else None
         if constant is None:
-            return "thermal history that was not trained: no recordings were left out to tell it"
+            return f"thermal history that was not trained: {why}"
         return part(
             "unseen",
             "thermal history and rates that were not trained",
             constant,
-            "no recordings were left out, so the map is not shown to be better than a constant: what that leaves",
+            f"{why}, so the map is not shown to be better than a constant: what that leaves",
         )
     return part(
         "unseen",

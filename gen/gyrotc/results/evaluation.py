@@ -119,9 +119,8 @@ class LastingError(Part):
         if not steps.any():
             return None
         blocks = jackknife_blocks(runs, float(np.median(steps[steps > 0.0])))
-        products, pairs = np.array([lagged_products(block) for block in blocks]).T
-        if not pairs.any():
-            return None
+        sums = np.array([lagged_products(block) for block in blocks])
+        products, pairs = sums[sums[:, 1] > 0.0].T
         least = float(np.mean(np.concatenate([run.after_dph for run in runs]) ** 2)) / math.sqrt(pairs.sum())
         remaining = pairs.sum() - pairs
         without = (products.sum() - products)[remaining > 0] / remaining[remaining > 0]

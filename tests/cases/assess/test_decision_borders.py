@@ -348,7 +348,9 @@ def test_less_knowledge_never_states_less_unseen_history(model_dict: dict[str, A
     assert shorter == sorted(shorter) and shorter[-1] < 1.1e-3
     single = LastingError.of([averages_of(np.array([1e-3]))])
     assert single is None
-    assert unseen_of(model_dict, single, 3e-4) == pytest.approx(0.01), "what a constant leaves"
+    unseen = unseen_part(model_dict, single, 3e-4)
+    assert unseen.contribution_dph == pytest.approx(0.01), "what a constant leaves"
+    assert unseen.source.startswith("no error that lasts is known of test runs,")
 
 
 @pytest.mark.parametrize(("lasting", "noise"), [(2e-4, 7e-4), (7e-4, 2e-4), (0.0, 7e-4)])
@@ -367,13 +369,25 @@ def test_what_lasts_is_told_from_noise(lasting: float, noise: float) -> None:
     assert squares.std() < 1.5 * np.sqrt(np.mean(standard**2))
 
 
+def test_blocks_that_show_nothing_that_lasts_add_no_degrees_of_freedom() -> None:
+    """Five runs of one mean beside one of three: a single block has products, whose scatter is not known."""
+    rng = np.random.default_rng(6)
+    one = LastingError.of([averages_of(rng.normal(size=means)) for means in (1, 1, 1, 1, 1, 3)])
+    assert one is not None and one.freedom == 1.0
+
+
 def averages_of(after_dph: Any) -> Averages:
     time_s = 100.0 * (np.arange(len(after_dph)) + 0.5)
     return Averages(time_s, after_dph, after_dph, np.zeros(len(after_dph)))
 
 
 def unseen_of(model_dict: dict[str, Any], lasting: LastingError | None, sigma: float) -> float:
-    """Return the contribution of unseen history, deg/h, of test runs whose error lasts so much."""
+    """Return the contribution of unseen history, deg/h."""
+    return unseen_part(model_dict, lasting, sigma).contribution_dph
+
+
+def unseen_part(model_dict: dict[str, Any], lasting: LastingError | None, sigma: float) -> Any:
+    """Return the row of the budget for unseen history of test runs whose error lasts so much."""
     figures = Statistics(mean_dph=0.0, std_dph=1e-3, rms_dph=1e-3, max_abs_dph=5e-3)
     exam = Pooled(
         before=figures,
@@ -388,7 +402,7 @@ def unseen_of(model_dict: dict[str, Any], lasting: LastingError | None, sigma: f
     made = made.model_copy(update={"exam": exam, "train": made.exam})
     budget = budget_of(Model.from_dict(model_dict), training_like(3000), made, None)
     (unseen,) = (one for one in budget.contributions if one.id == "unseen")
-    return unseen.contribution_dph
+    return unseen
 
 
 def test_statistics_are_those_of_numpy() -> None:
