@@ -139,12 +139,20 @@ def coarse_arithmetic(model: Model, table: Table) -> Iterator[Finding]:
     if growth is None or floor_dph is None or growth <= RMS_OVER_FLOOR - 1.0:
         return
     error_dph, constant_dph = floor_dph * math.sqrt((1.0 + growth) ** 2 - 1.0), model.fallback_dph
+    if table.numeric == "q31":  # its digits are those of a unit that no rate changes
+        why = f"the unit of its bias is 2^-{table.bias_frac_bits} deg/h"
+        advice = "State a larger q31_bias_frac_bits in the limits file, or take the f32 table, and build again."
+    else:
+        why = f"a constant of {constant_dph:.6g} deg/h in the rate takes the digits"
+        advice = (
+            f"Subtract a constant near {constant_dph:.6g} deg/h from the rate, in the recordings and in the firmware, "
+            "and build again."
+        )
     yield finding(
         "coarse_arithmetic",
         f"Rounding of the {table.numeric} table can be {error_dph:.2g} deg/h, and the noise floor is {floor_dph:.2g} "
-        f"deg/h: a constant of {constant_dph:.6g} deg/h in the rate takes the digits.",
-        advice=f"Subtract a constant near {constant_dph:.6g} deg/h from the rate, in the recordings and in the "
-        "firmware, and build again.",
+        f"deg/h: {why}.",
+        advice=advice,
         error_dph=error_dph,
         noise_floor_dph=floor_dph,
         constant_dph=constant_dph,

@@ -254,6 +254,15 @@ def test_a_constant_that_takes_the_digits_of_float32_is_named(tmp_path: Path) ->
     assert "next: Subtract a constant near 10000" in found["done"].stdout
 
 
+def test_a_coarse_unit_of_fixed_point_is_not_blamed_on_a_constant(plain: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "limits.toml").write_text('schema = 1\nq31_bias_frac_bits = 7\n[needs]\narithmetics = ["q31"]\n')
+    data, out = plain["out"].parent / "RLG-1", tmp_path / "out"
+    done = run_gyrotc("build", data, "--target", "host-gcc-O2", "--limits", tmp_path / "limits.toml", "--out", out)
+    one = json.loads((out / "evaluate.json").read_text())["findings"][0]
+    assert one["id"] == "coarse_arithmetic" and "2^-7 deg/h" in one["text"] and "constant" not in one["text"]
+    assert "next: State a larger q31_bias_frac_bits" in done.stdout
+
+
 def test_figures_of_the_judged_runs_do_not_depend_on_their_order(plain: dict[str, Any], tmp_path: Path) -> None:
     """One test run has spikes and another moves less, so that no two runs have the same figures."""
     runs = unit()
