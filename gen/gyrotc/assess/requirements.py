@@ -129,11 +129,12 @@ def _power_ons(runs: Sequence[Run]) -> Requirement:
     text = f"{count} power-on{'s were' if count != 1 else ' was'} recorded; a PASS needs {LEAST_POWER_ONS}"
     if count >= LEAST_POWER_ONS:
         return Requirement(id="power_ons", verdict="PASS", text=text)
+    missing = LEAST_POWER_ONS - count
     return Requirement(
         id="power_ons",
         verdict="CONDITIONAL PASS",
         text=f"{text}: fewer do not tell how far the bias differs from one to the next",
-        next=f"Record {LEAST_POWER_ONS - count} more runs, each after switching the gyro off and on.",
+        next=f"Record {missing} more run{'s, each' if missing != 1 else ''} after switching the gyro off and on.",
     )
 
 

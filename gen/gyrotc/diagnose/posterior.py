@@ -63,7 +63,7 @@ class Posterior:
 
     Attributes:
         id: The chosen cause.
-        rivals: Everything else in its place, the nearest first.
+        rivals: Everything else in its place: other causes, the nearest first, then something unnamed and nothing.
     """
 
     id: str

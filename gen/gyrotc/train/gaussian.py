@@ -67,7 +67,7 @@ _MAX_STEPS = 80
 # Which of the three variances each of the first columns behind the constant has.
 _PART = (0, 1, 1, 2)
 # The same of what a power-on has of its own, whose constant has a variance, too.
-_OWN_PART = np.array([0, 1, 2, 2, 3])
+_OWN_PART = np.array([0, *(1 + part for part in _PART)])
 
 
 class TrainingFailed(GyrotcError):
