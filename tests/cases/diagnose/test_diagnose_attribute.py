@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn import examples
 from gyrotc.causes import CATALOGUE, History
 from gyrotc.cli.jobs import diagnosis_lines
 from gyrotc.diagnose import (
@@ -448,6 +449,7 @@ def test_what_is_called_equal_and_the_probabilities_agree() -> None:
     assert near, "three together are not"
 
 
+@examples(100)
 @given(st.lists(st.floats(0.0, 40.0), max_size=6), st.floats(-5.0, 60.0), st.floats(-5.0, 60.0))
 def test_nothing_else_remains_possible_exactly_where_the_printed_probability_is_90_percent(
     distances: list[float], unnamed: float, nothing: float
@@ -464,6 +466,7 @@ def test_nothing_else_remains_possible_exactly_where_the_printed_probability_is_
     assert printed["hysteresis"] + sum(printed[r.id] for r in left[:-1]) < 0.9 or not left
 
 
+@examples(100)
 @given(st.lists(st.floats(0.0, 40.0), min_size=2, max_size=5), st.floats(0.0, 40.0))
 def test_a_cause_more_in_the_catalogue_changes_no_odds_of_the_others(distances: list[float], new: float) -> None:
     rivals = [Rival(f"cause {k}", d) for k, d in enumerate(distances)] + [Rival(UNNAMED, 3.0), Rival(NOTHING, 9.0)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drawn import examples
 from gyrotc.train import choose, expected_square
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,6 +97,7 @@ def test_a_candidate_that_could_not_be_fitted_or_is_refused_is_not_taken() -> No
     assert choose(["simple", "middle", "rich"], made).chosen == "middle"
 
 
+@examples(100)
 @given(
     losses=st.lists(st.floats(-3.0, 3.0), min_size=8, max_size=8),
     scale=st.floats(1e-3, 1e3),
